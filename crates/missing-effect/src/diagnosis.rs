@@ -1,0 +1,195 @@
+//! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
+//! printed or plotted is derived from them.
+
+use serde::Serialize;
+
+/// What the search found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Every added effect is singled out by the data.
+    Effect,
+    /// Something is missing, and at least one added effect has a stand-in that fits as well.
+    Undecided,
+    /// Something is missing, and nothing in the catalogue explains it.
+    Unexplained,
+    /// Nothing is missing that these data would show.
+    Adequate,
+}
+
+/// A fitted parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Its name, `alpha` or `overflow.rim`; initial states are `level(0)` and the like.
+    pub name: String,
+    /// The estimate, in `unit`.
+    pub value: f64,
+    /// Its standard error, in `unit`; `None` where the data do not determine it or it sits at a bound.
+    pub std_error: Option<f64>,
+    /// Unit, for example `cm^2.5/s`.
+    pub unit: String,
+}
+
+/// Residual tests of one fit; the bounds are for 95 %.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ResidualTests {
+    /// Autocorrelation of the simulation residual at lags 0, 1, ...
+    pub autocorrelation: Vec<f64>,
+    /// Cross-correlation of the whitened input with the whitened residual at lags 0, 1, ...
+    pub cross_correlation: Vec<f64>,
+    /// Half-width of the 95 % band of the autocorrelation.
+    pub autocorrelation_bound: f64,
+    /// Half-width of the 95 % band of the cross-correlation.
+    pub cross_correlation_bound: f64,
+    /// p-value of the Ljung-Box test: whiteness of the simulation residual.
+    pub whiteness_p: f64,
+    /// p-value of the portmanteau test of the cross-correlation with the input.
+    pub input_p: f64,
+}
+
+/// The residual in one bin of something: a time window, a range of level, of flow, ...
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bin {
+    /// Lower edge.
+    pub from: f64,
+    /// Upper edge.
+    pub to: f64,
+    /// Samples in it.
+    pub count: usize,
+    /// Mean residual (measured minus model), in the output's unit.
+    pub mean: f64,
+    /// Root mean square of the residual, in the output's unit.
+    pub rms: f64,
+    /// It fails: its mean square is clearly above that of the whole record's noise.
+    pub fails: bool,
+}
+
+/// Where a model fails, in the first record it was fitted to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failures {
+    /// By time \[s\].
+    pub by_time: Vec<Bin>,
+    /// By the model's level, in the output's unit.
+    pub by_level: Vec<Bin>,
+    /// By the command to the actuator (the flow into the process), in the input's unit.
+    pub by_flow: Vec<Bin>,
+    /// By direction of change of the model's level: falling, steady, rising (the edges are rates per second).
+    pub by_direction: Vec<Bin>,
+    /// By frequency \[Hz\]: the root mean square of the residual in octave bands.
+    pub by_frequency: Vec<Bin>,
+    /// The same in words, the worst first.
+    pub sentences: Vec<String>,
+}
+
+/// One model on the way: the base, or the base and the effects added so far.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Step {
+    /// The effect that this step added; `None` for the base.
+    pub added: Option<String>,
+    /// The vessel it acts in, where the plant has more than one: `upper` or `lower`.
+    pub place: Option<String>,
+    /// Root mean square of the simulation error on the fitted records, in the output's unit.
+    pub rmse: f64,
+    /// The same on the held-out record, whose first five samples set its initial states and are not scored.
+    pub rmse_test: Option<f64>,
+    /// Bayesian information criterion with this model's own noise colour; smaller is better.
+    pub bic: f64,
+    /// Parameters in chain order, initial states last.
+    pub parameters: Vec<Parameter>,
+    /// How many starts were tried.
+    pub starts: usize,
+    /// How many of them ended in the best minimum.
+    pub starts_agree: usize,
+    /// Residual tests.
+    pub tests: ResidualTests,
+    /// Where it fails.
+    pub failures: Failures,
+    /// The model's simulated output, one series per fitted record, then one per held-out record.
+    #[serde(skip)]
+    pub simulated: Vec<Vec<f64>>,
+}
+
+/// One candidate of the catalogue at the first step.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Score {
+    /// The effect, or `none`.
+    pub effect: String,
+    /// The vessel it acts in, where the plant has more than one.
+    pub place: Option<String>,
+    /// Fall of the Bayesian information criterion when it is added and everything is refitted; larger is better.
+    pub bic_gain: f64,
+    /// Simulation error after the refit, in the output's unit.
+    pub rmse: f64,
+    /// `|p|/|j|`: the part of the effect's signature that the fitted parameters cannot imitate.
+    pub visibility: f64,
+    /// The size that was found: the effect's leading parameter.
+    pub size: Option<Parameter>,
+    /// The smallest size that these data would show, in the unit of `size`.
+    pub smallest_visible: Option<f64>,
+}
+
+/// The noise floor and how it was obtained.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoiseFloor {
+    /// Standard deviation of the noise, in the output's unit.
+    pub level: f64,
+    /// Standard deviation of what cannot be predicted from its own past, in the output's unit.
+    pub innovation: f64,
+    /// Autoregressive coefficients of the noise: `v[k] = sum a_i v[k-i] + e[k]`; empty for white noise.
+    pub coefficients: Vec<f64>,
+    /// In words: which model's residual it was estimated from.
+    pub source: String,
+}
+
+/// A record as the report shows it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Shown {
+    /// Name.
+    pub name: String,
+    /// It took no part in any fit or choice.
+    pub held_out: bool,
+    /// Sampling instants \[s\].
+    pub time: Vec<f64>,
+    /// Command.
+    pub input: Vec<f64>,
+    /// Reading.
+    pub output: Vec<f64>,
+}
+
+/// What a diagnosis found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Version of this layout.
+    pub schema: u32,
+    /// The finding.
+    pub verdict: Verdict,
+    /// The effects that were added, in order.
+    pub effects: Vec<String>,
+    /// For each of them all that cannot be told apart from it on these data, best first.
+    pub groups: Vec<Vec<String>>,
+    /// The single effects, best first, at the first step; `none` first when the model is adequate.
+    pub ranked: Vec<String>,
+    /// The base model and every model after it.
+    pub steps: Vec<Step>,
+    /// Standard deviation of the noise, in the output's unit.
+    pub noise_floor: f64,
+    /// How the noise floor was found.
+    pub noise: NoiseFloor,
+    /// The scores of the single effects at the first step, best first.
+    pub scores: Vec<Score>,
+    /// The findings in words.
+    pub sentences: Vec<String>,
+    /// The plant, as the model file names it.
+    pub plant: String,
+    /// The effects that the model file already had.
+    pub known_effects: Vec<String>,
+    /// Unit of the input.
+    pub input_unit: String,
+    /// Unit of the output.
+    pub output_unit: String,
+    /// The records, fitted ones first.
+    #[serde(skip)]
+    pub records: Vec<Shown>,
+    /// How long it took \[s\].
+    pub seconds: f64,
+}

@@ -1,6 +1,15 @@
 //! A record: what was measured in one experiment, and what happens between its samples.
 
 use serde::{Deserialize, Serialize};
+use statrs::statistics::{Data, OrderStatistics};
+
+use crate::Error;
+
+/// The fewest rows that a record needs, whatever the model.
+pub const MIN_ROWS: usize = 20;
+
+/// Rows needed for each fitted parameter.
+pub const ROWS_PER_PARAMETER: usize = 5;
 
 /// What the input does between two samples. It is part of the data's type, because a held input
 /// treated as a continuous one leaves a spurious input term many times larger than a real leak.
@@ -25,6 +34,26 @@ pub struct Signal {
     pub values: Vec<f64>,
 }
 
+impl Signal {
+    /// A signal from its name, its unit (may be empty) and one value for each sample.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>, values: Vec<f64>) -> Self {
+        Signal {
+            name: name.into(),
+            unit: unit.into(),
+            values,
+        }
+    }
+
+    /// Smallest and largest value, in the signal's unit; `(NaN, NaN)` when there are none.
+    pub fn range(&self) -> (f64, f64) {
+        self.values
+            .iter()
+            .fold((f64::NAN, f64::NAN), |(low, high), &v| {
+                (low.min(v), high.max(v))
+            })
+    }
+}
+
 /// One experiment: time, input, output and, in a loop, the reference.
 ///
 /// `y[k]` is read at `t[k]`, before `u[k]` acts.
@@ -42,4 +71,120 @@ pub struct Record {
     pub reference: Option<Signal>,
     /// What the input does between samples.
     pub hold: Hold,
+}
+
+impl Record {
+    /// The number of samples.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// The median step of the time \[s\]; 0 with fewer than two samples.
+    pub fn sample_interval(&self) -> f64 {
+        median_step(&self.time)
+    }
+
+    /// Time from the first to the last sample \[s\]; 0 with fewer than two samples.
+    pub fn duration(&self) -> f64 {
+        match (self.time.first(), self.time.last()) {
+            (Some(first), Some(last)) => last - first,
+            _ => 0.0,
+        }
+    }
+
+    /// Smallest and largest input, in its unit; `(NaN, NaN)` when the record is empty.
+    pub fn input_range(&self) -> (f64, f64) {
+        self.input.range()
+    }
+
+    /// Smallest and largest output, in its unit; `(NaN, NaN)` when the record is empty.
+    pub fn output_range(&self) -> (f64, f64) {
+        self.output.range()
+    }
+
+    /// Checks a record that was put together in code: equal lengths, finite values, increasing time.
+    ///
+    /// [`read_csv`](crate::read_csv) has done this and more.
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`], [`Error::ValueNotFinite`], [`Error::TimeNotIncreasing`].
+    pub fn validate(&self) -> Result<(), Error> {
+        let signals = [
+            Some(&self.input),
+            Some(&self.output),
+            self.reference.as_ref(),
+        ];
+        for signal in signals.into_iter().flatten() {
+            if signal.values.len() != self.len() {
+                return Err(Error::LengthMismatch {
+                    record: self.name.clone(),
+                    signal: signal.name.clone(),
+                    expected: self.len(),
+                    found: signal.values.len(),
+                });
+            }
+            check_finite(&self.name, &signal.name, &signal.values)?;
+        }
+        check_finite(&self.name, "time", &self.time)?;
+        for (k, pair) in self.time.windows(2).enumerate() {
+            if pair[1] <= pair[0] {
+                return Err(Error::TimeNotIncreasing {
+                    record: self.name.clone(),
+                    index: k + 1,
+                    time: pair[1],
+                    previous: pair[0],
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that there are enough rows to fit `parameters` parameters (initial states included):
+    /// [`ROWS_PER_PARAMETER`] for each, and never fewer than [`MIN_ROWS`].
+    ///
+    /// # Errors
+    /// [`Error::TooFewRows`].
+    pub fn require_rows(&self, parameters: usize) -> Result<(), Error> {
+        let needed = MIN_ROWS.max(parameters.saturating_mul(ROWS_PER_PARAMETER));
+        if self.len() >= needed {
+            return Ok(());
+        }
+        Err(Error::TooFewRows {
+            record: self.name.clone(),
+            rows: self.len(),
+            needed,
+            why: format!(" to fit {parameters} parameters"),
+        })
+    }
+}
+
+/// The median of the differences between neighbours; 0 with fewer than two values.
+pub(crate) fn median_step(time: &[f64]) -> f64 {
+    if time.len() < 2 {
+        return 0.0;
+    }
+    Data::new(
+        time.windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .collect::<Vec<_>>(),
+    )
+    .median()
+}
+
+/// Refuses the first value that is NaN or infinite.
+pub(crate) fn check_finite(record: &str, signal: &str, values: &[f64]) -> Result<(), Error> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(Error::ValueNotFinite {
+            record: record.into(),
+            signal: signal.into(),
+            index,
+            value: values[index],
+        }),
+    }
 }

@@ -1,0 +1,427 @@
+//! Reads a record from a CSV file, and says in one line what is wrong with one that it refuses.
+//!
+//! Understood: commas, semicolons or tabs (found from the header); a decimal comma where commas do
+//! not separate; a byte-order mark, CRLF, blank lines, lines that begin with `#`, and blanks
+//! around a cell. Only the columns in use are read. Nothing is ever written.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+
+use crate::columns::{Columns, Found, Layout};
+use crate::record::{MIN_ROWS, median_step};
+use crate::{Error, Hold, Record, Signal};
+
+/// A step of the time above this many median steps is a gap: half-way between one sample and two,
+/// so that jitter up to a quarter of the interval passes and one missing sample does not.
+const GAP: f64 = 1.5;
+
+/// A record is refused when more than this share of the output sits exactly at its limits ...
+const SATURATED_SHARE: f64 = 1.0 / 3.0;
+
+/// ... and that is more than this many times what the commonest other value has: a coarsely
+/// quantised output has many samples at every level, a saturated one only at its limits.
+const SATURATED_RATIO: usize = 4;
+
+/// Reads a record; `columns` says which column is what, `hold` what the input does in between.
+///
+/// The time is converted to seconds. Its steps may vary, but no sample may be missing: a step above
+/// 1.5 times the median is a gap. Row numbers in messages are line numbers of the file.
+///
+/// # Errors
+/// [`Error::CannotOpen`], [`Error::NotText`], [`Error::EmptyFile`], [`Error::NoHeader`],
+/// [`Error::MissingColumn`], [`Error::AmbiguousColumn`], [`Error::SharedColumn`],
+/// [`Error::UnitContradiction`], [`Error::UnknownTimeUnit`], [`Error::WrongFieldCount`],
+/// [`Error::EmptyCell`], [`Error::TextInCell`], [`Error::NotFinite`], [`Error::MixedDecimalMarks`],
+/// [`Error::RepeatedTime`], [`Error::BackwardTime`], [`Error::TooFewRows`] (below
+/// [`MIN_ROWS`]), [`Error::Gap`], [`Error::ConstantInput`],
+/// [`Error::ConstantOutput`], [`Error::Saturated`].
+pub fn read_csv(path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Error> {
+    let file = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|source| Error::CannotOpen {
+        file: file.clone(),
+        source,
+    })?;
+    let text = decode(&file, &bytes)?;
+    let (layout, table) = read_table(&file, text, columns)?;
+    table.check(&file, &layout)?;
+
+    let signal = |found: &Found, values: Vec<f64>| Signal::new(&*found.name, &*found.unit, values);
+    Ok(Record {
+        name: path
+            .file_name()
+            .map_or(file, |name| name.to_string_lossy().into_owned()),
+        time: table.time.iter().map(|t| t * layout.seconds).collect(),
+        input: signal(&layout.input, table.input),
+        output: signal(&layout.output, table.output),
+        reference: layout
+            .reference
+            .as_ref()
+            .map(|found| signal(found, table.reference)),
+        hold,
+    })
+}
+
+/// The columns in use, in the file's units, with the line number of each row.
+#[derive(Default)]
+struct Table {
+    rows: Vec<u64>,
+    time: Vec<f64>,
+    input: Vec<f64>,
+    output: Vec<f64>,
+    reference: Vec<f64>,
+}
+
+fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Error> {
+    let not_text = |found| Error::NotText {
+        file: file.into(),
+        found,
+    };
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(not_text("UTF-16"));
+    }
+    if bytes.starts_with(b"PK\x03\x04") {
+        return Err(not_text("a zip archive or a spreadsheet"));
+    }
+    if bytes.contains(&0) {
+        return Err(not_text("binary data"));
+    }
+    let text = std::str::from_utf8(bytes).map_err(|_| not_text("in another encoding"))?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
+}
+
+fn read_table(file: &str, text: &str, columns: &Columns) -> Result<(Layout, Table), Error> {
+    let delimiter = delimiter(text);
+    let mut reader = ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(delimiter)
+        .comment(Some(b'#'))
+        .trim(Trim::All)
+        .from_reader(text.as_bytes());
+    let mut lines = LineCounter::new(text);
+    let mut record = StringRecord::new();
+    let mut header: Option<(Layout, usize)> = None;
+    let mut numbers = Numbers {
+        file,
+        decimal_comma_allowed: delimiter != b',',
+        mark: None,
+    };
+    let mut table = Table::default();
+
+    while reader
+        .read_record(&mut record)
+        .map_err(|error| Error::CannotOpen {
+            file: file.into(),
+            source: error.into(),
+        })?
+    {
+        let row = lines.advance(reader.position().byte());
+        if record.iter().all(str::is_empty) {
+            continue;
+        }
+        let Some((layout, fields)) = &header else {
+            header = Some((resolve(file, row, &record, columns)?, record.len()));
+            continue;
+        };
+        if record.len() != *fields {
+            return Err(Error::WrongFieldCount {
+                file: file.into(),
+                row,
+                expected: *fields,
+                found: record.len(),
+                delimiter: match delimiter {
+                    b';' => "semicolon",
+                    b'\t' => "tab",
+                    _ => "comma",
+                },
+            });
+        }
+        let mut cell = |column: &Found| numbers.parse(row, column, &record[column.index]);
+        let time = numbers_time(&mut cell, &layout.time)?;
+        table.input.push(cell(&layout.input)?);
+        table.output.push(cell(&layout.output)?);
+        if let Some(reference) = &layout.reference {
+            table.reference.push(cell(reference)?);
+        }
+        if let Some(&previous) = table.time.last() {
+            check_order(file, row, &layout.time.header, previous, time)?;
+        }
+        table.time.push(time);
+        table.rows.push(row);
+    }
+    match header {
+        Some((layout, _)) => Ok((layout, table)),
+        None => Err(Error::EmptyFile { file: file.into() }),
+    }
+}
+
+/// The time's cell; text there is most often a date, which has its own mend.
+fn numbers_time(
+    cell: &mut impl FnMut(&Found) -> Result<f64, Error>,
+    column: &Found,
+) -> Result<f64, Error> {
+    cell(column).map_err(|error| match error {
+        Error::TextInCell {
+            file,
+            row,
+            column,
+            text,
+            ..
+        } if text.contains(|c: char| c.is_ascii_digit()) => Error::TextInCell {
+            file,
+            row,
+            column,
+            text,
+            mend: "give the time as a number, such as seconds from the start",
+        },
+        other => other,
+    })
+}
+
+fn resolve(
+    file: &str,
+    row: u64,
+    record: &StringRecord,
+    columns: &Columns,
+) -> Result<Layout, Error> {
+    if record.iter().all(|cell| cell.parse::<f64>().is_ok()) {
+        return Err(Error::NoHeader {
+            file: file.into(),
+            row,
+            first: record.iter().collect::<Vec<_>>().join(", "),
+        });
+    }
+    let headers: Vec<String> = record.iter().map(str::to_string).collect();
+    columns.resolve(file, row, &headers)
+}
+
+/// The one of comma, semicolon and tab that the first row has most of.
+fn delimiter(text: &str) -> u8 {
+    let header = text
+        .lines()
+        .find(|line| !line.trim().is_empty() && !line.starts_with('#'))
+        .unwrap_or_default();
+    let count = |delimiter: &u8| header.bytes().filter(|byte| byte == delimiter).count();
+    // `max_by_key` takes the last of equals: a comma, where none occurs.
+    b";\t,".iter().copied().max_by_key(count).unwrap_or(b',')
+}
+
+/// Line numbers of the rows, past the blank lines and comments that the reader skips.
+struct LineCounter<'a> {
+    text: &'a str,
+    byte: usize,
+    newlines: u64,
+}
+
+impl<'a> LineCounter<'a> {
+    fn new(text: &'a str) -> Self {
+        LineCounter {
+            text,
+            byte: 0,
+            newlines: 0,
+        }
+    }
+
+    /// The line number of the row that the reader finished at `end`.
+    fn advance(&mut self, end: u64) -> u64 {
+        let end = usize::try_from(end).unwrap_or(usize::MAX);
+        let read = self.text.get(self.byte..end).unwrap_or_default();
+        let count = |text: &str| text.bytes().filter(|byte| *byte == b'\n').count() as u64;
+        let line = self.newlines + count(read.trim_end_matches(['\r', '\n'])) + 1;
+        self.newlines += count(read);
+        self.byte += read.len();
+        line
+    }
+}
+
+/// Turns cells into numbers.
+struct Numbers<'a> {
+    file: &'a str,
+    decimal_comma_allowed: bool,
+    /// The decimal mark seen so far.
+    mark: Option<char>,
+}
+
+impl Numbers<'_> {
+    fn parse(&mut self, row: u64, column: &Found, cell: &str) -> Result<f64, Error> {
+        let (file, header) = (self.file.to_string(), column.header.clone());
+        if cell.is_empty() {
+            return Err(Error::EmptyCell {
+                file,
+                row,
+                column: header,
+            });
+        }
+        let comma =
+            self.decimal_comma_allowed && cell.matches(',').count() == 1 && !cell.contains('.');
+        let value = if comma {
+            cell.replace(',', ".").parse::<f64>()
+        } else {
+            cell.parse::<f64>()
+        };
+        let value = value.map_err(|_| Error::TextInCell {
+            file: file.clone(),
+            row,
+            column: header.clone(),
+            text: cell.into(),
+            mend: if cell.contains(',') {
+                "write decimals with a point and without separators for thousands"
+            } else {
+                "correct the cell, or split the file there and give both parts: they are fitted together"
+            },
+        })?;
+        if !value.is_finite() {
+            return Err(Error::NotFinite {
+                file,
+                row,
+                column: header,
+                text: cell.into(),
+            });
+        }
+        let mark = if comma {
+            Some(',')
+        } else {
+            cell.contains('.').then_some('.')
+        };
+        if let (Some(here), Some(before)) = (mark, self.mark)
+            && here != before
+        {
+            let word = |mark| if mark == ',' { "comma" } else { "point" };
+            return Err(Error::MixedDecimalMarks {
+                file,
+                row,
+                column: header,
+                text: cell.into(),
+                here: word(here),
+                before: word(before),
+            });
+        }
+        self.mark = self.mark.or(mark);
+        Ok(value)
+    }
+}
+
+fn check_order(file: &str, row: u64, column: &str, previous: f64, time: f64) -> Result<(), Error> {
+    let (file, column) = (file.to_string(), column.to_string());
+    if time == previous {
+        Err(Error::RepeatedTime {
+            file,
+            row,
+            column,
+            time,
+        })
+    } else if time < previous {
+        Err(Error::BackwardTime {
+            file,
+            row,
+            column,
+            time,
+            previous,
+        })
+    } else {
+        Ok(())
+    }
+}
+
+impl Table {
+    /// What can only be seen in the whole record.
+    fn check(&self, file: &str, layout: &Layout) -> Result<(), Error> {
+        let rows = self.time.len();
+        if rows < MIN_ROWS {
+            return Err(Error::TooFewRows {
+                record: file.into(),
+                rows,
+                needed: MIN_ROWS,
+                why: String::new(),
+            });
+        }
+        self.check_gaps(file, &layout.time)?;
+        if let Some(value) = constant(&self.input) {
+            return Err(Error::ConstantInput {
+                file: file.into(),
+                column: layout.input.header.clone(),
+                value,
+                rows,
+            });
+        }
+        if let Some(value) = constant(&self.output) {
+            return Err(Error::ConstantOutput {
+                file: file.into(),
+                column: layout.output.header.clone(),
+                value,
+                rows,
+            });
+        }
+        self.check_saturation(file, &layout.output)
+    }
+
+    fn check_gaps(&self, file: &str, column: &Found) -> Result<(), Error> {
+        let interval = median_step(&self.time);
+        for (k, pair) in self.time.windows(2).enumerate() {
+            let step = pair[1] - pair[0];
+            if step > GAP * interval {
+                return Err(Error::Gap {
+                    file: file.into(),
+                    row: self.rows[k + 1],
+                    column: column.header.clone(),
+                    missing: (step / interval).round() as u64 - 1,
+                    previous: pair[0],
+                    time: pair[1],
+                    interval,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_saturation(&self, file: &str, column: &Found) -> Result<(), Error> {
+        let mut counts: HashMap<u64, usize> = HashMap::new();
+        for value in &self.output {
+            // + 0.0 makes one zero of the two.
+            *counts.entry((value + 0.0).to_bits()).or_default() += 1;
+        }
+        let low = self.output.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = self
+            .output
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        let mut at = |value: f64| counts.remove(&(value + 0.0).to_bits()).unwrap_or(0);
+        let (at_low, at_high) = (at(low), at(high));
+        let count = at_low + at_high;
+        let commonest = counts.values().copied().max().unwrap_or(0);
+        let rows = self.output.len();
+        if count as f64 <= SATURATED_SHARE * rows as f64 || count <= SATURATED_RATIO * commonest {
+            return Ok(());
+        }
+        let unit = if column.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", column.unit)
+        };
+        let limits = [(at_low, low), (at_high, high)]
+            .iter()
+            .filter(|(samples, _)| *samples > 1)
+            .map(|(samples, value)| format!("{samples} at {value}{unit}"))
+            .collect::<Vec<_>>()
+            .join(", ");
+        Err(Error::Saturated {
+            file: file.into(),
+            column: column.header.clone(),
+            count,
+            rows,
+            limits,
+        })
+    }
+}
+
+/// The value of a signal that stays the same to a part in a billion.
+fn constant(values: &[f64]) -> Option<f64> {
+    let first = *values.first()?;
+    values
+        .iter()
+        .all(|v| (v - first).abs() <= 1e-9 * first.abs())
+        .then_some(first)
+}

@@ -1,0 +1,387 @@
+//! What can be wrong with a record or a setting: each message names the place, the numbers that
+//! disagree and the mend, in one line.
+
+/// Everything this crate can refuse.
+///
+/// `row` is always the line number in the file as a text editor shows it, the header's included.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file could not be opened or read.
+    #[error("{file}: cannot be opened: {source}; check the path and the permissions")]
+    CannotOpen {
+        /// The path as it was given.
+        file: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The file is not text in an encoding that is understood.
+    #[error("{file}: this is not a UTF-8 text file but {found}; export it as CSV (UTF-8)")]
+    NotText {
+        /// The path as it was given.
+        file: String,
+        /// What it looks like.
+        found: &'static str,
+    },
+    /// Nothing in the file but blank lines and comments.
+    #[error(
+        "{file}: the file is empty; a header such as \"t [s],u [V],y [cm]\" and rows of numbers are needed"
+    )]
+    EmptyFile {
+        /// The path as it was given.
+        file: String,
+    },
+    /// The first row holds numbers where names are expected.
+    #[error(
+        "{file}, row {row}: the first row holds numbers ({first}), not names; put a header such as \"t [s],u [V],y [cm]\" above it"
+    )]
+    NoHeader {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the first row.
+        row: u64,
+        /// The first row.
+        first: String,
+    },
+    /// A column that is needed is not in the file.
+    #[error(
+        "{file}, row {row}: no column {wanted} for the {role}; the file has {columns}{suggestion}; set {role} = \"...\" under [columns]"
+    )]
+    MissingColumn {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the header.
+        row: u64,
+        /// `time`, `input`, `output` or `reference`.
+        role: &'static str,
+        /// The name that was looked for.
+        wanted: String,
+        /// All the columns of the file, quoted.
+        columns: String,
+        /// `; did you mean "..."?`, or empty.
+        suggestion: String,
+    },
+    /// Several columns fit one role.
+    #[error(
+        "{file}, row {row}: {candidates} could each be the {role}; say which with {role} = \"...\" under [columns], and rename columns of the same name"
+    )]
+    AmbiguousColumn {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the header.
+        row: u64,
+        /// `time`, `input`, `output` or `reference`.
+        role: &'static str,
+        /// The columns that fit, quoted.
+        candidates: String,
+    },
+    /// One column was named for two roles.
+    #[error(
+        "{file}, row {row}, column \"{column}\": it is named both as {first} and as {second}; give each its own column under [columns]"
+    )]
+    SharedColumn {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the header.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The first role.
+        first: &'static str,
+        /// The second role.
+        second: &'static str,
+    },
+    /// The model and the file give the same column different units.
+    #[error(
+        "{file}, row {row}, column \"{column}\": the file says {file_unit} but the model says {model_unit}; convert the column, or write {role} = \"{column}\" under [columns] and give the model's constants in {file_unit}"
+    )]
+    UnitContradiction {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the header.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// `time`, `input`, `output` or `reference`.
+        role: &'static str,
+        /// The unit in the file's header.
+        file_unit: String,
+        /// The unit in the model's `[columns]`.
+        model_unit: String,
+    },
+    /// The time column's unit is not a unit of time that is understood.
+    #[error(
+        "{file}, row {row}, column \"{column}\": {unit} is not a unit of time; use us, ms, s, min, h or d"
+    )]
+    UnknownTimeUnit {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the header.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The unit.
+        unit: String,
+    },
+    /// A row is longer or shorter than the header.
+    #[error(
+        "{file}, row {row}: {found} fields, but the header has {expected}; check for a missing or a surplus {delimiter}, and for commas inside numbers"
+    )]
+    WrongFieldCount {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// Fields in the header.
+        expected: usize,
+        /// Fields in this row.
+        found: usize,
+        /// The delimiter's name.
+        delimiter: &'static str,
+    },
+    /// A cell that is needed is empty.
+    #[error(
+        "{file}, row {row}, column \"{column}\": the cell is empty; fill it in, or split the file there and give both parts: they are fitted together"
+    )]
+    EmptyCell {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// The column's header.
+        column: String,
+    },
+    /// A cell holds something that is not a number.
+    #[error("{file}, row {row}, column \"{column}\": \"{text}\" is not a number; {mend}")]
+    TextInCell {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+        /// What to do.
+        mend: &'static str,
+    },
+    /// A cell holds NaN or an infinity.
+    #[error(
+        "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or split the file there and give both parts: they are fitted together"
+    )]
+    NotFinite {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// The file uses both marks for decimals, so a comma may separate thousands.
+    #[error(
+        "{file}, row {row}, column \"{column}\": \"{text}\" has a decimal {here}, but earlier rows have a decimal {before}; use one of them throughout"
+    )]
+    MixedDecimalMarks {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+        /// The mark in this cell.
+        here: &'static str,
+        /// The mark in earlier cells.
+        before: &'static str,
+    },
+    /// Two rows in a row have the same time.
+    #[error(
+        "{file}, row {row}, column \"{column}\": the time {time} is repeated from the row before; remove one of the two rows, or write the time with more digits"
+    )]
+    RepeatedTime {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the second of the two.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The time, as the file gives it.
+        time: f64,
+    },
+    /// The time runs backward.
+    #[error(
+        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; sort the rows by time, or split the file there and give both parts: they are fitted together"
+    )]
+    BackwardTime {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the later row.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The time in this row, as the file gives it.
+        time: f64,
+        /// The time in the row before.
+        previous: f64,
+    },
+    /// Samples are missing.
+    #[error(
+        "{file}, row {row}, column \"{column}\": {missing} missing before this row (the time steps from {previous} to {time}, elsewhere by {interval}); split the file there and give both parts: they are fitted together",
+        missing = samples(*.missing)
+    )]
+    Gap {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the first row after the gap.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// How many samples are missing.
+        missing: u64,
+        /// The time before the gap, as the file gives it.
+        previous: f64,
+        /// The time after the gap.
+        time: f64,
+        /// The median step of the time.
+        interval: f64,
+    },
+    /// The input never moves.
+    #[error(
+        "{file}, column \"{column}\": the input is {value} in all {rows} rows, so nothing can be learnt about the process; record an experiment in which it moves, or name another column with input = \"...\" under [columns]"
+    )]
+    ConstantInput {
+        /// The path as it was given.
+        file: String,
+        /// The column's header.
+        column: String,
+        /// Its value.
+        value: f64,
+        /// The number of rows.
+        rows: usize,
+    },
+    /// The output never moves.
+    #[error(
+        "{file}, column \"{column}\": the output is {value} in all {rows} rows; check the sensor, or name another column with output = \"...\" under [columns]"
+    )]
+    ConstantOutput {
+        /// The path as it was given.
+        file: String,
+        /// The column's header.
+        column: String,
+        /// Its value.
+        value: f64,
+        /// The number of rows.
+        rows: usize,
+    },
+    /// The output sits at its limit for much of the record.
+    #[error(
+        "{file}, column \"{column}\": {count} of {rows} samples sit exactly at a limit of the output ({limits}), where the sensor no longer sees the process; keep the experiment within the sensor's range, or cut those rows out and give the parts: they are fitted together"
+    )]
+    Saturated {
+        /// The path as it was given.
+        file: String,
+        /// The column's header.
+        column: String,
+        /// Samples at the limits.
+        count: usize,
+        /// The number of rows.
+        rows: usize,
+        /// The limits, as text.
+        limits: String,
+    },
+    /// The record is too short.
+    #[error("{record}: {rows} rows of data, but {needed} are needed{why}; give a longer record")]
+    TooFewRows {
+        /// The file or the record's name.
+        record: String,
+        /// Rows that are there.
+        rows: usize,
+        /// Rows that are needed.
+        needed: usize,
+        /// What they are needed for, or empty.
+        why: String,
+    },
+    /// The signals of a record have different lengths.
+    #[error(
+        "{record}: {signal} has {found} values but there are {expected} times; give one value for each time"
+    )]
+    LengthMismatch {
+        /// The record's name.
+        record: String,
+        /// The signal's name.
+        signal: String,
+        /// The number of times.
+        expected: usize,
+        /// The number of values.
+        found: usize,
+    },
+    /// A value in a record or a series is NaN or infinite.
+    #[error("{record}: {signal}[{index}] is {value}; every value has to be finite")]
+    ValueNotFinite {
+        /// The record's name, or the function that refuses.
+        record: String,
+        /// The signal's name.
+        signal: String,
+        /// Index from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The times of a record do not increase.
+    #[error(
+        "{record}: time[{index}] = {time} s does not follow time[{index} - 1] = {previous} s; times have to increase"
+    )]
+    TimeNotIncreasing {
+        /// The record's name.
+        record: String,
+        /// Index of the later time, from 0.
+        index: usize,
+        /// The later time \[s\].
+        time: f64,
+        /// The time before it \[s\].
+        previous: f64,
+    },
+    /// A setting is outside its range.
+    #[error("{setting} is {value}, but has to be {range}")]
+    InvalidSetting {
+        /// Which setting.
+        setting: &'static str,
+        /// Its value.
+        value: String,
+        /// What is allowed.
+        range: String,
+    },
+    /// A series is too short for what is asked of it.
+    #[error("{task}: {found} samples, but {needed} are needed; give a longer record or fewer lags")]
+    TooFewSamples {
+        /// What was asked.
+        task: &'static str,
+        /// Samples that are there.
+        found: usize,
+        /// Samples that are needed.
+        needed: usize,
+    },
+    /// Two series that belong together have different lengths.
+    #[error(
+        "{task}: {first} and {second} samples; the two series have to be sampled at the same times"
+    )]
+    SeriesMismatch {
+        /// What was asked.
+        task: &'static str,
+        /// Length of the first.
+        first: usize,
+        /// Length of the second.
+        second: usize,
+    },
+}
+
+fn samples(count: u64) -> String {
+    if count == 1 {
+        "1 sample is".into()
+    } else {
+        format!("{count} samples are")
+    }
+}

@@ -200,7 +200,6 @@ impl Header<'_> {
                 file: self.file.into(),
                 row: self.row,
                 column: self.names[index].clone(),
-                role: role.name,
                 file_unit,
                 model_unit: model_unit.into(),
             });
@@ -272,8 +271,7 @@ impl Header<'_> {
                 Some(wanted) => format!("\"{wanted}\""),
                 None => format!("beginning with \"{}\"", role.letter),
             },
-            columns: quoted(self.names.iter()),
-            suggestion,
+            columns: quoted(self.names.iter()) + &suggestion,
         }
     }
 

@@ -186,7 +186,8 @@ fn resolve(
     record: &StringRecord,
     columns: &Columns,
 ) -> Result<Layout, Error> {
-    if record.iter().all(|cell| cell.parse::<f64>().is_ok()) {
+    let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
+    if record.iter().all(|cell| cell.is_empty() || is_number(cell)) {
         return Err(Error::NoHeader {
             file: file.into(),
             row,
@@ -389,7 +390,9 @@ impl Table {
             .copied()
             .fold(f64::NEG_INFINITY, f64::max);
         let mut at = |value: f64| counts.remove(&(value + 0.0).to_bits()).unwrap_or(0);
-        let (at_low, at_high) = (at(low), at(high));
+        // The one lowest or highest sample of any record is no limit.
+        let mut limit = |value| Some(at(value)).filter(|samples| *samples > 1).unwrap_or(0);
+        let (at_low, at_high) = (limit(low), limit(high));
         let count = at_low + at_high;
         let commonest = counts.values().copied().max().unwrap_or(0);
         let rows = self.output.len();
@@ -403,7 +406,7 @@ impl Table {
         };
         let limits = [(at_low, low), (at_high, high)]
             .iter()
-            .filter(|(samples, _)| *samples > 1)
+            .filter(|(samples, _)| *samples > 0)
             .map(|(samples, value)| format!("{samples} at {value}{unit}"))
             .collect::<Vec<_>>()
             .join(", ");

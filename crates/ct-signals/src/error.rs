@@ -45,7 +45,7 @@ pub enum Error {
     },
     /// A column that is needed is not in the file.
     #[error(
-        "{file}, row {row}: no column {wanted} for the {role}; the file has {columns}{suggestion}; set {role} = \"...\" under [columns]"
+        "{file}, row {row}: no column {wanted} for the {role}; the file has {columns}; set {role} = \"...\" under [columns]"
     )]
     MissingColumn {
         /// The path as it was given.
@@ -56,10 +56,8 @@ pub enum Error {
         role: &'static str,
         /// The name that was looked for.
         wanted: String,
-        /// All the columns of the file, quoted.
+        /// All the columns of the file, quoted, and the closest of them where one is close.
         columns: String,
-        /// `; did you mean "..."?`, or empty.
-        suggestion: String,
     },
     /// Several columns fit one role.
     #[error(
@@ -93,7 +91,7 @@ pub enum Error {
     },
     /// The model and the file give the same column different units.
     #[error(
-        "{file}, row {row}, column \"{column}\": the file says {file_unit} but the model says {model_unit}; convert the column, or write {role} = \"{column}\" under [columns] and give the model's constants in {file_unit}"
+        "{file}, row {row}, column \"{column}\": the file says {file_unit} but the model says {model_unit}; convert the column, or write \"{column}\" under [columns] and give the model's constants in {file_unit}"
     )]
     UnitContradiction {
         /// The path as it was given.
@@ -102,8 +100,6 @@ pub enum Error {
         row: u64,
         /// The column's header.
         column: String,
-        /// `time`, `input`, `output` or `reference`.
-        role: &'static str,
         /// The unit in the file's header.
         file_unit: String,
         /// The unit in the model's `[columns]`.

@@ -1,4 +1,61 @@
 //! Records of sampled signals, what happens between samples, excitations, noise and residual tests.
+//!
+//! | question | answer |
+//! |---|---|
+//! | How do I read my measurements? | [`read_csv`], with [`Columns`] to say which column is what |
+//! | How do I make a record in code? | [`Record`], [`excitation`], [`noise`], then [`Record::validate`] |
+//! | Is anything left in a residual? | [`residual_tests`] |
+//! | The noise is coloured: what now? | [`ArModel`]: fit it, whiten residuals and sensitivities with it |
+//!
+//! All random numbers come from a generator that is passed in, so that every record can be made
+//! again from its seed.
+//!
+//! # Example
+//! A tank is simulated that drains more slowly than the model believes; the residual tells.
+//! ```
+//! use ct_signals::residual_tests::{ljung_box, prewhitened_input_test};
+//! use ct_signals::{Hold, Record, Signal, excitation, noise};
+//! use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+//!
+//! let mut rng = ChaCha8Rng::seed_from_u64(1);
+//! let n = 1000;
+//! let u = excitation::steps(n, 20..=60, 2.0, 8.0, &mut rng)?;
+//! let noise = noise::white(n, 0.1, &mut rng);
+//!
+//! // A level that follows the input, u[k] held from t[k] to t[k+1], read with noise.
+//! let response = |time_constant: f64| -> Vec<f64> {
+//!     let decay = (-1.0 / time_constant).exp();
+//!     let mut level = 5.0;
+//!     let mut levels = Vec::new();
+//!     for u in &u {
+//!         levels.push(level);
+//!         level = decay * level + (1.0 - decay) * u;
+//!     }
+//!     levels
+//! };
+//! let y = response(30.0).iter().zip(&noise).map(|(y, v)| y + v).collect();
+//! let record = Record {
+//!     name: "simulated".into(),
+//!     time: (0..n).map(|k| k as f64).collect(),
+//!     input: Signal::new("u", "V", u.clone()),
+//!     output: Signal::new("y", "cm", y),
+//!     reference: None,
+//!     hold: Hold::Zero,
+//! };
+//! record.validate()?;
+//!
+//! let residual = |time_constant| -> Vec<f64> {
+//!     let model = response(time_constant);
+//!     record.output.values.iter().zip(model).map(|(y, m)| y - m).collect()
+//! };
+//! // The right model leaves noise ...
+//! assert!(ljung_box(&residual(30.0), 20, 0)? > 0.01);
+//! assert!(prewhitened_input_test(&u, &residual(30.0), 20)?.1 > 0.01);
+//! // ... and a wrong one leaves something that is not white, and that the input explains.
+//! assert!(ljung_box(&residual(25.0), 20, 0)? < 1e-6);
+//! assert!(prewhitened_input_test(&u, &residual(25.0), 20)?.1 < 1e-3);
+//! # Ok::<(), ct_signals::Error>(())
+//! ```
 
 mod ar;
 mod columns;

@@ -98,49 +98,48 @@ impl Columns {
             names: headers,
         };
         // The named ones first, so that none of them is guessed for another role.
-        let named = |role: &Role, wanted: &Option<String>| match wanted {
-            Some(wanted) => header.named(role, wanted).map(Some),
-            None => Ok(None),
+        let named = |role: &Role, wanted: &Option<String>| {
+            wanted
+                .as_deref()
+                .map(|wanted| header.named(role, wanted))
+                .transpose()
         };
-        let roles = [
-            (TIME, &self.time),
-            (INPUT, &self.input),
-            (OUTPUT, &self.output),
-            (REFERENCE, &self.reference),
-        ];
-        let mut taken: Vec<(usize, &'static str)> = Vec::new();
-        let mut found = Vec::new();
-        for (role, wanted) in &roles {
-            let column = named(role, wanted)?;
-            if let Some(column) = &column {
-                if let Some((_, first)) = taken.iter().find(|(index, _)| *index == column.index) {
-                    return Err(Error::SharedColumn {
-                        file: file.into(),
-                        row,
-                        column: column.header.clone(),
-                        first,
-                        second: role.name,
-                    });
-                }
-                taken.push((column.index, role.name));
-            }
-            found.push(column);
-        }
-        let mut found = found.into_iter();
-        let mut take = |role: &Role| match found.next().flatten() {
-            Some(column) => Ok(Some(column)),
-            None => header.guess(role, &taken),
-        };
-        let missing = |role: &Role| header.missing(role, None);
+        let time = named(&TIME, &self.time)?;
+        let input = named(&INPUT, &self.input)?;
+        let output = named(&OUTPUT, &self.output)?;
+        let reference = named(&REFERENCE, &self.reference)?;
 
-        let time = take(&TIME)?.ok_or_else(|| missing(&TIME))?;
-        let input = take(&INPUT)?.ok_or_else(|| missing(&INPUT))?;
-        let output = take(&OUTPUT)?.ok_or_else(|| missing(&OUTPUT))?;
-        let reference = match &self.reference {
-            Some(_) => take(&REFERENCE)?,
-            // Nobody asked for it: where it is not plain which column it is, there is none.
-            None => take(&REFERENCE).ok().flatten(),
+        let mut taken: Vec<(usize, &'static str)> = Vec::new();
+        for (role, column) in [
+            (TIME, &time),
+            (INPUT, &input),
+            (OUTPUT, &output),
+            (REFERENCE, &reference),
+        ] {
+            let Some(column) = column else { continue };
+            if let Some((_, first)) = taken.iter().find(|(index, _)| *index == column.index) {
+                return Err(Error::SharedColumn {
+                    file: file.into(),
+                    row,
+                    column: column.header.clone(),
+                    first,
+                    second: role.name,
+                });
+            }
+            taken.push((column.index, role.name));
+        }
+
+        let needed = |role: &Role, column: Option<Found>| match column {
+            Some(column) => Ok(column),
+            None => header
+                .guess(role, &taken)?
+                .ok_or_else(|| header.missing(role, None)),
         };
+        let time = needed(&TIME, time)?;
+        let input = needed(&INPUT, input)?;
+        let output = needed(&OUTPUT, output)?;
+        // Nobody has to have a reference: where it is not plain which column it is, there is none.
+        let reference = reference.or_else(|| header.guess(&REFERENCE, &taken).ok().flatten());
         let seconds = unit::seconds(&time.unit).ok_or_else(|| Error::UnknownTimeUnit {
             file: file.into(),
             row,

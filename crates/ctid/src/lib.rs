@@ -1,1 +1,3 @@
 //! ctid
+
+pub mod report;

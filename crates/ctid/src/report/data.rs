@@ -1,0 +1,230 @@
+//! What the report's script draws, as JSON: the curves thinned for display, the rest as it stands.
+
+use missing_effect::{Diagnosis, Failures, ResidualTests, Score, Shown, Step};
+use serde::Serialize;
+
+use super::decimate::min_max;
+use super::text;
+
+/// Points of one curve that are drawn at most.
+const POINTS: usize = 5_000;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    input_unit: &'a str,
+    output_unit: &'a str,
+    noise_floor: f64,
+    records: Vec<Record<'a>>,
+    steps: Vec<Model<'a>>,
+    scores: &'a [Score],
+    /// The effects that were added and all that cannot be told apart from them.
+    groups: &'a [Vec<String>],
+    effects: &'a [String],
+}
+
+#[derive(Serialize)]
+struct Record<'a> {
+    name: &'a str,
+    held_out: bool,
+    output: Curve,
+    input: Curve,
+}
+
+#[derive(Serialize)]
+struct Model<'a> {
+    label: String,
+    rmse: f64,
+    rmse_test: Option<f64>,
+    whiteness: String,
+    input_test: String,
+    tests: &'a ResidualTests,
+    failures: &'a Failures,
+    runs: Vec<Run>,
+}
+
+/// A model's run over one record.
+#[derive(Serialize)]
+struct Run {
+    output: Curve,
+    residual: Curve,
+    /// The model's output and the input at the instants of `residual`.
+    level: Vec<f64>,
+    flow: Vec<f64>,
+}
+
+#[derive(Serialize)]
+struct Curve {
+    t: Vec<f64>,
+    y: Vec<f64>,
+}
+
+/// The JSON of the report, safe inside a `<script>` element. What is not finite becomes `null`.
+pub(super) fn json(diagnosis: &Diagnosis) -> String {
+    let report = Report {
+        input_unit: &diagnosis.input_unit,
+        output_unit: &diagnosis.output_unit,
+        noise_floor: diagnosis.noise_floor,
+        records: diagnosis.records.iter().map(record).collect(),
+        steps: diagnosis
+            .steps
+            .iter()
+            .map(|step| model(step, &diagnosis.records))
+            .collect(),
+        scores: &diagnosis.scores,
+        groups: &diagnosis.groups,
+        effects: &diagnosis.effects,
+    };
+    // Writing plain structs to memory cannot fail; an empty object would draw an empty report.
+    serde_json::to_string(&report)
+        .unwrap_or_else(|_| "{}".to_owned())
+        .replace('<', "\\u003c")
+}
+
+/// The name of a step: `base model`, or `+ overflow (upper)`.
+pub(super) fn step_label(step: &Step) -> String {
+    match (&step.added, &step.place) {
+        (None, _) => "base model".to_owned(),
+        (Some(effect), None) => format!("+ {effect}"),
+        (Some(effect), Some(place)) => format!("+ {effect} ({place})"),
+    }
+}
+
+fn record(shown: &Shown) -> Record<'_> {
+    Record {
+        name: &shown.name,
+        held_out: shown.held_out,
+        output: curve(&shown.time, &shown.output),
+        input: curve(&shown.time, &shown.input),
+    }
+}
+
+fn model<'a>(step: &'a Step, records: &[Shown]) -> Model<'a> {
+    Model {
+        label: step_label(step),
+        rmse: step.rmse,
+        rmse_test: step.rmse_test,
+        whiteness: text::whiteness(step.tests.whiteness_p),
+        input_test: text::input_test(step.tests.input_p),
+        tests: &step.tests,
+        failures: &step.failures,
+        runs: records
+            .iter()
+            .zip(&step.simulated)
+            .map(|(record, simulated)| run(record, simulated))
+            .collect(),
+    }
+}
+
+fn run(record: &Shown, simulated: &[f64]) -> Run {
+    let residual: Vec<f64> = record
+        .output
+        .iter()
+        .zip(simulated)
+        .map(|(measured, model)| measured - model)
+        .collect();
+    let at = min_max(&residual, POINTS);
+    Run {
+        output: curve(&record.time, simulated),
+        residual: curve(&record.time, &residual),
+        level: pick(simulated, &at),
+        flow: pick(&record.input, &at),
+    }
+}
+
+fn curve(time: &[f64], values: &[f64]) -> Curve {
+    let at = min_max(&values[..values.len().min(time.len())], POINTS);
+    Curve {
+        t: at.iter().map(|&i| rounded(time[i], 10)).collect(),
+        y: pick(values, &at),
+    }
+}
+
+fn pick(values: &[f64], at: &[usize]) -> Vec<f64> {
+    at.iter()
+        .filter_map(|&i| values.get(i))
+        .map(|&v| rounded(v, 6))
+        .collect()
+}
+
+/// Rounds to significant digits: nobody sees more, and the file is half as large.
+fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn nothing_can_close_the_script_element() {
+        let mut diagnosis = sample::two_tanks();
+        diagnosis.records[0].name = "</script><!--".to_owned();
+        let json = json(&diagnosis);
+        assert!(!json.contains('<'));
+        let back: serde_json::Value = serde_json::from_str(&json).expect("valid JSON");
+        assert_eq!(back["records"][0]["name"], "</script><!--");
+    }
+
+    #[test]
+    fn what_is_not_finite_is_null() {
+        let mut diagnosis = sample::two_tanks();
+        diagnosis.steps[0].rmse = f64::NAN;
+        diagnosis.steps[0].simulated[0][3] = f64::INFINITY;
+        let back: serde_json::Value = serde_json::from_str(&json(&diagnosis)).expect("valid JSON");
+        assert!(back["steps"][0]["rmse"].is_null());
+        assert!(back["steps"][0]["runs"][0]["output"]["y"][3].is_null());
+        assert!(back["steps"][0]["runs"][0]["residual"]["y"][3].is_null());
+    }
+
+    #[test]
+    fn every_step_runs_over_every_record() {
+        let diagnosis = sample::two_tanks();
+        let back: serde_json::Value = serde_json::from_str(&json(&diagnosis)).expect("valid JSON");
+        let steps = back["steps"].as_array().expect("steps");
+        assert_eq!(steps.len(), diagnosis.steps.len());
+        for step in steps {
+            let runs = step["runs"].as_array().expect("runs");
+            assert_eq!(runs.len(), diagnosis.records.len());
+            for run in runs {
+                let length = |part: &serde_json::Value| part.as_array().map(Vec::len);
+                assert_eq!(length(&run["level"]), length(&run["residual"]["t"]));
+                assert_eq!(length(&run["flow"]), length(&run["residual"]["t"]));
+            }
+        }
+    }
+
+    #[test]
+    fn a_long_record_is_thinned_but_keeps_its_peak() {
+        let n = 50_000;
+        let mut output = vec![1.0; n];
+        output[31_415] = 9.0;
+        let shown = Shown {
+            name: "long".to_owned(),
+            held_out: false,
+            time: (0..n).map(|k| k as f64 * 0.1).collect(),
+            input: vec![0.0; n],
+            output,
+        };
+        let curve = record(&shown).output;
+        assert!(curve.y.len() <= POINTS);
+        assert_eq!(curve.t.len(), curve.y.len());
+        let peak = curve.y.iter().position(|&y| y == 9.0).expect("the peak");
+        assert_eq!(curve.t[peak], 3141.5);
+    }
+
+    #[test]
+    fn series_of_different_lengths_are_cut_to_the_shorter() {
+        let shown = Shown {
+            name: String::new(),
+            held_out: false,
+            time: vec![0.0, 1.0],
+            input: vec![],
+            output: vec![1.0, 2.0, 3.0],
+        };
+        let run = run(&shown, &[1.0]);
+        assert_eq!(run.residual.y, [0.0]);
+        assert!(run.flow.is_empty());
+        assert_eq!(record(&shown).output.t.len(), 2);
+    }
+}

@@ -1,0 +1,397 @@
+//! The report: one HTML file that holds everything it needs, to be opened beside the plant.
+//!
+//! The words and the tables are written here and stand without a script; the plots are drawn in the
+//! browser by `report.js` with plotly.js, which the build script has packed. The page loads nothing:
+//! its content security policy forbids every connection. The same diagnosis gives the same bytes.
+
+mod data;
+mod decimate;
+#[cfg(test)]
+mod sample;
+mod tables;
+mod text;
+
+use missing_effect::{Diagnosis, Shown, Step, Verdict};
+
+use self::text::{escape, significant};
+
+/// Stands in the head of every report: a file that holds it may be overwritten by a new one.
+pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
+
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
+                      img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'";
+const STYLE: &str = include_str!("report.css");
+const SCRIPT: &str = include_str!("report.js");
+/// plotly.js, gzipped, in base64.
+const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
+
+/// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and
+/// no scores; what is empty is left out.
+pub fn html(diagnosis: &Diagnosis) -> String {
+    let title = format!("ctid: {}", escape(&diagnosis.plant));
+    let data = data::json(diagnosis);
+    let body: String = [
+        headline(diagnosis),
+        step_buttons(diagnosis),
+        "<main>".to_owned(),
+        fit(diagnosis),
+        failures(diagnosis),
+        residual_tests(diagnosis),
+        ranking(diagnosis),
+        steps(diagnosis),
+        "</main>".to_owned(),
+        footer(),
+    ]
+    .concat();
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
+         {GENERATOR}\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}\n\
+         <script type=\"application/json\" id=\"data\">{data}</script>\n\
+         <script type=\"text/plain\" id=\"plotly\">{PLOTLY}</script>\n\
+         <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+    )
+}
+
+/// The verdict, the fall of the error in large numbers, and what was looked at.
+fn headline(diagnosis: &Diagnosis) -> String {
+    let sentences: String = diagnosis
+        .sentences
+        .iter()
+        .map(|sentence| format!("<p>{}</p>\n", escape(sentence)))
+        .collect();
+    format!(
+        "<header>\n<p class=\"kicker\">ctid report · {plant}</p>\n<h1>{verdict}</h1>\n\
+         <div class=\"verdict\">\n{sentences}</div>\n{trail}{facts}\
+         <noscript><p class=\"notice\">The plots need a browser that runs scripts; \
+         the findings and the tables do not.</p></noscript>\n\
+         <p class=\"notice\" id=\"no-plots\" hidden></p>\n</header>\n",
+        plant = escape(&diagnosis.plant),
+        verdict = verdict(diagnosis),
+        trail = trail(diagnosis),
+        facts = tables::facts(diagnosis),
+    )
+}
+
+fn verdict(diagnosis: &Diagnosis) -> &'static str {
+    if is_comparison(diagnosis) {
+        return "Model against measurement";
+    }
+    match diagnosis.verdict {
+        Verdict::Effect => "The missing effect is found",
+        Verdict::Undecided => "Something is missing, and these data leave more than one candidate",
+        Verdict::Unexplained => "Something is missing that the catalogue does not explain",
+        Verdict::Adequate => "The model is adequate",
+    }
+}
+
+/// Nothing was scored: the report of `compare`.
+fn is_comparison(diagnosis: &Diagnosis) -> bool {
+    diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
+}
+
+fn trail(diagnosis: &Diagnosis) -> String {
+    if diagnosis.steps.is_empty() {
+        return String::new();
+    }
+    let unit = escape(&diagnosis.output_unit);
+    let items: String = diagnosis
+        .steps
+        .iter()
+        .map(|step| {
+            let held_out = step.rmse_test.map_or(String::new(), |error| {
+                format!(
+                    "<span class=\"test\">held out {} {unit}</span>",
+                    significant(error, 2)
+                )
+            });
+            format!(
+                "<li><span class=\"number\">{} <small>{unit}</small></span>\
+                 <span class=\"label\">{}</span>{held_out}</li>\n",
+                significant(step.rmse, 2),
+                label(step)
+            )
+        })
+        .collect();
+    let held_out = if diagnosis.steps.iter().any(|step| step.rmse_test.is_some()) {
+        "; below it the same on the held-out data, which took part in no fit and no choice"
+    } else {
+        ""
+    };
+    format!(
+        "<ol class=\"trail\">\n{items}</ol>\n<p class=\"caption\">Simulation error (root mean square; \
+         the model runs on the input alone and is never corrected by a measurement) \
+         on the fitted data{held_out}. Noise floor: {} {unit}.</p>\n",
+        significant(diagnosis.noise_floor, 2)
+    )
+}
+
+/// The buttons that choose the model that the plots show.
+fn step_buttons(diagnosis: &Diagnosis) -> String {
+    if diagnosis.steps.len() < 2 {
+        return String::new();
+    }
+    let last = diagnosis.steps.len() - 1;
+    let buttons: String = diagnosis
+        .steps
+        .iter()
+        .enumerate()
+        .map(|(k, step)| {
+            format!(
+                "<button type=\"button\" data-step=\"{k}\" aria-pressed=\"{}\">\
+                 <i class=\"swatch\"></i>{} <b>{} {}</b></button>\n",
+                k == last,
+                label(step),
+                significant(step.rmse, 2),
+                escape(&diagnosis.output_unit)
+            )
+        })
+        .collect();
+    format!(
+        "<nav id=\"steps\" aria-label=\"Model that the plots show\">\n<span>Show</span>\n{buttons}\
+         <button type=\"button\" id=\"play\" aria-pressed=\"false\">▶ watch the error fall</button>\n\
+         <span id=\"shown\" class=\"unseen\" aria-live=\"polite\"></span>\n</nav>\n"
+    )
+}
+
+fn fit(diagnosis: &Diagnosis) -> String {
+    if diagnosis.records.is_empty() {
+        return String::new();
+    }
+    let figures: String = diagnosis
+        .records
+        .iter()
+        .enumerate()
+        .map(|(k, record)| {
+            let role = role(record);
+            let heading = format!(
+                "{} <span class=\"badge\">{role}</span>",
+                escape(&record.name)
+            );
+            figure(&format!("record-{k}"), &heading, "")
+        })
+        .collect();
+    section(
+        "fit",
+        "Measured against model",
+        "Above the reading and the models, below the input. Shaded: where the chosen model clearly fails \
+         on the first fitted record. Drag to zoom, double-click to see all again; \
+         the names above a plot switch its curves on and off.",
+        &figures,
+    )
+}
+
+fn failures(diagnosis: &Diagnosis) -> String {
+    let Some(last) = diagnosis.steps.last() else {
+        return String::new();
+    };
+    let sentences: String = last
+        .failures
+        .sentences
+        .iter()
+        .map(|sentence| format!("<li>{}</li>", escape(sentence)))
+        .collect();
+    let any = |bins: fn(&Step) -> usize| diagnosis.steps.iter().any(|step| bins(step) > 0);
+    let mut figures = String::new();
+    if !diagnosis.records.is_empty() {
+        figures.push_str(&figure("by-time", "Residual against time", ""));
+    }
+    let mut pairs = String::new();
+    if any(|step| step.failures.by_level.len()) {
+        pairs.push_str(&figure("by-level", "Against the model's output", BINNED));
+    }
+    if any(|step| step.failures.by_flow.len()) {
+        pairs.push_str(&figure("by-flow", "Against the input", BINNED));
+    }
+    if any(|step| step.failures.by_direction.len()) {
+        pairs.push_str(&figure(
+            "by-direction",
+            "By direction of the model's output",
+            "Bars: root mean square; diamonds: mean.",
+        ));
+    }
+    if any(|step| step.failures.by_frequency.len()) {
+        pairs.push_str(&figure(
+            "by-frequency",
+            "By frequency",
+            "Root mean square of the residual in each octave.",
+        ));
+    }
+    let choices = choices(diagnosis);
+    if figures.is_empty() && pairs.is_empty() && sentences.is_empty() {
+        return String::new();
+    }
+    section(
+        "failures",
+        "Where the model fails",
+        "The residual is the measurement minus the simulated output. \
+         Hatched bars and shaded windows fail clearly; the dashed line is the noise floor.",
+        &format!(
+            "<ul id=\"failure-sentences\">{sentences}</ul>\n{choices}{figures}<div class=\"pairs\">{pairs}</div>\n"
+        ),
+    )
+}
+
+const BINNED: &str = "Above every sample with the mean of each bin, below the root mean square of each bin; \
+                      first fitted record.";
+
+/// Chooses the record of the residual plot and whether the axes stay, where there is a choice.
+fn choices(diagnosis: &Diagnosis) -> String {
+    let mut choices = String::new();
+    if diagnosis.records.len() > 1 {
+        let options: String = diagnosis
+            .records
+            .iter()
+            .enumerate()
+            .map(|(k, record)| {
+                let name = escape(&record.name);
+                format!("<option value=\"{k}\">{name} ({})</option>", role(record))
+            })
+            .collect();
+        choices.push_str(&format!(
+            "<label>Record <select id=\"residual-record\" autocomplete=\"off\">{options}</select></label>\n"
+        ));
+    }
+    if diagnosis.steps.len() > 1 {
+        choices.push_str(
+            "<label><input type=\"checkbox\" id=\"same-axes\" autocomplete=\"off\" checked> \
+             same axes for every model</label>\n",
+        );
+    }
+    if choices.is_empty() {
+        return choices;
+    }
+    format!("<p class=\"choice\">{choices}</p>\n")
+}
+
+fn role(record: &Shown) -> &'static str {
+    if record.held_out {
+        "held out"
+    } else {
+        "fitted"
+    }
+}
+
+fn residual_tests(diagnosis: &Diagnosis) -> String {
+    let Some(tests) = diagnosis.steps.last().map(|step| &step.tests) else {
+        return String::new();
+    };
+    let any = diagnosis.steps.iter().any(|step| {
+        step.tests.autocorrelation.len() > 1 || !step.tests.cross_correlation.is_empty()
+    });
+    if !any {
+        return String::new();
+    }
+    section(
+        "tests",
+        "Is anything left in the residual?",
+        "A model that has taken all there is leaves noise: nearly all stems inside the band, \
+         which holds 95 % of them when nothing is left.",
+        &format!(
+            "<div class=\"pairs\">{}{}</div>\n",
+            figure_with(
+                "autocorrelation",
+                "Residual against its own past",
+                &format!(
+                    "<span id=\"whiteness\">{}</span>",
+                    escape(&text::whiteness(tests.whiteness_p))
+                )
+            ),
+            figure_with(
+                "cross-correlation",
+                "Residual against past input",
+                &format!(
+                    "<span id=\"input-test\">{}</span> Both were whitened first.",
+                    escape(&text::input_test(tests.input_p))
+                )
+            )
+        ),
+    )
+}
+
+fn ranking(diagnosis: &Diagnosis) -> String {
+    if diagnosis.scores.is_empty() {
+        return String::new();
+    }
+    section(
+        "ranking",
+        "Which effect is missing?",
+        "Each effect of the catalogue was added to the base model alone and everything was fitted again. \
+         The larger the fall of the Bayesian information criterion (BIC), the better; a fall below 6 \
+         is no evidence, and effects within 6 of each other are not told apart.",
+        &format!(
+            "{}{}{}",
+            tables::groups(diagnosis),
+            figure("scores", "Fall of BIC with one effect added", ""),
+            tables::scores(diagnosis)
+        ),
+    )
+}
+
+fn steps(diagnosis: &Diagnosis) -> String {
+    if diagnosis.steps.is_empty() {
+        return String::new();
+    }
+    let (title, lead, plot) = if diagnosis.steps.len() < 2 {
+        ("The fitted parameters", "", String::new())
+    } else {
+        (
+            "How the error fell",
+            "One effect more with each step; every parameter is fitted again.",
+            figure("trail", "Simulation error after each step", ""),
+        )
+    };
+    section(
+        "parameters",
+        title,
+        lead,
+        &format!("{plot}{}", tables::parameters(diagnosis)),
+    )
+}
+
+fn footer() -> String {
+    "<footer><p>Written by ctid. The simulation error is that of a model that runs on the input alone; \
+     it is not a prediction error. Standard errors are one standard deviation. \
+     This file holds all its data and loads nothing.</p></footer>"
+        .to_owned()
+}
+
+fn label(step: &Step) -> String {
+    escape(&data::step_label(step))
+}
+
+fn section(id: &str, title: &str, lead: &str, content: &str) -> String {
+    let lead = if lead.is_empty() {
+        String::new()
+    } else {
+        format!("<p class=\"lead\">{lead}</p>\n")
+    };
+    format!(
+        "<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{title}</h2>\n{lead}{content}</section>\n"
+    )
+}
+
+/// A place for a plot. `heading` is HTML, `caption` is text.
+fn figure(id: &str, heading: &str, caption: &str) -> String {
+    figure_with(id, heading, &escape(caption))
+}
+
+/// A place for a plot, heading and caption in HTML.
+fn figure_with(id: &str, heading: &str, caption: &str) -> String {
+    let caption = if caption.is_empty() {
+        String::new()
+    } else {
+        format!("<p class=\"caption\">{caption}</p>")
+    };
+    format!(
+        "<figure aria-labelledby=\"plot-{id}-name\">\n<figcaption><h3 id=\"plot-{id}-name\">{heading}</h3>\
+         {caption}</figcaption>\n<div class=\"plot\" id=\"plot-{id}\"></div>\n</figure>\n"
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,413 @@
+// Draws the plots of the report: unpacks plotly.js, then draws every figure for the chosen step.
+"use strict";
+(() => {
+  const report = JSON.parse(document.getElementById("data").textContent);
+  const narrow = matchMedia("(max-width: 40rem)");
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const touch = matchMedia("(pointer: coarse)").matches;
+  const records = report.records || [];
+  const steps = report.steps || [];
+  // The bins of the failures belong to the first fitted record.
+  const located = Math.max(0, records.findIndex((record) => !record.held_out));
+  let chosen = steps.length - 1;
+  let residualRecord = located;
+  let sameAxes = true;
+  let printing = false;
+
+  // Okabe and Ito's colours, told apart by colour-blind readers; lightened on a dark ground.
+  const LIGHT = {
+    text: "#1b1f26", faint: "#59616e", grid: "#e3e6eb", zero: "#a9b0bb", measured: "#1b1f26",
+    fails: "rgba(230,159,0,0.20)", failing: "#c98500", passing: "#8794a6", ground: "#ffffff",
+    band: "rgba(0,99,163,0.12)", held: "#a8518a", best: "#0072b2", equal: "#56a3d4",
+    steps: ["#d55e00", "#0072b2", "#008a66", "#b5578f", "#8a6d00", "#4a6fa5"],
+  };
+  const DARK = {
+    text: "#e7eaef", faint: "#a3acb9", grid: "#2b313a", zero: "#5c6674", measured: "#dfe3e9",
+    fails: "rgba(240,180,40,0.20)", failing: "#f0b428", passing: "#75839a", ground: "#14171c",
+    band: "rgba(108,188,242,0.16)", held: "#e39ac8", best: "#56b4e9", equal: "#2f7fb0",
+    steps: ["#ff8a3c", "#56b4e9", "#2fc79a", "#e39ac8", "#e0c341", "#9db4dd"],
+  };
+  const DASHES = ["dash", "solid", "dot", "dashdot", "longdash", "longdashdot"];
+  const theme = () => (dark.matches && !printing ? DARK : LIGHT);
+  const stepColour = (k) => theme().steps[k % theme().steps.length];
+
+  // --- words -------------------------------------------------------------------------------
+
+  // plotly reads a little HTML in its texts; names from files are no HTML.
+  const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+  const named = (name, unit) => (unit ? `${name} [${plain(unit).replace(/\^(-?[\d.]+)/g, "<sup>$1</sup>")}]` : name);
+  const output = named("", report.output_unit).trim();
+  const sized = (value, unit) => `${value === null ? "–" : Number(value.toPrecision(2))} ${plain(unit)}`.trim();
+
+  // --- parts of a figure -------------------------------------------------------------------
+
+  function axis(title, more) {
+    const c = theme();
+    return Object.assign({
+      title: { text: title, standoff: 8 }, gridcolor: c.grid, zerolinecolor: c.zero, linecolor: c.zero,
+      tickcolor: c.zero, automargin: true, nticks: narrow.matches ? 6 : undefined,
+    }, more);
+  }
+
+  function layout(height, more) {
+    const c = theme();
+    return Object.assign({
+      height, autosize: true, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      font: { family: "system-ui, -apple-system, Segoe UI, Roboto, Arial, sans-serif", size: narrow.matches ? 11 : 12.5, color: c.text },
+      margin: { l: 52, r: 10, t: touch ? 34 : 10, b: 40 },
+      legend: { orientation: "h", x: 0, xanchor: "left", y: 1.01, yanchor: "bottom", bgcolor: "rgba(0,0,0,0)", uirevision: chosen },
+      hoverlabel: { bgcolor: c.ground, bordercolor: c.zero, font: { color: c.text } },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: c.faint, activecolor: c.best },
+      dragmode: touch ? false : "zoom", uirevision: "kept", showlegend: false, bargap: 0.12,
+    }, more);
+  }
+
+  const present = (values) => values.filter((v) => v !== null && v !== undefined);
+  const largest = (values) => present(values).reduce((most, v) => Math.max(most, Math.abs(v)), 0);
+  // What the axes must hold: every step, so that a fall is seen as a fall, or the chosen one alone.
+  const seen = () => (sameAxes ? steps : [steps[chosen]]);
+  const level = () => (report.noise_floor > 0 ? report.noise_floor : null);
+
+  // The windows of the chosen step that fail, neighbours joined.
+  function failingWindows() {
+    const joined = [];
+    for (const bin of steps[chosen].failures.by_time.filter((b) => b.fails)) {
+      const before = joined[joined.length - 1];
+      if (before && Math.abs(before.to - bin.from) <= 1e-6 * (Math.abs(bin.to) + 1)) before.to = bin.to;
+      else joined.push({ from: bin.from, to: bin.to });
+    }
+    return joined.map((w) => ({
+      type: "rect", xref: "x", yref: "paper", x0: w.from, x1: w.to, y0: 0, y1: 1, layer: "below",
+      fillcolor: theme().fails, line: { width: 0 },
+    }));
+  }
+
+  const across = (y, yref, colour, dash) => ({
+    type: "line", xref: "paper", x0: 0, x1: 1, yref, y0: y, y1: y, line: { color: colour, width: 1.5, dash },
+  });
+  const floorLine = (yref) => (level() === null ? [] : [across(level(), yref, theme().text, "dash")]);
+
+  const barMarker = (bins) => ({
+    color: bins.map((b) => (b.fails ? theme().failing : theme().passing)),
+    pattern: { shape: bins.map((b) => (b.fails ? "/" : "")), fgcolor: theme().ground, fillmode: "overlay", size: 7, solidity: 0.25 },
+  });
+  const binHover = (bins, name) => bins.map((b, k) =>
+    `${name(b, k)}<br>${b.count} values, rms ${sized(b.rms, report.output_unit)}, mean ${sized(b.mean, report.output_unit)}${b.fails ? "<br>fails" : ""}`);
+
+  const tallest = (kind) => 1.08 * largest([level(), ...seen().flatMap((s) => s.failures[kind].map((b) => b.rms))]) || 1;
+
+  // --- the figures -------------------------------------------------------------------------
+
+  function recordFigure(r) {
+    const record = records[r];
+    const c = theme();
+    const data = [{
+      name: "measured", x: record.output.t, y: record.output.y, mode: "lines", line: { color: c.measured, width: 1.3 }, opacity: 0.75,
+      hovertemplate: `%{y:.4~g} ${plain(report.output_unit)}`,
+    }];
+    steps.forEach((step, k) => {
+      const run = step.runs[r];
+      if (!run) return;
+      const main = k === chosen;
+      data.push({
+        name: plain(step.label), x: run.output.t, y: run.output.y, mode: "lines",
+        line: { color: stepColour(k), width: main ? 2.6 : 1.6, dash: main ? "solid" : DASHES[k % DASHES.length] },
+        visible: main || k === 0 ? true : "legendonly", legendrank: 1001 + k, zorder: main ? 2 : 1,
+        hovertemplate: `%{y:.4~g} ${plain(report.output_unit)}`,
+      });
+    });
+    data.push({
+      name: "input", x: record.input.t, y: record.input.y, yaxis: "y2", mode: "lines", showlegend: false,
+      line: { color: c.faint, width: 1.2, shape: "hv" }, hovertemplate: `%{y:.4~g} ${plain(report.input_unit)}`,
+    });
+    return { data, layout: layout(narrow.matches ? 400 : 460, {
+      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: r === located ? failingWindows() : [],
+      xaxis: axis("time [s]", { anchor: "y2", hoverformat: ".6~g", showspikes: false }),
+      yaxis: axis(named("output", report.output_unit), { domain: [0.33, 1] }),
+      yaxis2: axis(named("input", report.input_unit), { domain: [0, 0.24], nticks: 4 }),
+    }) };
+  }
+
+  function byTime() {
+    const run = steps[chosen].runs[residualRecord];
+    if (!run) return null;
+    const most = 1.05 * largest(seen().flatMap((s) => (s.runs[residualRecord] ? s.runs[residualRecord].residual.y : []))) || 1;
+    const floor = level() === null ? [] : [across(level(), "y", theme().text, "dash"), across(-level(), "y", theme().text, "dash")];
+    return { data: [{
+      x: run.residual.t, y: run.residual.y, mode: "lines", line: { color: stepColour(chosen), width: 1.4 }, name: "residual",
+      hovertemplate: `%{x:.6~g} s: %{y:.3~g} ${plain(report.output_unit)}<extra></extra>`,
+    }], layout: layout(narrow.matches ? 240 : 280, {
+      hovermode: "x", shapes: (residualRecord === located ? failingWindows() : []).concat(floor),
+      xaxis: axis("time [s]", { hoverformat: ".6~g" }), yaxis: axis(named("residual", report.output_unit), { range: [-most, most] }),
+    }) };
+  }
+
+  // Every sample and the bin means above, the rms of the bins below.
+  function binned(kind, at, title) {
+    const bins = steps[chosen].failures[kind].filter((b) => b.count > 0);
+    if (!bins.length) return null;
+    const run = steps[chosen].runs[located];
+    const centre = bins.map((b) => (b.from + b.to) / 2);
+    const most = 1.05 * largest(seen().flatMap((s) => (s.runs[located] ? s.runs[located].residual.y : s.failures[kind].map((b) => b.mean)))) || 1;
+    const data = [];
+    if (run) {
+      data.push({
+        x: run[at], y: run.residual.y, mode: "markers", marker: { color: stepColour(chosen), size: 4, opacity: 0.4 },
+        hovertemplate: `%{x:.4~g}: %{y:.3~g} ${plain(report.output_unit)}<extra></extra>`,
+      });
+    }
+    data.push({
+      x: centre, y: bins.map((b) => b.mean), mode: "lines+markers", line: { color: theme().text, width: 2 }, marker: { size: 6 },
+      hovertemplate: "mean %{y:.3~g}<extra></extra>",
+    }, {
+      type: "bar", x: centre, y: bins.map((b) => b.rms), width: bins.map((b) => 0.9 * (b.to - b.from)), yaxis: "y2", marker: barMarker(bins),
+      hovertext: binHover(bins, (b) => `${sized(b.from, "")} to ${sized(b.to, "")}`), hoverinfo: "text", textposition: "none",
+    });
+    return { data, layout: layout(400, {
+      hovermode: "closest", shapes: floorLine("y2"),
+      xaxis: axis(title, { anchor: "y2" }),
+      yaxis: axis(named("residual", report.output_unit), { domain: [0.42, 1], range: [-most, most] }),
+      yaxis2: axis(named("rms", report.output_unit), { domain: [0, 0.34], range: [0, tallest(kind)], nticks: 4 }),
+    }) };
+  }
+
+  function bars(kind, name, means, title) {
+    const bins = steps[chosen].failures[kind];
+    if (!bins.length) return null;
+    const names = bins.map(name);
+    const data = [{
+      type: "bar", x: names, y: bins.map((b) => b.rms), marker: barMarker(bins), hovertext: binHover(bins, name), hoverinfo: "text", textposition: "none",
+    }];
+    let low = 0;
+    if (means) {
+      low = Math.min(0, ...present(seen().flatMap((s) => s.failures[kind].map((b) => b.mean)))) * 1.15;
+      data.push({
+        x: names, y: bins.map((b) => b.mean), mode: "markers", marker: { symbol: "diamond", size: 11, color: theme().text, line: { color: theme().ground, width: 2 } },
+        hovertemplate: "mean %{y:.3~g}<extra></extra>",
+      });
+    }
+    return { data, layout: layout(300, {
+      hovermode: "closest", shapes: floorLine("y"), xaxis: axis(title, { type: "category" }),
+      yaxis: axis(named("residual", report.output_unit), { range: [low, tallest(kind)] }),
+    }) };
+  }
+
+  function directionName(bin, k, bins) {
+    const all = bins || steps[chosen].failures.by_direction;
+    if (all.length === 3) return ["falling", "steady", "rising"][k];
+    return `${sized(bin.from, "")} to ${sized(bin.to, "")} /s`;
+  }
+
+  // 0.002 Hz reads as 2 mHz.
+  const hertz = (f) => (f === null ? "∞" : f < 0.1 ? `${Number((1000 * f).toPrecision(2))} m` : `${Number(f.toPrecision(2))} `);
+  const bandName = (bin) => {
+    const [from, to] = [hertz(bin.from), hertz(bin.to)];
+    return from.endsWith("m") === to.endsWith("m") ? `${parseFloat(from)}–${to}Hz` : `${from}Hz–${to}Hz`;
+  };
+
+  function correlation(kind, bound, first) {
+    const values = steps[chosen].tests[kind].slice(first);
+    if (!values.length) return null;
+    const lags = values.map((_, k) => k + first);
+    const half = steps[chosen].tests[bound];
+    const most = Math.min(1.05, 1.1 * largest(seen().flatMap((s) => [...s.tests[kind].slice(first), s.tests[bound]])) || 1);
+    const c = theme();
+    const outside = values.map((v) => (half !== null && Math.abs(v) > half ? c.failing : c.passing));
+    return { data: [
+      { type: "bar", x: lags, y: values, width: 0.22, marker: { color: outside }, hoverinfo: "skip" },
+      { x: lags, y: values, mode: "markers", marker: { color: outside, size: 7 }, hovertemplate: "lag %{x}: %{y:.2f}<extra></extra>" },
+    ], layout: layout(280, {
+      hovermode: "closest",
+      shapes: half === null ? [] : [
+        { type: "rect", xref: "paper", x0: 0, x1: 1, y0: -half, y1: half, fillcolor: c.band, line: { width: 0 }, layer: "below" },
+        across(half, "y", c.best, "dot"), across(-half, "y", c.best, "dot")],
+      xaxis: axis("lag [samples]", { range: [first - 0.7, lags[lags.length - 1] + 0.7] }),
+      yaxis: axis("correlation", { range: [-most, most] }),
+    }) };
+  }
+
+  function scores() {
+    const c = theme();
+    const best = report.scores.slice().reverse();
+    const equal = new Set(report.groups.flat());
+    const names = best.map((s) => plain(s.place ? `${s.effect} (${s.place})` : s.effect));
+    return { data: [{
+      type: "bar", orientation: "h", y: names, x: best.map((s) => s.bic_gain),
+      marker: { color: best.map((s) => (report.effects.includes(s.effect) ? c.best : equal.has(s.effect) ? c.equal : c.passing)),
+        pattern: { shape: best.map((s) => (!report.effects.includes(s.effect) && equal.has(s.effect) ? "/" : "")), fgcolor: c.ground, fillmode: "overlay", size: 7, solidity: 0.25 } },
+      text: best.map((s) => (s.bic_gain === null ? "" : s.bic_gain.toFixed(1).replace("-", "−"))), textposition: "outside", cliponaxis: false,
+      hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${sized(s.rmse, report.output_unit)}`), hoverinfo: "text",
+    }], layout: layout(70 + 26 * best.length, {
+      hovermode: "closest", margin: { l: 20, r: 48, t: touch ? 34 : 10, b: 40 },
+      xaxis: axis("fall of BIC (larger is better)"), yaxis: axis("", { type: "category", ticksuffix: " ", nticks: best.length + 1, dtick: 1, fixedrange: true }),
+    }) };
+  }
+
+  function trail() {
+    const c = theme();
+    const names = steps.map((s) => plain(s.label));
+    const size = steps.map((_, k) => (k === chosen ? 14 : 9));
+    const data = [{ name: "fitted data", x: names, y: steps.map((s) => s.rmse), mode: "lines+markers", line: { color: c.best, width: 2.5 }, marker: { size } }];
+    if (steps.some((s) => s.rmse_test !== null)) {
+      data.push({ name: "held-out data", x: names, y: steps.map((s) => s.rmse_test), mode: "lines+markers", line: { color: c.held, width: 2.5, dash: "dot" }, marker: { size, symbol: "square" } });
+    }
+    data.forEach((d) => { d.hovertemplate = `%{y:.3~g} ${plain(report.output_unit)}`; });
+    if (level() !== null) {
+      data.push({ name: "noise floor", x: names, y: names.map(level), mode: "lines", line: { color: c.text, width: 1.5, dash: "dash" }, hovertemplate: `%{y:.3~g} ${plain(report.output_unit)}` });
+    }
+    return { data, layout: layout(340, {
+      showlegend: true, hovermode: "x unified", xaxis: axis("", { type: "category", range: [-0.4, names.length - 0.6] }),
+      yaxis: axis(named("simulation error, rms", report.output_unit), { rangemode: "tozero" }),
+    }) };
+  }
+
+  const figures = {
+    "by-time": byTime,
+    "by-level": () => binned("by_level", "level", named("simulated output", report.output_unit)),
+    "by-flow": () => binned("by_flow", "flow", named("input", report.input_unit)),
+    "by-direction": () => bars("by_direction", directionName, true, ""),
+    "by-frequency": () => bars("by_frequency", bandName, false, "frequency"),
+    autocorrelation: () => correlation("autocorrelation", "autocorrelation_bound", 1),
+    "cross-correlation": () => correlation("cross_correlation", "cross_correlation_bound", 0),
+    scores,
+    trail,
+  };
+  records.forEach((_, r) => { figures[`record-${r}`] = () => recordFigure(r); });
+
+  // --- drawing -----------------------------------------------------------------------------
+
+  const config = {
+    displaylogo: false, responsive: true, displayModeBar: touch ? true : "hover",
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], toImageButtonOptions: { scale: 2 },
+  };
+
+  const place = (id) => document.getElementById(`plot-${id}`);
+
+  function draw(id) {
+    const box = place(id);
+    if (!box) return;
+    const made = steps.length ? figures[id]() : null;
+    box.parentElement.hidden = made === null;
+    if (made) Plotly.react(box, made.data, made.layout, config);
+  }
+
+  const drawAll = () => Object.keys(figures).forEach(draw);
+
+  function words() {
+    const step = steps[chosen];
+    if (!step) return;
+    const put = (id, text) => { const e = document.getElementById(id); if (e) e.textContent = text; };
+    put("whiteness", step.whiteness);
+    put("input-test", step.input_test);
+    put("shown", `${step.label}: simulation error ${step.rmse === null ? "unknown" : sized(step.rmse, report.output_unit)}`);
+    const list = document.getElementById("failure-sentences");
+    if (list) list.replaceChildren(...step.failures.sentences.map((s) => { const item = document.createElement("li"); item.textContent = s; return item; }));
+    document.querySelectorAll("#steps [data-step]").forEach((b) => b.setAttribute("aria-pressed", String(Number(b.dataset.step) === chosen)));
+    if (steps.length > 1) document.querySelectorAll("table [data-step]").forEach((cell) => cell.classList.toggle("chosen", Number(cell.dataset.step) === chosen));
+  }
+
+  function paint() {
+    document.querySelectorAll("#steps [data-step] .swatch").forEach((s, k) => { s.style.background = stepColour(k); });
+  }
+
+  function choose(k) {
+    chosen = Math.min(Math.max(k, 0), steps.length - 1);
+    words();
+    // The ranking is that of the first step and stays.
+    Object.keys(figures).filter((id) => id !== "scores").forEach(draw);
+  }
+
+  // The residual and its record show the same stretch of time.
+  function link() {
+    const pair = () => [place(`record-${residualRecord}`), place("by-time")];
+    let busy = false;
+    const follow = (from) => (change) => {
+      const [a, b] = pair();
+      if (busy || !a || !b || (from !== a && from !== b)) return;
+      const other = from === a ? b : a;
+      const update = {};
+      if ("xaxis.autorange" in change) update["xaxis.autorange"] = true;
+      else if ("xaxis.range[0]" in change) update["xaxis.range"] = [change["xaxis.range[0]"], change["xaxis.range[1]"]];
+      else return;
+      busy = true;
+      Plotly.relayout(other, update).finally(() => { busy = false; });
+    };
+    ["by-time", ...records.map((_, r) => `record-${r}`)].map(place).filter((box) => box && box.on).forEach((box) => box.on("plotly_relayout", follow(box)));
+  }
+
+  function listen() {
+    const nav = document.getElementById("steps");
+    let playing = null;
+    const stop = () => {
+      clearInterval(playing);
+      playing = null;
+      const play = document.getElementById("play");
+      if (play) { play.textContent = "▶ watch the error fall"; play.setAttribute("aria-pressed", "false"); }
+    };
+    if (nav) {
+      nav.addEventListener("click", (event) => {
+        const button = event.target.closest("button");
+        if (!button) return;
+        if (button.id !== "play") { stop(); choose(Number(button.dataset.step)); return; }
+        if (playing !== null) { stop(); return; }
+        button.textContent = "■ stop";
+        button.setAttribute("aria-pressed", "true");
+        choose(0);
+        playing = setInterval(() => { choose(chosen + 1); if (chosen === steps.length - 1) stop(); }, 1500);
+      });
+      nav.addEventListener("keydown", (event) => {
+        const move = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+        if (!move || event.target.id === "play") return;
+        event.preventDefault();
+        stop();
+        choose(chosen + move);
+        nav.querySelector(`[data-step="${chosen}"]`).focus();
+      });
+    }
+    const select = document.getElementById("residual-record");
+    if (select) {
+      select.value = String(residualRecord);
+      select.addEventListener("change", () => {
+        residualRecord = Number(select.value);
+        draw("by-time");
+        Plotly.relayout(place("by-time"), { "xaxis.autorange": true });
+      });
+    }
+    const axes = document.getElementById("same-axes");
+    if (axes) axes.addEventListener("change", () => { sameAxes = axes.checked; choose(chosen); });
+    const redraw = () => { paint(); drawAll(); };
+    dark.addEventListener("change", redraw);
+    narrow.addEventListener("change", redraw);
+    // On paper: the light colours, and as wide as the sheet.
+    const paper = (on) => {
+      printing = on;
+      redraw();
+      document.querySelectorAll(".js-plotly-plot").forEach((box) => Plotly.relayout(box, on ? { width: 660, autosize: false } : { width: null, autosize: true }));
+    };
+    addEventListener("beforeprint", () => paper(true));
+    addEventListener("afterprint", () => paper(false));
+  }
+
+  async function unpack() {
+    const element = document.getElementById("plotly");
+    const bytes = Uint8Array.from(atob(element.textContent), (c) => c.charCodeAt(0));
+    element.remove();
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const script = document.createElement("script");
+    script.textContent = await new Response(stream).text();
+    document.head.append(script);
+  }
+
+  paint();
+  words();
+  unpack().then(() => {
+    drawAll();
+    link();
+    listen();
+    document.documentElement.dataset.drawn = "yes";
+  }).catch((error) => {
+    const notice = document.getElementById("no-plots");
+    notice.textContent = `The plots could not be drawn (${error.message}). The findings and the tables stand; a browser from 2023 or later draws the plots.`;
+    notice.hidden = false;
+  });
+})();

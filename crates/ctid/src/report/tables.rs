@@ -1,0 +1,247 @@
+//! The tables of the report.
+
+use missing_effect::{Diagnosis, Parameter, Step};
+
+use super::data::step_label;
+use super::text::{duration, escape, significant, unit, with_error};
+
+/// What was looked at: plant, records, noise floor.
+pub(super) fn facts(diagnosis: &Diagnosis) -> String {
+    let output = escape(&diagnosis.output_unit);
+    let mut facts = vec![("Plant".to_owned(), escape(&diagnosis.plant))];
+    if !diagnosis.known_effects.is_empty() {
+        let known = escape(&diagnosis.known_effects.join(", "));
+        facts.push(("Already in the model".to_owned(), known));
+    }
+    for record in &diagnosis.records {
+        let role = if record.held_out {
+            "Held out"
+        } else {
+            "Fitted to"
+        };
+        let mut text = format!("{}: {} samples", escape(&record.name), record.time.len());
+        if let (Some(first), Some(last)) = (record.time.first(), record.time.last()) {
+            text.push_str(&format!(" over {}", duration(last - first)));
+        }
+        facts.push((role.to_owned(), text));
+    }
+    facts.push((
+        "Noise floor".to_owned(),
+        format!(
+            "{} {output}, from: {}",
+            significant(diagnosis.noise_floor, 3),
+            escape(&diagnosis.noise.source)
+        ),
+    ));
+    let items: String = facts
+        .iter()
+        .map(|(name, text)| format!("<div><dt>{name}</dt><dd>{text}</dd></div>\n"))
+        .collect();
+    format!("<dl class=\"facts\">\n{items}</dl>\n")
+}
+
+/// The effects that were added, each with all that cannot be told apart from it.
+pub(super) fn groups(diagnosis: &Diagnosis) -> String {
+    let items: String = diagnosis
+        .groups
+        .iter()
+        .zip(&diagnosis.effects)
+        .map(|(group, effect)| {
+            let others: Vec<String> = group
+                .iter()
+                .filter(|other| *other != effect)
+                .map(|other| format!("<code>{}</code>", escape(other)))
+                .collect();
+            let finding = if others.is_empty() {
+                "told apart from every other effect".to_owned()
+            } else {
+                format!("these data cannot tell it from {}", others.join(", "))
+            };
+            format!("<li><code>{}</code>: {finding}</li>\n", escape(effect))
+        })
+        .collect();
+    if items.is_empty() {
+        return String::new();
+    }
+    format!("<p>Added to the model, in this order:</p>\n<ol class=\"groups\">\n{items}</ol>\n")
+}
+
+/// The catalogue, best effect first.
+pub(super) fn scores(diagnosis: &Diagnosis) -> String {
+    let output = unit(&diagnosis.output_unit);
+    let rows: String = diagnosis
+        .scores
+        .iter()
+        .enumerate()
+        .map(|(k, score)| {
+            let place = score
+                .place
+                .as_ref()
+                .map_or(String::new(), |place| format!(" ({})", escape(place)));
+            let class = if diagnosis.effects.contains(&score.effect) {
+                " class=\"added\""
+            } else {
+                ""
+            };
+            let size_unit = score.size.as_ref().map_or("", |size| size.unit.as_str());
+            let smallest = score.smallest_visible.map_or("–".to_owned(), |smallest| {
+                format!("{} {}", significant(smallest, 2), unit(size_unit))
+            });
+            format!(
+                "<tr{class}><td class=\"number\">{}</td><th scope=\"row\"><code>{}</code>{place}</th>\
+                 <td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+                 <td class=\"number\">{}</td><td class=\"number\">{smallest}</td></tr>\n",
+                k + 1,
+                escape(&score.effect),
+                one_decimal(score.bic_gain),
+                significant(score.rmse, 3),
+                percent(score.visibility),
+                size(score.size.as_ref()),
+            )
+        })
+        .collect();
+    table(
+        "The catalogue, best first",
+        &format!(
+            "<tr><th scope=\"col\" class=\"number\">#</th><th scope=\"col\">Effect</th>\
+             <th scope=\"col\" class=\"number\">Fall of BIC</th>\
+             <th scope=\"col\" class=\"number\">Simulation error [{output}]</th>\
+             <th scope=\"col\" class=\"number\">Visible part</th>\
+             <th scope=\"col\" class=\"number\">Size ± standard error</th>\
+             <th scope=\"col\" class=\"number\">Smallest size seen</th></tr>"
+        ),
+        &rows,
+        "Simulation error: root mean square on the fitted data after the refit. Visible part: how much of \
+         the effect's signature the fitted parameters cannot imitate. Smallest size seen: a smaller \
+         effect would have stayed hidden in these data.",
+    )
+}
+
+/// The parameters of every step side by side, with what the fit reached.
+pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
+    let steps = &diagnosis.steps;
+    let output = unit(&diagnosis.output_unit);
+    let heads: String = steps
+        .iter()
+        .enumerate()
+        .map(|(k, step)| {
+            format!(
+                "<th scope=\"col\" class=\"number\" data-step=\"{k}\">{}</th>",
+                escape(&step_label(step))
+            )
+        })
+        .collect();
+    let mut rows: String = names(steps)
+        .iter()
+        .map(|(name, parameter_unit)| {
+            row(
+                &format!("<code>{}</code>", escape(name)),
+                &unit(parameter_unit),
+                steps,
+                |step| {
+                    step.parameters
+                        .iter()
+                        .find(|p| p.name == *name)
+                        .map_or(String::new(), estimate)
+                },
+            )
+        })
+        .collect();
+    rows.push_str("</tbody><tbody>");
+    rows.push_str(&row(
+        "Simulation error, fitted data (rms)",
+        &output,
+        steps,
+        |step| significant(step.rmse, 3),
+    ));
+    if steps.iter().any(|step| step.rmse_test.is_some()) {
+        rows.push_str(&row(
+            "Simulation error, held-out data (rms)",
+            &output,
+            steps,
+            |step| {
+                step.rmse_test
+                    .map_or(String::new(), |error| significant(error, 3))
+            },
+        ));
+    }
+    rows.push_str(&row("BIC (smaller is better)", "", steps, |step| {
+        one_decimal(step.bic)
+    }));
+    rows.push_str(&row(
+        "Starts that reached this minimum",
+        "",
+        steps,
+        |step| format!("{} of {}", step.starts_agree, step.starts),
+    ));
+    table(
+        "Parameters after each step",
+        &format!("<tr><th scope=\"col\">Parameter</th><th scope=\"col\">Unit</th>{heads}</tr>"),
+        &rows,
+        "Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
+         A minimum that one start alone has reached may not be the best one.",
+    )
+}
+
+/// Every parameter once, with its unit, in the order of the last step, which has the most.
+fn names(steps: &[Step]) -> Vec<(&str, &str)> {
+    let mut names: Vec<(&str, &str)> = Vec::new();
+    for parameter in steps.iter().rev().flat_map(|step| &step.parameters) {
+        if !names.iter().any(|(name, _)| *name == parameter.name) {
+            names.push((&parameter.name, &parameter.unit));
+        }
+    }
+    names
+}
+
+fn row(name: &str, unit: &str, steps: &[Step], cell: impl Fn(&Step) -> String) -> String {
+    let cells: String = steps
+        .iter()
+        .enumerate()
+        .map(|(k, step)| format!("<td class=\"number\" data-step=\"{k}\">{}</td>", cell(step)))
+        .collect();
+    format!("<tr><th scope=\"row\">{name}</th><td>{unit}</td>{cells}</tr>\n")
+}
+
+fn estimate(parameter: &Parameter) -> String {
+    let value = with_error(parameter.value, parameter.std_error);
+    match parameter.std_error {
+        Some(_) => value,
+        None => format!("{value} *"),
+    }
+}
+
+fn size(size: Option<&Parameter>) -> String {
+    size.map_or("–".to_owned(), |size| {
+        format!(
+            "{} {}",
+            with_error(size.value, size.std_error),
+            unit(&size.unit)
+        )
+    })
+}
+
+fn one_decimal(value: f64) -> String {
+    if value.is_finite() {
+        format!("{value:.1}").replace('-', "−")
+    } else {
+        "–".to_owned()
+    }
+}
+
+fn percent(part: f64) -> String {
+    if part.is_finite() {
+        format!("{} %", significant(100.0 * part, 2))
+    } else {
+        "–".to_owned()
+    }
+}
+
+/// A table that scrolls inside its own box, also by the keyboard.
+fn table(name: &str, head: &str, rows: &str, caption: &str) -> String {
+    format!(
+        "<h3>{name}</h3>\n<div class=\"scroll\" role=\"region\" aria-label=\"{name}\" tabindex=\"0\">\n\
+         <table><thead>{head}</thead>\n<tbody>{rows}</tbody></table>\n</div>\n\
+         <p class=\"caption\">{caption}</p>\n"
+    )
+}

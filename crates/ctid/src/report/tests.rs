@@ -1,0 +1,166 @@
+use super::*;
+
+/// What a browser would fetch: `src`, `href`, `url(` and the like that do not point into the file.
+fn loads(page: &str) -> Vec<&str> {
+    [
+        " src=",
+        " href=",
+        "url(",
+        "@import",
+        "import(",
+        "fetch(",
+        "XMLHttpRequest",
+        "WebSocket",
+    ]
+    .into_iter()
+    .flat_map(|way| page.match_indices(way).map(move |(at, _)| at))
+    .filter_map(|at| page.get(at..(at + 24).min(page.len())))
+    .filter(|text| !text.starts_with(" href=\"data:,\""))
+    .collect()
+}
+
+#[test]
+fn the_page_loads_nothing() {
+    let page = html(&sample::two_tanks());
+    assert!(!page.contains("http://") && !page.contains("https://"));
+    assert_eq!(loads(&page), Vec::<&str>::new());
+    assert!(page.contains("default-src 'none'") && page.contains("connect-src 'none'"));
+}
+
+#[test]
+fn the_page_says_what_wrote_it_and_is_reproducible() {
+    let mut diagnosis = sample::two_tanks();
+    let page = html(&diagnosis);
+    let (head, _) = page.split_once("</head>").expect("a head");
+    assert!(head.contains("<meta name=\"generator\" content=\"ctid\">"));
+    diagnosis.seconds = 99.0;
+    assert!(page == html(&diagnosis), "the time it took must not show");
+}
+
+#[test]
+fn every_step_and_every_record_is_there() {
+    let diagnosis = sample::two_tanks();
+    let page = html(&diagnosis);
+    for (k, step) in diagnosis.steps.iter().enumerate() {
+        assert!(page.contains(&format!("<button type=\"button\" data-step=\"{k}\"")));
+        assert!(page.contains(&format!("<span class=\"label\">{}</span>", label(step))));
+        let error = significant(step.rmse, 2);
+        assert!(page.contains(&format!("<span class=\"number\">{error} <small>V</small>")));
+    }
+    for k in 0..diagnosis.records.len() {
+        assert!(page.contains(&format!("id=\"plot-record-{k}\"")));
+    }
+    for score in &diagnosis.scores {
+        assert!(page.contains(&format!("<code>{}</code>", score.effect)));
+    }
+    for sentence in &diagnosis.sentences {
+        assert!(page.contains(&escape(sentence)));
+    }
+    assert!(page.contains("cannot tell it from <code>pump_nonlinearity</code>"));
+    assert!(page.contains("<td class=\"number\" data-step=\"2\">0.550 ± 0.027</td>"));
+}
+
+#[test]
+fn every_plot_has_a_place_and_every_place_a_plot() {
+    let page = html(&sample::two_tanks());
+    let mut places = 0;
+    for (at, _) in page.match_indices("class=\"plot\" id=\"plot-") {
+        let rest = &page[at + 22..];
+        let id = &rest[..rest.find('"').expect("a quote")];
+        let drawn = id.starts_with("record-")
+            || SCRIPT.contains(&format!("\"{id}\": "))
+            || SCRIPT.contains(&format!("    {id},\n"))
+            || SCRIPT.contains(&format!("    {id}: "));
+        assert!(drawn, "nothing draws {id}");
+        places += 1;
+    }
+    assert_eq!(places, 2 + 9);
+}
+
+#[test]
+fn names_are_escaped_wherever_they_stand() {
+    let hostile = "<script>alert('x')</script>&\"";
+    let mut diagnosis = sample::two_tanks();
+    diagnosis.plant = hostile.to_owned();
+    diagnosis.output_unit = hostile.to_owned();
+    diagnosis.input_unit = hostile.to_owned();
+    diagnosis.sentences.push(hostile.to_owned());
+    diagnosis.noise.source = hostile.to_owned();
+    diagnosis.known_effects.push(hostile.to_owned());
+    diagnosis.effects[0] = hostile.to_owned();
+    diagnosis.groups[0] = vec![hostile.to_owned(), format!("{hostile} too")];
+    for record in &mut diagnosis.records {
+        record.name = hostile.to_owned();
+    }
+    for step in &mut diagnosis.steps {
+        step.added = Some(hostile.to_owned());
+        step.place = Some(hostile.to_owned());
+        step.failures.sentences.push(hostile.to_owned());
+        step.parameters[0].name = hostile.to_owned();
+        step.parameters[0].unit = hostile.to_owned();
+    }
+    diagnosis.scores[0].effect = hostile.to_owned();
+    diagnosis.scores[0].place = Some(hostile.to_owned());
+    if let Some(size) = &mut diagnosis.scores[0].size {
+        size.unit = hostile.to_owned();
+    }
+    assert!(!html(&diagnosis).contains("<script>alert"));
+}
+
+#[test]
+fn a_comparison_leaves_out_what_it_has_not() {
+    let page = html(&sample::comparison());
+    assert!(page.contains("<h1>Model against measurement</h1>"));
+    for absent in [
+        "id=\"steps\"",
+        "plot-scores",
+        "plot-trail",
+        "<select",
+        "held out",
+    ] {
+        let (words, _) = page.split_once("id=\"data\"").expect("data");
+        assert!(!words.contains(absent), "{absent}");
+    }
+    assert!(page.contains("plot-record-0") && page.contains("The fitted parameters"));
+}
+
+#[test]
+fn an_empty_diagnosis_is_still_a_page() {
+    let mut diagnosis = sample::comparison();
+    diagnosis.steps.clear();
+    diagnosis.records.clear();
+    diagnosis.sentences.clear();
+    diagnosis.noise_floor = f64::NAN;
+    let page = html(&diagnosis);
+    assert!(page.ends_with("</html>\n"));
+    assert!(!page.contains("class=\"plot\""));
+    let (words, _) = page.split_once("id=\"data\"").expect("data");
+    assert!(!words.contains("NaN"));
+}
+
+#[test]
+fn tests_that_were_not_made_are_left_out() {
+    let mut diagnosis = sample::comparison();
+    let tests = &mut diagnosis.steps[0].tests;
+    tests.autocorrelation.clear();
+    tests.cross_correlation.clear();
+    diagnosis.steps[0].failures.by_frequency.clear();
+    let page = html(&diagnosis);
+    assert!(!page.contains("plot-autocorrelation"));
+    assert!(!page.contains("plot-by-frequency"));
+    assert!(page.contains("plot-by-level"));
+}
+
+/// Writes the samples to look at: `cargo test -p ctid write_the_samples -- --ignored`.
+#[test]
+#[ignore = "writes files to look at"]
+fn write_the_samples() {
+    for (name, diagnosis) in [
+        ("ctid-report-sample.html", sample::two_tanks()),
+        ("ctid-report-comparison.html", sample::comparison()),
+    ] {
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, html(&diagnosis)).expect("a writable folder");
+        println!("{}", path.display());
+    }
+}

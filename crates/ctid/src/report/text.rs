@@ -1,0 +1,223 @@
+//! Words and numbers for people: escaping, sensible digits, units, p-values in words.
+
+/// Escapes text for HTML, inside elements and inside quoted attributes.
+pub(super) fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            _ => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+/// A unit as HTML: `cm^2.5/s` with a raised exponent.
+pub(super) fn unit(unit: &str) -> String {
+    let mut html = String::new();
+    let mut rest = unit;
+    while let Some((before, after)) = rest.split_once('^') {
+        let end = after
+            .find(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-'))
+            .unwrap_or(after.len());
+        html.push_str(&escape(before));
+        html.push_str("<sup>");
+        html.push_str(&escape(&after[..end]));
+        html.push_str("</sup>");
+        rest = &after[end..];
+    }
+    html.push_str(&escape(rest));
+    html
+}
+
+/// A number with this many significant digits; a dash where there is none.
+pub(super) fn significant(value: f64, digits: i32) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let exponent = exponent(value);
+    if (-4..6).contains(&exponent) {
+        decimals(value, digits - 1 - exponent)
+    } else {
+        format!(
+            "{}×10{}",
+            decimals(value / 10f64.powi(exponent), digits - 1),
+            raised(exponent)
+        )
+    }
+}
+
+/// `value ± standard error`, both to the second digit of the standard error.
+pub(super) fn with_error(value: f64, std_error: Option<f64>) -> String {
+    let Some(error) = std_error.filter(|e| e.is_finite() && *e > 0.0) else {
+        return significant(value, 4);
+    };
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let largest = exponent(value.abs().max(error));
+    let places = 1 - exponent(error);
+    if (-3..6).contains(&largest) {
+        format!("{} ± {}", decimals(value, places), decimals(error, places))
+    } else {
+        let scale = 10f64.powi(largest);
+        format!(
+            "({} ± {})×10{}",
+            decimals(value / scale, places + largest),
+            decimals(error / scale, places + largest),
+            raised(largest)
+        )
+    }
+}
+
+/// A duration, from seconds to days.
+pub(super) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s >= 2.0 * 86_400.0 => format!("{} days", significant(s / 86_400.0, 3)),
+        s if s >= 2.0 * 3_600.0 => format!("{} h", significant(s / 3_600.0, 3)),
+        s if s >= 600.0 => format!("{} min", significant(s / 60.0, 3)),
+        s => format!("{} s", significant(s, 3)),
+    }
+}
+
+/// What the Ljung-Box test says.
+pub(super) fn whiteness(p: f64) -> String {
+    let finding = match p {
+        p if !p.is_finite() => return "The whiteness of the residual was not tested.".to_owned(),
+        p if p >= 0.05 => "The residual cannot be told from white noise",
+        p if p >= 0.01 => "It is doubtful whether the residual is white noise",
+        _ => "The residual is not white noise: neighbouring samples err in the same way",
+    };
+    format!("{finding} (Ljung-Box test, {}).", p_value(p))
+}
+
+/// What the cross-correlation test with the input says.
+pub(super) fn input_test(p: f64) -> String {
+    let finding = match p {
+        p if !p.is_finite() => return "Residual against input was not tested.".to_owned(),
+        p if p >= 0.05 => "No trace of the input is left in the residual",
+        p if p >= 0.01 => "It is doubtful whether the input is still seen in the residual",
+        _ => "The input is still seen in the residual: the model misses part of how it acts",
+    };
+    format!("{finding} (cross-correlation test, {}).", p_value(p))
+}
+
+/// `p = 0.032`, or `p < 0.001`.
+fn p_value(p: f64) -> String {
+    if p < 0.001 {
+        "p < 0.001".to_owned()
+    } else {
+        format!("p = {}", significant(p, 2))
+    }
+}
+
+/// The power of ten of the first digit.
+fn exponent(value: f64) -> i32 {
+    if value == 0.0 {
+        return 0;
+    }
+    // The printed form has rounded already: 9.9999 counts as 9, 0.1 as exactly 10^-1.
+    format!("{:e}", value.abs())
+        .split_once('e')
+        .and_then(|(_, e)| e.parse().ok())
+        .unwrap_or(0)
+}
+
+/// Fixed decimals; negative `places` round to tens, hundreds, ...
+fn decimals(value: f64, places: i32) -> String {
+    let text = if places >= 0 {
+        format!("{value:.*}", usize::try_from(places).unwrap_or(0))
+    } else {
+        let step = 10f64.powi(-places);
+        format!("{:.0}", (value / step).round() * step)
+    };
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
+        Some(digits) => format!("−{digits}"),
+        None => text,
+    }
+}
+
+/// An exponent in raised digits.
+fn raised(exponent: i32) -> String {
+    exponent
+        .to_string()
+        .chars()
+        .map(|c| match c {
+            '-' => '⁻',
+            '1' => '¹',
+            '2' => '²',
+            '3' => '³',
+            '4' => '⁴',
+            '5' => '⁵',
+            '6' => '⁶',
+            '7' => '⁷',
+            '8' => '⁸',
+            '9' => '⁹',
+            _ => '⁰',
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markup_is_escaped() {
+        assert_eq!(
+            escape("<b a=\"1\" c='2'>&"),
+            "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;"
+        );
+    }
+
+    #[test]
+    fn exponents_of_units_are_raised() {
+        assert_eq!(unit("cm^2.5/s"), "cm<sup>2.5</sup>/s");
+        assert_eq!(unit("m^-1"), "m<sup>-1</sup>");
+        assert_eq!(unit("<i>"), "&lt;i&gt;");
+        assert_eq!(unit("a^b"), "a<sup></sup>b");
+    }
+
+    #[test]
+    fn numbers_have_sensible_digits() {
+        assert_eq!(significant(0.666_66, 3), "0.667");
+        assert_eq!(significant(123_456.0, 3), "123000");
+        assert_eq!(significant(-0.5, 2), "−0.50");
+        assert_eq!(significant(1.5e-7, 2), "1.5×10⁻⁷");
+        assert_eq!(significant(f64::NAN, 3), "–");
+        assert_eq!(significant(0.0, 3), "0");
+    }
+
+    #[test]
+    fn a_value_stops_where_its_error_starts() {
+        assert_eq!(with_error(8.123_456, Some(0.012_3)), "8.123 ± 0.012");
+        assert_eq!(with_error(47_012.0, Some(1_187.0)), "47000 ± 1200");
+        assert_eq!(with_error(1.234e-6, Some(2.1e-8)), "(1.234 ± 0.021)×10⁻⁶");
+        assert_eq!(with_error(0.0, Some(0.1)), "0.00 ± 0.10");
+        assert_eq!(with_error(3.0, None), "3.000");
+        assert_eq!(with_error(3.0, Some(f64::NAN)), "3.000");
+    }
+
+    #[test]
+    fn p_values_are_said_in_words() {
+        assert!(whiteness(0.4).contains("cannot be told from white noise"));
+        assert!(whiteness(0.0).contains("p < 0.001"));
+        assert!(input_test(0.02).contains("doubtful"));
+        assert!(input_test(f64::NAN).contains("not tested"));
+    }
+
+    #[test]
+    fn durations_have_fitting_units() {
+        assert_eq!(duration(90.0), "90.0 s");
+        assert_eq!(duration(3_600.0), "60.0 min");
+        assert_eq!(duration(36_000.0), "10.0 h");
+    }
+}

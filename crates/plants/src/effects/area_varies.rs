@@ -1,0 +1,46 @@
+//! `area_varies`: the vessel's surface changes with the level, as in a cone.
+
+use super::{EffectInfo, Place, any_plant};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "area_varies",
+    place: Place::Vessel,
+    physics: "The vessel widens or narrows with the level, as a cone does.",
+    equation: "S(H) = S (1 + c (H - H_op)/H_op)^2",
+    applies: any_plant,
+    parameters,
+    confused_with: &["sqrt_outflow"],
+    confirm: "Measure the vessel's width at two heights.",
+    source: "K. H. Johansson, The quadruple-tank process, IEEE Trans. CST 8(3), 2000, for the balance.",
+};
+
+fn parameters(_: &Site) -> Vec<ParameterInfo> {
+    vec![ParameterInfo {
+        name: "taper",
+        unit: Unit::ONE,
+        meaning: "relative widening for a relative rise of the level",
+        absent: 0.0,
+        lower: -0.6,
+        upper: 1.5,
+        starts: vec![0.1],
+    }]
+}
+
+struct AreaVaries<T> {
+    taper: T,
+    operating_level: f64,
+}
+
+pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    AreaVaries { taper: parameters[0], operating_level: site.operating_level() }
+}
+
+impl<T: Scalar> Law<T> for AreaVaries<T> {
+    fn area(&self, level: T, nominal: T) -> T {
+        let width = self.taper * (level - self.operating_level) * (1.0 / self.operating_level) + 1.0;
+        // A vessel that has narrowed to a tenth does not narrow further: the surface never vanishes.
+        let width = width.max(T::constant(0.1));
+        nominal * width * width
+    }
+}

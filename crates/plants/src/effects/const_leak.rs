@@ -1,0 +1,41 @@
+//! `const_leak`: a constant flow leaves a vessel unseen.
+
+use super::{EffectInfo, Place, any_plant};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "const_leak",
+    place: Place::Vessel,
+    physics: "A constant flow leaves the vessel beside the outlet: a leak, or a consumer that nobody recorded.",
+    equation: "S dH/dt = ... - q0",
+    applies: any_plant,
+    parameters,
+    confused_with: &["pump_deadzone", "sensor_offset", "laminar_outflow", "pump_nonlinearity"],
+    confirm: "Shut the outlet and the pump and watch whether the level falls.",
+    source: "Mass balance.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let flow = site.scales.flow.abs();
+    vec![ParameterInfo {
+        name: "flow",
+        unit: Unit::FLOW,
+        meaning: "flow that leaves unseen",
+        absent: 0.0,
+        lower: 0.0,
+        upper: 5.0 * flow,
+        starts: vec![0.1 * flow],
+    }]
+}
+
+struct ConstLeak<T>(T);
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    ConstLeak(parameters[0])
+}
+
+impl<T: Scalar> Law<T> for ConstLeak<T> {
+    fn net(&self, _level: T, net: T, _t: f64) -> T {
+        net - self.0
+    }
+}

@@ -1,0 +1,125 @@
+//! The catalogue: one file per effect. To add an effect, write its file and name it in the list below,
+//! at its position in the chain.
+
+use crate::{Law, ParameterInfo, Plant, Scalar, Site};
+
+/// Where in the chain an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Place {
+    /// Between the command and the inflow.
+    Actuator,
+    /// In a vessel's balance.
+    Vessel,
+    /// Between the level and the reading.
+    Sensor,
+}
+
+impl Place {
+    /// In words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Actuator => "actuator",
+            Self::Vessel => "vessel",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
+/// What the catalogue says of an effect.
+#[derive(Debug)]
+pub struct EffectInfo {
+    /// Identifier in model files and results.
+    pub id: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// Its physics in a sentence.
+    pub physics: &'static str,
+    /// Its equation.
+    pub equation: &'static str,
+    /// The plants it makes sense on.
+    pub applies: fn(Plant) -> bool,
+    /// Its parameters at a place: the leading one, whose absent value switches the effect off, comes first.
+    pub parameters: fn(&Site) -> Vec<ParameterInfo>,
+    /// Effects that data of this kind can hardly tell from it.
+    pub confused_with: &'static [&'static str],
+    /// How a person confirms it at the plant.
+    pub confirm: &'static str,
+    /// Where the equation is from.
+    pub source: &'static str,
+}
+
+impl EffectInfo {
+    /// The effect of that identifier.
+    #[must_use]
+    pub fn find(id: &str) -> Option<&'static Self> {
+        CATALOGUE.iter().copied().find(|effect| effect.id == id)
+    }
+}
+
+macro_rules! catalogue {
+    ($($module:ident),* $(,)?) => {
+        $(mod $module;)*
+
+        /// Every effect, in chain order.
+        pub static CATALOGUE: &[&EffectInfo] = &[$(&$module::INFO),*];
+
+        /// The law of an effect with its parameters, in the order of [`EffectInfo::parameters`].
+        pub(crate) fn bind<T: Scalar>(effect: &EffectInfo, site: &Site, parameters: &[T]) -> Option<Box<dyn Law<T>>> {
+            $(if effect.id == $module::INFO.id {
+                return Some(Box::new($module::bind(site, parameters)));
+            })*
+            None
+        }
+    };
+}
+
+catalogue![
+    // actuator
+    transport_delay,
+    pump_deadzone,
+    pump_saturation,
+    pump_nonlinearity,
+    pump_lag,
+    // vessel
+    sqrt_outflow,
+    laminar_outflow,
+    const_leak,
+    area_varies,
+    overflow,
+    // sensor
+    sensor_lag,
+    sensor_offset,
+    sensor_hysteresis,
+    sensor_saturation,
+];
+
+/// Position of an effect in the chain.
+pub(crate) fn chain_position(effect: &EffectInfo) -> usize {
+    CATALOGUE
+        .iter()
+        .position(|known| known.id == effect.id)
+        .unwrap_or(CATALOGUE.len())
+}
+
+/// Every plant.
+fn any_plant(_: Plant) -> bool {
+    true
+}
+
+/// Plants whose believed outflow follows a square root.
+fn torricelli_plant(plant: Plant) -> bool {
+    plant.outlet() == crate::Outlet::Torricelli
+}
+
+/// Plants whose believed outflow is linear.
+fn linear_plant(plant: Plant) -> bool {
+    plant.outlet() == crate::Outlet::Linear
+}
+
+/// `from` to `to` in `n` equal parts, from the middle of the first to the middle of the last.
+fn spread(from: f64, to: f64, n: usize) -> Vec<f64> {
+    (0..n)
+        .map(|i| from + (to - from) * (i as f64 + 0.5) / n as f64)
+        .collect()
+}

@@ -1,0 +1,49 @@
+//! `pump_deadzone`: below a threshold the command moves nothing.
+
+use super::{EffectInfo, Place, any_plant, spread};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "pump_deadzone",
+    place: Place::Actuator,
+    physics: "The pump delivers nothing below a threshold of the command: it must first overcome friction and head.",
+    equation: "q = k max(u - u_dz, 0)   (odd in u)",
+    applies: any_plant,
+    parameters,
+    confused_with: &["const_leak", "sensor_offset", "pump_nonlinearity", "laminar_outflow"],
+    confirm: "Raise the command slowly from zero and read at which value water begins to flow.",
+    source: "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (low, high) = site.scales.input;
+    let (low, high) = (low.abs().min(high.abs()), low.abs().max(high.abs()));
+    let mut starts = spread(low, low + 0.6 * (high - low), 3);
+    starts.insert(0, 0.5 * low);
+    vec![ParameterInfo {
+        name: "threshold",
+        unit: Unit::INPUT,
+        meaning: "command below which nothing flows",
+        absent: 0.0,
+        lower: 0.0,
+        upper: 0.95 * high,
+        starts,
+    }]
+}
+
+struct PumpDeadzone<T>(T);
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    PumpDeadzone(parameters[0])
+}
+
+impl<T: Scalar> Law<T> for PumpDeadzone<T> {
+    fn command(&mut self, u: T, _t: f64) -> T {
+        // Odd, so that it is the identity at a threshold of zero whatever the sign of the command.
+        if u.value() >= 0.0 {
+            (u - self.0).max(T::constant(0.0))
+        } else {
+            (u + self.0).min(T::constant(0.0))
+        }
+    }
+}

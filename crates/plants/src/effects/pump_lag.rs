@@ -1,0 +1,41 @@
+//! `pump_lag`: the inflow follows the command with a time constant.
+
+use super::{EffectInfo, Place, any_plant};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "pump_lag",
+    place: Place::Actuator,
+    physics: "The inflow follows the command with a time constant: the pump has to spin up.",
+    equation: "T dq/dt = k u - q",
+    applies: any_plant,
+    parameters,
+    confused_with: &["sensor_lag", "transport_delay"],
+    confirm: "Step the pump and watch the jet: does the inflow reach its new value at once?",
+    source: "K. J. Astrom, R. M. Murray, Feedback Systems, 2nd ed., ch. 3.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (sample, duration) = (site.scales.sample_interval, site.scales.duration);
+    vec![ParameterInfo {
+        name: "time_constant",
+        unit: Unit::TIME,
+        meaning: "time constant of the pump",
+        absent: 0.0,
+        lower: 0.0,
+        upper: 0.2 * duration,
+        starts: vec![sample, 8.0 * sample],
+    }]
+}
+
+struct PumpLag<T>(T);
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    PumpLag(parameters[0])
+}
+
+impl<T: Scalar> Law<T> for PumpLag<T> {
+    fn actuator_lag(&self) -> Option<T> {
+        Some(self.0)
+    }
+}

@@ -1,0 +1,41 @@
+//! `pump_saturation`: above a limit the command moves nothing more.
+
+use super::{EffectInfo, Place, any_plant, spread};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "pump_saturation",
+    place: Place::Actuator,
+    physics: "The pump delivers no more above a limit of the command, which lies below the largest recorded one.",
+    equation: "q = k min(u, u_max)",
+    applies: any_plant,
+    parameters,
+    confused_with: &["pump_nonlinearity", "overflow"],
+    confirm: "Step the command between two high values and see whether the inflow changes.",
+    source: "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (low, high) = site.scales.input;
+    vec![ParameterInfo {
+        name: "limit",
+        unit: Unit::INPUT,
+        meaning: "command above which the inflow no longer rises",
+        absent: f64::INFINITY,
+        lower: low + 0.2 * (high - low),
+        upper: high,
+        starts: spread(low + 0.35 * (high - low), high, 4),
+    }]
+}
+
+struct PumpSaturation<T>(T);
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    PumpSaturation(parameters[0])
+}
+
+impl<T: Scalar> Law<T> for PumpSaturation<T> {
+    fn command(&mut self, u: T, _t: f64) -> T {
+        u.min(self.0)
+    }
+}

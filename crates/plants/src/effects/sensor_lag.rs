@@ -1,0 +1,41 @@
+//! `sensor_lag`: the reading follows the level with a time constant.
+
+use super::{EffectInfo, Place, any_plant};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "sensor_lag",
+    place: Place::Sensor,
+    physics: "The reading follows the level with a time constant: a filter in the transmitter, or a stilling tube.",
+    equation: "T dy/dt = H - y",
+    applies: any_plant,
+    parameters,
+    confused_with: &["pump_lag", "transport_delay"],
+    confirm: "Lift the sensor by a known height and time how long the reading takes to settle.",
+    source: "K. J. Astrom, R. M. Murray, Feedback Systems, 2nd ed., ch. 3.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (sample, duration) = (site.scales.sample_interval, site.scales.duration);
+    vec![ParameterInfo {
+        name: "time_constant",
+        unit: Unit::TIME,
+        meaning: "time constant of the sensor",
+        absent: 0.0,
+        lower: 0.0,
+        upper: 0.2 * duration,
+        starts: vec![sample, 8.0 * sample],
+    }]
+}
+
+struct SensorLag<T>(T);
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    SensorLag(parameters[0])
+}
+
+impl<T: Scalar> Law<T> for SensorLag<T> {
+    fn sensor_lag(&self) -> Option<T> {
+        Some(self.0)
+    }
+}

@@ -1,0 +1,43 @@
+//! `sensor_offset`: the reading is shifted.
+
+use super::{EffectInfo, Place, any_plant};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "sensor_offset",
+    place: Place::Sensor,
+    physics: "The reading is shifted: the sensor's zero is not the level of the outlet.",
+    equation: "y = H + b",
+    applies: any_plant,
+    parameters,
+    confused_with: &["const_leak", "pump_deadzone", "laminar_outflow"],
+    confirm: "Empty the tank to the outlet and read the sensor.",
+    source: "J. Fraden, Handbook of Modern Sensors, 5th ed., ch. 3.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (low, high) = site.measured_level();
+    let span = high - low;
+    vec![ParameterInfo {
+        name: "offset",
+        unit: Unit::LEVEL,
+        meaning: "reading at a level of zero",
+        absent: 0.0,
+        lower: -2.0 * span,
+        // The water stands above the outlet, so the reading cannot be shifted by more than its smallest value.
+        upper: (2.0 * span).min(low + 0.1 * span).max(0.05 * span),
+        starts: vec![0.02 * span],
+    }]
+}
+
+struct SensorOffset<T>(T);
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    SensorOffset(parameters[0])
+}
+
+impl<T: Scalar> Law<T> for SensorOffset<T> {
+    fn reading(&mut self, y: T, _t: f64) -> T {
+        y + self.0
+    }
+}

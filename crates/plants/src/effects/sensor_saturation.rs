@@ -1,0 +1,44 @@
+//! `sensor_saturation`: above a limit the reading does not rise.
+
+use super::{EffectInfo, Place, any_plant, spread};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "sensor_saturation",
+    place: Place::Sensor,
+    physics: "The reading does not rise above a limit: the end of the sensor's or the converter's range.",
+    equation: "y = min(H, y_max)",
+    applies: any_plant,
+    parameters,
+    confused_with: &["overflow"],
+    confirm: "Look at the level itself while the reading stands at its limit.",
+    source: "J. Fraden, Handbook of Modern Sensors, 5th ed., ch. 3.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (low, high) = site.measured_level();
+    let span = high - low;
+    let mut starts = spread(low + 0.6 * span, high, 2);
+    starts.push(high);
+    vec![ParameterInfo {
+        name: "limit",
+        unit: Unit::LEVEL,
+        meaning: "largest reading",
+        absent: f64::INFINITY,
+        lower: low + 0.3 * span,
+        upper: high + 0.05 * span,
+        starts,
+    }]
+}
+
+struct SensorSaturation<T>(T);
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    SensorSaturation(parameters[0])
+}
+
+impl<T: Scalar> Law<T> for SensorSaturation<T> {
+    fn reading(&mut self, y: T, _t: f64) -> T {
+        y.min(self.0)
+    }
+}

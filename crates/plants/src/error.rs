@@ -1,0 +1,61 @@
+//! What can be wrong with a structure.
+
+/// What can be wrong with a structure or a simulation.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// No plant of that name.
+    #[error(
+        "unknown plant `{name}`: take one of single-tank, single-tank-linear, cascaded-tanks, cascaded-tanks-linear, first-order"
+    )]
+    UnknownPlant {
+        /// The name that was given.
+        name: String,
+    },
+    /// No effect of that name.
+    #[error("unknown effect `{name}`: `ctid effects` lists the catalogue{suggestion}")]
+    UnknownEffect {
+        /// The name that was given.
+        name: String,
+        /// Empty, or the closest name.
+        suggestion: String,
+    },
+    /// The effect is on already.
+    #[error("effect `{effect}` is on already: remove it once")]
+    EffectTwice {
+        /// The effect.
+        effect: &'static str,
+    },
+    /// The effect does not act on this plant.
+    #[error("effect `{effect}` does not act on plant `{plant}`: its outflow law is another")]
+    EffectDoesNotApply {
+        /// The effect.
+        effect: &'static str,
+        /// The plant.
+        plant: &'static str,
+    },
+    /// The plant has no such vessel.
+    #[error("effect `{effect}` cannot act there: plant `{plant}` has no such vessel")]
+    NoSuchVessel {
+        /// The effect.
+        effect: &'static str,
+        /// The plant.
+        plant: &'static str,
+    },
+    /// Wrong number of parameters or initial levels.
+    #[error("{what}: {given} given, {needed} needed")]
+    Count {
+        /// What was counted.
+        what: &'static str,
+        /// How many were given.
+        given: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// A controller that cannot work.
+    #[error("controller: {what}")]
+    Controller {
+        /// What is wrong and what to do.
+        what: String,
+    },
+}

@@ -1,0 +1,57 @@
+//! What an effect may do to the chain actuator -> vessels -> sensor.
+
+use crate::Scalar;
+
+/// A vessel's rim: the level cannot rise above it.
+#[derive(Debug, Clone, Copy)]
+pub struct Rim<T> {
+    /// Height of the rim, in the level's unit; infinite where there is none.
+    pub level: T,
+    /// Share of the spill that reaches the next vessel, 0 to 1.
+    pub fraction: T,
+}
+
+/// An effect with its parameters bound, at its place in the chain. Every method has a default that
+/// changes nothing, so a law says only what it does.
+///
+/// Smoothness is part of the contract: at the absent value the law returns its argument bit for bit,
+/// and its derivative there is the one of the limit.
+pub trait Law<T: Scalar>: Send {
+    /// Actuator: the command that acts, for the command that was given \[input unit\]. It may have memory
+    /// and is called once a sample, in order.
+    fn command(&mut self, u: T, _t: f64) -> T {
+        u
+    }
+    /// Actuator: dead time before the command acts \[s\].
+    fn delay(&self) -> Option<T> {
+        None
+    }
+    /// Actuator: time constant with which the inflow follows the command \[s\].
+    fn actuator_lag(&self) -> Option<T> {
+        None
+    }
+    /// Vessel: outflow to the next vessel at a level, given what the law before it says \[flow\].
+    fn outflow(&self, _level: T, nominal: T, _t: f64) -> T {
+        nominal
+    }
+    /// Vessel: the net inflow with what this law takes out and what is lost \[flow\].
+    fn net(&self, _level: T, net: T, _t: f64) -> T {
+        net
+    }
+    /// Vessel: surface at a level \[area\].
+    fn area(&self, _level: T, nominal: T) -> T {
+        nominal
+    }
+    /// Vessel: its rim.
+    fn rim(&self) -> Option<Rim<T>> {
+        None
+    }
+    /// Sensor: time constant with which the reading follows the level \[s\].
+    fn sensor_lag(&self) -> Option<T> {
+        None
+    }
+    /// Sensor: the reading of a level \[level unit\]. It may have memory and is called once a sample, in order.
+    fn reading(&mut self, y: T, _t: f64) -> T {
+        y
+    }
+}

@@ -1,0 +1,70 @@
+//! The first moments of an exponential over one step, smooth down to a time constant of zero.
+//!
+//! A first-order lag of time constant `T` behind a held or polynomial signal decays as
+//! `exp(-s/e)`, `s = t/h` in `[0, 1]`, `e = T/h`. What a slow vessel feels of it are the moments
+//! `M_j = int_0^1 s^j exp(-s/e) ds`; they go to zero with `e`, with the right slope (`M_0 -> e`), so
+//! that a lag does not jump where it vanishes.
+
+use crate::Scalar;
+
+/// `exp(-1/e)` and the moments `M_0, M_1, M_2` for `e = time_constant/h`, both non-negative, not both zero.
+pub(crate) fn exponential_moments<T: Scalar>(time_constant: T, h: T) -> (T, [T; 3]) {
+    let zero = T::constant(0.0);
+    if time_constant.value() > 2.0 * h.value() {
+        // Small z = h/T: the series, since the recursion below cancels.
+        let z = h / time_constant;
+        let mut term = T::constant(1.0);
+        let mut moments = [zero; 3];
+        for n in 0..18 {
+            for (j, moment) in moments.iter_mut().enumerate() {
+                *moment = *moment + term * (1.0 / (n + 1 + j) as f64);
+            }
+            term = term * z * (-1.0 / (n + 1) as f64);
+        }
+        return ((-z).exp(), moments);
+    }
+    let e = time_constant / h;
+    // Below 1/700 the exponential is zero in double precision, with all its derivatives.
+    let decay = if e.value() < 1.0 / 700.0 {
+        zero
+    } else {
+        (-(h / time_constant)).exp()
+    };
+    let m0 = e * (-decay + 1.0);
+    let m1 = e * (m0 - decay);
+    let m2 = e * (m1 * 2.0 - decay);
+    (decay, [m0, m1, m2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Dual;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn moments_agree_with_a_fine_quadrature() {
+        for e in [1e-3, 0.02, 0.3, 1.0, 1.9, 2.1, 10.0, 1e4] {
+            let (decay, moments) = exponential_moments(e, 1.0);
+            assert_relative_eq!(decay, (-1.0 / e as f64).exp(), epsilon = 1e-15);
+            let n = 400_000;
+            for (j, moment) in moments.iter().enumerate() {
+                // Midpoint rule: its error is 1/(24 n^2 e) and less.
+                let sum: f64 = (0..n)
+                    .map(|i| (i as f64 + 0.5) / f64::from(n))
+                    .map(|s| s.powi(j as i32) * (-s / e).exp())
+                    .sum::<f64>()
+                    / f64::from(n);
+                assert_relative_eq!(*moment, sum, max_relative = 2e-6, epsilon = 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn the_slope_at_zero_is_that_of_the_limit() {
+        let (decay, m) = exponential_moments(Dual::<1>::variable(0.0, 0), Dual::constant(2.0));
+        assert_eq!((decay.re, decay.eps[0]), (0.0, 0.0));
+        assert_eq!((m[0].re, m[0].eps[0]), (0.0, 0.5));
+        assert_eq!((m[1].re, m[1].eps[0]), (0.0, 0.0));
+    }
+}

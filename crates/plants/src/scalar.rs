@@ -1,0 +1,235 @@
+//! Numbers that a simulation runs on: plain `f64`, or forward duals that carry exact derivatives.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// What the simulator needs of a number. Comparisons are made on [`Scalar::value`], so a branch is
+/// taken by the value alone and the derivative follows the branch.
+pub trait Scalar:
+    Copy
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + Add<f64, Output = Self>
+    + Sub<f64, Output = Self>
+    + Mul<f64, Output = Self>
+{
+    /// A number without derivatives.
+    fn constant(value: f64) -> Self;
+    /// The value, without derivatives.
+    fn value(self) -> f64;
+    /// Square root; the argument must be positive.
+    fn sqrt(self) -> Self;
+    /// Exponential function.
+    fn exp(self) -> Self;
+    /// Whether both have the same derivatives.
+    fn same_derivatives(self, other: Self) -> bool;
+
+    /// The smaller of two by value; the first where they are equal.
+    fn min(self, other: Self) -> Self {
+        if other.value() < self.value() {
+            other
+        } else {
+            self
+        }
+    }
+    /// The larger of two by value; the first where they are equal.
+    fn max(self, other: Self) -> Self {
+        if other.value() > self.value() {
+            other
+        } else {
+            self
+        }
+    }
+}
+
+impl Scalar for f64 {
+    #[inline]
+    fn constant(value: f64) -> Self {
+        value
+    }
+    #[inline]
+    fn value(self) -> f64 {
+        self
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline]
+    fn exp(self) -> Self {
+        f64::exp(self)
+    }
+    #[inline]
+    fn same_derivatives(self, _other: Self) -> bool {
+        true
+    }
+}
+
+/// A value with `N` exact first derivatives, propagated by the chain rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dual<const N: usize> {
+    /// The value.
+    pub re: f64,
+    /// Its derivatives with respect to `N` chosen parameters.
+    pub eps: [f64; N],
+}
+
+impl<const N: usize> Dual<N> {
+    /// The `lane`-th parameter itself: derivative one in its own lane. A `lane` at or beyond `N` gives a constant.
+    #[must_use]
+    pub fn variable(value: f64, lane: usize) -> Self {
+        let mut eps = [0.0; N];
+        if let Some(own) = eps.get_mut(lane) {
+            *own = 1.0;
+        }
+        Self { re: value, eps }
+    }
+
+    /// `f(self)` with the value `re` and the derivative `slope` of `f`.
+    #[inline]
+    fn chain(self, re: f64, slope: f64) -> Self {
+        let mut eps = self.eps;
+        for e in &mut eps {
+            *e *= slope;
+        }
+        Self { re, eps }
+    }
+}
+
+impl<const N: usize> Scalar for Dual<N> {
+    #[inline]
+    fn constant(value: f64) -> Self {
+        Self {
+            re: value,
+            eps: [0.0; N],
+        }
+    }
+    #[inline]
+    fn value(self) -> f64 {
+        self.re
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        let root = self.re.sqrt();
+        self.chain(root, 0.5 / root)
+    }
+    #[inline]
+    fn exp(self) -> Self {
+        let e = self.re.exp();
+        self.chain(e, e)
+    }
+    #[inline]
+    fn same_derivatives(self, other: Self) -> bool {
+        self.eps == other.eps
+    }
+}
+
+impl<const N: usize> Add for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn add(mut self, other: Self) -> Self {
+        self.re += other.re;
+        for (a, b) in self.eps.iter_mut().zip(&other.eps) {
+            *a += b;
+        }
+        self
+    }
+}
+
+impl<const N: usize> Sub for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn sub(mut self, other: Self) -> Self {
+        self.re -= other.re;
+        for (a, b) in self.eps.iter_mut().zip(&other.eps) {
+            *a -= b;
+        }
+        self
+    }
+}
+
+impl<const N: usize> Mul for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn mul(mut self, other: Self) -> Self {
+        for (a, b) in self.eps.iter_mut().zip(&other.eps) {
+            *a = *a * other.re + self.re * b;
+        }
+        self.re *= other.re;
+        self
+    }
+}
+
+impl<const N: usize> Div for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn div(mut self, other: Self) -> Self {
+        let quotient = self.re / other.re;
+        let inverse = 1.0 / other.re;
+        for (a, b) in self.eps.iter_mut().zip(&other.eps) {
+            *a = (*a - quotient * b) * inverse;
+        }
+        self.re = quotient;
+        self
+    }
+}
+
+impl<const N: usize> Neg for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        self.chain(-self.re, -1.0)
+    }
+}
+
+impl<const N: usize> Add<f64> for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn add(mut self, other: f64) -> Self {
+        self.re += other;
+        self
+    }
+}
+
+impl<const N: usize> Sub<f64> for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn sub(mut self, other: f64) -> Self {
+        self.re -= other;
+        self
+    }
+}
+
+impl<const N: usize> Mul<f64> for Dual<N> {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: f64) -> Self {
+        self.chain(self.re * other, other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn function<T: Scalar>(x: T, y: T) -> T {
+        (x * y + 2.0).sqrt() / (y - x * 0.5) - (-x).exp() * 3.0
+    }
+
+    #[test]
+    fn derivatives_agree_with_central_differences() {
+        let (x, y, h) = (0.7, 1.9, 1e-6);
+        let exact = function(Dual::<2>::variable(x, 0), Dual::<2>::variable(y, 1));
+        assert_eq!(exact.re.to_bits(), function(x, y).to_bits());
+        let dx = (function(x + h, y) - function(x - h, y)) / (2.0 * h);
+        let dy = (function(x, y + h) - function(x, y - h)) / (2.0 * h);
+        assert_relative_eq!(exact.eps[0], dx, max_relative = 1e-8);
+        assert_relative_eq!(exact.eps[1], dy, max_relative = 1e-8);
+    }
+}

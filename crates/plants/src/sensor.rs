@@ -1,0 +1,63 @@
+//! The sensor: a lag behind the measured level, then static laws on the reading.
+
+use crate::{Law, Scalar, moments::exponential_moments, vessels::Stretch};
+
+pub(crate) struct Sensor<T: Scalar> {
+    laws: Vec<Box<dyn Law<T>>>,
+    lag: Option<T>,
+    /// Reading behind the lag minus the level.
+    excess: T,
+}
+
+impl<T: Scalar> Sensor<T> {
+    /// The sensor has settled when the record begins.
+    pub(crate) fn new(laws: Vec<Box<dyn Law<T>>>) -> Self {
+        let lag = laws.iter().find_map(|law| law.sensor_lag());
+        Self {
+            laws,
+            lag,
+            excess: T::constant(0.0),
+        }
+    }
+
+    pub(crate) fn has_lag(&self) -> bool {
+        self.lag.is_some()
+    }
+
+    /// Follows the level over a stretch: `T dw/dt = -w - T dH/dt`, `w` the excess, with the level's cubic
+    /// through its values and rates at both ends.
+    pub(crate) fn follow(&mut self, stretch: &Stretch<T>) {
+        let Some(lag) = self.lag else { return };
+        let h = stretch.h;
+        if h.value() == 0.0 {
+            let relaxed = if lag.value() > 0.0 {
+                self.excess / lag
+            } else {
+                T::constant(0.0)
+            };
+            self.excess = self.excess - (relaxed + stretch.rate_before) * h;
+            return;
+        }
+        // dH/ds = a + b s + c s^2 over s in [0, 1].
+        let (a, end) = (stretch.rate_before * h, stretch.rate_after * h);
+        let rise = stretch.after - stretch.before;
+        let b = rise * 6.0 - a * 4.0 - end * 2.0;
+        let c = (a + end - rise * 2.0) * 3.0;
+        let (decay, [m0, m1, m2]) = exponential_moments(lag, h);
+        // int_0^1 exp(-(1-s)/e) (a + b s + c s^2) ds
+        let felt = a * m0 + b * (m0 - m1) + c * (m0 - m1 * 2.0 + m2);
+        self.excess = self.excess * decay - felt;
+    }
+
+    /// The reading of a level.
+    pub(crate) fn read(&mut self, level: T, t: f64) -> T {
+        let behind = if self.lag.is_some() {
+            level + self.excess
+        } else {
+            level
+        };
+        self.laws
+            .iter_mut()
+            .fold(behind, |y, law| law.reading(y, t))
+    }
+}

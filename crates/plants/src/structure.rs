@@ -1,0 +1,270 @@
+//! A structure: a plant, what is known of it, and the effects that are on, in chain order.
+
+use crate::{
+    Error, ParameterInfo, Plant,
+    effects::{self, EffectInfo, Place},
+    plant::Outlet,
+};
+
+/// The most vessels a plant has.
+pub const MAX_VESSELS: usize = 2;
+
+/// What the data visit: it sets the plausible ranges, the starts and the operating levels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scales {
+    /// Smallest and largest command \[input unit\].
+    pub input: (f64, f64),
+    /// Range over which the actuator works: the known one, or zero to the largest command \[input unit\].
+    pub input_range: f64,
+    /// Smallest and largest level that each vessel visits, as far as it is known \[level unit\].
+    pub level: [(f64, f64); MAX_VESSELS],
+    /// Mean level of each vessel \[level unit\].
+    pub operating_level: [f64; MAX_VESSELS],
+    /// Area of each vessel, one where it is not known.
+    pub area: [f64; MAX_VESSELS],
+    /// Mean throughput \[area x level/s\].
+    pub flow: f64,
+    /// Median sampling interval \[s\].
+    pub sample_interval: f64,
+    /// Length of the longest record \[s\].
+    pub duration: f64,
+}
+
+impl Scales {
+    /// The largest level in any vessel, by magnitude.
+    #[must_use]
+    pub fn largest_level(&self) -> f64 {
+        self.level.iter().fold(0.0, |most: f64, (low, high)| {
+            most.max(low.abs()).max(high.abs())
+        })
+    }
+}
+
+/// Constants that are known and not fitted.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Known {
+    /// Area of each vessel; `None`: one, the level is only known in units of the sensor.
+    pub area: [Option<f64>; MAX_VESSELS],
+    /// Height of the tanks \[level unit\].
+    pub tank_height: Option<f64>,
+    /// Largest command \[input unit\].
+    pub input_range: Option<f64>,
+}
+
+/// An effect at its place.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed {
+    /// The effect.
+    pub effect: &'static EffectInfo,
+    /// The vessel it acts in; zero for actuator and sensor.
+    pub vessel: usize,
+}
+
+impl PartialEq for Placed {
+    fn eq(&self, other: &Self) -> bool {
+        self.effect.id == other.effect.id && self.vessel == other.vessel
+    }
+}
+
+/// Where an effect finds itself: what it may ask when it names its parameters or is bound.
+#[derive(Debug, Clone, Copy)]
+pub struct Site<'a> {
+    /// The plant.
+    pub plant: Plant,
+    /// The vessel it acts in.
+    pub vessel: usize,
+    /// What the data visit.
+    pub scales: &'a Scales,
+}
+
+impl Site<'_> {
+    /// The measured vessel is the last one.
+    #[must_use]
+    pub fn is_last(&self) -> bool {
+        self.vessel + 1 == self.plant.vessels()
+    }
+    /// Smallest and largest level of the vessel.
+    #[must_use]
+    pub fn level(&self) -> (f64, f64) {
+        self.scales.level[self.vessel]
+    }
+    /// Mean level of the vessel.
+    #[must_use]
+    pub fn operating_level(&self) -> f64 {
+        self.scales.operating_level[self.vessel]
+    }
+    /// Smallest and largest level of the measured vessel.
+    #[must_use]
+    pub fn measured_level(&self) -> (f64, f64) {
+        self.scales.level[self.plant.vessels() - 1]
+    }
+}
+
+/// A plant and the effects that are on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Structure {
+    /// The plant.
+    pub plant: Plant,
+    /// What is known of it.
+    pub known: Known,
+    /// The effects that are on; kept in chain order, whatever the order they were added in.
+    effects: Vec<Placed>,
+    /// What the data visit.
+    pub scales: Scales,
+}
+
+impl Structure {
+    /// A plant without effects.
+    #[must_use]
+    pub fn new(plant: Plant, known: Known, scales: Scales) -> Self {
+        let mut structure = Self {
+            plant,
+            known,
+            effects: Vec::new(),
+            scales,
+        };
+        if plant.outlet() == Outlet::Torricelli {
+            for (area, known) in structure.scales.area.iter_mut().zip(structure.known.area) {
+                *area = known.unwrap_or(1.0);
+            }
+        } else {
+            structure.scales.area = [1.0; MAX_VESSELS];
+        }
+        structure
+    }
+
+    /// The effects that are on, in chain order.
+    #[must_use]
+    pub fn effects(&self) -> &[Placed] {
+        &self.effects
+    }
+
+    /// The same structure with one more effect.
+    ///
+    /// # Errors
+    /// Where the effect is on already, does not act on this plant, or the vessel does not exist.
+    pub fn with(&self, placed: Placed) -> Result<Self, Error> {
+        let Placed { effect, vessel } = placed;
+        if self.effects.iter().any(|on| on.effect.id == effect.id) {
+            return Err(Error::EffectTwice { effect: effect.id });
+        }
+        if !(effect.applies)(self.plant) {
+            return Err(Error::EffectDoesNotApply {
+                effect: effect.id,
+                plant: self.plant.id(),
+            });
+        }
+        if vessel >= self.plant.vessels() || (effect.place != Place::Vessel && vessel != 0) {
+            return Err(Error::NoSuchVessel {
+                effect: effect.id,
+                plant: self.plant.id(),
+            });
+        }
+        let mut with = self.clone();
+        with.effects.push(placed);
+        with.effects
+            .sort_by_key(|on| effects::chain_position(on.effect));
+        Ok(with)
+    }
+
+    /// The same structure without an effect.
+    #[must_use]
+    pub fn without(&self, effect: &EffectInfo) -> Self {
+        let mut without = self.clone();
+        without.effects.retain(|on| on.effect.id != effect.id);
+        without
+    }
+
+    /// Every effect of the catalogue that may act on this plant and is not on, at every place it may take.
+    #[must_use]
+    pub fn candidates(&self) -> Vec<Placed> {
+        effects::CATALOGUE
+            .iter()
+            .filter(|effect| (effect.applies)(self.plant))
+            .filter(|effect| self.effects.iter().all(|on| on.effect.id != effect.id))
+            .flat_map(|&effect| {
+                let places = if effect.place == Place::Vessel {
+                    self.plant.vessels()
+                } else {
+                    1
+                };
+                (0..places).map(move |vessel| Placed { effect, vessel })
+            })
+            .collect()
+    }
+
+    /// Where an effect of this structure finds itself.
+    #[must_use]
+    pub fn site(&self, placed: Placed) -> Site<'_> {
+        Site {
+            plant: self.plant,
+            vessel: placed.vessel,
+            scales: &self.scales,
+        }
+    }
+
+    /// The parameters of one effect here.
+    #[must_use]
+    pub fn effect_parameters(&self, placed: Placed) -> Vec<ParameterInfo> {
+        (placed.effect.parameters)(&self.site(placed))
+    }
+
+    /// All parameters: the plant's, then each effect's in chain order. Initial levels are apart.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<ParameterInfo> {
+        let mut all = self.plant.parameters(&self.scales);
+        for &placed in &self.effects {
+            all.extend(self.effect_parameters(placed));
+        }
+        all
+    }
+
+    /// Names of all parameters, an effect's as `effect.parameter`, in the order of [`Structure::parameters`].
+    #[must_use]
+    pub fn parameter_names(&self) -> Vec<String> {
+        let mut all: Vec<String> = self
+            .plant
+            .parameters(&self.scales)
+            .iter()
+            .map(|p| p.name.to_string())
+            .collect();
+        for &placed in &self.effects {
+            all.extend(
+                self.effect_parameters(placed)
+                    .iter()
+                    .map(|p| format!("{}.{}", placed.effect.id, p.name)),
+            );
+        }
+        all
+    }
+
+    /// A parameter's unit in words.
+    #[must_use]
+    pub fn unit_label(&self, parameter: &ParameterInfo, level: &str, input: &str) -> String {
+        let area_known = self.plant.outlet() == Outlet::Torricelli && self.known.area[0].is_some();
+        parameter.unit.label(level, input, area_known)
+    }
+}
+
+impl Scales {
+    /// Scales from the ranges of the command and of the reading, before any simulation has shown more.
+    #[must_use]
+    pub fn from_ranges(
+        input: (f64, f64),
+        output: (f64, f64),
+        sample_interval: f64,
+        duration: f64,
+    ) -> Self {
+        let middle = 0.5 * (output.0 + output.1);
+        Self {
+            input,
+            input_range: input.0.abs().max(input.1.abs()),
+            level: [output; MAX_VESSELS],
+            operating_level: [middle; MAX_VESSELS],
+            area: [1.0; MAX_VESSELS],
+            flow: middle.abs() / (0.1 * duration),
+            sample_interval,
+            duration,
+        }
+    }
+}

@@ -83,7 +83,7 @@ fn verdict(diagnosis: &Diagnosis) -> &'static str {
     }
     match diagnosis.verdict {
         Verdict::Effect => "The missing effect is found",
-        Verdict::Undecided => "Something is missing, and these data leave more than one candidate",
+        Verdict::Undecided => "Something is missing; more than one effect fits these data",
         Verdict::Unexplained => "Something is missing that the catalogue does not explain",
         Verdict::Adequate => "The model is adequate",
     }
@@ -98,7 +98,7 @@ fn trail(diagnosis: &Diagnosis) -> String {
     if diagnosis.steps.is_empty() {
         return String::new();
     }
-    let unit = escape(&diagnosis.output_unit);
+    let unit = text::unit(&diagnosis.output_unit);
     let items: String = diagnosis
         .steps
         .iter()
@@ -125,8 +125,7 @@ fn trail(diagnosis: &Diagnosis) -> String {
     format!(
         "<ol class=\"trail\">\n{items}</ol>\n<p class=\"caption\">Simulation error (root mean square; \
          the model runs on the input alone and is never corrected by a measurement) \
-         on the fitted data{held_out}. Noise floor: {} {unit}.</p>\n",
-        significant(diagnosis.noise_floor, 2)
+         on the fitted data{held_out}.</p>\n"
     )
 }
 
@@ -147,7 +146,7 @@ fn step_buttons(diagnosis: &Diagnosis) -> String {
                 k == last,
                 label(step),
                 significant(step.rmse, 2),
-                escape(&diagnosis.output_unit)
+                text::unit(&diagnosis.output_unit)
             )
         })
         .collect();
@@ -179,8 +178,8 @@ fn fit(diagnosis: &Diagnosis) -> String {
         "fit",
         "Measured against model",
         "Above the reading and the models, below the input. Shaded: where the chosen model clearly fails \
-         on the first fitted record. Drag to zoom, double-click to see all again; \
-         the names above a plot switch its curves on and off.",
+         on the first fitted record, the stronger the worse. Drag to zoom (on a touch screen choose the \
+         magnifier first), double-click to see all again; the names switch the curves on and off.",
         &figures,
     )
 }
@@ -326,7 +325,11 @@ fn ranking(diagnosis: &Diagnosis) -> String {
         &format!(
             "{}{}{}",
             tables::groups(diagnosis),
-            figure("scores", "Fall of BIC with one effect added", ""),
+            figure(
+                "scores",
+                "Fall of BIC with one effect added",
+                "Blue: added to the model; hatched: these data cannot tell it from an added one."
+            ),
             tables::scores(diagnosis)
         ),
     )

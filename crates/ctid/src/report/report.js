@@ -17,17 +17,18 @@
   // Okabe and Ito's colours, told apart by colour-blind readers; lightened on a dark ground.
   const LIGHT = {
     text: "#1b1f26", faint: "#59616e", grid: "#e3e6eb", zero: "#a9b0bb", measured: "#1b1f26",
-    fails: "rgba(230,159,0,0.20)", failing: "#c98500", passing: "#8794a6", ground: "#ffffff",
+    failing: "#e69f00", passing: "#8794a6", ground: "#ffffff",
     band: "rgba(0,99,163,0.12)", held: "#a8518a", best: "#0072b2", equal: "#56a3d4",
     steps: ["#d55e00", "#0072b2", "#008a66", "#b5578f", "#8a6d00", "#4a6fa5"],
   };
   const DARK = {
     text: "#e7eaef", faint: "#a3acb9", grid: "#2b313a", zero: "#5c6674", measured: "#dfe3e9",
-    fails: "rgba(240,180,40,0.20)", failing: "#f0b428", passing: "#75839a", ground: "#14171c",
+    failing: "#f0b428", passing: "#75839a", ground: "#14171c",
     band: "rgba(108,188,242,0.16)", held: "#e39ac8", best: "#56b4e9", equal: "#2f7fb0",
     steps: ["#ff8a3c", "#56b4e9", "#2fc79a", "#e39ac8", "#e0c341", "#9db4dd"],
   };
   const DASHES = ["dash", "solid", "dot", "dashdot", "longdash", "longdashdot"];
+  const FONT = "system-ui, -apple-system, Segoe UI, Roboto, Arial, sans-serif";
   const theme = () => (dark.matches && !printing ? DARK : LIGHT);
   const stepColour = (k) => theme().steps[k % theme().steps.length];
 
@@ -35,9 +36,11 @@
 
   // plotly reads a little HTML in its texts; names from files are no HTML.
   const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-  const named = (name, unit) => (unit ? `${name} [${plain(unit).replace(/\^(-?[\d.]+)/g, "<sup>$1</sup>")}]` : name);
-  const output = named("", report.output_unit).trim();
-  const sized = (value, unit) => `${value === null ? "–" : Number(value.toPrecision(2))} ${plain(unit)}`.trim();
+  const pretty = (unit) => plain(unit || "").replace(/\^(-?[\d.]+)/g, "<sup>$1</sup>");
+  const OUT = pretty(report.output_unit);
+  const IN = pretty(report.input_unit);
+  const named = (name, unit) => (unit ? `${name} [${unit}]` : name);
+  const sized = (value, unit) => `${value === null ? "–" : Number(value.toPrecision(2))} ${unit}`.trim();
 
   // --- parts of a figure -------------------------------------------------------------------
 
@@ -53,10 +56,10 @@
     const c = theme();
     return Object.assign({
       height, autosize: true, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { family: "system-ui, -apple-system, Segoe UI, Roboto, Arial, sans-serif", size: narrow.matches ? 11 : 12.5, color: c.text },
-      margin: { l: 52, r: 10, t: touch ? 34 : 10, b: 40 },
+      font: { family: FONT, size: narrow.matches ? 11 : 12.5, color: c.text },
+      margin: { l: 52, r: 10, t: 10, b: 40 },
       legend: { orientation: "h", x: 0, xanchor: "left", y: 1.01, yanchor: "bottom", bgcolor: "rgba(0,0,0,0)", uirevision: chosen },
-      hoverlabel: { bgcolor: c.ground, bordercolor: c.zero, font: { color: c.text } },
+      hoverlabel: { bgcolor: c.ground, bordercolor: c.zero, font: { color: c.text, family: FONT } },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: c.faint, activecolor: c.best },
       dragmode: touch ? false : "zoom", uirevision: "kept", showlegend: false, bargap: 0.12,
     }, more);
@@ -68,17 +71,12 @@
   const seen = () => (sameAxes ? steps : [steps[chosen]]);
   const level = () => (report.noise_floor > 0 ? report.noise_floor : null);
 
-  // The windows of the chosen step that fail, neighbours joined.
+  // The windows in which the chosen step fails: the larger the error, the stronger.
   function failingWindows() {
-    const joined = [];
-    for (const bin of steps[chosen].failures.by_time.filter((b) => b.fails)) {
-      const before = joined[joined.length - 1];
-      if (before && Math.abs(before.to - bin.from) <= 1e-6 * (Math.abs(bin.to) + 1)) before.to = bin.to;
-      else joined.push({ from: bin.from, to: bin.to });
-    }
-    return joined.map((w) => ({
-      type: "rect", xref: "x", yref: "paper", x0: w.from, x1: w.to, y0: 0, y1: 1, layer: "below",
-      fillcolor: theme().fails, line: { width: 0 },
+    const most = largest(seen().flatMap((s) => s.failures.by_time.map((b) => b.rms))) || 1;
+    return steps[chosen].failures.by_time.filter((b) => b.fails).map((b) => ({
+      type: "rect", xref: "x", yref: "paper", x0: b.from, x1: b.to, y0: 0, y1: 1, layer: "below",
+      fillcolor: theme().failing, opacity: 0.08 + 0.37 * ((b.rms || 0) / most), line: { width: 0 },
     }));
   }
 
@@ -87,12 +85,15 @@
   });
   const floorLine = (yref) => (level() === null ? [] : [across(level(), yref, theme().text, "dash")]);
 
+  const hatch = (where) => ({
+    shape: where.map((yes) => (yes ? "/" : "")), fgcolor: where.map(() => theme().ground), fgopacity: 0.7, fillmode: "overlay", size: 8, solidity: 0.2,
+  });
   const barMarker = (bins) => ({
     color: bins.map((b) => (b.fails ? theme().failing : theme().passing)),
-    pattern: { shape: bins.map((b) => (b.fails ? "/" : "")), fgcolor: theme().ground, fillmode: "overlay", size: 7, solidity: 0.25 },
+    pattern: hatch(bins.map((b) => b.fails)),
   });
   const binHover = (bins, name) => bins.map((b, k) =>
-    `${name(b, k)}<br>${b.count} values, rms ${sized(b.rms, report.output_unit)}, mean ${sized(b.mean, report.output_unit)}${b.fails ? "<br>fails" : ""}`);
+    `${name(b, k)}<br>${b.count} values, rms ${sized(b.rms, OUT)}, mean ${sized(b.mean, OUT)}${b.fails ? "<br>fails" : ""}`);
 
   const tallest = (kind) => 1.08 * largest([level(), ...seen().flatMap((s) => s.failures[kind].map((b) => b.rms))]) || 1;
 
@@ -103,7 +104,7 @@
     const c = theme();
     const data = [{
       name: "measured", x: record.output.t, y: record.output.y, mode: "lines", line: { color: c.measured, width: 1.3 }, opacity: 0.75,
-      hovertemplate: `%{y:.4~g} ${plain(report.output_unit)}`,
+      hovertemplate: `%{y:.4~g} ${OUT}`,
     }];
     steps.forEach((step, k) => {
       const run = step.runs[r];
@@ -113,18 +114,18 @@
         name: plain(step.label), x: run.output.t, y: run.output.y, mode: "lines",
         line: { color: stepColour(k), width: main ? 2.6 : 1.6, dash: main ? "solid" : DASHES[k % DASHES.length] },
         visible: main || k === 0 ? true : "legendonly", legendrank: 1001 + k, zorder: main ? 2 : 1,
-        hovertemplate: `%{y:.4~g} ${plain(report.output_unit)}`,
+        hovertemplate: `%{y:.4~g} ${OUT}`,
       });
     });
     data.push({
       name: "input", x: record.input.t, y: record.input.y, yaxis: "y2", mode: "lines", showlegend: false,
-      line: { color: c.faint, width: 1.2, shape: "hv" }, hovertemplate: `%{y:.4~g} ${plain(report.input_unit)}`,
+      line: { color: c.faint, width: 1.2, shape: "hv" }, hovertemplate: `%{y:.4~g} ${IN}`,
     });
     return { data, layout: layout(narrow.matches ? 400 : 460, {
       showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: r === located ? failingWindows() : [],
-      xaxis: axis("time [s]", { anchor: "y2", hoverformat: ".6~g", showspikes: false }),
-      yaxis: axis(named("output", report.output_unit), { domain: [0.33, 1] }),
-      yaxis2: axis(named("input", report.input_unit), { domain: [0, 0.24], nticks: 4 }),
+      xaxis: axis("time [s]", { anchor: "y2", exponentformat: "none", hoverformat: ".6~g", showspikes: false }),
+      yaxis: axis(named("output", OUT), { domain: [0.33, 1] }),
+      yaxis2: axis(named("input", IN), { domain: [0, 0.24], nticks: 4 }),
     }) };
   }
 
@@ -135,10 +136,10 @@
     const floor = level() === null ? [] : [across(level(), "y", theme().text, "dash"), across(-level(), "y", theme().text, "dash")];
     return { data: [{
       x: run.residual.t, y: run.residual.y, mode: "lines", line: { color: stepColour(chosen), width: 1.4 }, name: "residual",
-      hovertemplate: `%{x:.6~g} s: %{y:.3~g} ${plain(report.output_unit)}<extra></extra>`,
+      hovertemplate: `%{x:.6~g} s: %{y:.3~g} ${OUT}<extra></extra>`,
     }], layout: layout(narrow.matches ? 240 : 280, {
       hovermode: "x", shapes: (residualRecord === located ? failingWindows() : []).concat(floor),
-      xaxis: axis("time [s]", { hoverformat: ".6~g" }), yaxis: axis(named("residual", report.output_unit), { range: [-most, most] }),
+      xaxis: axis("time [s]", { exponentformat: "none", hoverformat: ".6~g" }), yaxis: axis(named("residual", OUT), { range: [-most, most] }),
     }) };
   }
 
@@ -153,7 +154,7 @@
     if (run) {
       data.push({
         x: run[at], y: run.residual.y, mode: "markers", marker: { color: stepColour(chosen), size: 4, opacity: 0.4 },
-        hovertemplate: `%{x:.4~g}: %{y:.3~g} ${plain(report.output_unit)}<extra></extra>`,
+        hovertemplate: `%{x:.4~g}: %{y:.3~g} ${OUT}<extra></extra>`,
       });
     }
     data.push({
@@ -166,8 +167,8 @@
     return { data, layout: layout(400, {
       hovermode: "closest", shapes: floorLine("y2"),
       xaxis: axis(title, { anchor: "y2" }),
-      yaxis: axis(named("residual", report.output_unit), { domain: [0.42, 1], range: [-most, most] }),
-      yaxis2: axis(named("rms", report.output_unit), { domain: [0, 0.34], range: [0, tallest(kind)], nticks: 4 }),
+      yaxis: axis(named("residual", OUT), { domain: [0.42, 1], range: [-most, most] }),
+      yaxis2: axis(named("rms", OUT), { domain: [0, 0.34], range: [0, tallest(kind)], nticks: 4 }),
     }) };
   }
 
@@ -188,7 +189,7 @@
     }
     return { data, layout: layout(300, {
       hovermode: "closest", shapes: floorLine("y"), xaxis: axis(title, { type: "category" }),
-      yaxis: axis(named("residual", report.output_unit), { range: [low, tallest(kind)] }),
+      yaxis: axis(named("residual", OUT), { range: [low, tallest(kind)] }),
     }) };
   }
 
@@ -230,16 +231,20 @@
     const c = theme();
     const best = report.scores.slice().reverse();
     const equal = new Set(report.groups.flat());
+    const gains = present(best.map((s) => s.bic_gain));
+    const [low, high] = [Math.min(0, ...gains), Math.max(1, ...gains)];
+    const room = (narrow.matches ? 0.24 : 0.08) * (high - low);
     const names = best.map((s) => plain(s.place ? `${s.effect} (${s.place})` : s.effect));
     return { data: [{
       type: "bar", orientation: "h", y: names, x: best.map((s) => s.bic_gain),
       marker: { color: best.map((s) => (report.effects.includes(s.effect) ? c.best : equal.has(s.effect) ? c.equal : c.passing)),
-        pattern: { shape: best.map((s) => (!report.effects.includes(s.effect) && equal.has(s.effect) ? "/" : "")), fgcolor: c.ground, fillmode: "overlay", size: 7, solidity: 0.25 } },
+        pattern: hatch(best.map((s) => !report.effects.includes(s.effect) && equal.has(s.effect))) },
       text: best.map((s) => (s.bic_gain === null ? "" : s.bic_gain.toFixed(1).replace("-", "−"))), textposition: "outside", cliponaxis: false,
-      hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${sized(s.rmse, report.output_unit)}`), hoverinfo: "text",
+      hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${sized(s.rmse, OUT)}`), hoverinfo: "text",
     }], layout: layout(70 + 26 * best.length, {
-      hovermode: "closest", margin: { l: 20, r: 48, t: touch ? 34 : 10, b: 40 },
-      xaxis: axis("fall of BIC (larger is better)"), yaxis: axis("", { type: "category", ticksuffix: " ", nticks: best.length + 1, dtick: 1, fixedrange: true }),
+      hovermode: "closest", margin: { l: 20, r: 10, t: 10, b: 40 },
+      // Room for the numbers at the ends of the bars.
+      xaxis: axis("fall of BIC (larger is better)", { range: [low < 0 ? low - room : 0, high + room] }), yaxis: axis("", { type: "category", ticksuffix: " ", nticks: best.length + 1, dtick: 1, fixedrange: true }),
     }) };
   }
 
@@ -247,26 +252,26 @@
     const c = theme();
     const names = steps.map((s) => plain(s.label));
     const size = steps.map((_, k) => (k === chosen ? 14 : 9));
-    const data = [{ name: "fitted data", x: names, y: steps.map((s) => s.rmse), mode: "lines+markers", line: { color: c.best, width: 2.5 }, marker: { size } }];
+    const data = [{ name: "fitted data", x: names, y: steps.map((s) => s.rmse), mode: "lines+markers", line: { color: c.best, width: 2.5 }, marker: { size, opacity: 1 } }];
     if (steps.some((s) => s.rmse_test !== null)) {
-      data.push({ name: "held-out data", x: names, y: steps.map((s) => s.rmse_test), mode: "lines+markers", line: { color: c.held, width: 2.5, dash: "dot" }, marker: { size, symbol: "square" } });
+      data.push({ name: "held-out data", x: names, y: steps.map((s) => s.rmse_test), mode: "lines+markers", line: { color: c.held, width: 2.5, dash: "dot" }, marker: { size, opacity: 1, symbol: "square" } });
     }
-    data.forEach((d) => { d.hovertemplate = `%{y:.3~g} ${plain(report.output_unit)}`; });
+    data.forEach((d) => { d.hovertemplate = `%{y:.3~g} ${OUT}`; });
     if (level() !== null) {
-      data.push({ name: "noise floor", x: names, y: names.map(level), mode: "lines", line: { color: c.text, width: 1.5, dash: "dash" }, hovertemplate: `%{y:.3~g} ${plain(report.output_unit)}` });
+      data.push({ name: "noise floor", x: names, y: names.map(level), mode: "lines", line: { color: c.text, width: 1.5, dash: "dash" }, hovertemplate: `%{y:.3~g} ${OUT}` });
     }
     return { data, layout: layout(340, {
       showlegend: true, hovermode: "x unified", xaxis: axis("", { type: "category", range: [-0.4, names.length - 0.6] }),
-      yaxis: axis(named("simulation error, rms", report.output_unit), { rangemode: "tozero" }),
+      yaxis: axis(named("simulation error, rms", OUT), { rangemode: "tozero" }),
     }) };
   }
 
   const figures = {
     "by-time": byTime,
-    "by-level": () => binned("by_level", "level", named("simulated output", report.output_unit)),
-    "by-flow": () => binned("by_flow", "flow", named("input", report.input_unit)),
+    "by-level": () => binned("by_level", "level", named("simulated output", OUT)),
+    "by-flow": () => binned("by_flow", "flow", named("input", IN)),
     "by-direction": () => bars("by_direction", directionName, true, ""),
-    "by-frequency": () => bars("by_frequency", bandName, false, "frequency"),
+    "by-frequency": () => bars("by_frequency", bandName, false, ""),
     autocorrelation: () => correlation("autocorrelation", "autocorrelation_bound", 1),
     "cross-correlation": () => correlation("cross_correlation", "cross_correlation_bound", 0),
     scores,
@@ -277,9 +282,17 @@
   // --- drawing -----------------------------------------------------------------------------
 
   const config = {
-    displaylogo: false, responsive: true, displayModeBar: touch ? true : "hover",
+    displaylogo: false, responsive: true, displayModeBar: touch ? false : "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], toImageButtonOptions: { scale: 2 },
   };
+
+  // On a touch screen a finger scrolls the page; the plots worth a zoom show their tools above.
+  const ZOOMED = /^(record-\d+|by-time|by-level|by-flow)$/;
+  function withTools({ data, layout }) {
+    layout.margin.t = 34;
+    Object.assign(layout.legend, { y: 0, yref: "container", yanchor: "bottom" });
+    return [data, layout, Object.assign({}, config, { displayModeBar: true, modeBarButtonsToRemove: [...config.modeBarButtonsToRemove, "toImage"] })];
+  }
 
   const place = (id) => document.getElementById(`plot-${id}`);
 
@@ -288,7 +301,7 @@
     if (!box) return;
     const made = steps.length ? figures[id]() : null;
     box.parentElement.hidden = made === null;
-    if (made) Plotly.react(box, made.data, made.layout, config);
+    if (made) Plotly.react(box, ...(touch && ZOOMED.test(id) ? withTools(made) : [made.data, made.layout, config]));
   }
 
   const drawAll = () => Object.keys(figures).forEach(draw);
@@ -299,10 +312,15 @@
     const put = (id, text) => { const e = document.getElementById(id); if (e) e.textContent = text; };
     put("whiteness", step.whiteness);
     put("input-test", step.input_test);
-    put("shown", `${step.label}: simulation error ${step.rmse === null ? "unknown" : sized(step.rmse, report.output_unit)}`);
+    put("shown", `${step.label}: simulation error ${step.rmse === null ? "unknown" : sized(step.rmse, report.output_unit || "")}`);
     const list = document.getElementById("failure-sentences");
     if (list) list.replaceChildren(...step.failures.sentences.map((s) => { const item = document.createElement("li"); item.textContent = s; return item; }));
-    document.querySelectorAll("#steps [data-step]").forEach((b) => b.setAttribute("aria-pressed", String(Number(b.dataset.step) === chosen)));
+    document.querySelectorAll("#steps [data-step]").forEach((b) => {
+      const here = Number(b.dataset.step) === chosen;
+      b.setAttribute("aria-pressed", String(here));
+      // On a narrow screen the row of buttons scrolls.
+      if (here) b.parentElement.scrollLeft = b.offsetLeft - (b.parentElement.clientWidth - b.offsetWidth) / 2;
+    });
     if (steps.length > 1) document.querySelectorAll("table [data-step]").forEach((cell) => cell.classList.toggle("chosen", Number(cell.dataset.step) === chosen));
   }
 

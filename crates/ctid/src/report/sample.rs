@@ -333,3 +333,44 @@ pub(super) fn comparison() -> Diagnosis {
     diagnosis.sentences = vec!["The model errs by 7 times the noise floor.".into()];
     diagnosis
 }
+
+/// Long records, a name that is markup, gaps, infinite edges and numbers that are not finite.
+pub(super) fn awkward() -> Diagnosis {
+    let mut diagnosis = two_tanks();
+    let repeats = 100;
+    for (k, record) in diagnosis.records.iter_mut().enumerate() {
+        let n = record.time.len() * repeats;
+        record.name = "<a href=\"x\">week</a> & <b>\"all\"</b>".to_owned();
+        record.time = (0..n).map(|i| i as f64 * PERIOD).collect();
+        record.input = record.input.repeat(repeats);
+        record.output = record.output.repeat(repeats);
+        record.output[n / 3..n / 2].fill(f64::NAN);
+        for step in &mut diagnosis.steps {
+            step.simulated[k] = step.simulated[k].repeat(repeats);
+        }
+    }
+    for step in &mut diagnosis.steps {
+        for bin in &mut step.failures.by_time {
+            bin.from *= repeats as f64;
+            bin.to *= repeats as f64;
+        }
+        for (from, to) in [(0, f64::NEG_INFINITY), (2, f64::INFINITY)] {
+            step.failures.by_direction[from].from = to;
+        }
+        step.failures.by_level[3].rms = f64::NAN;
+        step.failures.by_level[3].mean = f64::NAN;
+        step.failures.by_frequency.clear();
+        step.tests.cross_correlation.clear();
+        step.tests.input_p = f64::NAN;
+        step.tests.autocorrelation_bound = f64::NAN;
+    }
+    diagnosis.steps[1].simulated.clear();
+    diagnosis.steps[1].rmse = f64::NAN;
+    diagnosis.steps[1].rmse_test = None;
+    diagnosis.steps[1].failures.by_flow.clear();
+    diagnosis.scores[2].bic_gain = f64::NAN;
+    diagnosis.noise_floor = f64::NAN;
+    diagnosis.output_unit = "cm^2".to_owned();
+    diagnosis.input_unit = String::new();
+    diagnosis
+}

@@ -7,11 +7,11 @@ use super::text::{duration, escape, significant, unit, with_error};
 
 /// What was looked at: plant, records, noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
-    let output = escape(&diagnosis.output_unit);
-    let mut facts = vec![("Plant".to_owned(), escape(&diagnosis.plant))];
+    let output = unit(&diagnosis.output_unit);
+    let mut facts = vec![("Plant", escape(&diagnosis.plant))];
     if !diagnosis.known_effects.is_empty() {
         let known = escape(&diagnosis.known_effects.join(", "));
-        facts.push(("Already in the model".to_owned(), known));
+        facts.push(("Already in the model", known));
     }
     for record in &diagnosis.records {
         let role = if record.held_out {
@@ -23,16 +23,13 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
         if let (Some(first), Some(last)) = (record.time.first(), record.time.last()) {
             text.push_str(&format!(" over {}", duration(last - first)));
         }
-        facts.push((role.to_owned(), text));
+        facts.push((role, text));
     }
-    facts.push((
-        "Noise floor".to_owned(),
-        format!(
-            "{} {output}, from: {}",
-            significant(diagnosis.noise_floor, 3),
-            escape(&diagnosis.noise.source)
-        ),
-    ));
+    if diagnosis.noise_floor.is_finite() {
+        let level = significant(diagnosis.noise_floor, 2);
+        let source = escape(&diagnosis.noise.source);
+        facts.push(("Noise floor", format!("{level} {output}, from: {source}")));
+    }
     let items: String = facts
         .iter()
         .map(|(name, text)| format!("<div><dt>{name}</dt><dd>{text}</dd></div>\n"))

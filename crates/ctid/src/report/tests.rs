@@ -151,6 +151,20 @@ fn tests_that_were_not_made_are_left_out() {
     assert!(page.contains("plot-by-level"));
 }
 
+#[test]
+fn long_records_with_gaps_make_a_page_of_sensible_size() {
+    let started = std::time::Instant::now();
+    let page = html(&sample::awkward());
+    assert!(
+        page.len() < PLOTLY.len() + 4_000_000,
+        "{} bytes",
+        page.len()
+    );
+    assert!(started.elapsed().as_secs_f64() < 2.0);
+    let (words, _) = page.split_once("id=\"data\"").expect("data");
+    assert!(!words.contains("NaN") && !words.contains("inf "));
+}
+
 /// Writes the samples to look at: `cargo test -p ctid write_the_samples -- --ignored`.
 #[test]
 #[ignore = "writes files to look at"]
@@ -158,6 +172,7 @@ fn write_the_samples() {
     for (name, diagnosis) in [
         ("ctid-report-sample.html", sample::two_tanks()),
         ("ctid-report-comparison.html", sample::comparison()),
+        ("ctid-report-awkward.html", sample::awkward()),
     ] {
         let path = std::env::temp_dir().join(name);
         std::fs::write(&path, html(&diagnosis)).expect("a writable folder");

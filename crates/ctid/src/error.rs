@@ -1,0 +1,52 @@
+//! What the program can refuse: every message is one line that names the place and the mend.
+
+use std::path::Path;
+
+/// Everything that ends the program with exit code 2.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Something in a file, at a line.
+    #[error("{file}:{line}: {what}")]
+    AtLine {
+        /// The path as it was given.
+        file: String,
+        /// Line number, from 1.
+        line: usize,
+        /// What is wrong and the mend.
+        what: String,
+    },
+    /// Something about a file as a whole.
+    #[error("{file}: {what}")]
+    File {
+        /// The path as it was given.
+        file: String,
+        /// What is wrong and the mend.
+        what: String,
+    },
+    /// No effect of that name.
+    #[error("{0}")]
+    UnknownEffect(String),
+    /// The command line asks for something that does not go together.
+    #[error("{0}")]
+    Usage(String),
+    /// A record.
+    #[error(transparent)]
+    Record(#[from] ct_signals::Error),
+    /// A plant and its effects.
+    #[error(transparent)]
+    Plant(#[from] plants::Error),
+    /// Standard output is gone.
+    #[error("cannot write to standard output: {0}")]
+    Output(#[from] std::io::Error),
+}
+
+impl Error {
+    /// Something about a file as a whole.
+    pub(crate) fn file(path: &Path, what: impl Into<String>) -> Self {
+        Self::File {
+            file: path.display().to_string(),
+            what: what.into(),
+        }
+    }
+}

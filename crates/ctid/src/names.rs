@@ -1,0 +1,49 @@
+//! The name that was probably meant.
+
+use plants::{CATALOGUE, EffectInfo};
+
+use crate::Error;
+
+/// `; did you mean X?` where a name of the list is close to what was written, else nothing.
+pub(crate) fn suggestion<'a>(written: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    let written = written.to_lowercase().replace('-', "_");
+    names
+        .into_iter()
+        .map(|name| {
+            let plain = name.to_lowercase().replace('-', "_");
+            (strsim::damerau_levenshtein(&written, &plain), name)
+        })
+        .filter(|(edits, name)| 5 * edits <= 2 * name.chars().count().max(3))
+        .min_by_key(|(edits, _)| *edits)
+        .map(|(_, name)| format!("; did you mean {name}?"))
+        .unwrap_or_default()
+}
+
+/// The effect of that name.
+pub(crate) fn effect(id: &str) -> Result<&'static EffectInfo, Error> {
+    EffectInfo::find(id).ok_or_else(|| Error::UnknownEffect(unknown_effect(id)))
+}
+
+/// What to say of a name that is not in the catalogue.
+pub(crate) fn unknown_effect(id: &str) -> String {
+    format!(
+        "unknown effect \"{id}\": `ctid effects` lists the catalogue{}",
+        suggestion(id, CATALOGUE.iter().map(|effect| effect.id))
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slip_is_mended_and_another_word_is_not() {
+        let names = ["overflow", "pump_deadzone"];
+        assert_eq!(suggestion("overflw", names), "; did you mean overflow?");
+        assert_eq!(
+            suggestion("Pump-Deadzone", names),
+            "; did you mean pump_deadzone?"
+        );
+        assert_eq!(suggestion("gravity", names), "");
+    }
+}

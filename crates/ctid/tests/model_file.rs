@@ -1,0 +1,424 @@
+//! The model file: what it says, and one message for each mistake.
+
+use std::path::Path;
+
+use ct_signals::Hold;
+use ctid::model_file::{self, ModelFile};
+use plants::Plant;
+
+fn parse(text: &str) -> ModelFile {
+    model_file::parse("tank.toml", text).unwrap()
+}
+
+fn message(text: &str) -> String {
+    let message = model_file::parse("tank.toml", text)
+        .unwrap_err()
+        .to_string();
+    assert!(!message.contains('\n'), "more than one line: {message}");
+    message
+}
+
+/// The message begins so, and says this further on.
+fn refuses(text: &str, start: &str, mend: &str) {
+    let message = message(text);
+    assert!(
+        message.starts_with(start),
+        "{message}\n does not begin with {start}"
+    );
+    assert!(message.contains(mend), "{message}\n does not say {mend}");
+}
+
+#[test]
+fn everything_that_may_be_said_is_understood() {
+    let model = parse(
+        r#"
+plant = "cascaded-tanks"     # two tanks
+effects = ["pump_deadzone", "overflow"]
+hold = "first"
+
+[columns]
+time = "t [s]"
+output = "y [cm]"
+
+[known]
+area_upper = 154
+area_lower = 154.0
+tank_height = 60.0
+input_range = 10
+
+[start]
+alpha_upper = 11
+"pump_deadzone.u_dz" = 0.4
+
+[controller]
+type = "PI"
+gain = 0.6
+integral_time = 90
+u_min = 0
+u_max = 10.0
+
+[effect.overflow]
+where = "lower"
+rim = 50.0
+fixed = ["rim"]
+"#
+        .replace("u_dz", deadzone_parameter())
+        .as_str(),
+    );
+    assert_eq!(model.plant, Plant::CascadedTanks);
+    let effects: Vec<_> = model
+        .effects
+        .iter()
+        .map(|e| (e.effect.id, e.vessel))
+        .collect();
+    assert_eq!(effects, [("pump_deadzone", 0), ("overflow", 1)]);
+    assert_eq!(model.columns.output.as_deref(), Some("y [cm]"));
+    assert_eq!(model.columns.input, None);
+    assert_eq!(model.known.area, [Some(154.0), Some(154.0)]);
+    assert_eq!(model.known.input_range, Some(10.0));
+    assert_eq!(model.start["alpha_upper"], 11.0);
+    assert_eq!(model.start["overflow.rim"], 50.0);
+    assert_eq!(model.start.len(), 3);
+    assert_eq!(model.fixed, ["overflow.rim"]);
+    assert_eq!(model.hold, Hold::First);
+    let controller = model.controller.unwrap();
+    assert_eq!((controller.gain, controller.u_max), (0.6, 10.0));
+}
+
+/// The catalogue names it; the file format does not.
+fn deadzone_parameter() -> &'static str {
+    let model = parse("plant = \"cascaded-tanks\"\neffects = [\"pump_deadzone\"]");
+    let scales = plants::Scales::from_ranges((0.0, 1.0), (0.0, 1.0), 1.0, 10.0);
+    let structure = model.structure(scales).unwrap();
+    structure.effect_parameters(model.effects[0])[0].name
+}
+
+#[test]
+fn a_plant_is_enough() {
+    let model = parse("plant = \"single-tank\"");
+    assert!(model.effects.is_empty() && model.start.is_empty() && model.controller.is_none());
+    assert_eq!(model.hold, Hold::Zero);
+    assert_eq!(model.known.area, [None, None]);
+}
+
+#[test]
+fn a_linear_plant_may_know_its_area() {
+    assert_eq!(
+        parse("plant = \"single-tank-linear\"\n[known]\narea = 2.0")
+            .known
+            .area[0],
+        Some(2.0)
+    );
+}
+
+#[test]
+fn a_missing_plant() {
+    refuses(
+        "effects = []",
+        "tank.toml: no plant is named",
+        "write plant = \"...\"",
+    );
+}
+
+#[test]
+fn an_unknown_plant() {
+    refuses(
+        "\nplant = \"single_tank\"",
+        "tank.toml:2: unknown plant \"single_tank\"",
+        "did you mean single-tank?",
+    );
+}
+
+#[test]
+fn an_unknown_effect() {
+    refuses(
+        "plant = \"single-tank\"\neffects = [\n  \"overfow\",\n]",
+        "tank.toml:3: unknown effect \"overfow\"",
+        "did you mean overflow?",
+    );
+}
+
+#[test]
+fn an_effect_twice() {
+    refuses(
+        "plant = \"single-tank\"\neffects = [\"overflow\", \"overflow\"]",
+        "tank.toml:2: effect `overflow` is on already",
+        "remove it once",
+    );
+}
+
+#[test]
+fn an_effect_of_another_plant() {
+    refuses(
+        "plant = \"single-tank\"\neffects = [\"sqrt_outflow\"]",
+        "tank.toml:2: effect `sqrt_outflow` does not act on plant `single-tank`",
+        "",
+    );
+}
+
+#[test]
+fn an_unknown_key() {
+    refuses(
+        "plant = \"single-tank\"\nefects = []",
+        "tank.toml:2: unknown key efects",
+        "did you mean effects?",
+    );
+    refuses(
+        "plant = \"single-tank\"\n[known]\ntank_hight = 4",
+        "tank.toml:3: unknown key tank_hight",
+        "did you mean tank_height?",
+    );
+    refuses(
+        "plant = \"single-tank\"\n[columns]\nouput = \"y\"",
+        "tank.toml:3: unknown key ouput",
+        "did you mean output?",
+    );
+}
+
+#[test]
+fn text_where_a_number_belongs() {
+    refuses(
+        "plant = \"single-tank\"\n\n[known]\narea = \"154\"",
+        "tank.toml:4: ",
+        "write it without quotes",
+    );
+    refuses(
+        "plant = \"single-tank\"\n[start]\nalpha = true",
+        "tank.toml:3: ",
+        "not a number",
+    );
+}
+
+#[test]
+fn a_syntax_error() {
+    refuses("plant = \"single-tank\"\neffects = [", "tank.toml:2: ", "");
+    refuses("plant = single-tank", "tank.toml:1: ", "");
+    refuses(
+        "plant = \"single-tank\"\nplant = \"first-order\"",
+        "tank.toml:2: ",
+        "duplicate key",
+    );
+}
+
+#[test]
+fn an_unknown_hold() {
+    refuses(
+        "plant = \"single-tank\"\nhold = \"linear\"",
+        "tank.toml:2: unknown word `linear`",
+        "first",
+    );
+}
+
+#[test]
+fn constants_have_to_be_finite_and_above_zero() {
+    let known = |line: &str| format!("plant = \"single-tank\"\n[known]\n{line}");
+    refuses(
+        &known("area = 0"),
+        "tank.toml:3: area = 0 has to be above zero",
+        "correct it",
+    );
+    refuses(
+        &known("area = -154.0"),
+        "tank.toml:3: area = -154",
+        "above zero",
+    );
+    refuses(
+        &known("tank_height = nan"),
+        "tank.toml:3: tank_height = NaN is not a finite",
+        "delete",
+    );
+    refuses(
+        &known("input_range = inf"),
+        "tank.toml:3: input_range = inf is not a finite",
+        "delete",
+    );
+}
+
+#[test]
+fn areas_of_another_plant() {
+    refuses(
+        "plant = \"cascaded-tanks\"\n[known]\narea = 154.0",
+        "tank.toml:3: plant cascaded-tanks has two vessels",
+        "area_upper and area_lower instead of area",
+    );
+    refuses(
+        "plant = \"single-tank\"\n[known]\narea_upper = 154.0",
+        "tank.toml:3: plant single-tank has one vessel",
+        "write area instead of area_upper",
+    );
+    refuses(
+        "plant = \"cascaded-tanks\"\n[known]\narea_lower = 154.0",
+        "tank.toml:3: one area alone",
+        "give both",
+    );
+}
+
+#[test]
+fn an_unknown_start() {
+    refuses(
+        "plant = \"single-tank\"\n[start]\nalfa = 1.0",
+        "tank.toml:3: [start] has alfa, which is not a parameter of this model; it has pump_gain, alpha",
+        "did you mean alpha?",
+    );
+}
+
+#[test]
+fn an_impossible_start() {
+    refuses(
+        "plant = \"single-tank\"\n[start]\nalpha = -1.0",
+        "tank.toml:3: alpha = -1 has to be above zero",
+        "",
+    );
+    refuses(
+        "plant = \"single-tank-linear\"\n[start]\nK = nan",
+        "tank.toml:3: K = NaN is not a finite number",
+        "",
+    );
+    // The gain of a linear plant may have either sign.
+    assert_eq!(
+        parse("plant = \"single-tank-linear\"\n[start]\nK = -2").start["K"],
+        -2.0
+    );
+}
+
+#[test]
+fn a_start_given_twice() {
+    refuses(
+        "plant = \"single-tank\"\neffects = [\"overflow\"]\n[start]\n\"overflow.rim\" = 4\n[effect.overflow]\nrim = 5.0",
+        "tank.toml:6: overflow.rim is given here and under [start]",
+        "keep one",
+    );
+}
+
+#[test]
+fn controllers_that_cannot_work() {
+    let controller = |lines: &str| format!("plant = \"single-tank\"\n\n[controller]\n{lines}");
+    refuses(
+        &controller("gain = 1.0"),
+        "tank.toml:3: [controller] has no type",
+        "type = \"PI\"",
+    );
+    refuses(
+        &controller("type = \"PID\"\ngain = 1.0"),
+        "tank.toml:4: controller type \"PID\" is not known",
+        "type = \"PI\"",
+    );
+    refuses(
+        &controller("type = \"PI\"\ngain = 1.0"),
+        "tank.toml:3: [controller] has no integral_time",
+        "",
+    );
+    refuses(
+        &controller("type = \"PI\"\ngain = 0\nintegral_time = 9"),
+        "tank.toml:3: controller: gain = 0",
+        "other than zero",
+    );
+    refuses(
+        &controller("type = \"PI\"\ngain = 1\nintegral_time = -9"),
+        "tank.toml:3: controller: integral_time = -9",
+        "positive time",
+    );
+    refuses(
+        &controller("type = \"PI\"\ngain = 1\nintegral_time = 9\nu_min = 10\nu_max = 0"),
+        "tank.toml:3: controller: u_min = 10 is not below u_max = 0",
+        "swap them",
+    );
+    refuses(
+        &controller("type = \"PI\"\ngain = 1\nintegral_time = 9\nderivative_time = 1"),
+        "tank.toml:7: unknown key derivative_time",
+        "integral_time",
+    );
+}
+
+#[test]
+fn tables_of_effects() {
+    let table = |plant: &str, lines: &str| {
+        format!("plant = \"{plant}\"\neffects = [\"overflow\", \"pump_lag\"]\n{lines}")
+    };
+    let two = |lines: &str| table("cascaded-tanks", lines);
+    refuses(
+        &two("[effect.overfow]\nrim = 1.0"),
+        "tank.toml:3: unknown effect \"overfow\"",
+        "overflow?",
+    );
+    refuses(
+        &two("[effect.overflow]\nwhere = \"middle\""),
+        "tank.toml:4: where = \"middle\" is no vessel",
+        "\"upper\" or \"lower\"",
+    );
+    refuses(
+        &two("[effect.overflow]\nwhere = 1.0"),
+        "tank.toml:4: where is a word",
+        "",
+    );
+    refuses(
+        &table("single-tank", "[effect.overflow]\nwhere = \"upper\""),
+        "tank.toml:4: plant single-tank has one vessel",
+        "leave it out",
+    );
+    refuses(
+        &two("[effect.pump_lag]\nwhere = \"upper\""),
+        "tank.toml:4: pump_lag acts at the actuator",
+        "leave it out",
+    );
+    refuses(
+        &two("[effect.overflow]\nrimm = 1.0"),
+        "tank.toml:4: overflow has no parameter rimm; it has rim, fraction",
+        "did you mean rim?",
+    );
+    refuses(
+        &two("[effect.overflow]\nwhere = \"lower\"\nfraction = 0.5"),
+        "tank.toml:5: overflow has no parameter fraction; it has rim",
+        "",
+    );
+    refuses(
+        &two("[effect.overflow]\nfixed = [\"rim\"]"),
+        "tank.toml:3: rim is fixed but has no value",
+        "write rim = ...",
+    );
+    refuses(
+        &two("[effect.overflow]\nfixed = \"rim\""),
+        "tank.toml:4: fixed is a list",
+        "[\"rim\"]",
+    );
+    refuses(
+        &two("[effect.overflow]\nrim = \"high\""),
+        "tank.toml:4: rim has to be a finite number",
+        "",
+    );
+    refuses(
+        &two("[effect.overflow]\nrim = [1.0]"),
+        "tank.toml:4: not understood",
+        "a number, where =",
+    );
+}
+
+#[test]
+fn a_table_of_an_effect_that_is_off_waits() {
+    let model = parse("plant = \"single-tank\"\n[effect.overflow]\nrim = 4.0\nfixed = [\"rim\"]");
+    assert!(model.effects.is_empty() && model.start.is_empty() && model.fixed.is_empty());
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    let error = model_file::read(Path::new("no/such.toml"))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.starts_with("no/such.toml: the model file cannot be opened"),
+        "{error}"
+    );
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tank.toml");
+    std::fs::write(&path, b"plant = \"\xff\"").unwrap();
+    assert!(
+        model_file::read(&path)
+            .unwrap_err()
+            .to_string()
+            .contains("not UTF-8")
+    );
+
+    std::fs::write(&path, "\u{feff}plant = \"first-order\"\r\n").unwrap();
+    assert_eq!(model_file::read(&path).unwrap().plant, Plant::FirstOrder);
+}

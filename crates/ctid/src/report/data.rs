@@ -40,6 +40,7 @@ struct Model<'a> {
     tests: &'a ResidualTests,
     failures: &'a Failures,
     runs: Vec<Run>,
+    cloud: Option<Cloud>,
 }
 
 /// A model's run over one record.
@@ -47,9 +48,15 @@ struct Model<'a> {
 struct Run {
     output: Curve,
     residual: Curve,
-    /// The model's output and the input at the instants of `residual`.
+}
+
+/// Samples of the first fitted record, spread evenly over it: what the residual depends on. The
+/// extremes alone would show a wider cloud than there is.
+#[derive(Serialize)]
+struct Cloud {
     level: Vec<f64>,
     flow: Vec<f64>,
+    residual: Vec<f64>,
 }
 
 #[derive(Serialize)]
@@ -112,23 +119,41 @@ fn model<'a>(step: &'a Step, records: &[Shown]) -> Model<'a> {
             .zip(&step.simulated)
             .map(|(record, simulated)| run(record, simulated))
             .collect(),
+        cloud: cloud(step, records),
     }
 }
 
 fn run(record: &Shown, simulated: &[f64]) -> Run {
-    let residual: Vec<f64> = record
+    Run {
+        output: curve(&record.time, simulated),
+        residual: curve(&record.time, &residual(record, simulated)),
+    }
+}
+
+fn cloud(step: &Step, records: &[Shown]) -> Option<Cloud> {
+    let (record, simulated) = records
+        .iter()
+        .zip(&step.simulated)
+        .find(|(record, _)| !record.held_out)?;
+    let residual = residual(record, simulated);
+    let at: Vec<usize> = (0..residual.len())
+        .step_by(residual.len().div_ceil(POINTS).max(1))
+        .collect();
+    Some(Cloud {
+        level: pick(simulated, &at),
+        flow: pick(&record.input, &at),
+        residual: pick(&residual, &at),
+    })
+}
+
+/// Measured minus model.
+fn residual(record: &Shown, simulated: &[f64]) -> Vec<f64> {
+    record
         .output
         .iter()
         .zip(simulated)
         .map(|(measured, model)| measured - model)
-        .collect();
-    let at = min_max(&residual, POINTS);
-    Run {
-        output: curve(&record.time, simulated),
-        residual: curve(&record.time, &residual),
-        level: pick(simulated, &at),
-        flow: pick(&record.input, &at),
-    }
+        .collect()
 }
 
 fn curve(time: &[f64], values: &[f64]) -> Curve {
@@ -186,12 +211,29 @@ mod tests {
         for step in steps {
             let runs = step["runs"].as_array().expect("runs");
             assert_eq!(runs.len(), diagnosis.records.len());
-            for run in runs {
-                let length = |part: &serde_json::Value| part.as_array().map(Vec::len);
-                assert_eq!(length(&run["level"]), length(&run["residual"]["t"]));
-                assert_eq!(length(&run["flow"]), length(&run["residual"]["t"]));
+            let length = |part: &serde_json::Value| part.as_array().map(Vec::len);
+            for (run, record) in runs.iter().zip(&diagnosis.records) {
+                assert_eq!(length(&run["output"]["t"]), Some(record.time.len()));
+                assert_eq!(length(&run["residual"]["y"]), Some(record.time.len()));
+            }
+            for part in ["level", "flow", "residual"] {
+                assert_eq!(
+                    length(&step["cloud"][part]),
+                    Some(diagnosis.records[0].time.len())
+                );
             }
         }
+    }
+
+    #[test]
+    fn the_cloud_of_a_long_record_is_thinned_evenly() {
+        let diagnosis = sample::awkward();
+        let cloud = cloud(&diagnosis.steps[0], &diagnosis.records).expect("a fitted record");
+        assert_eq!(cloud.residual.len(), POINTS);
+        assert_eq!(
+            cloud.level[1],
+            rounded(diagnosis.steps[0].simulated[0][12], 6)
+        );
     }
 
     #[test]
@@ -224,7 +266,6 @@ mod tests {
         };
         let run = run(&shown, &[1.0]);
         assert_eq!(run.residual.y, [0.0]);
-        assert!(run.flow.is_empty());
         assert_eq!(record(&shown).output.t.len(), 2);
     }
 }

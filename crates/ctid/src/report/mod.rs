@@ -235,7 +235,7 @@ fn failures(diagnosis: &Diagnosis) -> String {
     )
 }
 
-const BINNED: &str = "Above every sample with the mean of each bin, below the root mean square of each bin; \
+const BINNED: &str = "Above the samples with the mean of each bin, below the root mean square of each bin; \
                       first fitted record.";
 
 /// Chooses the record of the residual plot and whether the axes stay, where there is a choice.

@@ -147,13 +147,13 @@
   function binned(kind, at, title) {
     const bins = steps[chosen].failures[kind].filter((b) => b.count > 0);
     if (!bins.length) return null;
-    const run = steps[chosen].runs[located];
+    const cloud = steps[chosen].cloud;
     const centre = bins.map((b) => (b.from + b.to) / 2);
-    const most = 1.05 * largest(seen().flatMap((s) => (s.runs[located] ? s.runs[located].residual.y : s.failures[kind].map((b) => b.mean)))) || 1;
+    const most = 1.05 * largest(seen().flatMap((s) => (s.cloud ? s.cloud.residual : s.failures[kind].map((b) => b.mean)))) || 1;
     const data = [];
-    if (run) {
+    if (cloud) {
       data.push({
-        x: run[at], y: run.residual.y, mode: "markers", marker: { color: stepColour(chosen), size: 4, opacity: 0.4 },
+        x: cloud[at], y: cloud.residual, mode: "markers", marker: { color: stepColour(chosen), size: 4, opacity: 0.4 },
         hovertemplate: `%{x:.4~g}: %{y:.3~g} ${OUT}<extra></extra>`,
       });
     }

@@ -3,7 +3,7 @@
 use missing_effect::{Diagnosis, Parameter, Step};
 
 use super::data::step_label;
-use super::text::{duration, escape, significant, unit, with_error};
+use super::text::{code, duration, escape, significant, unit, with_error};
 
 /// What was looked at: plant, records, noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
@@ -47,14 +47,14 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
             let others: Vec<String> = group
                 .iter()
                 .filter(|other| *other != effect)
-                .map(|other| format!("<code>{}</code>", escape(other)))
+                .map(|other| code(other))
                 .collect();
             let finding = if others.is_empty() {
                 "told apart from every other effect".to_owned()
             } else {
                 format!("these data cannot tell it from {}", others.join(", "))
             };
-            format!("<li><code>{}</code>: {finding}</li>\n", escape(effect))
+            format!("<li>{}: {finding}</li>\n", code(effect))
         })
         .collect();
     if items.is_empty() {
@@ -85,11 +85,11 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
                 format!("{} {}", significant(smallest, 2), unit(size_unit))
             });
             format!(
-                "<tr{class}><td class=\"number\">{}</td><th scope=\"row\"><code>{}</code>{place}</th>\
+                "<tr{class}><td class=\"number\">{}</td><th scope=\"row\">{}{place}</th>\
                  <td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
                  <td class=\"number\">{}</td><td class=\"number\">{smallest}</td></tr>\n",
                 k + 1,
-                escape(&score.effect),
+                code(&score.effect),
                 one_decimal(score.bic_gain),
                 significant(score.rmse, 3),
                 percent(score.visibility),
@@ -131,17 +131,12 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
     let mut rows: String = names(steps)
         .iter()
         .map(|(name, parameter_unit)| {
-            row(
-                &format!("<code>{}</code>", escape(name)),
-                &unit(parameter_unit),
-                steps,
-                |step| {
-                    step.parameters
-                        .iter()
-                        .find(|p| p.name == *name)
-                        .map_or(String::new(), estimate)
-                },
-            )
+            row(&code(name), &unit(parameter_unit), steps, |step| {
+                step.parameters
+                    .iter()
+                    .find(|p| p.name == *name)
+                    .map_or(String::new(), estimate)
+            })
         })
         .collect();
     rows.push_str("</tbody><tbody>");

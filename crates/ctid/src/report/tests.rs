@@ -51,12 +51,12 @@ fn every_step_and_every_record_is_there() {
         assert!(page.contains(&format!("id=\"plot-record-{k}\"")));
     }
     for score in &diagnosis.scores {
-        assert!(page.contains(&format!("<code>{}</code>", score.effect)));
+        assert!(page.contains(&text::code(&score.effect)));
     }
     for sentence in &diagnosis.sentences {
         assert!(page.contains(&escape(sentence)));
     }
-    assert!(page.contains("cannot tell it from <code>pump_nonlinearity</code>"));
+    assert!(page.contains("cannot tell it from <code>pump_<wbr>nonlinearity</code>"));
     assert!(page.contains("<td class=\"number\" data-step=\"2\">0.550 ± 0.027</td>"));
 }
 

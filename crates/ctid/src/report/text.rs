@@ -16,6 +16,15 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
+/// An effect or a parameter as HTML; a long name may break after a word, not within one.
+pub(super) fn code(name: &str) -> String {
+    let name = escape(name)
+        .replace('_', "_<wbr>")
+        .replace('.', ".<wbr>")
+        .replace('(', "<wbr>(");
+    format!("<code>{name}</code>")
+}
+
 /// A unit as HTML: `cm^2.5/s` with a raised exponent.
 pub(super) fn unit(unit: &str) -> String {
     let mut html = String::new();
@@ -176,6 +185,15 @@ mod tests {
             escape("<b a=\"1\" c='2'>&"),
             "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;"
         );
+    }
+
+    #[test]
+    fn names_break_between_words() {
+        assert_eq!(
+            code("pump_lag.T(0)"),
+            "<code>pump_<wbr>lag.<wbr>T<wbr>(0)</code>"
+        );
+        assert_eq!(code("<i>"), "<code>&lt;i&gt;</code>");
     }
 
     #[test]

@@ -1,0 +1,155 @@
+//! `ctid effects`: the catalogue, and what it knows of one effect.
+
+use plants::{CATALOGUE, EffectInfo, Place, Placed, Plant};
+
+use crate::look::{Look, Side, table};
+use crate::{Error, model_file, names, numbers};
+
+/// The whole catalogue, by place.
+#[must_use]
+pub fn list(look: Look) -> String {
+    let widest = CATALOGUE.iter().map(|effect| effect.id.len()).max();
+    let widest = widest.unwrap_or(0);
+    let mut text = String::new();
+    for (place, heading) in [
+        (
+            Place::Actuator,
+            "actuator: between the command and the inflow",
+        ),
+        (Place::Vessel, "vessel: in its balance"),
+        (Place::Sensor, "sensor: between the level and the reading"),
+    ] {
+        text += &format!("{}\n", look.heading(heading));
+        for effect in CATALOGUE.iter().filter(|effect| effect.place == place) {
+            let first = format!(
+                "  {}{}  ",
+                look.strong(effect.id),
+                " ".repeat(widest - effect.id.len())
+            );
+            text += &look.paragraph(&first, effect.physics);
+        }
+        text.push('\n');
+    }
+    text + &look.paragraph(
+        "",
+        "`ctid effects EFFECT` says more of one: its equation, its parameters, how to confirm it.",
+    )
+}
+
+/// Everything the catalogue knows of one effect.
+///
+/// # Errors
+/// Where there is none of that name.
+pub fn describe(id: &str, look: Look) -> Result<String, Error> {
+    let effect = names::effect(id)?;
+    let entry = |name: &str, what: &str| {
+        look.paragraph(&format!("  {}", look.faint(format!("{name:<14}"))), what)
+    };
+    let mut text = format!("{}\n", look.heading(effect.id));
+    text += &look.paragraph("  ", effect.physics);
+    text.push('\n');
+    text += &entry("equation", effect.equation);
+    text += &entry("where", &place(effect));
+    text += &entry(
+        "plants",
+        &applies_to(effect)
+            .map(Plant::id)
+            .collect::<Vec<_>>()
+            .join(", "),
+    );
+    text.push('\n');
+    text += &parameters(effect, look);
+    text.push('\n');
+    let confused = if effect.confused_with.is_empty() {
+        "nothing in the catalogue".to_string()
+    } else {
+        effect.confused_with.join(", ")
+    };
+    text += &entry("confused with", &confused);
+    text += &entry("confirm", effect.confirm);
+    text += &entry("source", effect.source);
+    text.push('\n');
+    text += &entry(
+        "add it",
+        &format!("ctid add {} --model MODEL.toml", effect.id),
+    );
+    Ok(text)
+}
+
+fn applies_to(effect: &EffectInfo) -> impl Iterator<Item = Plant> {
+    Plant::ALL
+        .into_iter()
+        .filter(|&plant| (effect.applies)(plant))
+}
+
+fn place(effect: &EffectInfo) -> String {
+    match effect.place {
+        Place::Actuator => "at the actuator, between the command and the inflow".to_string(),
+        Place::Vessel => {
+            "in a vessel's balance; of two vessels either, `ctid add --where upper|lower`"
+                .to_string()
+        }
+        Place::Sensor => "at the sensor, between the level and the reading".to_string(),
+    }
+}
+
+/// The parameters, on a plant that shows as many of them as there are.
+fn parameters(effect: &'static EffectInfo, look: Look) -> String {
+    let Some(plant) = applies_to(effect).max_by_key(|plant| plant.vessels()) else {
+        return String::new();
+    };
+    let structure = model_file::any_structure(plant);
+    let placed = Placed { effect, vessel: 0 };
+    let heading = ["parameter", "unit", "absent at", "meaning"];
+    let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
+    for info in structure.effect_parameters(placed) {
+        let unit = info.unit.label("level", "input", false);
+        rows.push(vec![
+            info.name.to_string(),
+            if unit.is_empty() {
+                "1".to_string()
+            } else {
+                unit
+            },
+            absent(info.absent),
+            info.meaning.to_string(),
+        ]);
+    }
+    table(&[Side::Left, Side::Left, Side::Right, Side::Left], &rows)
+        .iter()
+        .map(|line| format!("  {line}\n"))
+        .collect()
+}
+
+fn absent(value: f64) -> String {
+    match value {
+        f64::INFINITY => "never reached".to_string(),
+        value if value.is_nan() => "any".to_string(),
+        value => numbers::significant(value, 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_is_listed_and_described_within_the_width() {
+        let look = Look::plain();
+        let all = list(look);
+        for effect in CATALOGUE {
+            assert!(all.contains(effect.id));
+            let text = describe(effect.id, look).unwrap();
+            for word in ["equation", "parameter", "absent at", "confirm", "source"] {
+                assert!(text.contains(word), "{text}");
+            }
+        }
+        assert!(all.lines().all(|line| line.chars().count() <= 80), "{all}");
+    }
+
+    #[test]
+    fn a_slip_is_answered_with_the_name() {
+        let error = describe("overfow", Look::plain()).unwrap_err().to_string();
+        assert!(error.contains("did you mean overflow?"), "{error}");
+    }
+}

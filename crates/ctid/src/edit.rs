@@ -1,0 +1,386 @@
+//! `ctid add` and `ctid remove`: they edit the `effects = [...]` line of a model file and leave
+//! everything else as it stands, comments and layout included.
+
+use std::path::Path;
+
+use plants::{Place, Placed};
+use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
+
+use crate::model_file::{self, ModelFile};
+use crate::{Error, atomic, names};
+
+/// Adds an effect to a model file; `place` is `upper` or `lower`, where there is a choice. Returns
+/// what was done, in one line.
+///
+/// # Errors
+/// Where the effect is unknown, on already, or does not act on this plant or there; the file is
+/// then as it was.
+pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Error> {
+    let name = path.display().to_string();
+    change(path, |text| with_effect(&name, text, effect, place))
+}
+
+/// Removes an effect from a model file. Returns what was done, in one line.
+///
+/// # Errors
+/// Where the effect is unknown or not on; the file is then as it was.
+pub fn remove(path: &Path, effect: &str) -> Result<String, Error> {
+    let name = path.display().to_string();
+    change(path, |text| without_effect(&name, text, effect))
+}
+
+/// A changed text and what was done, in one line.
+pub struct Edited {
+    /// The model file's new text.
+    pub text: String,
+    /// What was done.
+    pub done: String,
+}
+
+fn change(path: &Path, edit: impl FnOnce(&str) -> Result<Edited, Error>) -> Result<String, Error> {
+    let text = model_file::read_text(path)?;
+    let edited = edit(&text)?;
+    // The editor writes LF; a file from an editor that writes CRLF keeps it.
+    let written = if text.contains("\r\n") {
+        edited.text.replace("\r\n", "\n").replace('\n', "\r\n")
+    } else {
+        edited.text
+    };
+    atomic::write(path, written.as_bytes())?;
+    Ok(edited.done)
+}
+
+/// The text of a model file with one more effect; `file` names it in messages.
+///
+/// # Errors
+/// As [`add`].
+pub fn with_effect(
+    file: &str,
+    text: &str,
+    effect: &str,
+    place: Option<&str>,
+) -> Result<Edited, Error> {
+    let model = model_file::parse(file, text)?;
+    let effect = names::effect(effect)?;
+    let refuse = |what: String| Error::File {
+        file: file.to_string(),
+        what,
+    };
+    if model.effects.iter().any(|on| on.effect.id == effect.id) {
+        return Err(refuse(format!(
+            "{} is on already; `ctid remove {0}` takes it out",
+            effect.id
+        )));
+    }
+    let vessel = place
+        .map(|word| model_file::vessel(model.plant, effect, word).map_err(&refuse))
+        .transpose()?;
+    let placed = Placed {
+        effect,
+        vessel: vessel.unwrap_or(0),
+    };
+    model_file::any_structure(model.plant)
+        .with(placed)
+        .map_err(|error| refuse(error.to_string()))?;
+
+    let mut document = document(file, text)?;
+    push(&mut document, effect.id);
+    if let Some(word) = place {
+        set_place(&mut document, effect.id, word).ok_or_else(|| {
+            refuse(format!(
+                "[effect.{}] is not a table; make it one",
+                effect.id
+            ))
+        })?;
+    }
+    let text = document.to_string();
+    // What is about to be written has to be a model file that can be read again.
+    let model = model_file::parse(file, &text)?;
+    let placed = model.effects.last().copied().unwrap_or(placed);
+    let done = format!(
+        "{file}: added {}{}; effects = {}",
+        effect.id,
+        place_of(&model, placed, place.is_none()),
+        list(&model)
+    );
+    Ok(Edited { text, done })
+}
+
+/// The text of a model file without an effect; its `[effect.X]` table stays for another day.
+///
+/// # Errors
+/// As [`remove`].
+pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Error> {
+    let model = model_file::parse(file, text)?;
+    let effect = names::effect(effect)?;
+    let mut document = document(file, text)?;
+    let removed = document
+        .get_mut("effects")
+        .and_then(Item::as_array_mut)
+        .is_some_and(|effects| take_out(effects, effect.id));
+    if !removed {
+        return Err(Error::File {
+            file: file.to_string(),
+            what: format!(
+                "{} is not on, so it cannot be removed; effects = {}",
+                effect.id,
+                list(&model)
+            ),
+        });
+    }
+    let text = document.to_string();
+    let model = model_file::parse(file, &text)?;
+    let kept = match document
+        .get("effect")
+        .and_then(|table| table.get(effect.id))
+    {
+        Some(_) => format!(
+            "; [effect.{}] stays for the day it is added again",
+            effect.id
+        ),
+        None => String::new(),
+    };
+    let done = format!(
+        "{file}: removed {}; effects = {}{kept}",
+        effect.id,
+        list(&model)
+    );
+    Ok(Edited { text, done })
+}
+
+fn document(file: &str, text: &str) -> Result<DocumentMut, Error> {
+    text.parse()
+        .map_err(|error: toml_edit::TomlError| Error::File {
+            file: file.to_string(),
+            what: error.message().replace('\n', "; "),
+        })
+}
+
+/// Appends to the list, in the list's own layout; makes the list where there is none.
+fn push(document: &mut DocumentMut, id: &str) {
+    let Some(effects) = document.get_mut("effects").and_then(Item::as_array_mut) else {
+        document.insert("effects", value(Array::from_iter([id])));
+        return;
+    };
+    let trailing = effects.trailing().as_str().unwrap_or_default().to_string();
+    let multiline = trailing.contains('\n') && !effects.is_empty();
+    if !multiline {
+        effects.push(id);
+        return;
+    }
+    // One effect a line: a comment behind the last one stays behind it.
+    let indent = effects
+        .iter()
+        .last()
+        .and_then(|last| last.decor().prefix()?.as_str())
+        .and_then(|prefix| prefix.rsplit('\n').next())
+        .unwrap_or_default();
+    let comma = effects.trailing_comma();
+    let newline = trailing.rfind('\n').unwrap_or(0);
+    let item = Value::from(id).decorated(format!("{}\n{indent}", &trailing[..newline]), "");
+    effects.push_formatted(item);
+    effects.set_trailing(&trailing[newline..]);
+    effects.set_trailing_comma(comma);
+}
+
+/// Takes an effect out of the list. What stands before an entry may be the comment of the entry
+/// above it, so it is handed on to what follows.
+fn take_out(effects: &mut Array, id: &str) -> bool {
+    let Some(index) = effects.iter().position(|on| on.as_str() == Some(id)) else {
+        return false;
+    };
+    let removed = effects.remove(index);
+    let prefix = removed.decor().prefix().and_then(|prefix| prefix.as_str());
+    let before = prefix.unwrap_or_default().to_string();
+    let joined = |after: &str| match (before.contains('#'), after.contains('#')) {
+        (true, true) => format!("{}{after}", before.trim_end()),
+        (false, true) => after.to_string(),
+        (_, false) => before.clone(),
+    };
+    if let Some(next) = effects.get_mut(index) {
+        let after = next.decor().prefix().and_then(|prefix| prefix.as_str());
+        let prefix = joined(after.unwrap_or_default());
+        next.decor_mut().set_prefix(prefix);
+    } else if before.contains('#') {
+        let trailing = effects.trailing().as_str().unwrap_or_default();
+        let trailing = format!("{}{trailing}", before.trim_end());
+        effects.set_trailing(trailing);
+    }
+    if effects.is_empty() {
+        effects.set_trailing_comma(false);
+    }
+    true
+}
+
+/// Writes `where = "..."` into the `[effect.X]` table, made where there is none.
+fn set_place(document: &mut DocumentMut, id: &str, word: &str) -> Option<()> {
+    let mut tables = Table::new();
+    tables.set_implicit(true);
+    let mut settings = Table::new();
+    settings.decor_mut().set_prefix("\n");
+    document
+        .entry("effect")
+        .or_insert(Item::Table(tables))
+        .as_table_like_mut()?
+        .entry(id)
+        .or_insert(Item::Table(settings))
+        .as_table_like_mut()?
+        .insert("where", value(word));
+    Some(())
+}
+
+/// ` at the upper tank`, where the plant has two; `assumed` when nobody said which.
+fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
+    match model.plant.vessel_name(placed.vessel) {
+        Some(name) if placed.effect.place == Place::Vessel => {
+            let other = if assumed {
+                "; `--where` says another"
+            } else {
+                ""
+            };
+            format!(" at the {name} vessel{other}")
+        }
+        _ => String::new(),
+    }
+}
+
+fn list(model: &ModelFile) -> String {
+    let ids: Vec<&str> = model.effects.iter().map(|on| on.effect.id).collect();
+    format!("{ids:?}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn added(text: &str, effect: &str) -> String {
+        with_effect("tank.toml", text, effect, None).unwrap().text
+    }
+
+    fn removed(text: &str, effect: &str) -> String {
+        without_effect("tank.toml", text, effect).unwrap().text
+    }
+
+    const COMMENTED: &str = r#"# The tank in hall 3.
+plant = "single-tank"   # as built
+effects = []            # none yet
+
+[known]  # measured with a tape
+area = 154.0
+"#;
+
+    #[test]
+    fn comments_and_layout_stay() {
+        let with = added(COMMENTED, "overflow");
+        assert_eq!(with, COMMENTED.replace("[]", "[\"overflow\"]"));
+        assert_eq!(removed(&with, "overflow"), COMMENTED);
+        let both = added(&with, "pump_lag");
+        assert_eq!(
+            both,
+            COMMENTED.replace("[]", "[\"overflow\", \"pump_lag\"]")
+        );
+        assert_eq!(removed(&both, "overflow"), added(COMMENTED, "pump_lag"));
+        assert_eq!(removed(&both, "pump_lag"), with);
+    }
+
+    #[test]
+    fn a_list_over_several_lines_keeps_its_lines() {
+        let text = r#"plant = "single-tank"
+effects = [
+    "overflow",   # seen in May
+    "pump_lag",   # the new drive
+    # perhaps more
+]
+"#;
+        let more = added(text, "sensor_lag");
+        let expected = text.replace("more\n", "more\n    \"sensor_lag\",\n");
+        assert_eq!(more, expected);
+        assert_eq!(removed(&more, "sensor_lag"), text);
+        let without = removed(text, "pump_lag");
+        for comment in ["# seen in May", "# the new drive", "# perhaps more"] {
+            assert!(without.contains(comment), "{without}");
+        }
+        let none = removed(&without, "overflow");
+        for comment in ["# seen in May", "# the new drive", "# perhaps more"] {
+            assert!(none.contains(comment), "{none}");
+        }
+        assert_eq!(model_file::parse("", &none).unwrap().effects, []);
+    }
+
+    #[test]
+    fn a_missing_line_is_made() {
+        let text = "plant = \"single-tank\" # as built\n\n# sizes\n[known]\narea = 1.0\n";
+        let with = added(text, "overflow");
+        let line = "# as built\neffects = [\"overflow\"]\n";
+        assert_eq!(with, text.replace("# as built\n", line));
+    }
+
+    #[test]
+    fn the_place_is_written_where_there_is_a_choice() {
+        let text = "plant = \"cascaded-tanks\"\neffects = []\n";
+        let edited = with_effect("tank.toml", text, "overflow", Some("lower")).unwrap();
+        assert_eq!(
+            edited.text,
+            "plant = \"cascaded-tanks\"\neffects = [\"overflow\"]\n\n[effect.overflow]\nwhere = \"lower\"\n"
+        );
+        assert_eq!(
+            edited.done,
+            "tank.toml: added overflow at the lower vessel; effects = [\"overflow\"]"
+        );
+        let done = without_effect("tank.toml", &edited.text, "overflow").unwrap();
+        assert!(
+            done.done.contains("[effect.overflow] stays"),
+            "{}",
+            done.done
+        );
+        // The table has waited: nobody need say again where.
+        let again = with_effect("tank.toml", &done.text, "overflow", None).unwrap();
+        assert_eq!(
+            model_file::parse("", &again.text).unwrap().effects[0].vessel,
+            1
+        );
+        let upper = with_effect("tank.toml", &done.text, "overflow", Some("upper")).unwrap();
+        assert_eq!(upper.text.matches("where").count(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_done_is_refused() {
+        let text = "plant = \"single-tank\"\neffects = [\"overflow\"]\n";
+        let add = |effect, place| match with_effect("tank.toml", text, effect, place) {
+            Err(error) => error.to_string(),
+            Ok(edited) => edited.text,
+        };
+        assert_eq!(
+            add("overflow", None),
+            "tank.toml: overflow is on already; `ctid remove overflow` takes it out"
+        );
+        assert!(add("overflo", None).contains("did you mean overflow?"));
+        assert!(add("sqrt_outflow", None).contains("does not act on plant"));
+        assert!(add("const_leak", Some("upper")).contains("one vessel"));
+        assert!(add("pump_lag", Some("upper")).contains("acts at the actuator"));
+        let remove = without_effect("tank.toml", text, "pump_lag");
+        assert_eq!(
+            remove.err().unwrap().to_string(),
+            "tank.toml: pump_lag is not on, so it cannot be removed; effects = [\"overflow\"]"
+        );
+    }
+
+    #[test]
+    fn a_refused_change_leaves_the_file_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tank.toml");
+        std::fs::write(&path, "plant = \"single-tank\"\r\neffects = []\r\n").unwrap();
+        assert!(add(&path, "overfow", None).is_err());
+        assert_eq!(
+            std::fs::read(&path).unwrap(),
+            b"plant = \"single-tank\"\r\neffects = []\r\n"
+        );
+        add(&path, "overflow", None).unwrap();
+        assert_eq!(
+            std::fs::read(&path).unwrap(),
+            b"plant = \"single-tank\"\r\neffects = [\"overflow\"]\r\n"
+        );
+        // Nothing is left beside it.
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,166 @@
+//! Numbers for the terminal: as many digits as they deserve, aligned in columns.
+
+/// A number with this many significant digits, `-` where there is none.
+pub(crate) fn significant(value: f64, digits: i32) -> String {
+    if !value.is_finite() {
+        return match value {
+            f64::INFINITY => "infinite".to_string(),
+            _ => "-".to_string(),
+        };
+    }
+    let exponent = exponent(value);
+    if (-4..6).contains(&exponent) {
+        decimals(value, digits - 1 - exponent)
+    } else {
+        let places = usize::try_from(digits - 1).unwrap_or(0);
+        format!("{value:.places$e}")
+    }
+}
+
+/// A value and its standard error, both to the second digit of the error. `None` for the error
+/// where the data do not give one.
+pub(crate) fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<String>) {
+    let Some(error) = std_error.filter(|error| error.is_finite() && *error > 0.0) else {
+        return (significant(value, 4), None);
+    };
+    if !value.is_finite() {
+        return (significant(value, 4), None);
+    }
+    let (largest, last) = (exponent(value.abs().max(error)), exponent(error) - 1);
+    if largest < 6 && last > -7 {
+        (decimals(value, -last), Some(decimals(error, -last)))
+    } else {
+        // So many digits, or so large, that only powers of ten can be read.
+        (
+            significant(value, (largest - last + 1).min(8)),
+            Some(significant(error, 2)),
+        )
+    }
+}
+
+/// `value ± error unit`.
+pub(crate) fn with_error(value: f64, std_error: Option<f64>, unit: &str) -> String {
+    let text = match value_and_error(value, std_error) {
+        (value, Some(error)) => format!("{value} ± {error}"),
+        (value, None) => value,
+    };
+    format!("{text} {unit}").trim_end().to_string()
+}
+
+/// Numbers that stand under each other: all with the decimals that give the smallest of them two
+/// significant digits; `-` where there is none.
+pub(crate) fn column(values: &[Option<f64>]) -> Vec<String> {
+    let finite = || values.iter().flatten().filter(|value| value.is_finite());
+    let places = finite()
+        .filter(|value| **value != 0.0)
+        .map(|&value| 1 - exponent(value))
+        .max()
+        .unwrap_or(0)
+        .max(0);
+    let too_wide = finite().any(|&value| exponent(value) > 7) || places > 6;
+    values
+        .iter()
+        .map(|value| match value {
+            Some(value) if value.is_finite() && !too_wide => decimals(*value, places),
+            Some(value) => significant(*value, 3),
+            None => "-".to_string(),
+        })
+        .collect()
+}
+
+/// A duration, from milliseconds to days.
+pub(crate) fn duration(seconds: f64) -> String {
+    let (value, unit) = match seconds.abs() {
+        s if s >= 2.0 * 86_400.0 => (seconds / 86_400.0, "days"),
+        s if s >= 2.0 * 3_600.0 => (seconds / 3_600.0, "h"),
+        s if s >= 600.0 => (seconds / 60.0, "min"),
+        s if s >= 1.0 => (seconds, "s"),
+        _ => (seconds * 1e3, "ms"),
+    };
+    let whole = (value - value.round()).abs() < 1e-9 * value.abs();
+    if whole {
+        format!("{value:.0} {unit}")
+    } else {
+        format!("{} {unit}", significant(value, 3))
+    }
+}
+
+/// The power of ten of the first digit.
+fn exponent(value: f64) -> i32 {
+    if value == 0.0 {
+        return 0;
+    }
+    // The printed form does not round: log10 would make 0.001 a power of -2.99.
+    format!("{:e}", value.abs())
+        .split_once('e')
+        .and_then(|(_, exponent)| exponent.parse().ok())
+        .unwrap_or(0)
+}
+
+/// Fixed decimals; negative `places` round to tens, hundreds, ...
+fn decimals(value: f64, places: i32) -> String {
+    let text = match usize::try_from(places) {
+        Ok(places) => format!("{value:.places$}"),
+        Err(_) => {
+            let step = 10f64.powi(-places);
+            format!("{:.0}", (value / step).round() * step)
+        }
+    };
+    // No minus before a number that is all zeros.
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_string(),
+        _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_are_sensible() {
+        assert_eq!(significant(0.666_66, 3), "0.667");
+        assert_eq!(significant(123_456.0, 3), "123000");
+        assert_eq!(significant(-0.5, 2), "-0.50");
+        assert_eq!(significant(1.5e-7, 2), "1.5e-7");
+        assert_eq!(significant(2.0e9, 2), "2.0e9");
+        assert_eq!(significant(0.0, 1), "0");
+        assert_eq!(significant(-0.0, 1), "0");
+        assert_eq!(significant(f64::NAN, 3), "-");
+        assert_eq!(significant(f64::INFINITY, 3), "infinite");
+    }
+
+    #[test]
+    fn a_value_stops_where_its_error_starts() {
+        let text = |value, error| with_error(value, Some(error), "cm");
+        assert_eq!(text(11.023_456, 0.012_3), "11.023 ± 0.012 cm");
+        assert_eq!(text(47_012.0, 1_187.0), "47000 ± 1200 cm");
+        assert_eq!(text(0.0, 0.1), "0.00 ± 0.10 cm");
+        assert_eq!(text(-0.001, 0.1), "0.00 ± 0.10 cm");
+        assert_eq!(text(1.234e-8, 2.1e-10), "1.234e-8 ± 2.1e-10 cm");
+        assert_eq!(text(1.234e8, 2.1e6), "1.234e8 ± 2.1e6 cm");
+        assert_eq!(with_error(3.0, None, ""), "3.000");
+        assert_eq!(with_error(3.0, Some(f64::NAN), ""), "3.000");
+        assert_eq!(with_error(f64::NAN, Some(1.0), "s"), "- s");
+    }
+
+    #[test]
+    fn a_column_has_one_number_of_decimals() {
+        let column =
+            |values: &[f64]| super::column(&values.iter().copied().map(Some).collect::<Vec<_>>());
+        assert_eq!(column(&[0.6712, 0.0512]), ["0.671", "0.051"]);
+        assert_eq!(column(&[12.0, 1893.4]), ["12", "1893"]);
+        assert_eq!(column(&[1e-9, 1.0]), ["1.00e-9", "1.00"]);
+        assert_eq!(super::column(&[None, Some(0.5)]), ["-", "0.50"]);
+        assert_eq!(column(&[0.0, f64::NAN]), ["0", "-"]);
+    }
+
+    #[test]
+    fn durations_have_fitting_units() {
+        assert_eq!(duration(0.012), "12 ms");
+        assert_eq!(duration(90.0), "90 s");
+        assert_eq!(duration(1798.0), "30.0 min");
+        assert_eq!(duration(36_000.0), "10 h");
+        assert_eq!(duration(864_000.0), "10 days");
+    }
+}

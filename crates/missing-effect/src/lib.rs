@@ -1,7 +1,20 @@
 //! Compares a plant with records, locates the failure, names the missing effect and confirms it.
+//!
+//! [`compare`] fits the believed model and says where it fails. [`diagnose`] then searches the catalogue for sets
+//! of effects that explain the failure, confirms each of them, groups what the data cannot tell apart, and returns
+//! the trail of the falling error.
 
+mod diagnose;
 mod diagnosis;
+mod error;
+mod locate;
+mod noise_floor;
+mod search;
+mod sentences;
+mod step;
 
+pub use diagnose::{Options, Problem, Progress, compare, diagnose};
 pub use diagnosis::{
     Bin, Diagnosis, Failures, NoiseFloor, Parameter, ResidualTests, Score, Shown, Step, Verdict,
 };
+pub use error::Error;

@@ -23,8 +23,9 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         meaning: "flow that leaves unseen",
         absent: 0.0,
         lower: 0.0,
-        upper: 5.0 * flow,
-        starts: vec![0.1 * flow],
+        // More than this does not leak away unseen.
+        upper: 0.2 * flow,
+        starts: vec![0.05 * flow],
     }]
 }
 

@@ -23,8 +23,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         unit: Unit::LEVEL,
         meaning: "height of the rim",
         absent: f64::INFINITY,
-        lower: low + 0.2 * span,
-        upper: high + 0.05 * span,
+        lower: low - 0.5 * span,
+        upper: high + 0.5 * span,
         starts: spread(low + 0.4 * span, high, 4),
     }];
     if !site.is_last() {

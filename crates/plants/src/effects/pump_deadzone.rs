@@ -46,4 +46,11 @@ impl<T: Scalar> Law<T> for PumpDeadzone<T> {
             (u + self.0).min(T::constant(0.0))
         }
     }
+    fn corners(&self) -> [Option<T>; 2] {
+        if self.0.value() > 0.0 {
+            [Some(self.0), Some(-self.0)]
+        } else {
+            [None; 2]
+        }
+    }
 }

@@ -38,4 +38,7 @@ impl<T: Scalar> Law<T> for PumpSaturation<T> {
     fn command(&mut self, u: T, _t: f64) -> T {
         u.min(self.0)
     }
+    fn corners(&self) -> [Option<T>; 2] {
+        [Some(self.0).filter(|limit| limit.value().is_finite()), None]
+    }
 }

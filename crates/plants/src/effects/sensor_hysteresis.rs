@@ -28,7 +28,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         starts,
     };
     vec![
-        info("step", "by how much the reading is too high", 0.0, 0.0, 0.3 * span, vec![0.03 * span]),
+        info("step", "by how much the reading is too high", 0.0, 0.0, 0.1 * span, vec![0.03 * span]),
         info(
             "drop",
             "level at which a falling reading drops back",

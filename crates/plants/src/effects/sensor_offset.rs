@@ -17,16 +17,16 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
-    let span = high - low;
+    // A zero that is wrong by more than this would have been seen.
+    let most = 0.1 * low.abs().max(high.abs());
     vec![ParameterInfo {
         name: "offset",
         unit: Unit::LEVEL,
         meaning: "reading at a level of zero",
         absent: 0.0,
-        lower: -2.0 * span,
-        // The water stands above the outlet, so the reading cannot be shifted by more than its smallest value.
-        upper: (2.0 * span).min(low + 0.1 * span).max(0.05 * span),
-        starts: vec![0.02 * span],
+        lower: -most,
+        upper: most,
+        starts: vec![0.1 * most],
     }]
 }
 

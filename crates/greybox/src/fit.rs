@@ -1,0 +1,273 @@
+//! Fits from many starts, the noise's colour, and the uncertainty of what was fitted.
+
+use ct_signals::ArModel;
+use rayon::prelude::*;
+
+use crate::{
+    Error, Setup, Stop, Stopping, Triangle,
+    levenberg_marquardt::{held, minimise},
+    random_starts,
+    starts::extend_levels,
+};
+
+/// How to fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitOptions {
+    /// How many random starts.
+    pub starts: usize,
+    /// Seed of the starts.
+    pub seed: u64,
+    /// Largest order of the noise model that is tried; zero takes the noise for white.
+    pub noise_order: usize,
+    /// When to stop.
+    pub stopping: Stopping,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self {
+            starts: 12,
+            seed: 1,
+            noise_order: 6,
+            stopping: Stopping {
+                evaluations: 120,
+                cost: 1e-9,
+            },
+        }
+    }
+}
+
+/// A fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The fitted vector: parameters, then initial levels.
+    pub x: Vec<f64>,
+    /// Sum of squares of the whitened residual \[output unit squared\].
+    pub cost: f64,
+    /// Root mean square of the simulation error \[output unit\].
+    pub rmse: f64,
+    /// The noise in whose metric it was fitted.
+    pub noise: ArModel,
+    /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance at its best.
+    pub deviance: f64,
+    /// Fitted numbers, those of the noise included.
+    pub parameters: usize,
+    /// Samples.
+    pub samples: usize,
+    /// How many starts were tried.
+    pub starts: usize,
+    /// How many of them ended in the best minimum.
+    pub agree: usize,
+    /// Why the best one stopped.
+    pub stop: Stop,
+    /// The folded rows at the minimum.
+    pub triangle: Triangle,
+    /// Positions (among the fitted entries) that the gradient does not hold at a bound.
+    interior: Vec<usize>,
+    free: Vec<usize>,
+}
+
+impl Fit {
+    /// The same fit, with the starts counted of the one it continues.
+    #[must_use]
+    pub fn continuing(mut self, first: &Self) -> Self {
+        self.starts = first.starts;
+        self.agree = first.agree;
+        self
+    }
+
+    /// Bayesian information criterion: smaller is better.
+    #[must_use]
+    pub fn bic(&self) -> f64 {
+        self.deviance + self.parameters as f64 * (self.samples as f64).ln()
+    }
+
+    /// Variance of the innovations, with the degrees of freedom that are left.
+    #[must_use]
+    pub fn variance(&self) -> f64 {
+        self.cost / (self.samples.saturating_sub(self.free.len())).max(1) as f64
+    }
+
+    /// Standard error of every entry of the vector; `None` for one that is fixed, held at a bound, or not determined.
+    #[must_use]
+    pub fn std_errors(&self) -> Vec<Option<f64>> {
+        let mut errors = vec![None; self.x.len()];
+        if let Some(covariance) = self.triangle.covariance(&self.interior) {
+            for (i, &column) in self.interior.iter().enumerate() {
+                errors[self.free[column]] = Some((covariance[i][i] * self.variance()).sqrt());
+            }
+        }
+        errors
+    }
+
+    /// Correlations between the entries that have a standard error: their positions and the matrix.
+    #[must_use]
+    pub fn correlations(&self) -> Option<(Vec<usize>, Vec<Vec<f64>>)> {
+        let covariance = self.triangle.covariance(&self.interior)?;
+        let matrix = covariance
+            .iter()
+            .enumerate()
+            .map(|(i, row)| {
+                row.iter()
+                    .enumerate()
+                    .map(|(j, c)| c / (covariance[i][i] * covariance[j][j]).sqrt())
+                    .collect()
+            })
+            .collect();
+        Some((
+            self.interior
+                .iter()
+                .map(|&column| self.free[column])
+                .collect(),
+            matrix,
+        ))
+    }
+}
+
+/// Fits from random starts, with the noise's colour estimated.
+///
+/// # Errors
+/// Where no start gives a finite simulation.
+pub fn fit(setup: &Setup, options: &FitOptions) -> Result<Fit, Error> {
+    let starts = random_starts(setup, options.starts.max(1), options.seed);
+    let white = fit_from(setup, &starts, &ArModel::white(1.0), options.stopping)?;
+    coloured(setup, white, options.noise_order, options.stopping)
+}
+
+/// Fits from the given starts in the metric of a given noise; white noise is `ArModel::white(1.0)`.
+///
+/// # Errors
+/// Where no start gives a finite simulation.
+pub fn fit_from(
+    setup: &Setup,
+    starts: &[Vec<f64>],
+    noise: &ArModel,
+    stopping: Stopping,
+) -> Result<Fit, Error> {
+    let free = setup.free();
+    let bounds: Vec<(f64, f64)> = free.iter().map(|&i| setup.bounds()[i]).collect();
+    let minima: Vec<_> = starts
+        .par_iter()
+        .map(|start| {
+            let mut start = start.clone();
+            setup.impose_fixed(&mut start);
+            let full = |x: &[f64]| {
+                let mut full = start.clone();
+                for (&i, value) in free.iter().zip(x) {
+                    full[i] = *value;
+                }
+                full
+            };
+            let x: Vec<f64> = free.iter().map(|&i| start[i]).collect();
+            let minimum = minimise(x, &bounds, stopping, |x| setup.linearise(&full(x), noise));
+            (full(&minimum.x), minimum)
+        })
+        .filter(|(_, minimum)| minimum.stop != Stop::NotFinite)
+        .collect();
+    let best = minima
+        .iter()
+        .map(|(_, minimum)| minimum.triangle.cost())
+        .fold(f64::INFINITY, f64::min);
+    let agree = minima
+        .iter()
+        .filter(|(_, minimum)| minimum.triangle.cost() <= best * (1.0 + 1e-5))
+        .count();
+    let (x, minimum) = minima
+        .into_iter()
+        .find(|(_, minimum)| minimum.triangle.cost() <= best)
+        .ok_or(Error::NoFiniteStart {
+            starts: starts.len(),
+        })?;
+    let interior = (0..free.len())
+        .filter(|&j| !held(minimum.x[j], bounds[j], minimum.triangle.descent(j)))
+        .collect();
+    let samples = setup.samples();
+    let cost = minimum.triangle.cost();
+    let n = samples as f64;
+    let log_det: f64 = setup
+        .records
+        .iter()
+        .map(|record| noise.log_det(record.len()))
+        .sum();
+    let squares: f64 = setup.residuals(&x)?.iter().flatten().map(|r| r * r).sum();
+    Ok(Fit {
+        x,
+        cost,
+        rmse: (squares / n).sqrt(),
+        noise: noise.clone(),
+        deviance: n * (1.0 + (std::f64::consts::TAU * (cost / n).max(f64::MIN_POSITIVE)).ln())
+            + log_det,
+        parameters: free.len() + 1 + noise.order(),
+        samples,
+        starts: starts.len(),
+        agree,
+        stop: minimum.stop,
+        triangle: minimum.triangle,
+        interior,
+        free: free.to_vec(),
+    })
+}
+
+/// Estimates the noise's colour from a fit's residual and refits in that metric, until the two agree.
+///
+/// # Errors
+/// As [`fit_from`].
+pub fn coloured(setup: &Setup, fit: Fit, order: usize, stopping: Stopping) -> Result<Fit, Error> {
+    let (starts, agree) = (fit.starts, fit.agree);
+    let mut fit = fit;
+    for _ in 0..8 {
+        let residuals = setup.residuals(&fit.x)?;
+        let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+        let noise = ArModel::fit(&segments, order)?;
+        let same = noise.order() == fit.noise.order()
+            && noise
+                .coefficients()
+                .iter()
+                .zip(fit.noise.coefficients())
+                .all(|(a, b)| (a - b).abs() < 1e-4);
+        if same {
+            break;
+        }
+        let next = fit_from(setup, std::slice::from_ref(&fit.x), &noise, stopping)?;
+        let settled = fit.noise.order() > 0 && (next.deviance - fit.deviance).abs() < 1e-3;
+        fit = next;
+        if settled {
+            break;
+        }
+    }
+    fit.starts = starts;
+    fit.agree = agree;
+    Ok(fit)
+}
+
+/// The initial levels that fit best with every parameter frozen; `parameters` are the vector's entries before the levels.
+///
+/// # Errors
+/// As [`fit_from`].
+pub fn fit_initial_levels(
+    setup: &Setup,
+    parameters: &[f64],
+    stopping: Stopping,
+) -> Result<Vec<f64>, Error> {
+    let mut frozen = setup.clone();
+    frozen.freeze_parameters();
+    let mut x = parameters.to_vec();
+    extend_levels(setup, &mut x);
+    // The upper level may be far from rest: a few starts around it.
+    let starts: Vec<Vec<f64>> = [1.0, 0.25, 4.0]
+        .into_iter()
+        .map(|factor| {
+            let mut start = x.clone();
+            if setup.structure.plant.vessels() > 1 {
+                for level in start[parameters.len()..]
+                    .iter_mut()
+                    .step_by(setup.structure.plant.vessels())
+                {
+                    *level *= factor;
+                }
+            }
+            start
+        })
+        .collect();
+    Ok(fit_from(&frozen, &starts, &ArModel::white(1.0), stopping)?.x)
+}

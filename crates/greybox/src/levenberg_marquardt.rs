@@ -1,0 +1,142 @@
+//! Levenberg-Marquardt with bounds.
+//!
+//! Minimises `|r(x)|^2` over a box. The step solves `min |J d - r|^2 + mu |D d|^2`, `D` the column norms of `J`
+//! (Marquardt's scaling, so that units do not matter), over the parameters that are not held at a bound by the
+//! gradient; it is clipped to the box. `mu` follows the gain ratio (H. B. Nielsen, Damping parameter in Marquardt's
+//! method, 1999).
+
+use crate::Triangle;
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stopping {
+    /// Most evaluations.
+    pub evaluations: usize,
+    /// Relative fall of the cost below which a step counts as the last one.
+    pub cost: f64,
+}
+
+/// Why the iteration stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stop {
+    /// The cost falls no more.
+    Converged,
+    /// The evaluations were used up.
+    Evaluations,
+    /// The simulation is not finite at the start.
+    NotFinite,
+}
+
+pub(crate) struct Minimum {
+    pub x: Vec<f64>,
+    pub triangle: Triangle,
+    pub stop: Stop,
+}
+
+/// Whether the gradient holds a parameter at its bound.
+pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
+    let room = 1e-12 * (upper - lower);
+    (x <= lower + room && descent <= 0.0) || (x >= upper - room && descent >= 0.0)
+}
+
+/// From `x`, which is clipped to the box; `evaluate` gives the folded rows `[J, r]`, `r` = measured minus model.
+pub(crate) fn minimise(
+    mut x: Vec<f64>,
+    bounds: &[(f64, f64)],
+    stopping: Stopping,
+    evaluate: impl Fn(&[f64]) -> Option<Triangle>,
+) -> Minimum {
+    let p = x.len();
+    for (value, (lower, upper)) in x.iter_mut().zip(bounds) {
+        *value = value.clamp(*lower, *upper);
+    }
+    let Some(mut at) = evaluate(&x) else {
+        return Minimum {
+            x,
+            triangle: Triangle::new(p + 1),
+            stop: Stop::NotFinite,
+        };
+    };
+    let (mut damping, mut growth) = (1e-3, 2.0);
+    let mut evaluations = 1;
+    let mut small_steps = 0;
+    while evaluations < stopping.evaluations {
+        let cost = at.cost();
+        let free: Vec<usize> = (0..p)
+            .filter(|&j| !held(x[j], bounds[j], at.descent(j)))
+            .collect();
+        if free.is_empty() || cost == 0.0 {
+            return Minimum {
+                x,
+                triangle: at,
+                stop: Stop::Converged,
+            };
+        }
+        let scale: Vec<f64> = (0..p)
+            .map(|j| at.column_norm(j).max(f64::MIN_POSITIVE))
+            .collect();
+        let step = at.solve(&free, &scale, damping);
+        let trial: Vec<f64> = x
+            .iter()
+            .zip(&step)
+            .zip(bounds)
+            .map(|((x, d), &(lower, upper))| {
+                // A parameter that must be positive does not lose more than four fifths at once.
+                let lower = if lower > 0.0 {
+                    lower.max(0.2 * x)
+                } else {
+                    lower
+                };
+                (x + d).clamp(lower, upper.max(lower))
+            })
+            .collect();
+        let moved: Vec<f64> = trial.iter().zip(&x).map(|(to, from)| to - from).collect();
+        let predicted = cost - at.predicted(&moved);
+        if moved.iter().all(|d| *d == 0.0) || predicted.abs() <= 1e-15 * cost {
+            return Minimum {
+                x,
+                triangle: at,
+                stop: Stop::Converged,
+            };
+        }
+        evaluations += 1;
+        let next = evaluate(&trial).filter(|next| next.cost() < cost);
+        if let Some(next) = next {
+            let fall = cost - next.cost();
+            let ratio = fall / predicted;
+            damping =
+                (damping * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0)).max(1e-12);
+            growth = 2.0;
+            x = trial;
+            at = next;
+            small_steps = if fall <= stopping.cost * cost {
+                small_steps + 1
+            } else {
+                0
+            };
+            if small_steps == 2 {
+                return Minimum {
+                    x,
+                    triangle: at,
+                    stop: Stop::Converged,
+                };
+            }
+        } else {
+            if damping > 1e12 || predicted.abs() <= 1e-3 * stopping.cost * cost {
+                return Minimum {
+                    x,
+                    triangle: at,
+                    stop: Stop::Converged,
+                };
+            }
+            damping *= growth;
+            growth *= 2.0;
+        }
+    }
+    Minimum {
+        x,
+        triangle: at,
+        stop: Stop::Evaluations,
+    }
+}

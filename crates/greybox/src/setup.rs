@@ -1,0 +1,440 @@
+//! A structure set against records: the vector that is fitted, its bounds, and the simulation with derivatives.
+
+use std::collections::BTreeMap;
+
+use ct_signals::{ArModel, Hold, Record};
+use plants::{Command, Dual, MAX_VESSELS, Scalar, Scales, Simulator, Structure};
+
+use crate::{Error, Triangle};
+
+/// A structure, the records, and which parameters are free.
+///
+/// The fitted vector holds the structure's parameters (free ones and fixed ones), then the initial level of every
+/// vessel for every record.
+#[derive(Debug, Clone)]
+pub struct Setup<'a> {
+    /// The structure.
+    pub structure: Structure,
+    /// The records that are fitted together.
+    pub records: &'a [Record],
+    /// Parameters that are not fitted, with their values.
+    pub fixed: BTreeMap<String, f64>,
+    /// Equal parts of a sampling interval in the simulation.
+    pub substeps: usize,
+    names: Vec<String>,
+    bounds: Vec<(f64, f64)>,
+    /// Positions of the parameters that are fitted.
+    free: Vec<usize>,
+}
+
+/// What a simulation shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    /// The reading, a series for each record.
+    pub output: Vec<Vec<f64>>,
+    /// Smallest and largest level of each vessel over all records.
+    pub level: [(f64, f64); MAX_VESSELS],
+    /// Mean level of each vessel over all records.
+    pub mean_level: [f64; MAX_VESSELS],
+}
+
+/// Scales of records as the structure meets them first.
+pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<Scales> {
+    let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    let input = records.iter().map(Record::input_range).reduce(wider)?;
+    let output = records.iter().map(Record::output_range).reduce(wider)?;
+    let sample = records
+        .iter()
+        .map(Record::sample_interval)
+        .fold(f64::INFINITY, f64::min);
+    let duration = records.iter().map(Record::duration).fold(0.0, f64::max);
+    let mut scales = Scales::from_ranges(input, output, sample, duration);
+    if let Some(range) = input_range {
+        scales.input_range = range;
+    }
+    Some(scales)
+}
+
+impl<'a> Setup<'a> {
+    /// A structure against records.
+    ///
+    /// # Errors
+    /// Where there is no record, a record is not sound, or `fixed` names a parameter that there is not.
+    pub fn new(
+        structure: Structure,
+        records: &'a [Record],
+        fixed: BTreeMap<String, f64>,
+    ) -> Result<Self, Error> {
+        if records.is_empty() {
+            return Err(Error::NoRecord);
+        }
+        for record in records {
+            record.validate()?;
+        }
+        let plant = structure.plant;
+        let mut names = structure.parameter_names();
+        let mut bounds: Vec<(f64, f64)> = structure
+            .parameters()
+            .iter()
+            .map(|p| (p.lower, p.upper))
+            .collect();
+        for name in fixed.keys() {
+            // A name of an effect that is not on in this structure is no mistake: it waits.
+            let effect_known = name
+                .split_once('.')
+                .is_some_and(|(effect, _)| plants::EffectInfo::find(effect).is_some());
+            if !names.contains(name) && !effect_known {
+                return Err(Error::UnknownParameter {
+                    name: name.clone(),
+                    known: names.join(", "),
+                });
+            }
+        }
+        let mut free: Vec<usize> = (0..names.len())
+            .filter(|&i| !fixed.contains_key(&names[i]))
+            .collect();
+        let reach = structure.scales.largest_level().max(1e-9);
+        let lowest = if plant.outlet() == plants::Outlet::Torricelli {
+            0.0
+        } else {
+            -1e3 * reach
+        };
+        for (r, _) in records.iter().enumerate() {
+            for vessel in 0..plant.vessels() {
+                free.push(names.len());
+                let of = if records.len() > 1 {
+                    format!(", record {}", r + 1)
+                } else {
+                    String::new()
+                };
+                names.push(format!("{}(0){of}", plant.level_name(vessel)));
+                bounds.push((lowest, 1e3 * reach));
+            }
+        }
+        Ok(Self {
+            structure,
+            records,
+            fixed,
+            substeps: 1,
+            names,
+            bounds,
+            free,
+        })
+    }
+
+    /// A setup from records alone: the scales are taken from them.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn from_records(
+        plant: plants::Plant,
+        known: plants::Known,
+        effects: &[plants::Placed],
+        records: &'a [Record],
+        fixed: BTreeMap<String, f64>,
+    ) -> Result<Self, Error> {
+        let scales = scales_of(records, known.input_range).ok_or(Error::NoRecord)?;
+        let mut structure = Structure::new(plant, known, scales);
+        for &effect in effects {
+            structure = structure.with(effect)?;
+        }
+        Self::new(structure, records, fixed)
+    }
+
+    /// The same records against another structure.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn with_structure(&self, structure: Structure) -> Result<Self, Error> {
+        let mut setup = Self::new(structure, self.records, self.fixed.clone())?;
+        setup.substeps = self.substeps;
+        Ok(setup)
+    }
+
+    /// The same structure against other records, in the same scales.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn with_records<'b>(&self, records: &'b [Record]) -> Result<Setup<'b>, Error> {
+        let mut setup = Setup::new(self.structure.clone(), records, self.fixed.clone())?;
+        setup.substeps = self.substeps;
+        Ok(setup)
+    }
+
+    /// Names of the vector's entries.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Bounds of the vector's entries.
+    #[must_use]
+    pub fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
+    }
+
+    /// Positions of the entries that are fitted.
+    #[must_use]
+    pub fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    /// How many of the vector's entries are parameters, before the initial levels.
+    #[must_use]
+    pub fn parameter_count(&self) -> usize {
+        self.names.len() - self.records.len() * self.structure.plant.vessels()
+    }
+
+    /// Puts the fixed parameters' values in their places.
+    pub(crate) fn impose_fixed(&self, x: &mut [f64]) {
+        for (name, value) in self.names.iter().zip(x) {
+            if let Some(fixed) = self.fixed.get(name) {
+                *value = *fixed;
+            }
+        }
+    }
+
+    /// Holds every parameter; only initial levels stay free.
+    pub(crate) fn freeze_parameters(&mut self) {
+        let count = self.parameter_count();
+        self.free.retain(|&i| i >= count);
+    }
+
+    /// Samples in all records.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.records.iter().map(Record::len).sum()
+    }
+
+    /// Positions of the initial levels of record `r`.
+    fn levels_of(&self, r: usize) -> std::ops::Range<usize> {
+        let n = self.structure.plant.vessels();
+        let from = self.parameter_count() + r * n;
+        from..from + n
+    }
+
+    /// Runs one record on any scalar; `each` sees every sample's reading and the levels; it may stop the run.
+    fn run<T: Scalar>(
+        &self,
+        record: &Record,
+        simulator: &mut Simulator<T>,
+        mut each: impl FnMut(usize, T, &Simulator<T>) -> bool,
+    ) {
+        simulator.set_substeps(self.substeps);
+        let n = record.len();
+        for k in 0..n {
+            let y = simulator.read();
+            if !each(k, y, simulator) {
+                return;
+            }
+            if k + 1 < n {
+                simulator.advance(command(record, k), record.time[k + 1] - record.time[k]);
+            }
+        }
+    }
+
+    /// Simulates all records.
+    ///
+    /// # Errors
+    /// Where the vector has the wrong length.
+    pub fn simulate(&self, x: &[f64]) -> Result<Simulated, Error> {
+        let mut simulated = Simulated {
+            output: Vec::with_capacity(self.records.len()),
+            level: [(f64::INFINITY, f64::NEG_INFINITY); MAX_VESSELS],
+            mean_level: [0.0; MAX_VESSELS],
+        };
+        for (r, record) in self.records.iter().enumerate() {
+            let mut simulator = Simulator::new(
+                &self.structure,
+                &x[..self.parameter_count()],
+                &x[self.levels_of(r)],
+                record.input.values[0],
+            )?;
+            let mut output = Vec::with_capacity(record.len());
+            self.run(record, &mut simulator, |_, y, simulator| {
+                output.push(y);
+                for (i, level) in simulator.levels().into_iter().enumerate() {
+                    simulated.level[i].0 = simulated.level[i].0.min(level);
+                    simulated.level[i].1 = simulated.level[i].1.max(level);
+                    simulated.mean_level[i] += level;
+                }
+                true
+            });
+            simulated.output.push(output);
+        }
+        let samples = self.samples() as f64;
+        for mean in &mut simulated.mean_level {
+            *mean /= samples;
+        }
+        Ok(simulated)
+    }
+
+    /// Measured minus model, a series for each record.
+    ///
+    /// # Errors
+    /// As [`Setup::simulate`].
+    pub fn residuals(&self, x: &[f64]) -> Result<Vec<Vec<f64>>, Error> {
+        let simulated = self.simulate(x)?;
+        Ok(self
+            .records
+            .iter()
+            .zip(simulated.output)
+            .map(|(record, model)| {
+                record
+                    .output
+                    .values
+                    .iter()
+                    .zip(model)
+                    .map(|(y, m)| y - m)
+                    .collect()
+            })
+            .collect())
+    }
+
+    /// The folded rows `[d model/d x_free, measured - model]`, whitened by the noise model; `None` where the
+    /// simulation is not finite.
+    #[must_use]
+    pub fn linearise(&self, x: &[f64], noise: &ArModel) -> Option<Triangle> {
+        // Parameters and one record's initial levels; a few lane counts, so that short vectors stay cheap.
+        let parameters = self
+            .free
+            .iter()
+            .filter(|&&i| i < self.parameter_count())
+            .count();
+        match parameters + self.structure.plant.vessels() {
+            0..=4 => self.linearise_lanes::<4>(x, noise),
+            5..=6 => self.linearise_lanes::<6>(x, noise),
+            7..=8 => self.linearise_lanes::<8>(x, noise),
+            9..=12 => self.linearise_lanes::<12>(x, noise),
+            _ => self.linearise_lanes::<16>(x, noise),
+        }
+    }
+
+    fn linearise_lanes<const L: usize>(&self, x: &[f64], noise: &ArModel) -> Option<Triangle> {
+        let columns = self.free.len() + 1;
+        let mut triangle = Triangle::new(columns);
+        let mut whitener = noise.whitener(columns);
+        let mut row = vec![0.0; columns];
+        let count = self.parameter_count();
+        for (r, record) in self.records.iter().enumerate() {
+            let own = self.levels_of(r);
+            // Columns of this record: the free parameters and its own initial levels, in lanes of one simulator or,
+            // where they are too many, of several that run side by side.
+            let lanes: Vec<usize> = (0..self.free.len())
+                .filter(|&column| self.free[column] < count || own.contains(&self.free[column]))
+                .collect();
+            let mut simulators = Vec::with_capacity(lanes.len().div_ceil(L));
+            for chunk in lanes.chunks(L) {
+                let dual = |i: usize| {
+                    let lane = chunk
+                        .iter()
+                        .position(|&column| self.free[column] == i)
+                        .unwrap_or(L);
+                    Dual::<L>::variable(x[i], lane)
+                };
+                let theta: Vec<_> = (0..count).map(dual).collect();
+                let levels: Vec<_> = own.clone().map(dual).collect();
+                let mut simulator =
+                    Simulator::new(&self.structure, &theta, &levels, record.input.values[0])
+                        .ok()?;
+                simulator.set_substeps(self.substeps);
+                simulators.push(simulator);
+            }
+            whitener.reset();
+            let n = record.len();
+            for k in 0..n {
+                row.fill(0.0);
+                let mut model = f64::NAN;
+                for (simulator, chunk) in simulators.iter_mut().zip(lanes.chunks(L)) {
+                    let y = simulator.read();
+                    model = y.re;
+                    for (lane, &column) in chunk.iter().enumerate() {
+                        row[column] = y.eps[lane];
+                    }
+                    if k + 1 < n {
+                        simulator.advance(command(record, k), record.time[k + 1] - record.time[k]);
+                    }
+                }
+                row[columns - 1] = record.output.values[k] - model;
+                if !row.iter().all(|value| value.is_finite()) {
+                    return None;
+                }
+                whitener.push(&mut row);
+                triangle.push(&row);
+            }
+        }
+        triangle.finish();
+        Some(triangle)
+    }
+
+    /// Takes the smallest number of substeps for which halving the step moves no reading by more than `1e-6` of the
+    /// output's range.
+    ///
+    /// # Errors
+    /// As [`Setup::simulate`].
+    pub fn choose_substeps(&mut self, x: &[f64]) -> Result<(), Error> {
+        let (low, high) = self
+            .records
+            .iter()
+            .map(Record::output_range)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), range| {
+                (low.min(range.0), high.max(range.1))
+            });
+        let tolerance = 1e-6 * (high - low);
+        let mut coarse = {
+            self.substeps = 1;
+            self.simulate(x)?
+        };
+        while self.substeps < 32 {
+            let n = self.substeps;
+            self.substeps = 2 * n;
+            let fine = self.simulate(x)?;
+            let moved = coarse
+                .output
+                .iter()
+                .flatten()
+                .zip(fine.output.iter().flatten())
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
+            if moved <= tolerance {
+                self.substeps = n;
+                return Ok(());
+            }
+            coarse = fine;
+        }
+        Ok(())
+    }
+
+    /// The scales that a simulation shows: levels of every vessel and the throughput.
+    ///
+    /// # Errors
+    /// As [`Setup::simulate`].
+    pub fn scales_at(&self, x: &[f64]) -> Result<Scales, Error> {
+        let simulated = self.simulate(x)?;
+        let plant = self.structure.plant;
+        let mut scales = self.structure.scales.clone();
+        for vessel in 0..plant.vessels() {
+            let (low, high) = simulated.level[vessel];
+            if low.is_finite() && high.is_finite() && high > low {
+                scales.level[vessel] = (low, high);
+                scales.operating_level[vessel] = simulated.mean_level[vessel];
+            }
+        }
+        let (sum, n) = self
+            .records
+            .iter()
+            .flat_map(|record| &record.input.values)
+            .fold((0.0, 0usize), |(sum, n), u| (sum + u.abs(), n + 1));
+        scales.flow = (x[0] * sum / n as f64).abs();
+        Ok(scales)
+    }
+}
+
+/// The command from sample `k` to the next one.
+fn command(record: &Record, k: usize) -> Command {
+    let u = &record.input.values;
+    match record.hold {
+        Hold::Zero => Command::held(u[k]),
+        Hold::First => Command::ramp(u[k], u[k + 1]),
+    }
+}

@@ -1,0 +1,295 @@
+//! Least squares on the fly: an upper triangle that rows are folded into, in `O(p^2)` memory.
+
+/// Rows are collected in blocks and folded in by Householder reflections.
+const BLOCK: usize = 32;
+
+/// The triangular factor `R` of all rows pushed so far: `R'R = sum row row'`. Each row is `[j_1 .. j_p, r]`, so the
+/// last column holds the residual's coordinates.
+///
+/// Unlike the normal equations it does not square the condition number. Folding costs about `2 (p+1)^2`
+/// operations a row.
+#[derive(Debug, Clone)]
+pub struct Triangle {
+    columns: usize,
+    /// Upper triangle, row by row.
+    r: Vec<f64>,
+    /// Rows not yet folded in, column by column.
+    block: Vec<f64>,
+    filled: usize,
+    rows: usize,
+}
+
+impl Triangle {
+    /// `columns` counts the residual's column too.
+    #[must_use]
+    pub fn new(columns: usize) -> Self {
+        Self {
+            columns,
+            r: vec![0.0; columns * columns],
+            block: vec![0.0; columns * BLOCK],
+            filled: 0,
+            rows: 0,
+        }
+    }
+
+    /// Number of columns, the residual's included.
+    #[must_use]
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Number of rows pushed.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Folds one row in; it has [`Triangle::columns`] entries.
+    pub fn push(&mut self, row: &[f64]) {
+        for (column, value) in self.block.chunks_exact_mut(BLOCK).zip(row) {
+            column[self.filled] = *value;
+        }
+        self.filled += 1;
+        self.rows += 1;
+        if self.filled == BLOCK {
+            self.fold();
+        }
+    }
+
+    fn fold(&mut self) {
+        let n = self.columns;
+        let filled = std::mem::take(&mut self.filled);
+        for column in self.block.chunks_exact_mut(BLOCK) {
+            column[filled..].fill(0.0);
+        }
+        for j in 0..n {
+            let (head, tail) = self.block.split_at_mut((j + 1) * BLOCK);
+            let v = &head[j * BLOCK..];
+            let below: f64 = v.iter().map(|x| x * x).sum();
+            if below == 0.0 {
+                continue;
+            }
+            let diagonal = self.r[j * n + j];
+            let norm = (diagonal * diagonal + below).sqrt();
+            let alpha = if diagonal > 0.0 { -norm } else { norm };
+            let v0 = diagonal - alpha;
+            let scale = 1.0 / (norm * (norm + diagonal.abs()));
+            self.r[j * n + j] = alpha;
+            for (k, column) in (j + 1..n).zip(tail.chunks_exact_mut(BLOCK)) {
+                let dot: f64 = v.iter().zip(&*column).map(|(a, b)| a * b).sum();
+                let factor = (v0 * self.r[j * n + k] + dot) * scale;
+                self.r[j * n + k] -= factor * v0;
+                for (b, a) in column.iter_mut().zip(v) {
+                    *b -= factor * a;
+                }
+            }
+        }
+    }
+
+    /// Folds in what is left; call it before reading.
+    pub fn finish(&mut self) {
+        if self.filled > 0 {
+            self.fold();
+        }
+    }
+
+    /// `R[i][j]`; zero below the diagonal.
+    #[must_use]
+    pub fn at(&self, i: usize, j: usize) -> f64 {
+        if j < i {
+            0.0
+        } else {
+            self.r[i * self.columns + j]
+        }
+    }
+
+    /// The Euclidean norm of column `j` of all rows.
+    #[must_use]
+    pub fn column_norm(&self, j: usize) -> f64 {
+        (0..=j).map(|i| self.at(i, j).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Sum of squares of the last column: the cost.
+    #[must_use]
+    pub fn cost(&self) -> f64 {
+        self.column_norm(self.columns - 1).powi(2)
+    }
+
+    /// `(J' r)_j`: minus half the cost's gradient.
+    #[must_use]
+    pub fn descent(&self, j: usize) -> f64 {
+        (0..=j)
+            .map(|i| self.at(i, j) * self.at(i, self.columns - 1))
+            .sum()
+    }
+
+    /// The triangle of the same rows with columns chosen and put in this order; the residual may be among them.
+    #[must_use]
+    pub fn select(&self, order: &[usize]) -> Self {
+        let mut chosen = Self::new(order.len());
+        let mut row = vec![0.0; order.len()];
+        for i in 0..self.columns {
+            for (to, &j) in row.iter_mut().zip(order) {
+                *to = self.at(i, j);
+            }
+            chosen.push(&row);
+        }
+        chosen.finish();
+        chosen.rows = self.rows;
+        chosen
+    }
+
+    /// Minimises `|J x - r|^2 + damping sum_j (scale_j x_j)^2` over the `free` parameters; the others stay zero.
+    /// Directions that no row speaks of stay zero too.
+    #[must_use]
+    pub fn solve(&self, free: &[usize], scale: &[f64], damping: f64) -> Vec<f64> {
+        let p = free.len();
+        let mut order = free.to_vec();
+        order.push(self.columns - 1);
+        let mut system = self.select(&order);
+        if damping > 0.0 {
+            let mut row = vec![0.0; p + 1];
+            for (i, &j) in free.iter().enumerate() {
+                row[i] = damping.sqrt() * scale[j];
+                system.push(&row);
+                row[i] = 0.0;
+            }
+            system.finish();
+        }
+        let mut x = vec![0.0; p];
+        for i in (0..p).rev() {
+            let diagonal = system.at(i, i);
+            let rest: f64 = (i + 1..p).map(|j| system.at(i, j) * x[j]).sum();
+            if diagonal.abs() > 1e-14 * system.column_norm(i) {
+                x[i] = (system.at(i, p) - rest) / diagonal;
+            }
+        }
+        let mut all = vec![0.0; self.columns - 1];
+        for (value, &j) in x.iter().zip(free) {
+            all[j] = *value;
+        }
+        all
+    }
+
+    /// `|J x - r|^2`.
+    #[must_use]
+    pub fn predicted(&self, x: &[f64]) -> f64 {
+        let last = self.columns - 1;
+        (0..self.columns)
+            .map(|i| {
+                let moved: f64 = (i..last).map(|j| self.at(i, j) * x[j]).sum();
+                (self.at(i, last) - moved).powi(2)
+            })
+            .sum()
+    }
+
+    /// The inverse of `J'J` over the `free` parameters, row by row; `None` where a column is a combination of the
+    /// others to within `1e-10` of its length.
+    #[must_use]
+    pub fn covariance(&self, free: &[usize]) -> Option<Vec<Vec<f64>>> {
+        let p = free.len();
+        let system = self.select(free);
+        let mut inverse = vec![vec![0.0; p]; p];
+        for i in (0..p).rev() {
+            let diagonal = system.at(i, i);
+            if diagonal.abs() <= 1e-10 * system.column_norm(i) || !diagonal.is_finite() {
+                return None;
+            }
+            inverse[i][i] = 1.0 / diagonal;
+            let (above, below) = inverse.split_at_mut(i + 1);
+            for (j, entry) in above[i].iter_mut().enumerate().skip(i + 1) {
+                let sum: f64 = below
+                    .iter()
+                    .zip(i + 1..=j)
+                    .map(|(row, k)| system.at(i, k) * row[j])
+                    .sum();
+                *entry = -sum / diagonal;
+            }
+        }
+        Some(
+            (0..p)
+                .map(|i| {
+                    (0..p)
+                        .map(|j| (i.max(j)..p).map(|k| inverse[i][k] * inverse[j][k]).sum())
+                        .collect()
+                })
+                .collect(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use nalgebra::{DMatrix, DVector};
+    use rand::{RngExt, SeedableRng};
+
+    fn rows(n: usize, p: usize) -> Vec<Vec<f64>> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        (0..n)
+            .map(|_| (0..=p).map(|_| rng.random_range(-1.0..1.0)).collect())
+            .collect()
+    }
+
+    #[test]
+    fn agrees_with_a_dense_solution() {
+        for n in [9, 32, 33, 200] {
+            let p = 5;
+            let rows = rows(n, p);
+            let mut triangle = Triangle::new(p + 1);
+            for row in &rows {
+                triangle.push(row);
+            }
+            triangle.finish();
+            let j = DMatrix::from_fn(n, p, |i, k| rows[i][k]);
+            let r = DVector::from_fn(n, |i, _| rows[i][p]);
+            let dense = j.clone().svd(true, true).solve(&r, 1e-14).unwrap();
+            let free: Vec<usize> = (0..p).collect();
+            let x = triangle.solve(&free, &[1.0; 5], 0.0);
+            for (a, b) in x.iter().zip(dense.iter()) {
+                assert_relative_eq!(a, b, max_relative = 1e-10);
+            }
+            assert_relative_eq!(
+                triangle.predicted(&x),
+                (&j * &dense - &r).norm_squared(),
+                max_relative = 1e-10
+            );
+            assert_relative_eq!(triangle.cost(), r.norm_squared(), max_relative = 1e-12);
+            let inverse = (j.transpose() * &j).try_inverse().unwrap();
+            let ours = triangle.covariance(&free).unwrap();
+            for a in 0..p {
+                for b in 0..p {
+                    assert_relative_eq!(
+                        ours[a][b],
+                        inverse[(a, b)],
+                        max_relative = 1e-9,
+                        epsilon = 1e-12
+                    );
+                }
+            }
+            // Damped, with two parameters held.
+            let damped = triangle.solve(&[0, 2, 4], &[1.0, 1.0, 2.0, 1.0, 0.5], 0.7);
+            let sub = DMatrix::from_fn(n, 3, |i, k| rows[i][[0, 2, 4][k]]);
+            let weight = DMatrix::from_diagonal(&DVector::from_vec(vec![0.7, 2.8, 0.175]));
+            let reference = (sub.transpose() * &sub + weight)
+                .lu()
+                .solve(&(sub.transpose() * &r))
+                .unwrap();
+            for (k, i) in [0, 2, 4].into_iter().enumerate() {
+                assert_relative_eq!(damped[i], reference[k], max_relative = 1e-10);
+            }
+        }
+    }
+
+    #[test]
+    fn a_combination_of_columns_has_no_covariance() {
+        let mut triangle = Triangle::new(4);
+        for row in rows(50, 1) {
+            triangle.push(&[row[0], row[1], row[0] + row[1], 1.0]);
+        }
+        triangle.finish();
+        assert!(triangle.covariance(&[0, 1, 2]).is_none());
+        assert!(triangle.covariance(&[0, 1]).is_some());
+    }
+}

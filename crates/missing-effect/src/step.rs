@@ -1,0 +1,141 @@
+//! From a fitted node to what is reported of it.
+
+use ct_signals::{Record, residual_tests};
+use greybox::{Fit, Setup, Stopping, fit_initial_levels};
+
+use crate::{
+    Error, Parameter, ResidualTests, Step,
+    locate::{Series, locate},
+    noise_floor::input_p,
+    search::Node,
+};
+
+/// Samples of a held-out record on which its initial levels are fitted, and which are not scored.
+pub(crate) const HEAD: usize = 5;
+
+/// A held-out record as a model simulates it.
+struct HeldOut {
+    outputs: Vec<Vec<f64>>,
+    rmse: f64,
+}
+
+/// Initial levels from the first [`HEAD`] samples with everything else frozen; scored on the rest.
+fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
+    if test.is_empty() {
+        return Ok(None);
+    }
+    let parameters = &node.fit.x[..node.setup.parameter_count()];
+    let heads: Vec<Record> = test
+        .iter()
+        .map(|record| {
+            let mut head = record.clone();
+            head.time.truncate(HEAD);
+            head.input.values.truncate(HEAD);
+            head.output.values.truncate(HEAD);
+            head.reference = None;
+            head
+        })
+        .collect();
+    let x = fit_initial_levels(
+        &node.setup.with_records(&heads)?,
+        parameters,
+        Stopping {
+            evaluations: 60,
+            cost: 1e-10,
+        },
+    )?;
+    let simulated = node.setup.with_records(test)?.simulate(&x)?.output;
+    let (mut squares, mut count) = (0.0, 0);
+    for (record, model) in test.iter().zip(&simulated) {
+        for (y, m) in record.output.values.iter().zip(model).skip(HEAD) {
+            squares += (y - m) * (y - m);
+            count += 1;
+        }
+    }
+    Ok(Some(HeldOut {
+        outputs: simulated,
+        rmse: (squares / f64::from(count.max(1))).sqrt(),
+    }))
+}
+
+/// All entries of the vector with their standard errors.
+pub(crate) fn parameters(setup: &Setup, fit: &Fit) -> Vec<Parameter> {
+    let record = &setup.records[0];
+    let infos = setup.structure.parameters();
+    let errors = fit.std_errors();
+    setup
+        .names()
+        .iter()
+        .zip(&fit.x)
+        .zip(errors)
+        .enumerate()
+        .map(|(i, ((name, value), std_error))| Parameter {
+            name: name.clone(),
+            value: *value,
+            std_error,
+            unit: infos.get(i).map_or_else(
+                || record.output.unit.clone(),
+                |info| {
+                    setup
+                        .structure
+                        .unit_label(info, &record.output.unit, &record.input.unit)
+                },
+            ),
+        })
+        .collect()
+}
+
+/// The report of one node; `floor` is the noise's standard deviation.
+pub(crate) fn report(node: &Node, own: &Fit, floor: f64, test: &[Record]) -> Result<Step, Error> {
+    let Node { setup, fit, added } = node;
+    let last = added.last();
+    let simulated = setup.simulate(&fit.x)?.output;
+    let residuals = setup.residuals(&fit.x)?;
+    let (record, residual) = (&setup.records[0], &residuals[0]);
+    let lags = (record.len() / 10).clamp(2, 60);
+    let portmanteau = (record.len() / 10).clamp(2, 25);
+    let (cross, _) = residual_tests::prewhitened_input_test(&record.input.values, residual, lags)?;
+    let bound = 1.96 / (record.len() as f64).sqrt();
+    let tests = ResidualTests {
+        autocorrelation: residual_tests::autocorrelation(residual, lags),
+        cross_correlation: cross,
+        autocorrelation_bound: bound,
+        cross_correlation_bound: bound,
+        whiteness_p: residual_tests::ljung_box(residual, portmanteau, 0)?,
+        input_p: input_p(node)?,
+    };
+    let failures = locate(&Series {
+        time: &record.time,
+        input: &record.input.values,
+        model: &simulated[0],
+        residual,
+        floor,
+        output_unit: &record.output.unit,
+        input_unit: &record.input.unit,
+    });
+    let held_out = hold_out(node, test)?;
+    let rmse_test = held_out.as_ref().map(|held_out| held_out.rmse);
+    let mut series = simulated;
+    series.extend(held_out.into_iter().flat_map(|held_out| held_out.outputs));
+    Ok(Step {
+        added: last.map(|placed| placed.effect.id.to_string()),
+        place: last.and_then(|placed| place_name(node, *placed)),
+        rmse: fit.rmse,
+        rmse_test,
+        bic: own.bic(),
+        parameters: parameters(setup, fit),
+        starts: fit.starts,
+        starts_agree: fit.agree,
+        tests,
+        failures,
+        simulated: series,
+    })
+}
+
+/// The vessel's name, where the effect acts in one of several.
+pub(crate) fn place_name(node: &Node, placed: plants::Placed) -> Option<String> {
+    (placed.effect.place == plants::Place::Vessel)
+        .then(|| node.setup.structure.plant.vessel_name(placed.vessel))
+        .flatten()
+        .map(str::to_string)
+}

@@ -4,12 +4,68 @@ use std::collections::VecDeque;
 
 use crate::{Law, Scalar, moments::exponential_moments, vessels::Inflow};
 
-/// A straight piece of the command: from `value` at `time`, `slope` a second.
+/// Corners of a ramp that lie closer together than this share of the interval are one.
+const SAME_CORNER: f64 = 1e-9;
+
+/// A smooth stretch of the command: `value + slope s + curve s^2`, `s` the seconds since it began.
+#[derive(Clone, Copy)]
+pub(crate) struct Signal<T> {
+    value: T,
+    slope: T,
+    curve: T,
+    /// Slope and curve are zero.
+    held: bool,
+}
+
+impl<T: Scalar> Signal<T> {
+    fn held(value: T) -> Self {
+        let zero = T::constant(0.0);
+        Self {
+            value,
+            slope: zero,
+            curve: zero,
+            held: true,
+        }
+    }
+
+    fn at(&self, s: T) -> T {
+        if self.held {
+            self.value
+        } else {
+            self.value + (self.slope + self.curve * s) * s
+        }
+    }
+
+    /// The same signal, counted from `s` on.
+    pub(crate) fn from(&self, s: T) -> Self {
+        if self.held {
+            return *self;
+        }
+        Self {
+            value: self.at(s),
+            slope: self.slope + self.curve * s * 2.0,
+            ..*self
+        }
+    }
+
+    fn over(&self, h: T) -> Inflow<T> {
+        if self.held {
+            return Inflow::held(self.value);
+        }
+        Inflow {
+            start: self.value,
+            middle: self.at(h * 0.5),
+            end: self.at(h),
+        }
+    }
+}
+
+/// A stretch that was commanded: it began `after` seconds after `time`.
 #[derive(Clone, Copy)]
 struct Piece<T> {
     time: f64,
-    value: T,
-    slope: T,
+    after: T,
+    signal: Signal<T>,
 }
 
 pub(crate) struct Actuator<T: Scalar> {
@@ -20,6 +76,8 @@ pub(crate) struct Actuator<T: Scalar> {
     excess: T,
     /// What the command was, oldest first; only kept where there is a delay.
     past: VecDeque<Piece<T>>,
+    /// Where a ramp has corners, as shares of the interval: scratch space.
+    corners: Vec<T>,
     /// Where the last step ended: the command after delay, for the lag's jump.
     last: T,
 }
@@ -29,30 +87,85 @@ impl<T: Scalar> Actuator<T> {
     pub(crate) fn new(laws: Vec<Box<dyn Law<T>>>, at_rest: f64, start: f64) -> Self {
         let delay = laws.iter().find_map(|law| law.delay());
         let lag = laws.iter().find_map(|law| law.actuator_lag());
+        let zero = T::constant(0.0);
         let mut actuator = Self {
             laws,
             delay,
             lag,
-            excess: T::constant(0.0),
+            excess: zero,
             past: VecDeque::new(),
-            last: T::constant(0.0),
+            corners: Vec::new(),
+            last: zero,
         };
-        actuator.last = actuator.effective(at_rest, start);
+        actuator.last = actuator.effective(T::constant(at_rest), start);
         if delay.is_some() {
-            let zero = T::constant(0.0);
             actuator.past.push_back(Piece {
                 time: f64::NEG_INFINITY,
-                value: actuator.last,
-                slope: zero,
+                after: zero,
+                signal: Signal::held(actuator.last),
             });
         }
         actuator
     }
 
-    fn effective(&mut self, u: f64, t: f64) -> T {
-        self.laws
-            .iter_mut()
-            .fold(T::constant(u), |u, law| law.command(u, t))
+    fn effective(&mut self, u: T, t: f64) -> T {
+        self.laws.iter_mut().fold(u, |u, law| law.command(u, t))
+    }
+
+    /// Finds where a ramp has corners after the static laws: zero, the corners, one.
+    fn find_corners(&mut self, from: f64, to: f64, t: f64, h: f64) {
+        self.corners.clear();
+        self.corners.extend([T::constant(0.0), T::constant(1.0)]);
+        for i in 0..self.laws.len() {
+            for corner in self.laws[i].corners().into_iter().flatten() {
+                let mut k = 0;
+                while k + 1 < self.corners.len() {
+                    let (low, high) = (self.corners[k], self.corners[k + 1]);
+                    let mut before = |s: T| {
+                        let time = t + s.value() * h;
+                        self.laws[..i]
+                            .iter_mut()
+                            .fold(s * (to - from) + from, |u, law| law.command(u, time))
+                    };
+                    let (a, b) = (before(low) - corner, before(high) - corner);
+                    if a.value() * b.value() < 0.0 {
+                        let at = low - (high - low) * a / (b - a);
+                        if at.value() - low.value() > SAME_CORNER
+                            && high.value() - at.value() > SAME_CORNER
+                        {
+                            self.corners.insert(k + 1, at);
+                            k += 1;
+                        }
+                    }
+                    k += 1;
+                }
+            }
+        }
+    }
+
+    /// The smooth stretch between two shares of a ramp's interval.
+    fn stretch(&mut self, ramp: (f64, f64), t: f64, h: f64, low: T, high: T) -> Signal<T> {
+        let (from, to) = ramp;
+        let mut at = |share: f64| {
+            let s = low + (high - low) * share;
+            self.effective(s * (to - from) + from, t + s.value() * h)
+        };
+        // Strictly inside: at a corner itself the derivatives could be those of the neighbour.
+        let (first, middle, last) = (at(0.25), at(0.5), at(0.75));
+        let mut bend = first + last - middle * 2.0;
+        let largest = first.value().abs().max(last.value().abs());
+        if bend.value().abs() <= 4.0 * f64::EPSILON * largest {
+            // Rounding; its derivatives need not be.
+            bend = bend - bend.value();
+        }
+        let slope = (last - first) * 2.0;
+        let inverse = T::constant(1.0) / ((high - low) * h);
+        Signal {
+            value: middle - slope * 0.5 + bend * 2.0,
+            slope: (slope - bend * 8.0) * inverse,
+            curve: bend * 8.0 * inverse * inverse,
+            held: false,
+        }
     }
 
     /// Runs `each(length, command)` over the pieces of one sampling interval, in order: a piece is smooth,
@@ -63,34 +176,49 @@ impl<T: Scalar> Actuator<T> {
         to: Option<f64>,
         t: f64,
         h: f64,
-        mut each: impl FnMut(&mut Self, T, Inflow<T>),
+        mut each: impl FnMut(&mut Self, T, Signal<T>),
     ) {
-        let start = self.effective(from, t);
         let length = T::constant(h);
-        let command = match to {
-            None => Inflow::held(start),
-            Some(to) => Inflow {
-                start,
-                middle: self.effective(0.5 * (from + to), t + 0.5 * h),
-                end: self.effective(to, t + h),
-            },
+        let zero = T::constant(0.0);
+        let commanded = match to {
+            None => {
+                let signal = Signal::held(self.effective(T::constant(from), t));
+                if self.delay.is_none() {
+                    each(self, length, signal);
+                    return;
+                }
+                self.past.push_back(Piece {
+                    time: t,
+                    after: zero,
+                    signal,
+                });
+                None
+            }
+            Some(to) => Some((from, to)),
         };
-        let Some(delay) = self.delay else {
-            each(self, length, command);
-            return;
-        };
-        let slope = (command.end - command.start) * (1.0 / h);
-        self.past.push_back(Piece {
-            time: t,
-            value: command.start,
-            slope,
-        });
+        if let Some(ramp) = commanded {
+            self.find_corners(ramp.0, ramp.1, t, h);
+            for k in 0..self.corners.len() - 1 {
+                let (low, high) = (self.corners[k], self.corners[k + 1]);
+                let signal = self.stretch(ramp, t, h, low, high);
+                if self.delay.is_some() {
+                    self.past.push_back(Piece {
+                        time: t,
+                        after: low * h,
+                        signal,
+                    });
+                } else {
+                    each(self, (high - low) * h, signal);
+                }
+            }
+        }
+        let Some(delay) = self.delay else { return };
         // Break points: where a past piece begins to arrive, in time from the start of this interval.
-        let arrives = |piece: &Piece<T>| delay + (piece.time - t);
+        let arrives = |piece: &Piece<T>| delay + piece.after + (piece.time - t);
         while self.past.len() > 1 && arrives(&self.past[1]).value() < 0.0 {
             self.past.pop_front();
         }
-        let mut begin = T::constant(0.0);
+        let mut begin = zero;
         let mut index = 0;
         loop {
             let piece = self.past[index];
@@ -100,17 +228,10 @@ impl<T: Scalar> Actuator<T> {
                 .map(arrives)
                 .filter(|next| next.value() < h);
             let end = next.unwrap_or(length);
-            let at = |s: T| {
-                if piece.time.is_finite() {
-                    piece.value + piece.slope * (s - arrives(&piece))
-                } else {
-                    piece.value
-                }
-            };
-            let signal = Inflow {
-                start: at(begin),
-                middle: at((begin + end) * 0.5),
-                end: at(end),
+            let signal = if piece.signal.held {
+                piece.signal
+            } else {
+                piece.signal.from(begin - arrives(&piece))
             };
             each(self, end - begin, signal);
             if next.is_none() {
@@ -122,34 +243,38 @@ impl<T: Scalar> Actuator<T> {
     }
 
     /// The signal behind the lag over a stretch of length `h`, as the parabola with the same first three moments.
-    pub(crate) fn lagged(&mut self, h: T, command: Inflow<T>) -> Inflow<T> {
-        let Some(lag) = self.lag else { return command };
+    pub(crate) fn lagged(&mut self, h: T, command: Signal<T>) -> Inflow<T> {
+        let ahead = command.over(h);
+        let Some(lag) = self.lag else { return ahead };
         // The lag follows continuously: what the command jumps by is added to the excess.
-        self.excess = self.excess + (self.last - command.start);
-        self.last = command.end;
+        self.excess = self.excess + (self.last - command.value);
+        self.last = ahead.end;
         if h.value() == 0.0 {
+            // An empty stretch moves nothing, but its length may have derivatives.
+            let behind = ahead.map(|c| c + self.excess);
+            self.excess = self.excess - command.slope * h;
             if lag.value() > 0.0 {
                 self.excess = self.excess - self.excess / lag * h;
             }
-            return command.map(|c| c + self.excess);
+            return behind;
         }
         // Behind a polynomial w the lag settles to w - T w' + T^2 w''; the rest decays.
-        let [_, b, c] = command.coefficients();
-        let e = lag / h;
-        let settled = |s: f64| -(e * (b + c * (2.0 * s))) + e * e * c * 2.0;
-        let amplitude = self.excess - settled(0.0);
+        let settled = |s: T| {
+            -(lag * (command.slope + command.curve * s * 2.0)) + lag * lag * command.curve * 2.0
+        };
+        let amplitude = self.excess - settled(T::constant(0.0));
         let (decay, [m0, m1, m2]) = exponential_moments(lag, h);
         let (l0, l1, l2) = (m0, m1 * 2.0 - m0, (m2 - m1) * 6.0 + m0);
         let at = |s: f64| {
             let (p1, p2) = (2.0 * s - 1.0, 6.0 * s * s - 6.0 * s + 1.0);
-            settled(s) + amplitude * (l0 + l1 * (3.0 * p1) + l2 * (5.0 * p2))
+            settled(h * s) + amplitude * (l0 + l1 * (3.0 * p1) + l2 * (5.0 * p2))
         };
         let behind = Inflow {
-            start: command.start + at(0.0),
-            middle: command.middle + at(0.5),
-            end: command.end + at(1.0),
+            start: ahead.start + at(0.0),
+            middle: ahead.middle + at(0.5),
+            end: ahead.end + at(1.0),
         };
-        self.excess = amplitude * decay + settled(1.0);
+        self.excess = amplitude * decay + settled(h);
         behind
     }
 }

@@ -18,9 +18,14 @@ pub struct Rim<T> {
 /// and its derivative there is the one of the limit.
 pub trait Law<T: Scalar>: Send {
     /// Actuator: the command that acts, for the command that was given \[input unit\]. It may have memory
-    /// and is called once a sample, in order.
+    /// and is called in the order of time: once an interval that is held, more often on a ramp.
     fn command(&mut self, u: T, _t: f64) -> T {
         u
+    }
+    /// Actuator: the inputs at which [`Law::command`] has a corner, so that a ramp can be cut there. No law before it
+    /// in the chain may have memory.
+    fn corners(&self) -> [Option<T>; 2] {
+        [None; 2]
     }
     /// Actuator: dead time before the command acts \[s\].
     fn delay(&self) -> Option<T> {

@@ -46,7 +46,7 @@ mod tests {
     fn moments_agree_with_a_fine_quadrature() {
         for e in [1e-3, 0.02, 0.3, 1.0, 1.9, 2.1, 10.0, 1e4] {
             let (decay, moments) = exponential_moments(e, 1.0);
-            assert_relative_eq!(decay, (-1.0 / e as f64).exp(), epsilon = 1e-15);
+            assert_relative_eq!(decay, (-1.0_f64 / e).exp(), epsilon = 1e-15);
             let n = 400_000;
             for (j, moment) in moments.iter().enumerate() {
                 // Midpoint rule: its error is 1/(24 n^2 e) and less.

@@ -169,19 +169,15 @@ impl<T: Scalar> Simulator<T> {
             h,
             |actuator, length, signal| {
                 // A short piece needs no more parts than its share of the interval.
-                let parts = ((*substeps as f64 * length.value() / h).ceil() as usize).max(1);
+                let parts = *substeps as f64 * length.value() / h;
+                let parts = ((parts - 1e-9).ceil() as usize).max(1);
                 let part = if parts == 1 {
                     length
                 } else {
                     length * (1.0 / parts as f64)
                 };
                 for i in 0..parts {
-                    let signal = if parts == 1 {
-                        signal
-                    } else {
-                        let edge = |i: usize| T::constant(i as f64 / parts as f64);
-                        signal.part(edge(i), edge(i + 1))
-                    };
+                    let signal = signal.from(part * i as f64);
                     let inflow = actuator.lagged(part, signal).map(|u| gain * u);
                     if sensor.has_lag() {
                         let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);

@@ -69,6 +69,17 @@ type Levels<T> = [T; MAX_VESSELS];
 /// Who wants to see the smooth stretches of the measured level, if anybody.
 pub(crate) type Watch<'a, T> = Option<&'a mut dyn FnMut(&Stretch<T>)>;
 
+/// Runge-Kutta is trusted while a step is shorter than this many time constants of every vessel.
+const STEP_LIMIT: f64 = 1.0;
+/// The same where a rim is near: then linear vessels too go by Runge-Kutta alone.
+const STEP_LIMIT_AT_RIM: f64 = 0.125;
+/// The most parts that a step of linear vessels is cut into for that.
+const MOST_PARTS: usize = 256;
+/// A step that is still too long for its vessels is cut into at most so many parts; beyond that it is taken implicitly.
+const UNITS: usize = 32;
+/// Contacts with a rim that are looked for within a step.
+const MOST_EVENTS: usize = 12;
+
 /// One vessel as the balance sees it.
 struct Vessel<T> {
     area: T,
@@ -81,13 +92,25 @@ struct Vessel<T> {
     laws: Vec<usize>,
 }
 
+/// Linear vessels have an exact flow; what effects add to it is integrated beside it, so that it vanishes with them.
+struct LinearFlow<T> {
+    whole: Propagators<T>,
+    half: Propagators<T>,
+    /// Effects act, so that the exact flow is not all.
+    disturbed: bool,
+}
+
 /// The vessels in series.
 pub(crate) struct Vessels<T: Scalar> {
     vessels: Vec<Vessel<T>>,
     laws: Vec<Box<dyn Law<T>>>,
     pub(crate) levels: Levels<T>,
-    /// For linear vessels without effects: exact propagation.
-    propagators: Option<Propagators<T>>,
+    /// For linear vessels without a rim.
+    linear: Option<LinearFlow<T>>,
+    /// Some vessel has a rim.
+    rims: bool,
+    /// Into how many parts a second of linear vessels is cut at least \[1/s\].
+    parts_per_second: f64,
 }
 
 /// A stretch of time over which the measured level moved smoothly.
@@ -97,6 +120,14 @@ pub(crate) struct Stretch<T> {
     pub after: T,
     pub rate_before: T,
     pub rate_after: T,
+}
+
+/// What ends a smooth stretch.
+enum Event<T> {
+    /// A vessel meets its rim after this part of the step.
+    Rim(usize, T),
+    /// A vessel stops spilling after this part of the step.
+    Release(usize, f64),
 }
 
 impl<T: Scalar> Vessels<T> {
@@ -120,7 +151,6 @@ impl<T: Scalar> Vessels<T> {
                 laws: Vec::new(),
             })
             .collect();
-        let linear = laws.is_empty() && vessels.iter().all(|v| v.outlet == Outlet::Linear);
         let mut bound = Vec::with_capacity(laws.len());
         for (vessel, law) in laws {
             match law.rim() {
@@ -129,8 +159,22 @@ impl<T: Scalar> Vessels<T> {
             }
             bound.push(law);
         }
-        let propagators = linear
-            .then(|| Propagators::new(vessels.iter().map(|v| (v.area, v.coefficient)).collect()));
+        let rims = vessels.iter().any(|v| v.rim.level.value() != f64::INFINITY);
+        let linear = vessels.iter().all(|v| v.outlet == Outlet::Linear);
+        let limit = if rims { STEP_LIMIT_AT_RIM } else { STEP_LIMIT };
+        let parts_per_second = if linear {
+            let rates = vessels.iter().map(|v| 1.0 / (v.area.value().abs() * limit));
+            rates.fold(0.0, f64::max)
+        } else {
+            0.0
+        };
+        let propagators =
+            || Propagators::new(vessels.iter().map(|v| (v.area, v.coefficient)).collect());
+        let linear = (linear && !rims).then(|| LinearFlow {
+            whole: propagators(),
+            half: propagators(),
+            disturbed: vessels.iter().any(|v| !v.laws.is_empty()),
+        });
         let mut initial = [T::constant(0.0); MAX_VESSELS];
         for (level, given) in initial.iter_mut().zip(levels) {
             *level = *given;
@@ -139,7 +183,9 @@ impl<T: Scalar> Vessels<T> {
             vessels,
             laws: bound,
             levels: initial,
-            propagators,
+            linear,
+            rims,
+            parts_per_second,
         };
         all.keep_within();
         all
@@ -157,9 +203,9 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    /// What flows out of vessel `i` to the next one, and its net inflow, at a level.
+    /// What flows out of vessel `i` to the next one at a level.
     #[inline]
-    fn balance(&self, i: usize, level: T, inflow: T, t: f64) -> (T, T) {
+    fn outflow(&self, i: usize, level: T, t: f64) -> T {
         let vessel = &self.vessels[i];
         let mut outflow = match vessel.outlet {
             Outlet::Torricelli => vessel.coefficient * square_root(level),
@@ -168,11 +214,29 @@ impl<T: Scalar> Vessels<T> {
         for &law in &vessel.laws {
             outflow = self.laws[law].outflow(level, outflow, t);
         }
+        outflow
+    }
+
+    /// What flows out of vessel `i` to the next one, and its net inflow, at a level.
+    #[inline]
+    fn balance(&self, i: usize, level: T, inflow: T, t: f64) -> (T, T) {
+        let outflow = self.outflow(i, level, t);
         let mut net = inflow - outflow;
-        for &law in &vessel.laws {
+        for &law in &self.vessels[i].laws {
             net = self.laws[law].net(level, net, t);
         }
         (outflow, net)
+    }
+
+    /// Surface of vessel `i` at a level.
+    #[inline]
+    fn area(&self, i: usize, level: T) -> T {
+        let vessel = &self.vessels[i];
+        let mut area = vessel.area;
+        for &law in &vessel.laws {
+            area = self.laws[law].area(level, area);
+        }
+        area
     }
 
     /// Rates of all levels \[level unit/s\].
@@ -190,52 +254,178 @@ impl<T: Scalar> Vessels<T> {
                     inflow = inflow + net * vessel.rim.fraction;
                 }
             } else {
-                let mut area = vessel.area;
-                for &law in &vessel.laws {
-                    area = self.laws[law].area(level, area);
-                }
-                rates[i] = net / area;
+                rates[i] = net / self.area(i, level);
             }
         }
         rates
     }
 
+    /// Rates of linear vessels without effects, written as in [`Vessels::rates`].
+    fn linear_rates(&self, levels: &Levels<T>, q: T) -> Levels<T> {
+        let mut rates = [T::constant(0.0); MAX_VESSELS];
+        let mut inflow = q;
+        for (i, vessel) in self.vessels.iter().enumerate() {
+            let outflow = levels[i] - vessel.coefficient;
+            let net = inflow - outflow;
+            inflow = outflow;
+            rates[i] = net / vessel.area;
+        }
+        rates
+    }
+
+    /// `from + by h`.
+    #[inline]
+    fn moved(&self, from: &Levels<T>, by: &Levels<T>, h: T) -> Levels<T> {
+        let mut to = *from;
+        for i in 0..self.vessels.len() {
+            to[i] = to[i] + by[i] * h;
+        }
+        to
+    }
+
     /// One Runge-Kutta step from the present levels, in the present modes.
+    #[inline]
     fn trial(&self, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
-        let n = self.vessels.len();
         let half = h * 0.5;
         let dt = h.value();
-        let moved = |by: &Levels<T>, h: T| {
-            let mut to = self.levels;
-            for i in 0..n {
-                to[i] = to[i] + by[i] * h;
-            }
-            to
-        };
         let k1 = self.rates(&self.levels, q.start, t);
-        let k2 = self.rates(&moved(&k1, half), q.middle, t + 0.5 * dt);
-        let k3 = self.rates(&moved(&k2, half), q.middle, t + 0.5 * dt);
-        let k4 = self.rates(&moved(&k3, h), q.end, t + dt);
-        let mut next = self.levels;
-        for i in 0..n {
+        let k2 = self.rates(&self.moved(&self.levels, &k1, half), q.middle, t + 0.5 * dt);
+        let k3 = self.rates(&self.moved(&self.levels, &k2, half), q.middle, t + 0.5 * dt);
+        let k4 = self.rates(&self.moved(&self.levels, &k3, h), q.end, t + dt);
+        self.weighted(&self.levels, h, [&k1, &k2, &k3, &k4])
+    }
+
+    #[inline]
+    fn weighted(&self, from: &Levels<T>, h: T, [k1, k2, k3, k4]: [&Levels<T>; 4]) -> Levels<T> {
+        let mut next = *from;
+        for i in 0..self.vessels.len() {
             next[i] = next[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * h * (1.0 / 6.0);
         }
         next
     }
 
-    /// Which vessels spill: those that stand at their rim with a positive net inflow.
-    fn settle_modes(&mut self, q: T, t: f64) {
+    /// One step of linear vessels: their exact flow, and beside it Runge-Kutta on what the effects add.
+    fn linear_trial(
+        &self,
+        whole: Levels<T>,
+        half: Levels<T>,
+        h: T,
+        q: Inflow<T>,
+        t: f64,
+    ) -> Levels<T> {
+        let dt = h.value();
+        let added = |levels: &Levels<T>, flow: &Levels<T>, q: T, t: f64| {
+            let mut rates = self.rates(levels, q, t);
+            let linear = self.linear_rates(flow, q);
+            for (rate, linear) in rates.iter_mut().zip(linear) {
+                *rate = *rate - linear;
+            }
+            rates
+        };
+        let k1 = added(&self.levels, &self.levels, q.start, t);
+        let k2 = added(
+            &self.moved(&half, &k1, h * 0.5),
+            &half,
+            q.middle,
+            t + 0.5 * dt,
+        );
+        let k3 = added(
+            &self.moved(&half, &k2, h * 0.5),
+            &half,
+            q.middle,
+            t + 0.5 * dt,
+        );
+        let k4 = added(&self.moved(&whole, &k3, h), &whole, q.end, t + dt);
+        self.weighted(&whole, h, [&k1, &k2, &k3, &k4])
+    }
+
+    /// How many time constants of its fastest vessel a step of length `h` lasts, up to a factor of two: what
+    /// Runge-Kutta must not be asked. It looks at values alone, so that derivatives follow one path.
+    #[inline]
+    fn stiffness(&self, h: f64, t: f64) -> f64 {
+        let mut most = 0.0_f64;
+        for (i, vessel) in self.vessels.iter().enumerate() {
+            let level = self.levels[i];
+            match vessel.outlet {
+                // The outflow bends downwards from zero, so its slope is less than outflow/level: half of it for a root.
+                Outlet::Torricelli => {
+                    let (outflow, content) = if vessel.laws.is_empty() {
+                        let height = level.value();
+                        let outflow = vessel.coefficient.value() * square_root(height);
+                        (outflow, height * vessel.area.value())
+                    } else {
+                        let outflow = self.outflow(i, level, t).value();
+                        (outflow, level.value() * self.area(i, level).value())
+                    };
+                    // Without the division in the common case; an empty vessel has no content and no outflow.
+                    if h * outflow > 2.0 * STEP_LIMIT * content {
+                        most = most.max(0.5 * h * outflow / content);
+                    }
+                }
+                Outlet::Linear if vessel.laws.is_empty() => {}
+                Outlet::Linear => most = most.max(0.5 * h * self.slope(i, t).abs()),
+            }
+        }
+        most
+    }
+
+    /// By how much a higher level slows its own rise, by a difference \[1/s\].
+    fn slope(&self, i: usize, t: f64) -> f64 {
+        let level = self.levels[i];
+        let step = 1e-6 * (level.value().abs() + 1e-3);
+        let (low, high) = (self.outflow(i, level, t), self.outflow(i, level + step, t));
+        (high.value() - low.value()) / (step * self.area(i, level).value())
+    }
+
+    /// One step that cannot overshoot, whatever its length: implicit in each vessel's own level, of order one.
+    fn relax(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        let mut next = self.levels;
+        let mut inflow = q.end;
+        for (i, to) in next.iter_mut().enumerate().take(self.vessels.len()) {
+            let level = self.levels[i];
+            let (outflow, net) = self.balance(i, level, inflow, t);
+            let slope = self.slope(i, t).max(0.0);
+            let damped = 1.0 / (1.0 + h.value() * slope);
+            *to = level + net / self.area(i, level) * h * damped;
+            let low = match self.vessels[i].outlet {
+                Outlet::Torricelli => 0.0,
+                Outlet::Linear => f64::NEG_INFINITY,
+            };
+            *to = (*to).max(T::constant(low)).min(self.vessels[i].rim.level);
+            // What left the vessel is what its balance says; the rest of the step it is near its new level.
+            inflow = if slope * h.value() > 1.0 {
+                self.outflow(i, *to, t)
+            } else {
+                outflow
+            };
+        }
+        if let Some(watch) = watch {
+            // The transient is over at once; what is left looks straight.
+            let last = self.vessels.len() - 1;
+            let (before, after) = (self.levels[last], next[last]);
+            let rate = (after - before) / h;
+            watch(&Stretch {
+                h,
+                before,
+                after,
+                rate_before: rate,
+                rate_after: rate,
+            });
+        }
+        self.levels = next;
+    }
+
+    /// Which vessels spill: those that stand at their rim with a positive net inflow, but for one that has just stopped.
+    fn settle_modes(&mut self, q: T, t: f64, released: Option<usize>) {
         let mut inflow = q;
         for i in 0..self.vessels.len() {
             let (outflow, net) = self.balance(i, self.levels[i], inflow, t);
             let vessel = &mut self.vessels[i];
-            let rim = vessel.rim.level.value();
-            // A level that was put on the rim by the search below is there up to rounding.
-            let at_rim = self.levels[i].value() >= rim - 1e-12 * rim.abs();
-            vessel.spilling = at_rim && net.value() > 0.0;
+            vessel.spilling = self.levels[i].value() >= vessel.rim.level.value()
+                && net.value() > 0.0
+                && released != Some(i);
             inflow = outflow;
             if vessel.spilling {
-                self.levels[i] = vessel.rim.level;
                 inflow = inflow + net * vessel.rim.fraction;
             }
         }
@@ -243,45 +433,101 @@ impl<T: Scalar> Vessels<T> {
 
     /// Moves on by `h` from time `t`; `watch` sees every smooth stretch of the measured level in turn.
     pub(crate) fn step(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
-        if let Some(propagators) = &mut self.propagators {
-            let before = self.levels;
-            let next = propagators.advance(&before, h, q);
-            let last = self.vessels.len() - 1;
-            if let Some(watch) = watch {
-                let rate_before = self.rates(&before, q.start, t)[last];
-                let rate_after = self.rates(&next, q.end, t + h.value())[last];
-                watch(&Stretch {
-                    h,
-                    before: before[last],
-                    after: next[last],
-                    rate_before,
-                    rate_after,
-                });
+        let wanted = self.parts_per_second * h.value();
+        if wanted.is_nan() || wanted <= 1.0 {
+            self.part(h, q, t, watch);
+            return;
+        }
+        // Nothing here depends on effects, so that one at its absent value sees the parts of the base model.
+        let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
+        let share = 1.0 / parts as f64;
+        let each = h * share;
+        for k in 0..parts {
+            let edge = |k: usize| T::constant(k as f64 * share);
+            let begin = t + k as f64 * each.value();
+            self.part(each, q.part(edge(k), edge(k + 1)), begin, watch);
+        }
+    }
+
+    fn part(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        if self.stiffness(h.value(), t) <= STEP_LIMIT {
+            self.unit(h, q, t, watch);
+            return;
+        }
+        let mut done = 0;
+        while done < UNITS {
+            let left = UNITS - done;
+            let stiffness = self.stiffness(h.value(), t);
+            let span = |from: usize, to: usize| {
+                let edge = |k: usize| T::constant(k as f64 / UNITS as f64);
+                let length = h * ((to - from) as f64 / UNITS as f64);
+                let begin = t + h.value() * (from as f64 / UNITS as f64);
+                (length, q.part(edge(from), edge(to)), begin)
+            };
+            // The longest that is short enough, in powers of two.
+            let mut units = 1 << left.ilog2();
+            while units > 1 && stiffness * units as f64 > STEP_LIMIT * UNITS as f64 {
+                units /= 2;
             }
-            self.levels = next;
+            if stiffness * units as f64 > STEP_LIMIT * UNITS as f64 {
+                let (length, q, begin) = span(done, UNITS);
+                self.relax(length, q, begin, watch);
+                return;
+            }
+            let (length, q, begin) = span(done, done + units);
+            self.unit(length, q, begin, watch);
+            done += units;
+        }
+    }
+
+    /// A step that is short enough.
+    fn unit(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        if self.rims {
+            self.step_with_rims(h, q, t, watch);
             return;
         }
-        if self
-            .vessels
-            .iter()
-            .all(|v| v.rim.level.value() == f64::INFINITY)
-        {
-            let next = self.trial(h, q, t);
-            self.accept(next, h, q, t, watch);
-            return;
-        }
+        let next = match &mut self.linear {
+            None => self.trial(h, q, t),
+            Some(flow) => {
+                let whole = flow.whole.advance(&self.levels, h, q);
+                if flow.disturbed {
+                    let first = q.part(T::constant(0.0), T::constant(0.5));
+                    let half = flow.half.advance(&self.levels, h * 0.5, first);
+                    self.linear_trial(whole, half, h, q, t)
+                } else {
+                    whole
+                }
+            }
+        };
+        self.accept(next, h, q, t, watch);
+    }
+
+    fn step_with_rims(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let (mut h, mut q, mut t) = (h, q, t);
+        let mut released = None;
         // Each vessel can meet its rim and leave it a few times within a step; more is chatter.
-        for _ in 0..8 {
-            self.settle_modes(q.start, t);
+        for _ in 0..MOST_EVENTS {
+            self.settle_modes(q.start, t, released);
             let next = self.trial(h, q, t);
-            let Some(part) = self.first_rim(&next, h, q, t) else {
+            let Some(event) = self.first_event(&next, h, q, t) else {
                 self.accept(next, h, q, t, watch);
                 return;
             };
+            let part = match event {
+                Event::Rim(_, part) => part,
+                // At a release the rates do not jump, so that the instant needs no derivatives.
+                Event::Release(_, part) => T::constant(part),
+            };
             let first = q.part(T::constant(0.0), part);
-            let at_rim = self.trial(h * part, first, t);
-            self.accept(at_rim, h * part, first, t, watch);
+            let there = self.trial(h * part, first, t);
+            self.accept(there, h * part, first, t, watch);
+            released = match event {
+                Event::Rim(i, _) => {
+                    self.levels[i] = self.vessels[i].rim.level;
+                    None
+                }
+                Event::Release(i, _) => Some(i),
+            };
             t += (h * part).value();
             q = q.part(part, T::constant(1.0));
             h = h - h * part;
@@ -291,9 +537,9 @@ impl<T: Scalar> Vessels<T> {
     }
 
     fn accept(&mut self, next: Levels<T>, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
-        let last = self.vessels.len() - 1;
-        let before = self.levels;
         if let Some(watch) = watch {
+            let last = self.vessels.len() - 1;
+            let before = self.levels;
             let rate_before = self.rates(&before, q.start, t)[last];
             let rate_after = self.rates(&next, q.end, t + h.value())[last];
             watch(&Stretch {
@@ -308,63 +554,128 @@ impl<T: Scalar> Vessels<T> {
         self.keep_within();
     }
 
-    /// The part of the step after which the first level meets its rim; `None` where none does.
-    fn first_rim(&self, next: &Levels<T>, h: T, q: Inflow<T>, t: f64) -> Option<T> {
-        let above =
-            |levels: &Levels<T>, i: usize| levels[i].value() - self.vessels[i].rim.level.value();
+    /// The net inflow of vessel `i` at levels, in the present modes.
+    fn net(&self, i: usize, levels: &Levels<T>, q: T, t: f64) -> f64 {
+        let mut inflow = q;
+        for (k, vessel) in self.vessels.iter().enumerate().take(i) {
+            let (outflow, net) = self.balance(k, levels[k], inflow, t);
+            inflow = outflow;
+            if vessel.spilling && net.value() > 0.0 {
+                inflow = inflow + net * vessel.rim.fraction;
+            }
+        }
+        self.balance(i, levels[i], inflow, t).1.value()
+    }
+
+    /// The first thing to happen within the step that would lead to `next`, if anything does.
+    fn first_event(&self, next: &Levels<T>, h: T, q: Inflow<T>, t: f64) -> Option<Event<T>> {
+        let at = |s: f64| {
+            let part = T::constant(s);
+            let piece = q.part(T::constant(0.0), part);
+            (self.trial(h * part, piece, t), piece.end, t + s * h.value())
+        };
         let mut first: Option<(f64, usize)> = None;
         for (i, vessel) in self.vessels.iter().enumerate() {
-            if vessel.spilling || above(next, i) <= 1e-12 * vessel.rim.level.value().abs() {
+            let rim = vessel.rim.level.value();
+            if rim == f64::INFINITY {
                 continue;
             }
-            // Illinois: regula falsi that does not stall.
-            let (mut low, mut high) = ((0.0, above(&self.levels, i)), (1.0, above(next, i)));
-            if low.1 >= 0.0 {
-                // On the rim already and rising: settled as spilling next time.
-                continue;
-            }
-            let mut side = 0;
-            for _ in 0..40 {
-                let s = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-                let part = T::constant(s);
-                let value = above(&self.trial(h * part, q.part(T::constant(0.0), part), t), i);
-                if value > 0.0 {
-                    high = (s, value);
-                    if side == 1 {
-                        low.1 *= 0.5;
-                    }
-                    side = 1;
+            // Positive once the event has happened.
+            let past = |levels: &Levels<T>, q: T, t: f64| {
+                if vessel.spilling {
+                    -self.net(i, levels, q, t)
                 } else {
-                    low = (s, value);
-                    if side == -1 {
-                        high.1 *= 0.5;
-                    }
-                    side = -1;
+                    levels[i].value() - rim
                 }
-                if value.abs() <= 1e-14 * vessel.rim.level.value().abs() || high.0 - low.0 < 1e-15 {
-                    break;
+            };
+            let low = past(&self.levels, q.start, t);
+            let (mut end, mut high) = (1.0, past(next, q.end, t + h.value()));
+            if low >= 0.0 {
+                // Just released, or on the rim with a net inflow of nothing.
+                continue;
+            }
+            if high <= 0.0 {
+                if vessel.spilling {
+                    continue;
+                }
+                // Above the rim in between? The top of the cubic through levels and rates says where to look.
+                let Some(top) = self.top(i, next, h, q, t).filter(|&(_, level)| level > rim) else {
+                    continue;
+                };
+                let (levels, q, t) = at(top.0);
+                (end, high) = (top.0, past(&levels, q, t));
+                if high <= 0.0 {
+                    continue;
                 }
             }
-            let s = if low.1.abs() < high.1.abs() {
-                low.0
-            } else {
-                high.0
-            };
+            let s = crossing((0.0, low), (end, high), |s| {
+                let (levels, q, t) = at(s);
+                past(&levels, q, t)
+            });
             if first.is_none_or(|(earlier, _)| s < earlier) {
                 first = Some((s, i));
             }
         }
         let (s, i) = first?;
+        if self.vessels[i].spilling {
+            return (s < 1.0).then_some(Event::Release(i, s));
+        }
         // One Newton step in duals gives the instant its derivatives.
-        let part = T::constant(s);
-        let piece = q.part(T::constant(0.0), part);
-        let at = self.trial(h * part, piece, t);
-        let rate = self.rates(&at, piece.end, t + s * h.value())[i].value() * h.value();
-        let miss = at[i] - self.vessels[i].rim.level;
+        let (levels, q_there, t_there) = at(s);
+        let rate = self.rates(&levels, q_there, t_there)[i].value() * h.value();
         if rate <= 0.0 {
             return None;
         }
-        let part = part - miss * (1.0 / rate);
-        (part.value() < 1.0).then_some(part)
+        let miss = levels[i] - self.vessels[i].rim.level;
+        let part = T::constant(s) - miss * (1.0 / rate);
+        (part.value() < 1.0).then_some(Event::Rim(i, part))
     }
+
+    /// Where within the step, and how high, the level of a vessel is highest; `None` where that is at an end.
+    fn top(&self, i: usize, next: &Levels<T>, h: T, q: Inflow<T>, t: f64) -> Option<(f64, f64)> {
+        let dt = h.value();
+        let begin = self.rates(&self.levels, q.start, t)[i].value() * dt;
+        let end = self.rates(next, q.end, t + dt)[i].value() * dt;
+        if begin <= 0.0 || end >= 0.0 {
+            return None;
+        }
+        let before = self.levels[i].value();
+        let rise = next[i].value() - before;
+        // Rates along the cubic: begin + b s + c s^2, from above zero to below: one root within.
+        let b = 6.0 * rise - 4.0 * begin - 2.0 * end;
+        let c = 3.0 * (begin + end - 2.0 * rise);
+        let root = (b * b - 4.0 * begin * c).max(0.0).sqrt();
+        let s = 2.0 * begin / (root - b);
+        let level = before + s * (begin + s * (0.5 * b + s * c / 3.0));
+        (s > 0.0 && s < 1.0).then_some((s, level))
+    }
+}
+
+/// Where a function that is negative at `low` and positive at `high` changes its sign, by regula falsi that does not
+/// stall (Illinois). Nine digits are enough: at a rim a Newton step follows, and a release is flat.
+fn crossing(mut low: (f64, f64), mut high: (f64, f64), f: impl Fn(f64) -> f64) -> f64 {
+    let mut last = f64::NAN;
+    let mut side = 0;
+    for _ in 0..60 {
+        let s = ((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1)).clamp(low.0, high.0);
+        if (s - last).abs() < 1e-9 || high.0 - low.0 < 1e-9 {
+            return s;
+        }
+        last = s;
+        let value = f(s);
+        if value > 0.0 {
+            high = (s, value);
+            if side == 1 {
+                low.1 *= 0.5;
+            }
+            side = 1;
+        } else {
+            low = (s, value);
+            if side == -1 {
+                high.1 *= 0.5;
+            }
+            side = -1;
+        }
+    }
+    last
 }

@@ -1,0 +1,102 @@
+//! An effect at its absent value is the base model, bit for bit, and smooth there.
+
+mod support;
+
+use plants::{Place, Plant};
+use support::{DRIVES, base, input, interior, label, placements};
+
+#[test]
+fn an_absent_effect_leaves_the_output_bit_for_bit() {
+    for plant in Plant::ALL {
+        let base = base(plant);
+        for (seed, drive) in DRIVES.into_iter().enumerate() {
+            let input = input(drive, 300, base.h, seed as u64);
+            for substeps in [1, 3] {
+                let without = base.run(&input, substeps);
+                for placed in placements(plant) {
+                    let with = base.with_absent(&[placed]).run(&input, substeps);
+                    for (k, (a, b)) in with.iter().zip(&without).enumerate() {
+                        assert_eq!(
+                            a.to_bits(),
+                            b.to_bits(),
+                            "{}, {drive:?}, {substeps} substeps, sample {k}: {a} against {b}",
+                            label(&[placed], plant)
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn all_effects_at_once_absent_leave_the_output_bit_for_bit() {
+    for plant in Plant::ALL {
+        let base = base(plant);
+        for vessel in 0..plant.vessels() {
+            let all: Vec<_> = placements(plant)
+                .into_iter()
+                .filter(|p| p.effect.place != Place::Vessel || p.vessel == vessel)
+                .collect();
+            for (seed, drive) in DRIVES.into_iter().enumerate() {
+                let input = input(drive, 300, base.h, 10 + seed as u64);
+                let with = base.with_absent(&all).run(&input, 1);
+                assert_eq!(with, base.run(&input, 1), "{}, {drive:?}", plant.id());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_derivative_at_absent_is_that_of_the_limit() {
+    for plant in Plant::ALL {
+        let base = base(plant);
+        for (seed, drive) in DRIVES.into_iter().enumerate() {
+            let input = input(drive, 200, base.h, 20 + seed as u64);
+            for substeps in [1, 3] {
+                for placed in placements(plant) {
+                    let info = &base.structure.effect_parameters(placed)[0];
+                    if !info.absent.is_finite() {
+                        // A threshold that is never reached has no derivative there; derivatives.rs has it at work.
+                        continue;
+                    }
+                    let case = base.with_absent(&[placed]);
+                    let own = base.theta.len();
+                    let at = |x: f64| {
+                        let mut moved = case.clone();
+                        moved.theta[own] = x;
+                        moved.run(&input, substeps)
+                    };
+                    // A difference towards the inside of the bounds, of second order: below absent a delay or a lag
+                    // has no meaning, and a leak or a dead zone has a corner there.
+                    let step = 1e-4 * (interior(&base, placed, info) - info.absent);
+                    let (f0, f1, f2) = (
+                        at(info.absent),
+                        at(info.absent + step),
+                        at(info.absent + 2.0 * step),
+                    );
+                    let exact = case.run_dual(&input, substeps);
+                    let largest = exact.iter().fold(0.0_f64, |m, y| m.max(y.eps[own].abs()));
+                    let mut worst = 0.0_f64;
+                    for (k, y) in exact.iter().enumerate() {
+                        let difference = (4.0 * f1[k] - f2[k] - 3.0 * f0[k]) / (2.0 * step);
+                        worst = worst.max((difference - y.eps[own]).abs() / largest);
+                    }
+                    assert!(
+                        worst < 2e-6,
+                        "{}, {drive:?}, {substeps} substeps: derivative at absent off by {worst:e} of {largest:e}",
+                        label(&[placed], plant)
+                    );
+                    // Where both sides mean something the central difference agrees too.
+                    if info.lower < info.absent {
+                        let below = at(info.absent - step);
+                        for (k, y) in exact.iter().enumerate() {
+                            let difference = (f1[k] - below[k]) / (2.0 * step);
+                            assert!((difference - y.eps[own]).abs() < 2e-6 * largest);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! Plants with numbers, inputs, and a reference that integrates the written equations by other means.
+#![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+pub mod reference;
+
+use plants::{
+    CATALOGUE, Command, Dual, Known, ParameterInfo, Place, Placed, Plant, Scalar, Scales,
+    Simulator, Structure,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A plant at a set of believable numbers.
+#[derive(Clone)]
+pub struct Case {
+    pub structure: Structure,
+    /// The plant's own parameters, then each effect's.
+    pub theta: Vec<f64>,
+    pub levels: Vec<f64>,
+    pub at_rest: f64,
+    /// Nominal sampling interval \[s\].
+    pub h: f64,
+}
+
+pub fn effect(id: &str) -> &'static plants::EffectInfo {
+    plants::EffectInfo::find(id).expect("an effect of the catalogue")
+}
+
+/// A plant whose levels stay between about 4 and 20 for commands between 3.5 and 6.5, with `h/tau` near 0.03.
+pub fn base(plant: Plant) -> Case {
+    let (theta, levels, area, flow, h): (Vec<f64>, Vec<f64>, _, f64, f64) = match plant {
+        Plant::SingleTank => (vec![9.0, 13.0], vec![11.0], [Some(154.0), None], 45.0, 3.0),
+        Plant::CascadedTanks => (
+            vec![3.3, 5.0, 4.6],
+            vec![9.5, 12.0],
+            [Some(28.0), Some(32.0)],
+            16.5,
+            1.5,
+        ),
+        Plant::SingleTankLinear => (vec![2.0, 80.0, 1.5], vec![11.0], [None; 2], 10.0, 3.0),
+        Plant::CascadedTanksLinear => (
+            vec![2.0, 60.0, 90.0, 1.5],
+            vec![9.5, 12.0],
+            [None; 2],
+            10.0,
+            3.0,
+        ),
+        Plant::FirstOrder => (vec![2.2, 80.0], vec![11.0], [None; 2], 11.0, 3.0),
+    };
+    let known = Known {
+        area,
+        ..Known::default()
+    };
+    let mut scales = Scales::from_ranges((3.5, 6.5), (6.0, 17.0), h, 400.0 * h);
+    scales.input_range = 10.0;
+    scales.operating_level = [10.0, 11.0];
+    scales.flow = flow;
+    Case {
+        structure: Structure::new(plant, known, scales),
+        theta,
+        levels,
+        at_rest: 4.7,
+        h,
+    }
+}
+
+/// Every effect of the catalogue at every place that it takes on this plant.
+pub fn placements(plant: Plant) -> Vec<Placed> {
+    CATALOGUE
+        .iter()
+        .filter(|effect| (effect.applies)(plant))
+        .flat_map(|&effect| {
+            let places = if effect.place == Place::Vessel {
+                plant.vessels()
+            } else {
+                1
+            };
+            (0..places).map(move |vessel| Placed { effect, vessel })
+        })
+        .collect()
+}
+
+pub fn label(placed: &[Placed], plant: Plant) -> String {
+    let names: Vec<String> = placed
+        .iter()
+        .map(|p| format!("{}@{}", p.effect.id, p.vessel))
+        .collect();
+    format!("{} with [{}]", plant.id(), names.join(", "))
+}
+
+/// A value at which the effect shows.
+pub fn interior(case: &Case, placed: Placed, info: &ParameterInfo) -> f64 {
+    let (h, flow) = (case.h, case.structure.scales.flow);
+    match (placed.effect.id, info.name) {
+        ("transport_delay", _) => 2.37 * h,
+        ("pump_deadzone", _) => 0.37,
+        ("pump_saturation", _) => 5.61,
+        ("pump_nonlinearity", _) => 0.31,
+        ("pump_lag", _) => 3.3 * h,
+        ("sqrt_outflow", _) => 0.8,
+        ("laminar_outflow", _) => 0.02 * flow,
+        ("const_leak", _) => 0.1 * flow,
+        ("area_varies", _) => 0.4,
+        ("overflow", "rim") => 11.3,
+        ("overflow", _) => 0.4,
+        ("sensor_lag", _) => 2.7 * h,
+        ("sensor_offset", _) => 0.7,
+        ("sensor_hysteresis", "step") => 0.8,
+        ("sensor_hysteresis", "drop") => 9.05,
+        ("sensor_hysteresis", _) => 2.1,
+        ("sensor_saturation", _) => 12.3,
+        _ => info.starts[0],
+    }
+}
+
+/// The same value, or the one that switches the effect off: absent for what has one, else the first start.
+pub fn absent(info: &ParameterInfo) -> f64 {
+    if info.absent.is_nan() {
+        info.starts[0]
+    } else {
+        info.absent
+    }
+}
+
+impl Case {
+    /// With effects, their parameters as `value` says.
+    pub fn with(
+        &self,
+        effects: &[Placed],
+        value: impl Fn(&Case, Placed, &ParameterInfo) -> f64,
+    ) -> Self {
+        let mut case = self.clone();
+        for &placed in effects {
+            case.structure = case.structure.with(placed).expect("it applies");
+        }
+        for &placed in case.structure.effects() {
+            for info in case.structure.effect_parameters(placed) {
+                case.theta.push(value(self, placed, &info));
+            }
+        }
+        case
+    }
+
+    pub fn with_interior(&self, effects: &[Placed]) -> Self {
+        self.with(effects, interior)
+    }
+
+    pub fn with_absent(&self, effects: &[Placed]) -> Self {
+        self.with(effects, |_, _, info| absent(info))
+    }
+
+    pub fn run(&self, input: &[(Command, f64)], substeps: usize) -> Vec<f64> {
+        simulate(
+            &self.structure,
+            &self.theta,
+            &self.levels,
+            self.at_rest,
+            input,
+            substeps,
+        )
+    }
+
+    /// Parameters, then initial levels: what a fit may move.
+    pub fn variables(&self) -> Vec<f64> {
+        self.theta.iter().chain(&self.levels).copied().collect()
+    }
+
+    /// The output at other variables.
+    pub fn run_at<T: Scalar>(
+        &self,
+        variables: &[T],
+        input: &[(Command, f64)],
+        substeps: usize,
+    ) -> Vec<T> {
+        let (theta, levels) = variables.split_at(self.theta.len());
+        simulate(
+            &self.structure,
+            theta,
+            levels,
+            self.at_rest,
+            input,
+            substeps,
+        )
+    }
+
+    /// The output with its derivatives by all variables.
+    pub fn run_dual(&self, input: &[(Command, f64)], substeps: usize) -> Vec<Dual<16>> {
+        let variables: Vec<Dual<16>> = self
+            .variables()
+            .iter()
+            .enumerate()
+            .map(|(i, &v)| Dual::variable(v, i))
+            .collect();
+        assert!(variables.len() <= 16);
+        self.run_at(&variables, input, substeps)
+    }
+}
+
+/// One reading before each command.
+pub fn simulate<T: Scalar>(
+    structure: &Structure,
+    theta: &[T],
+    levels: &[T],
+    at_rest: f64,
+    input: &[(Command, f64)],
+    substeps: usize,
+) -> Vec<T> {
+    let mut simulator = Simulator::new(structure, theta, levels, at_rest).expect("counts");
+    simulator.set_substeps(substeps);
+    input
+        .iter()
+        .map(|&(command, h)| {
+            let y = simulator.read();
+            simulator.advance(command, h);
+            y
+        })
+        .collect()
+}
+
+/// How a record is sampled and driven.
+#[derive(Debug, Clone, Copy)]
+pub struct Drive {
+    pub ramped: bool,
+    pub jittered: bool,
+}
+
+pub const DRIVES: [Drive; 4] = [
+    Drive {
+        ramped: false,
+        jittered: false,
+    },
+    Drive {
+        ramped: false,
+        jittered: true,
+    },
+    Drive {
+        ramped: true,
+        jittered: false,
+    },
+    Drive {
+        ramped: true,
+        jittered: true,
+    },
+];
+
+/// Random steps (held) or random ramps between 3.5 and 6.5, changing every few samples.
+pub fn input(drive: Drive, n: usize, h: f64, seed: u64) -> Vec<(Command, f64)> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut target = rng.random_range(3.5..6.5);
+    let mut u: f64 = 4.7;
+    let mut left = 0;
+    (0..n)
+        .map(|_| {
+            if left == 0 {
+                left = rng.random_range(4..24);
+                target = rng.random_range(3.5..6.5);
+                if !drive.ramped {
+                    u = target;
+                }
+            }
+            let step = if drive.jittered {
+                h * rng.random_range(0.6..1.4)
+            } else {
+                h
+            };
+            let command = if drive.ramped {
+                let to = u + (target - u) / f64::from(left);
+                let command = Command::ramp(u, to);
+                u = to;
+                command
+            } else {
+                Command::held(u)
+            };
+            left -= 1;
+            (command, step)
+        })
+        .collect()
+}
+
+/// Largest difference, as a share of the largest magnitude of the second.
+pub fn difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let scale = b.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    a.iter()
+        .zip(b)
+        .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()))
+        / scale
+}

@@ -1,0 +1,392 @@
+//! The equations of the catalogue as its files write them, integrated without the crate's own laws: Dormand-Prince
+//! restarted at every corner of the input where nothing overflows, else fine Runge-Kutta steps with every contact
+//! with a rim bisected.
+
+use ode_solvers::dopri5::Dopri5;
+use ode_solvers::{DVector, OutputType, System};
+use plants::{Command, Outlet, Plant};
+
+use super::Case;
+
+/// Parameters by name; what is missing is absent.
+#[derive(Clone, Default)]
+struct Equations {
+    linear: bool,
+    n: usize,
+    gain: f64,
+    area: [f64; 2],
+    /// `alpha`, or the offset of a linear outlet.
+    outlet: [f64; 2],
+    leak: [f64; 2],
+    laminar: [f64; 2],
+    curvature: [f64; 2],
+    taper: [f64; 2],
+    operating: [f64; 2],
+    rim: [f64; 2],
+    fraction: [f64; 2],
+    delay: f64,
+    threshold: f64,
+    limit: f64,
+    bend: f64,
+    input_range: f64,
+    pump_lag: Option<f64>,
+    sensor_lag: Option<f64>,
+    offset: f64,
+    hysteresis: Option<[f64; 4]>,
+    largest_reading: f64,
+    at_rest: f64,
+}
+
+impl Equations {
+    fn new(case: &Case) -> Self {
+        let structure = &case.structure;
+        let theta = &case.theta;
+        let scales = &structure.scales;
+        let mut e = Self {
+            linear: structure.plant.outlet() == Outlet::Linear,
+            n: structure.plant.vessels(),
+            gain: theta[0],
+            area: scales.area,
+            operating: scales.operating_level,
+            rim: [f64::INFINITY; 2],
+            limit: f64::INFINITY,
+            largest_reading: f64::INFINITY,
+            input_range: scales.input_range,
+            at_rest: case.at_rest,
+            ..Self::default()
+        };
+        match structure.plant {
+            Plant::SingleTank => e.outlet[0] = theta[1],
+            Plant::CascadedTanks => e.outlet = [theta[1], theta[2]],
+            Plant::SingleTankLinear => (e.area[0], e.outlet[0]) = (theta[1], theta[2]),
+            Plant::CascadedTanksLinear => {
+                (e.area, e.outlet) = ([theta[1], theta[2]], [0.0, theta[3]]);
+            }
+            Plant::FirstOrder => e.area[0] = theta[1],
+        }
+        let names = structure.parameter_names();
+        let vessel = |id: &str| {
+            let placed = structure.effects().iter().find(|p| p.effect.id == id);
+            placed.map_or(0, |p| p.vessel)
+        };
+        let (low, high) = scales.level[e.n - 1];
+        let own = structure.plant.parameters(scales).len();
+        for (name, &value) in names.iter().zip(theta).skip(own) {
+            let (id, parameter) = name.split_once('.').expect("effect.parameter");
+            let v = vessel(id);
+            match (id, parameter) {
+                ("transport_delay", _) => e.delay = value,
+                ("pump_deadzone", _) => e.threshold = value,
+                ("pump_saturation", _) => e.limit = value,
+                ("pump_nonlinearity", _) => e.bend = value,
+                ("pump_lag", _) => e.pump_lag = Some(value),
+                ("sqrt_outflow", _) => e.curvature[v] = value,
+                ("laminar_outflow", _) => e.laminar[v] = value,
+                ("const_leak", _) => e.leak[v] = value,
+                ("area_varies", _) => e.taper[v] = value,
+                ("overflow", "rim") => e.rim[v] = value,
+                ("overflow", _) => e.fraction[v] = value,
+                ("sensor_lag", _) => e.sensor_lag = Some(value),
+                ("sensor_offset", _) => e.offset = value,
+                ("sensor_hysteresis", "step") => {
+                    e.hysteresis = Some([value, 0.0, 0.0, 0.015 * (high - low)]);
+                }
+                ("sensor_hysteresis", "drop") => {
+                    e.hysteresis.as_mut().expect("step first")[1] = value
+                }
+                ("sensor_hysteresis", _) => e.hysteresis.as_mut().expect("step first")[2] = value,
+                ("sensor_saturation", _) => e.largest_reading = value,
+                _ => panic!("`{name}` has no reference: write its equation here"),
+            }
+        }
+        e
+    }
+
+    /// Static part of the actuator.
+    fn command(&self, u: f64) -> f64 {
+        let beyond = (u.abs() - self.threshold).max(0.0) * u.signum();
+        let limited = if beyond > self.limit {
+            self.limit
+        } else {
+            beyond
+        };
+        limited + self.bend * limited * (limited - self.input_range) / self.input_range
+    }
+
+    fn outflow(&self, i: usize, level: f64) -> f64 {
+        let own = if self.linear {
+            level - self.outlet[i]
+        } else {
+            self.outlet[i] * level.max(0.0).sqrt()
+        };
+        let root = self.operating[i].sqrt();
+        let curved = if self.curvature[i] == 0.0 {
+            0.0
+        } else {
+            2.0 * root * (level.sqrt() - root) - (level - self.operating[i])
+        };
+        own + self.laminar[i] * level + self.curvature[i] * curved
+    }
+
+    /// Rates of (levels, pump's state, sensor's state) for the command that arrives, and each vessel's net inflow.
+    fn rates(&self, x: &[f64], arriving: f64, spilling: [bool; 2]) -> ([f64; 4], [f64; 2]) {
+        let mut dx = [0.0; 4];
+        let mut net = [0.0; 2];
+        let acting = match self.pump_lag {
+            Some(lag) => {
+                dx[2] = (arriving - x[2]) / lag;
+                x[2]
+            }
+            None => arriving,
+        };
+        let mut inflow = self.gain * acting;
+        for i in 0..self.n {
+            let out = self.outflow(i, x[i]);
+            net[i] = inflow - out - self.leak[i];
+            let width = 1.0 + self.taper[i] * (x[i] - self.operating[i]) / self.operating[i];
+            assert!(width > 0.1, "the reference has no narrowest width");
+            inflow = out;
+            if spilling[i] {
+                inflow += self.fraction[i] * net[i].max(0.0);
+            } else {
+                dx[i] = net[i] / (self.area[i] * width * width);
+            }
+        }
+        if let Some(lag) = self.sensor_lag {
+            dx[3] = (x[self.n - 1] - x[3]) / lag;
+        }
+        (dx, net)
+    }
+}
+
+/// The command as a function of time, delayed and shaped, with its corners.
+struct Signal<'a> {
+    equations: &'a Equations,
+    /// Beginning, length and command of each interval.
+    pieces: Vec<(f64, f64, Command)>,
+}
+
+impl Signal<'_> {
+    /// The command as given at a time within piece `k` (or before all).
+    fn raw(&self, k: Option<usize>, t: f64) -> f64 {
+        let Some(k) = k else {
+            return self.equations.at_rest;
+        };
+        let (begin, h, command) = self.pieces[k];
+        match command.to {
+            None => command.from,
+            Some(to) => command.from + (to - command.from) * (t - begin) / h,
+        }
+    }
+
+    /// Times at which what arrives jumps or has a corner.
+    fn corners(&self) -> Vec<f64> {
+        let e = self.equations;
+        let mut all = Vec::new();
+        for &(begin, h, command) in &self.pieces {
+            all.push(begin);
+            all.push(begin + e.delay);
+            if let Some(to) = command.to {
+                for kink in [e.threshold, -e.threshold, e.limit + e.threshold] {
+                    let s = (kink - command.from) / (to - command.from);
+                    if s > 0.0 && s < 1.0 {
+                        all.push(begin + s * h + e.delay);
+                    }
+                }
+            }
+        }
+        all.sort_by(f64::total_cmp);
+        all
+    }
+
+    /// The piece that arrives in the middle of a stretch.
+    fn piece(&self, middle: f64) -> Option<usize> {
+        let t = middle - self.equations.delay;
+        let after = self.pieces.partition_point(|&(begin, _, _)| begin <= t);
+        after.checked_sub(1)
+    }
+}
+
+struct Stretch<'a, 'b> {
+    signal: &'a Signal<'b>,
+    piece: Option<usize>,
+}
+
+impl Stretch<'_, '_> {
+    fn arriving(&self, t: f64) -> f64 {
+        let e = self.signal.equations;
+        e.command(self.signal.raw(self.piece, t - e.delay))
+    }
+}
+
+impl System<f64, DVector<f64>> for Stretch<'_, '_> {
+    fn system(&self, t: f64, x: &DVector<f64>, dx: &mut DVector<f64>) {
+        let (rates, _) = self
+            .signal
+            .equations
+            .rates(x.as_slice(), self.arriving(t), [false; 2]);
+        dx.copy_from_slice(&rates);
+    }
+}
+
+/// Readings before each command.
+pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
+    let equations = Equations::new(case);
+    let e = &equations;
+    let mut t = 0.0;
+    let mut pieces = Vec::new();
+    for &(command, h) in input {
+        pieces.push((t, h, command));
+        t += h;
+    }
+    let end = t;
+    let signal = Signal {
+        equations: e,
+        pieces,
+    };
+    let mut x = [0.0; 4];
+    for (i, (to, &level)) in x.iter_mut().zip(&case.levels).enumerate() {
+        *to = level.min(e.rim[i]);
+    }
+    x[2] = e.command(e.at_rest);
+    x[3] = x[e.n - 1];
+    let mut corners = signal.corners();
+    corners.push(end);
+    let mut readings = Vec::new();
+    let mut stuck = 0.0_f64;
+    let mut from = 0.0;
+    let mut sample = 0;
+    let overflows = e.rim.iter().any(|rim| rim.is_finite());
+    for corner in corners {
+        if corner > end {
+            break;
+        }
+        if corner > from {
+            let stretch = Stretch {
+                signal: &signal,
+                piece: signal.piece(0.5 * (from + corner)),
+            };
+            x = if overflows {
+                bisected(e, &stretch, x, from, corner)
+            } else {
+                smooth(stretch, x, from, corner)
+            };
+            from = corner;
+        }
+        while sample < input.len() && signal.pieces[sample].0 <= from {
+            let behind = if e.sensor_lag.is_some() {
+                x[3]
+            } else {
+                x[e.n - 1]
+            };
+            let mut y = behind + e.offset;
+            if let Some([step, drop, rise, width]) = e.hysteresis {
+                let up = ((y - drop) / rise).clamp(0.0, 1.0);
+                let down = ((y - drop) / width).clamp(0.0, 1.0);
+                stuck = stuck.max(up).min(down.max(up));
+                y += step * stuck;
+            }
+            readings.push(y.min(e.largest_reading));
+            sample += 1;
+        }
+    }
+    readings
+}
+
+fn smooth(stretch: Stretch, x: [f64; 4], from: f64, to: f64) -> [f64; 4] {
+    if to - from < 1e-9 {
+        // Two corners that rounding has parted: one Euler step is exact here.
+        let (rates, _) = stretch
+            .signal
+            .equations
+            .rates(&x, stretch.arriving(from), [false; 2]);
+        return std::array::from_fn(|i| x[i] + rates[i] * (to - from));
+    }
+    let mut solver = Dopri5::new(
+        stretch,
+        from,
+        to,
+        to - from,
+        DVector::from_column_slice(&x),
+        1e-12,
+        1e-12,
+    );
+    solver.set_output(OutputType::Sparse);
+    solver.integrate().expect("the reference integrates");
+    let last = solver.y_out().last().expect("a last point");
+    assert_eq!(solver.x_out().last(), Some(&to));
+    std::array::from_fn(|i| last[i])
+}
+
+/// Fine Runge-Kutta steps; where a level meets a rim or a net inflow changes sign at one, the instant is bisected.
+fn bisected(e: &Equations, stretch: &Stretch, mut x: [f64; 4], from: f64, to: f64) -> [f64; 4] {
+    let step = |x: [f64; 4], t: f64, h: f64, spilling: [bool; 2]| -> [f64; 4] {
+        let f = |x: [f64; 4], t: f64| e.rates(&x, stretch.arriving(t), spilling).0;
+        let add = |x: [f64; 4], k: [f64; 4], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
+        let k1 = f(x, t);
+        let k2 = f(add(x, k1, 0.5 * h), t + 0.5 * h);
+        let k3 = f(add(x, k2, 0.5 * h), t + 0.5 * h);
+        let k4 = f(add(x, k3, h), t + h);
+        std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
+    };
+    let modes = |x: [f64; 4], t: f64| -> [bool; 2] {
+        let mut spilling = [false; 2];
+        for i in 0..e.n {
+            let net = e.rates(&x, stretch.arriving(t), spilling).1;
+            spilling[i] = x[i] >= e.rim[i] && net[i] > 0.0;
+        }
+        spilling
+    };
+    // Whether the modes have been left by a state.
+    let left = |x: [f64; 4], t: f64, spilling: [bool; 2]| {
+        let net = e.rates(&x, stretch.arriving(t), spilling).1;
+        (0..e.n).any(|i| {
+            if spilling[i] {
+                net[i] < 0.0
+            } else {
+                x[i] > e.rim[i]
+            }
+        })
+    };
+    let n = 100;
+    let fine = (to - from) / f64::from(n);
+    let mut t = from;
+    for k in 1..=n {
+        let until = if k == n {
+            to
+        } else {
+            from + fine * f64::from(k)
+        };
+        let mut spilling = modes(x, t);
+        let mut arrived = false;
+        for _ in 0..6 {
+            let h = until - t;
+            let next = step(x, t, h, spilling);
+            if !left(next, until, spilling) {
+                x = next;
+                arrived = true;
+                break;
+            }
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..50 {
+                let middle = 0.5 * (low + high);
+                if left(step(x, t, h * middle, spilling), t + h * middle, spilling) {
+                    high = middle;
+                } else {
+                    low = middle;
+                }
+            }
+            x = step(x, t, h * high, spilling);
+            t += h * high;
+            for i in 0..e.n {
+                if !spilling[i] {
+                    x[i] = if x[i] >= e.rim[i] { e.rim[i] } else { x[i] };
+                }
+            }
+            spilling = modes(x, t);
+        }
+        assert!(arrived, "the reference chatters");
+        t = until;
+    }
+    x
+}

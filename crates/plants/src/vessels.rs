@@ -127,7 +127,7 @@ enum Event<T> {
     /// A vessel meets its rim after this part of the step.
     Rim(usize, T),
     /// A vessel stops spilling after this part of the step.
-    Release(usize, f64),
+    Release(usize, T),
 }
 
 impl<T: Scalar> Vessels<T> {
@@ -249,10 +249,8 @@ impl<T: Scalar> Vessels<T> {
             let (outflow, net) = self.balance(i, level, inflow, t);
             inflow = outflow;
             if vessel.spilling {
-                // The level stands at the rim, and the net inflow spills.
-                if net.value() > 0.0 {
-                    inflow = inflow + net * vessel.rim.fraction;
-                }
+                // The level stands at the rim, and the net inflow spills; where it turns negative the mode ends.
+                inflow = inflow + net * vessel.rim.fraction;
             } else {
                 rates[i] = net / self.area(i, level);
             }
@@ -513,11 +511,7 @@ impl<T: Scalar> Vessels<T> {
                 self.accept(next, h, q, t, watch);
                 return;
             };
-            let part = match event {
-                Event::Rim(_, part) => part,
-                // At a release the rates do not jump, so that the instant needs no derivatives.
-                Event::Release(_, part) => T::constant(part),
-            };
+            let (Event::Rim(_, part) | Event::Release(_, part)) = event;
             let first = q.part(T::constant(0.0), part);
             let there = self.trial(h * part, first, t);
             self.accept(there, h * part, first, t, watch);
@@ -555,16 +549,16 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// The net inflow of vessel `i` at levels, in the present modes.
-    fn net(&self, i: usize, levels: &Levels<T>, q: T, t: f64) -> f64 {
+    fn net(&self, i: usize, levels: &Levels<T>, q: T, t: f64) -> T {
         let mut inflow = q;
         for (k, vessel) in self.vessels.iter().enumerate().take(i) {
             let (outflow, net) = self.balance(k, levels[k], inflow, t);
             inflow = outflow;
-            if vessel.spilling && net.value() > 0.0 {
+            if vessel.spilling {
                 inflow = inflow + net * vessel.rim.fraction;
             }
         }
-        self.balance(i, levels[i], inflow, t).1.value()
+        self.balance(i, levels[i], inflow, t).1
     }
 
     /// The first thing to happen within the step that would lead to `next`, if anything does.
@@ -583,7 +577,7 @@ impl<T: Scalar> Vessels<T> {
             // Positive once the event has happened.
             let past = |levels: &Levels<T>, q: T, t: f64| {
                 if vessel.spilling {
-                    -self.net(i, levels, q, t)
+                    -self.net(i, levels, q, t).value()
                 } else {
                     levels[i].value() - rim
                 }
@@ -617,18 +611,27 @@ impl<T: Scalar> Vessels<T> {
             }
         }
         let (s, i) = first?;
-        if self.vessels[i].spilling {
-            return (s < 1.0).then_some(Event::Release(i, s));
-        }
-        // One Newton step in duals gives the instant its derivatives.
-        let (levels, q_there, t_there) = at(s);
-        let rate = self.rates(&levels, q_there, t_there)[i].value() * h.value();
-        if rate <= 0.0 {
+        // One Newton step in duals gives the instant its derivatives: those of the steps as they are taken, not of the
+        // flow that they approximate, hence the slope by a difference.
+        let spilling = self.vessels[i].spilling;
+        let past = |s: f64| {
+            let (levels, q, t) = at(s);
+            if spilling {
+                -self.net(i, &levels, q, t)
+            } else {
+                levels[i] - self.vessels[i].rim.level
+            }
+        };
+        let slope = (past(s + 1e-4).value() - past(s - 1e-4).value()) * 5e3;
+        if slope <= 0.0 {
             return None;
         }
-        let miss = levels[i] - self.vessels[i].rim.level;
-        let part = T::constant(s) - miss * (1.0 / rate);
-        (part.value() < 1.0).then_some(Event::Rim(i, part))
+        let part = (T::constant(s) - past(s) * (1.0 / slope)).max(T::constant(0.0));
+        (part.value() < 1.0).then_some(if spilling {
+            Event::Release(i, part)
+        } else {
+            Event::Rim(i, part)
+        })
     }
 
     /// Where within the step, and how high, the level of a vessel is highest; `None` where that is at an end.

@@ -286,3 +286,21 @@ pub fn difference(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()))
         / scale
 }
+
+/// Random sets of `size` effects that may be on together.
+pub fn random_sets(plant: Plant, size: usize, count: usize, seed: u64) -> Vec<Vec<Placed>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let all = placements(plant);
+    (0..count)
+        .map(|_| {
+            let mut set: Vec<Placed> = Vec::new();
+            while set.len() < size {
+                let placed = all[rng.random_range(0..all.len())];
+                if set.iter().all(|on| on.effect.id != placed.effect.id) {
+                    set.push(placed);
+                }
+            }
+            set
+        })
+        .collect()
+}

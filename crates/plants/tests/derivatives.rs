@@ -1,0 +1,120 @@
+//! Derivatives that duals carry against central differences of the output, at values where every effect shows.
+
+mod support;
+
+use plants::Plant;
+use support::{Case, DRIVES, Drive, base, input, label, placements, random_sets};
+
+/// The largest disagreement, as a share of the largest derivative by that variable, over samples and variables.
+///
+/// The output has corners (the hysteresis turns, the reading saturates between two samples), and a difference across a
+/// corner is no derivative: of two step lengths the better counts at each sample, and both are short.
+fn disagreement(case: &Case, input: &[(plants::Command, f64)], substeps: usize) -> (f64, usize) {
+    let exact = case.run_dual(input, substeps);
+    let plain = case.run(input, substeps);
+    for (dual, plain) in exact.iter().zip(&plain) {
+        assert_eq!(
+            dual.re.to_bits(),
+            plain.to_bits(),
+            "the value follows one path with and without derivatives"
+        );
+    }
+    let variables = case.variables();
+    let mut worst = (0.0, 0);
+    for lane in 0..variables.len() {
+        let scale = variables[lane].abs().max(0.1);
+        let difference = |share: f64| {
+            let moved = |sign: f64| {
+                let mut moved = variables.clone();
+                moved[lane] += sign * share * scale;
+                case.run_at(&moved, input, substeps)
+            };
+            let (up, down) = (moved(1.0), moved(-1.0));
+            let rate = |(a, b): (&f64, &f64)| (a - b) / (2.0 * share * scale);
+            up.iter().zip(&down).map(rate).collect::<Vec<f64>>()
+        };
+        let (coarse, fine) = (difference(1e-5), difference(1e-6));
+        let largest = exact.iter().fold(0.0_f64, |m, y| m.max(y.eps[lane].abs()));
+        for (k, y) in exact.iter().enumerate() {
+            let error = (coarse[k] - y.eps[lane])
+                .abs()
+                .min((fine[k] - y.eps[lane]).abs())
+                / largest.max(1e-12);
+            assert!(error.is_finite());
+            if error > worst.0 {
+                if error > 2e-7 {
+                    println!(
+                        "k {k} lane {lane}: {} {} {} of {largest}",
+                        coarse[k], fine[k], y.eps[lane]
+                    );
+                }
+                worst = (error, lane);
+            }
+        }
+    }
+    worst
+}
+
+fn check(
+    case: &Case,
+    effects: &[plants::Placed],
+    drive: Drive,
+    seed: u64,
+    most: f64,
+) -> Option<String> {
+    let plant = case.structure.plant;
+    let case = case.with_interior(effects);
+    let input = input(drive, 120, case.h, seed);
+    let mut failures = String::new();
+    for substeps in [1, 3] {
+        let (error, lane) = disagreement(&case, &input, substeps);
+        println!(
+            "{error:8.1e} {} {drive:?} {substeps}",
+            label(effects, plant)
+        );
+        if error > most {
+            let names = case.structure.parameter_names();
+            let name = names
+                .get(lane)
+                .cloned()
+                .unwrap_or(format!("level {}", lane - names.len().min(lane)));
+            failures += &format!(
+                "{error:e} by {name}: {} {drive:?} {substeps} seed {seed}\n",
+                label(effects, plant)
+            );
+        }
+    }
+    (!failures.is_empty()).then_some(failures)
+}
+
+#[test]
+fn every_effect_has_the_derivatives_of_its_output() {
+    let mut failures = Vec::new();
+    for plant in Plant::ALL {
+        let base = base(plant);
+        for (seed, drive) in DRIVES.into_iter().enumerate() {
+            failures.extend(check(&base, &[], drive, 100 + seed as u64, 1e-7));
+            for placed in placements(plant) {
+                failures.extend(check(&base, &[placed], drive, 100 + seed as u64, 2e-7));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.concat());
+}
+
+#[test]
+fn pairs_and_triples_have_the_derivatives_of_their_output() {
+    let mut failures = Vec::new();
+    for plant in Plant::ALL {
+        let base = base(plant);
+        for size in [2, 3] {
+            for (i, set) in random_sets(plant, size, 16, 7 * size as u64)
+                .iter()
+                .enumerate()
+            {
+                failures.extend(check(&base, set, DRIVES[i % 4], 200 + i as u64, 1e-6));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.concat());
+}

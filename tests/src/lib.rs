@@ -1,1 +1,168 @@
-//! See the package's description.
+//! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
+
+use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
+use plants::{
+    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, controller::Pi,
+};
+use rand_chacha::ChaCha8Rng;
+
+/// How the command comes about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Drive {
+    /// Random steps of the command.
+    Open,
+    /// Random steps of the set point, a PI controller that reads the noisy sensor.
+    Closed,
+}
+
+/// A rig.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    /// The plant.
+    pub plant: Plant,
+    /// What is built into it, with its parameters, in chain order.
+    pub hidden: Vec<(&'static str, usize, Vec<f64>)>,
+    /// The plant's own parameters.
+    pub theta: Vec<f64>,
+    /// Level at rest of each vessel under the middle command \[cm\].
+    pub levels: Vec<f64>,
+    /// Range of the command \[V\].
+    pub command: (f64, f64),
+    /// Standard deviation of the noise \[cm\].
+    pub noise: f64,
+    /// Correlation of the noise from sample to sample; zero is white.
+    pub colour: f64,
+    /// How the command comes about.
+    pub drive: Drive,
+    /// Samples.
+    pub samples: usize,
+    /// Sampling interval \[s\].
+    pub interval: f64,
+}
+
+impl Rig {
+    /// A single tank of 154 cm^2 whose level stands near 16 cm.
+    #[must_use]
+    pub fn single_tank() -> Self {
+        Self {
+            plant: Plant::SingleTank,
+            hidden: Vec::new(),
+            theta: vec![10.0, 12.5],
+            levels: vec![16.0],
+            command: (3.5, 6.5),
+            noise: 0.05,
+            colour: 0.0,
+            drive: Drive::Open,
+            samples: 1000,
+            interval: 2.0,
+        }
+    }
+
+    /// Two tanks of 154 cm^2 in series, the lower level near 16 cm, the upper one near 20 cm.
+    #[must_use]
+    pub fn cascaded_tanks() -> Self {
+        Self {
+            plant: Plant::CascadedTanks,
+            theta: vec![10.0, 11.2, 12.5],
+            levels: vec![20.0, 16.0],
+            ..Self::single_tank()
+        }
+    }
+
+    /// A first-order lag with offset.
+    #[must_use]
+    pub fn linear_tank() -> Self {
+        Self {
+            plant: Plant::SingleTankLinear,
+            theta: vec![6.4, 100.0, -16.0],
+            levels: vec![16.0],
+            ..Self::single_tank()
+        }
+    }
+
+    /// What is known of it.
+    #[must_use]
+    pub fn known(&self) -> Known {
+        let area = match self.plant {
+            Plant::SingleTank => [Some(154.0), None],
+            Plant::CascadedTanks => [Some(154.0), Some(154.0)],
+            _ => [None, None],
+        };
+        Known {
+            area,
+            tank_height: Some(60.0),
+            input_range: Some(10.0),
+        }
+    }
+
+    /// Runs it.
+    ///
+    /// # Panics
+    /// Where the rig is not possible: its settings are constants of a test.
+    #[allow(clippy::expect_used)]
+    pub fn run(&self, rng: &mut ChaCha8Rng) -> Record {
+        let mut scales = Scales::from_ranges(
+            (0.0, 10.0),
+            (5.0, 30.0),
+            self.interval,
+            self.interval * self.samples as f64,
+        );
+        scales.operating_level = [self.levels[0], *self.levels.last().expect("a vessel")];
+        scales.input_range = 10.0;
+        let mut structure = Structure::new(self.plant, self.known(), scales);
+        let mut theta = self.theta.clone();
+        for (id, vessel, parameters) in &self.hidden {
+            let effect = EffectInfo::find(id).expect("an effect of the catalogue");
+            structure = structure
+                .with(Placed {
+                    effect,
+                    vessel: *vessel,
+                })
+                .expect("an effect of this plant");
+            theta.extend(parameters);
+        }
+        let middle = 0.5 * (self.command.0 + self.command.1);
+        let mut simulator =
+            Simulator::new(&structure, &theta, &self.levels, middle).expect("a simulation");
+        let e = if self.colour > 0.0 {
+            noise::ar1(self.samples, self.noise, self.colour, rng)
+        } else {
+            noise::white(self.samples, self.noise, rng)
+        };
+        let (low, high) = match self.drive {
+            Drive::Open => self.command,
+            Drive::Closed => (
+                0.7 * self.levels[self.levels.len() - 1],
+                1.3 * self.levels[self.levels.len() - 1],
+            ),
+        };
+        let wanted: Result<Vec<f64>, Error> =
+            excitation::steps(self.samples, 20..=90, low, high, rng);
+        let wanted = wanted.expect("an excitation");
+        let mut controller = Pi::new(0.4, 120.0, (0.0, 10.0), middle).expect("a controller");
+        let (mut u, mut y) = (
+            Vec::with_capacity(self.samples),
+            Vec::with_capacity(self.samples),
+        );
+        for k in 0..self.samples {
+            let reading = simulator.read() + e[k];
+            let command = match self.drive {
+                Drive::Open => wanted[k],
+                Drive::Closed => controller.command(wanted[k], reading, self.interval),
+            };
+            simulator.advance(Command::held(command), self.interval);
+            y.push(reading);
+            u.push(command);
+        }
+        Record {
+            name: "rig".to_string(),
+            time: (0..self.samples)
+                .map(|k| k as f64 * self.interval)
+                .collect(),
+            input: Signal::new("u", "V", u),
+            output: Signal::new("y", "cm", y),
+            reference: None,
+            hold: Hold::Zero,
+        }
+    }
+}

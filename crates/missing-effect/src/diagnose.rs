@@ -6,6 +6,7 @@ use std::time::Instant;
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, coloured, fit_from, random_starts};
 use plants::{Known, Placed, Plant};
+use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
@@ -74,14 +75,14 @@ const STOPPING: Stopping = Stopping {
 /// An effect is accepted where its criterion falls by more than this ...
 const BIC_MARGIN: f64 = 6.0;
 /// ... and where chance would let so large a fall happen less often than this, counted over all candidates.
-const FALSE_CLAIM: f64 = 0.005;
+const FALSE_CLAIM: f64 = 0.001;
 /// What stands in for another lies within this of its criterion.
 const GROUP_MARGIN: f64 = 6.0;
 /// Probability-weighted sizes: shown at 1 % false alarm with 90 % power.
 const VISIBLE: f64 = 2.576 + 1.282;
 const BREADTH: Breadth = Breadth {
     beam: 3,
-    refits: 16,
+    refits: 12,
     most: 6,
 };
 
@@ -194,20 +195,22 @@ pub fn diagnose(
     };
     let trail = trail(&base, &confirmed, metric)?;
     let last = trail.last().cloned().unwrap_or_else(|| base.clone());
-    let mut groups = Vec::new();
-    for position in 0..last.added.len() {
-        let own = last.added[position].effect.id;
-        let mut group = vec![own.to_string()];
-        for node in exchanges(&last, position, metric)? {
-            let stand_in = node.added.last().map_or("", |placed| placed.effect.id);
-            // In the white metric a coloured residual counts each sample for less than one.
-            let behind = (node.fit.bic() - last.fit.bic()) / per_sample;
-            if node.plausible() && behind < GROUP_MARGIN && !group.iter().any(|g| g == stand_in) {
-                group.push(stand_in.to_string());
+    let groups = (0..last.added.len())
+        .into_par_iter()
+        .map(|position| {
+            let mut group = vec![last.added[position].effect.id.to_string()];
+            for node in exchanges(&last, position, metric)? {
+                let stand_in = node.added.last().map_or("", |placed| placed.effect.id);
+                // In the white metric a coloured residual counts each sample for less than one.
+                let behind = (node.fit.bic() - last.fit.bic()) / per_sample;
+                if node.plausible() && behind < GROUP_MARGIN && !group.iter().any(|g| g == stand_in)
+                {
+                    group.push(stand_in.to_string());
+                }
             }
-        }
-        groups.push(group);
-    }
+            Ok(group)
+        })
+        .collect::<Result<Vec<_>, Error>>()?;
     tell("telling apart", 2, 3);
     let single = singles(&trail[0], metric);
     let scores = scores(&trail[0], &single, metric);
@@ -333,14 +336,14 @@ fn in_metric<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
 /// Takes out, one by one, what the noise explains as well.
 fn confirm<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
     while !node.added.is_empty() {
-        let mut least: Option<(f64, Node<'a>)> = None;
-        for position in 0..node.added.len() {
-            let lacking = without(&node, position, noise)?;
-            let loss = lacking.fit.bic() - node.fit.bic();
-            if least.as_ref().is_none_or(|(smallest, _)| loss < *smallest) {
-                least = Some((loss, lacking));
-            }
-        }
+        let lacking: Vec<Node<'a>> = (0..node.added.len())
+            .into_par_iter()
+            .map(|position| without(&node, position, noise))
+            .collect::<Result<_, _>>()?;
+        let least = lacking
+            .into_iter()
+            .map(|lacking| (lacking.fit.bic() - node.fit.bic(), lacking))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((loss, lacking)) = least else { break };
         let freedom = (node.fit.parameters - lacking.fit.parameters).max(1) as f64;
         let fall = lacking.fit.deviance - node.fit.deviance;
@@ -376,16 +379,10 @@ fn trail<'a>(base: &Node<'a>, last: &Node<'a>, noise: &ArModel) -> Result<Vec<No
     let mut left = last.added.clone();
     while !left.is_empty() {
         let parent = &trail[trail.len() - 1];
-        let mut best: Option<Node> = None;
-        for &placed in &left {
-            if let Some(node) = place(parent, placed, last, noise)
-                && best
-                    .as_ref()
-                    .is_none_or(|known| node.fit.cost < known.fit.cost)
-            {
-                best = Some(node);
-            }
-        }
+        let best = left
+            .par_iter()
+            .filter_map(|&placed| place(parent, placed, last, noise))
+            .min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
         let Some(node) = best else { break };
         left.retain(|placed| Some(placed) != node.added.last());
         trail.push(node);

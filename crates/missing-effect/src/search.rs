@@ -81,8 +81,10 @@ const FINE: Stopping = Stopping {
 /// Starts of a new effect that are followed down, the most promising of its grid.
 const FOLLOWED: usize = 2;
 
+/// A rough fit this near in the criterion may come within a group's margin.
+const NEAR: f64 = 25.0;
 /// Stand-ins that are refitted for each effect, the most promising first.
-const EXCHANGED: usize = 8;
+const EXCHANGED: usize = 6;
 
 /// A child's starts: the parent's vector, with the new effect's parameters on the grid of its starts.
 fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
@@ -317,6 +319,14 @@ pub(crate) fn exchanges<'a>(
     let mut nodes: Vec<Node> = proposals
         .into_par_iter()
         .filter_map(|proposal| realise(proposal, noise, ROUGH))
+        .map(|rough| {
+            // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
+            if rough.fit.bic() - node.fit.bic() < NEAR {
+                refine(&rough, noise, &[]).unwrap_or(rough)
+            } else {
+                rough
+            }
+        })
         .collect();
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     Ok(nodes)

@@ -1,0 +1,54 @@
+//! Records with no missing effect: the tool must not name one.
+
+use ctid_tests::{Drive, Rig};
+use missing_effect::{Options, Problem, diagnose};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Open and closed loop, white and coloured noise, three kinds of plant: 60 records, of which at most one may be
+/// said to miss something of the catalogue.
+#[test]
+fn at_most_one_of_sixty_adequate_models_is_blamed() {
+    let mut blamed = Vec::new();
+    for run in 0..60u64 {
+        let rig = match run % 3 {
+            0 => Rig::single_tank(),
+            1 => Rig::cascaded_tanks(),
+            _ => Rig::linear_tank(),
+        };
+        let drive = if (run / 3) % 2 == 0 {
+            Drive::Open
+        } else {
+            Drive::Closed
+        };
+        let colour = [0.0, 0.8, 0.0, 0.95][(run / 6 % 4) as usize];
+        let rig = Rig {
+            drive,
+            colour,
+            noise: if colour > 0.0 { 0.1 } else { 0.05 },
+            ..rig
+        };
+        let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1000 + run));
+        let problem = Problem {
+            plant: rig.plant,
+            known: rig.known(),
+            effects: Vec::new(),
+            start: Default::default(),
+            fixed: Vec::new(),
+            records: vec![record],
+            test: Vec::new(),
+        };
+        let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
+        println!(
+            "{run} {} {drive:?} colour {colour}: {:?} {:?} {:.2} s",
+            rig.plant.id(),
+            found.verdict,
+            found.effects,
+            found.seconds
+        );
+        if !found.effects.is_empty() {
+            blamed.push((run, rig.plant.id(), drive, colour, found.effects));
+        }
+    }
+    assert!(blamed.len() <= 1, "{blamed:?}");
+}

@@ -91,13 +91,12 @@ impl<const N: usize> Dual<N> {
     }
 
     /// `f(self)` with the value `re` and the derivative `slope` of `f`.
-    #[inline]
+    #[inline(always)]
     fn chain(self, re: f64, slope: f64) -> Self {
-        let mut eps = self.eps;
-        for e in &mut eps {
-            *e *= slope;
+        Self {
+            re,
+            eps: std::array::from_fn(|i| self.eps[i] * slope),
         }
-        Self { re, eps }
     }
 }
 
@@ -129,59 +128,44 @@ impl<const N: usize> Scalar for Dual<N> {
     }
 }
 
-impl<const N: usize> Add for Dual<N> {
-    type Output = Self;
-    #[inline]
-    fn add(mut self, other: Self) -> Self {
-        self.re += other.re;
-        for (a, b) in self.eps.iter_mut().zip(&other.eps) {
-            *a += b;
+/// The operators are written as one pass that builds the result in place: by-value edits of a copy cost a `memcpy` each.
+macro_rules! operator {
+    ($trait:ident, $method:ident, |$a:ident, $b:ident| $re:expr, |$i:ident| $eps:expr) => {
+        impl<const N: usize> $trait for Dual<N> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                let ($a, $b) = (&self, &other);
+                Self {
+                    re: $re,
+                    eps: std::array::from_fn(|$i| $eps),
+                }
+            }
         }
-        self
-    }
+    };
 }
 
-impl<const N: usize> Sub for Dual<N> {
-    type Output = Self;
-    #[inline]
-    fn sub(mut self, other: Self) -> Self {
-        self.re -= other.re;
-        for (a, b) in self.eps.iter_mut().zip(&other.eps) {
-            *a -= b;
-        }
-        self
-    }
-}
-
-impl<const N: usize> Mul for Dual<N> {
-    type Output = Self;
-    #[inline]
-    fn mul(mut self, other: Self) -> Self {
-        for (a, b) in self.eps.iter_mut().zip(&other.eps) {
-            *a = *a * other.re + self.re * b;
-        }
-        self.re *= other.re;
-        self
-    }
-}
+operator!(Add, add, |a, b| a.re + b.re, |i| a.eps[i] + b.eps[i]);
+operator!(Sub, sub, |a, b| a.re - b.re, |i| a.eps[i] - b.eps[i]);
+operator!(Mul, mul, |a, b| a.re * b.re, |i| a.eps[i] * b.re
+    + a.re * b.eps[i]);
 
 impl<const N: usize> Div for Dual<N> {
     type Output = Self;
-    #[inline]
-    fn div(mut self, other: Self) -> Self {
-        let quotient = self.re / other.re;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        let re = self.re / other.re;
         let inverse = 1.0 / other.re;
-        for (a, b) in self.eps.iter_mut().zip(&other.eps) {
-            *a = (*a - quotient * b) * inverse;
+        Self {
+            re,
+            eps: std::array::from_fn(|i| (self.eps[i] - re * other.eps[i]) * inverse),
         }
-        self.re = quotient;
-        self
     }
 }
 
 impl<const N: usize> Neg for Dual<N> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn neg(self) -> Self {
         self.chain(-self.re, -1.0)
     }
@@ -189,25 +173,29 @@ impl<const N: usize> Neg for Dual<N> {
 
 impl<const N: usize> Add<f64> for Dual<N> {
     type Output = Self;
-    #[inline]
-    fn add(mut self, other: f64) -> Self {
-        self.re += other;
-        self
+    #[inline(always)]
+    fn add(self, other: f64) -> Self {
+        Self {
+            re: self.re + other,
+            eps: self.eps,
+        }
     }
 }
 
 impl<const N: usize> Sub<f64> for Dual<N> {
     type Output = Self;
-    #[inline]
-    fn sub(mut self, other: f64) -> Self {
-        self.re -= other;
-        self
+    #[inline(always)]
+    fn sub(self, other: f64) -> Self {
+        Self {
+            re: self.re - other,
+            eps: self.eps,
+        }
     }
 }
 
 impl<const N: usize> Mul<f64> for Dual<N> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn mul(self, other: f64) -> Self {
         self.chain(self.re * other, other)
     }

@@ -14,11 +14,8 @@ fn with(plant: Plant, effects: &[(&str, f64)]) -> Case {
         })
         .collect();
     base(plant).with(&placed, |_, placed, _| {
-        effects
-            .iter()
-            .find(|(id, _)| *id == placed.effect.id)
-            .unwrap()
-            .1
+        let own = effects.iter().find(|(id, _)| *id == placed.effect.id);
+        own.map_or(f64::NAN, |(_, value)| *value)
     })
 }
 
@@ -188,7 +185,8 @@ fn the_derivative_by_a_delay_passes_whole_samples_without_a_jump() {
                     // Runge-Kutta cuts the steps elsewhere on either side, which changes its error: by (h/tau)^4/24 of
                     // the jumping rate, or by (h/tau)^2 for a lag below the sample.
                     let (most, fall) = match (plant.outlet(), lag) {
-                        (plants::Outlet::Linear, _) => (1e-8, 1.0),
+                        (plants::Outlet::Linear, None) => (1e-8, 1.0),
+                        (plants::Outlet::Linear, _) => (1e-6, 0.1),
                         (_, None) => (1e-4, 0.01),
                         _ => (1e-3, 0.1),
                     };

@@ -1,1 +1,3 @@
-//! See the package's description.
+//! Small programs, and the records that the tour of `ctid` walks through.
+
+pub mod tour_records;

@@ -36,6 +36,9 @@ pub enum Error {
     /// A plant and its effects.
     #[error(transparent)]
     Plant(#[from] plants::Error),
+    /// The computation.
+    #[error(transparent)]
+    Diagnosis(#[from] missing_effect::Error),
     /// Standard output is gone.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] std::io::Error),

@@ -1,13 +1,32 @@
-//! ctid
+//! Says which physical effect a model of measured data is missing: the program `ctid`, as a library.
+//!
+//! | what | where |
+//! |---|---|
+//! | the command line | [`run`], [`Cli`] |
+//! | the model file | [`model_file`]; its effects are edited by [`edit`] |
+//! | records and model, read and checked | [`input`] |
+//! | the tour | [`tour`] |
+//! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
+//! | what is written, and what is not overwritten | [`output`] |
+//!
+//! The algorithms are in the crate `missing-effect`; here is only what surrounds them.
 
 mod atomic;
 pub mod catalogue;
+mod commands;
 pub mod edit;
 mod error;
+pub mod input;
 pub mod look;
 pub mod model_file;
 mod names;
 mod numbers;
+pub mod output;
+mod plot;
+pub mod progress;
 pub mod report;
+pub mod terminal;
+pub mod tour;
 
+pub use commands::{Cli, run};
 pub use error::Error;

@@ -67,7 +67,8 @@ impl Look {
         self.paint(Style::new().bold().yellow(), text)
     }
 
-    fn paint(self, style: Style, text: impl Display) -> String {
+    /// Text in a style.
+    pub(crate) fn paint(self, style: Style, text: impl Display) -> String {
         style.force_styling(self.colour).apply_to(text).to_string()
     }
 

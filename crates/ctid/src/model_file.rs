@@ -171,7 +171,7 @@ struct Raw {
     start: BTreeMap<Spanned<String>, Spanned<Number>>,
     controller: Option<Spanned<RawController>>,
     #[serde(default)]
-    effect: BTreeMap<Spanned<String>, Spanned<BTreeMap<Spanned<String>, Spanned<Entry>>>>,
+    effect: BTreeMap<Spanned<String>, Spanned<EffectTable>>,
     #[serde(default)]
     hold: Hold,
 }
@@ -216,6 +216,9 @@ impl Number {
         }
     }
 }
+
+/// An `[effect.X]` table as it stands.
+type EffectTable = BTreeMap<Spanned<String>, Spanned<Entry>>;
 
 /// An entry of an `[effect.X]` table.
 #[derive(Deserialize)]
@@ -404,7 +407,7 @@ impl Source<'_> {
     fn effect_tables(
         &self,
         plant: Plant,
-        tables: &BTreeMap<Spanned<String>, Spanned<BTreeMap<Spanned<String>, Spanned<Entry>>>>,
+        tables: &BTreeMap<Spanned<String>, Spanned<EffectTable>>,
     ) -> Result<BTreeMap<&'static str, Setting>, Error> {
         let mut settings = BTreeMap::new();
         for (name, table) in tables {

@@ -38,13 +38,13 @@ pub(crate) fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Op
     }
 }
 
-/// `value ± error unit`.
-pub(crate) fn with_error(value: f64, std_error: Option<f64>, unit: &str) -> String {
-    let text = match value_and_error(value, std_error) {
-        (value, Some(error)) => format!("{value} ± {error}"),
-        (value, None) => value,
-    };
-    format!("{text} {unit}").trim_end().to_string()
+/// A whole number, `-` where there is none.
+pub(crate) fn whole(value: f64) -> String {
+    if value.is_finite() {
+        decimals(value, 0)
+    } else {
+        significant(value, 1)
+    }
 }
 
 /// Numbers that stand under each other: all with the decimals that give the smallest of them two
@@ -74,10 +74,10 @@ pub(crate) fn duration(seconds: f64) -> String {
         s if s >= 2.0 * 86_400.0 => (seconds / 86_400.0, "days"),
         s if s >= 2.0 * 3_600.0 => (seconds / 3_600.0, "h"),
         s if s >= 600.0 => (seconds / 60.0, "min"),
-        s if s >= 1.0 => (seconds, "s"),
+        s if s >= 1.0 || s == 0.0 => (seconds, "s"),
         _ => (seconds * 1e3, "ms"),
     };
-    let whole = (value - value.round()).abs() < 1e-9 * value.abs();
+    let whole = (value - value.round()).abs() <= 1e-9 * value.abs();
     if whole {
         format!("{value:.0} {unit}")
     } else {
@@ -132,16 +132,23 @@ mod tests {
 
     #[test]
     fn a_value_stops_where_its_error_starts() {
-        let text = |value, error| with_error(value, Some(error), "cm");
-        assert_eq!(text(11.023_456, 0.012_3), "11.023 ± 0.012 cm");
-        assert_eq!(text(47_012.0, 1_187.0), "47000 ± 1200 cm");
-        assert_eq!(text(0.0, 0.1), "0.00 ± 0.10 cm");
-        assert_eq!(text(-0.001, 0.1), "0.00 ± 0.10 cm");
-        assert_eq!(text(1.234e-8, 2.1e-10), "1.234e-8 ± 2.1e-10 cm");
-        assert_eq!(text(1.234e8, 2.1e6), "1.234e8 ± 2.1e6 cm");
-        assert_eq!(with_error(3.0, None, ""), "3.000");
-        assert_eq!(with_error(3.0, Some(f64::NAN), ""), "3.000");
-        assert_eq!(with_error(f64::NAN, Some(1.0), "s"), "- s");
+        let text = |value, error| match value_and_error(value, Some(error)) {
+            (value, Some(error)) => format!("{value} ± {error}"),
+            (value, None) => value,
+        };
+        assert_eq!(text(11.023_456, 0.012_3), "11.023 ± 0.012");
+        assert_eq!(text(47_012.0, 1_187.0), "47000 ± 1200");
+        assert_eq!(text(0.0, 0.1), "0.00 ± 0.10");
+        assert_eq!(text(-0.001, 0.1), "0.00 ± 0.10");
+        assert_eq!(text(1.234e-8, 2.1e-10), "1.234e-8 ± 2.1e-10");
+        assert_eq!(text(1.234e8, 2.1e6), "1.234e8 ± 2.1e6");
+        assert_eq!(value_and_error(3.0, None), ("3.000".to_string(), None));
+        assert_eq!(text(3.0, f64::NAN), "3.000");
+        assert_eq!(text(f64::NAN, 1.0), "-");
+        assert_eq!(
+            (whole(-6.7), whole(-0.2), whole(f64::NAN)),
+            ("-7".into(), "0".into(), "-".into())
+        );
     }
 
     #[test]
@@ -158,6 +165,7 @@ mod tests {
     #[test]
     fn durations_have_fitting_units() {
         assert_eq!(duration(0.012), "12 ms");
+        assert_eq!(duration(0.0), "0 s");
         assert_eq!(duration(90.0), "90 s");
         assert_eq!(duration(1798.0), "30.0 min");
         assert_eq!(duration(36_000.0), "10 h");

@@ -1,5 +1,7 @@
 //! The model file: what it says, and one message for each mistake.
 
+#![allow(clippy::unwrap_used)]
+
 use std::path::Path;
 
 use ct_signals::Hold;

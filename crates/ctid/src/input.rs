@@ -1,0 +1,278 @@
+//! What `compare` and `diagnose` read: all of it, and checked, before anything is computed.
+
+use std::path::{Path, PathBuf};
+
+use ct_signals::{ROWS_PER_PARAMETER, Record, read_csv};
+use missing_effect::Problem;
+use plants::{Plant, Scales};
+
+use crate::model_file::{self, ModelFile};
+use crate::output::same_file;
+use crate::{Error, numbers};
+
+/// A level this many times the tank's height is in another unit.
+const BEYOND_THE_TANK: f64 = 1.5;
+
+/// The files of a problem.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Files {
+    /// Records that are fitted together, at least one.
+    pub data: Vec<PathBuf>,
+    /// Records that are only scored.
+    pub test: Vec<PathBuf>,
+    /// The model file.
+    pub model: PathBuf,
+}
+
+impl Files {
+    /// All of them.
+    #[must_use]
+    pub fn all(&self) -> Vec<&Path> {
+        let records = self.data.iter().chain(&self.test);
+        records.chain([&self.model]).map(PathBuf::as_path).collect()
+    }
+
+    /// Reads and checks everything.
+    ///
+    /// # Errors
+    /// One line that names the file, the place and the mend.
+    pub fn read(&self) -> Result<Problem, Error> {
+        self.check_repetition()?;
+        let model = model_file::read(&self.model)?;
+        let read = |paths: &[PathBuf]| -> Result<Vec<Record>, ct_signals::Error> {
+            paths
+                .iter()
+                .map(|path| read_csv(path, &model.columns, model.hold))
+                .collect()
+        };
+        let (records, test) = (read(&self.data)?, read(&self.test)?);
+        problem(&self.model.display().to_string(), model, records, test)
+    }
+
+    /// No record twice: a fitted one cannot be held out, and twice the same is not twice the data.
+    fn check_repetition(&self) -> Result<(), Error> {
+        let records: Vec<(&PathBuf, bool)> = self
+            .data
+            .iter()
+            .map(|path| (path, false))
+            .chain(self.test.iter().map(|path| (path, true)))
+            .collect();
+        for (index, (path, held_out)) in records.iter().enumerate() {
+            let Some((_, before)) = records[..index]
+                .iter()
+                .find(|(other, _)| same_file(other, path))
+            else {
+                continue;
+            };
+            let what = if *held_out && !before {
+                "it is both fitted and held out by --test; held-out data have to be another record"
+            } else {
+                "it is given twice; give it once"
+            };
+            return Err(Error::file(path, what));
+        }
+        Ok(())
+    }
+}
+
+/// A problem from what has been read; `model_name` names the model file in messages.
+///
+/// # Errors
+/// Where the records do not fit each other or the model.
+pub fn problem(
+    model_name: &str,
+    model: ModelFile,
+    records: Vec<Record>,
+    test: Vec<Record>,
+) -> Result<Problem, Error> {
+    check_units(&records, &test)?;
+    check_height(model_name, &model, records.iter().chain(&test))?;
+    check_rows(&model, &records)?;
+    Ok(Problem {
+        plant: model.plant,
+        known: model.known,
+        effects: model.effects,
+        start: model.start,
+        fixed: model.fixed,
+        records,
+        test,
+    })
+}
+
+/// Records that are fitted by one model are in one unit.
+fn check_units(records: &[Record], test: &[Record]) -> Result<(), Error> {
+    let Some((first, others)) = records.split_first() else {
+        return Err(Error::Usage(
+            "no record is given; name a CSV file".to_string(),
+        ));
+    };
+    for other in others.iter().chain(test) {
+        for (here, there) in [(&other.input, &first.input), (&other.output, &first.output)] {
+            if here.unit != there.unit {
+                let named = |unit: &str| match unit {
+                    "" => "without a unit".to_string(),
+                    unit => format!("in {unit}"),
+                };
+                return Err(Error::File {
+                    file: other.name.clone(),
+                    what: format!(
+                        "column \"{}\" is {}, but {} has it {}; convert one of them, or write the unit in its header",
+                        here.name,
+                        named(&here.unit),
+                        first.name,
+                        named(&there.unit)
+                    ),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A level far above the tank is in another unit than the tank.
+fn check_height<'a>(
+    model_name: &str,
+    model: &ModelFile,
+    records: impl Iterator<Item = &'a Record>,
+) -> Result<(), Error> {
+    let Some(height) = model.known.tank_height else {
+        return Ok(());
+    };
+    for record in records {
+        let (_, highest) = record.output_range();
+        if highest > BEYOND_THE_TANK * height {
+            return Err(Error::File {
+                file: model_name.to_string(),
+                what: format!(
+                    "tank_height = {height}, but the output of {} reaches {} {}; give the height in the output's unit",
+                    record.name,
+                    numbers::significant(highest, 3),
+                    record.output.unit
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Enough rows for the parameters; every record brings initial levels of its own.
+fn check_rows(model: &ModelFile, records: &[Record]) -> Result<(), Error> {
+    let [first, others @ ..] = records else {
+        return Ok(());
+    };
+    let scales = Scales::from_ranges(
+        first.input_range(),
+        first.output_range(),
+        first.sample_interval(),
+        first.duration(),
+    );
+    let parameters = model.structure(scales)?.parameters().len() - model.fixed.len();
+    let needed = parameters + records.len() * Plant::vessels(model.plant);
+    if others.is_empty() {
+        return Ok(first.require_rows(needed)?);
+    }
+    let rows: usize = records.iter().map(Record::len).sum();
+    if rows >= needed * ROWS_PER_PARAMETER {
+        return Ok(());
+    }
+    let names: Vec<&str> = records.iter().map(|record| record.name.as_str()).collect();
+    Err(Error::Record(ct_signals::Error::TooFewRows {
+        record: names.join(" and "),
+        rows,
+        needed: needed * ROWS_PER_PARAMETER,
+        why: format!(" to fit {needed} parameters"),
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ct_signals::{Hold, Signal};
+
+    fn record(name: &str, rows: usize, unit: &str) -> Record {
+        let values = |scale: f64| (0..rows).map(|k| scale * (1.0 + (k % 7) as f64)).collect();
+        Record {
+            name: name.to_string(),
+            time: (0..rows).map(|k| k as f64).collect(),
+            input: Signal::new("u", "V", values(1.0)),
+            output: Signal::new("y", unit, values(2.0)),
+            reference: None,
+            hold: Hold::Zero,
+        }
+    }
+
+    fn refused(model: &str, records: Vec<Record>, test: Vec<Record>) -> String {
+        let model = model_file::parse("tank.toml", model).unwrap();
+        problem("tank.toml", model, records, test)
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn records_in_different_units_are_refused() {
+        let plant = "plant = \"single-tank\"";
+        assert_eq!(
+            refused(
+                plant,
+                vec![record("a.csv", 50, "cm")],
+                vec![record("b.csv", 50, "m")]
+            ),
+            "b.csv: column \"y\" is in m, but a.csv has it in cm; convert one of them, or write the unit in its header"
+        );
+        let message = refused(
+            plant,
+            vec![record("a.csv", 50, "cm"), record("b.csv", 50, "")],
+            vec![],
+        );
+        assert!(
+            message.contains("is without a unit, but a.csv has it in cm"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn a_level_far_above_the_tank_is_refused() {
+        let message = refused(
+            "plant = \"single-tank\"\n[known]\ntank_height = 0.6",
+            vec![record("a.csv", 50, "cm")],
+            vec![],
+        );
+        assert!(
+            message.starts_with(
+                "tank.toml: tank_height = 0.6, but the output of a.csv reaches 14.0 cm"
+            ),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn too_few_rows_are_refused() {
+        let model = "plant = \"cascaded-tanks\"\neffects = [\"overflow\"]";
+        let message = refused(model, vec![record("a.csv", 30, "cm")], vec![]);
+        assert!(
+            message.starts_with("a.csv: 30 rows of data, but 35 are needed to fit 7 parameters"),
+            "{message}"
+        );
+        let message = refused(
+            model,
+            vec![record("a.csv", 20, "cm"), record("b.csv", 20, "cm")],
+            vec![],
+        );
+        assert!(
+            message.starts_with("a.csv and b.csv: 40 rows of data, but 45 are needed to fit 9"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn a_record_is_given_once() {
+        let files = |data: &[&str], test: &[&str]| Files {
+            data: data.iter().map(PathBuf::from).collect(),
+            test: test.iter().map(PathBuf::from).collect(),
+            model: "tank.toml".into(),
+        };
+        let message = |files: Files| files.read().unwrap_err().to_string();
+        assert!(message(files(&["a.csv"], &["./a.csv"])).contains("both fitted and held out"));
+        assert!(message(files(&["a.csv", "a.csv"], &[])).contains("given twice"));
+    }
+}

@@ -1,0 +1,274 @@
+//! `--json` and `--report`: checked before anything is computed, written at the end, whole or not at all.
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use missing_effect::Diagnosis;
+
+use crate::{Error, atomic, report};
+
+/// How much of an existing page is looked at: the mark stands in its head.
+const HEAD: u64 = 4096;
+
+/// What is in a file that the program writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The diagnosis as JSON.
+    Json,
+    /// The diagnosis as a page.
+    Report,
+}
+
+/// A file that will be written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    kind: Kind,
+    path: PathBuf,
+}
+
+/// Checks where results may go: not onto an input, not onto each other, not over a file that ctid
+/// did not write, and into a folder that is there and may be written to.
+///
+/// # Errors
+/// One line that names the file and the mend; nothing has been written.
+pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, Error> {
+    for (index, &(kind, path)) in wanted.iter().enumerate() {
+        if inputs.iter().any(|input| same_file(input, path)) {
+            return Err(Error::file(
+                path,
+                "it is one of the inputs and would be overwritten; choose another name",
+            ));
+        }
+        if wanted[..index]
+            .iter()
+            .any(|(_, other)| same_file(other, path))
+        {
+            return Err(Error::file(
+                path,
+                "two results cannot share a file; choose another name for one of them",
+            ));
+        }
+        check(kind, path)?;
+    }
+    let planned = |&(kind, path): &(Kind, &Path)| Output {
+        kind,
+        path: path.to_path_buf(),
+    };
+    Ok(wanted.iter().map(planned).collect())
+}
+
+impl Output {
+    /// Where it goes.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// Where the disk does not take it; what stood there before is then still there.
+    pub fn write(&self, diagnosis: &Diagnosis) -> Result<(), Error> {
+        let content = match self.kind {
+            Kind::Json => {
+                let text = serde_json::to_string_pretty(diagnosis)
+                    .map_err(|error| Error::file(&self.path, error.to_string()))?;
+                text + "\n"
+            }
+            Kind::Report => report::html(diagnosis),
+        };
+        atomic::write(&self.path, content.as_bytes())
+    }
+}
+
+/// The first of `report.html`, `report-2.html`, `report-3.html`, ... that may be written in a folder.
+///
+/// # Errors
+/// Where the folder cannot be written to.
+pub fn free_report(folder: &Path) -> Result<Output, Error> {
+    let mut number = 1;
+    loop {
+        let name = match number {
+            1 => "report.html".to_string(),
+            n => format!("report-{n}.html"),
+        };
+        let path = folder.join(name);
+        if matches!(
+            standing(Kind::Report, &path),
+            Standing::Nothing | Standing::Ours
+        ) {
+            return Ok(plan(&[(Kind::Report, &path)], &[])?.remove(0));
+        }
+        number += 1;
+    }
+}
+
+/// What stands where a result is to go.
+#[derive(Debug, PartialEq, Eq)]
+enum Standing {
+    Nothing,
+    Ours,
+    Folder,
+    NotOurs,
+}
+
+fn standing(kind: Kind, path: &Path) -> Standing {
+    let Ok(metadata) = fs::metadata(path) else {
+        return Standing::Nothing;
+    };
+    if metadata.is_dir() {
+        Standing::Folder
+    } else if metadata.is_file() && (metadata.len() == 0 || is_ours(kind, path)) {
+        // An empty file has nothing to lose.
+        Standing::Ours
+    } else {
+        Standing::NotOurs
+    }
+}
+
+/// ctid wrote it: a page with the mark, or JSON with the keys of a diagnosis.
+fn is_ours(kind: Kind, path: &Path) -> bool {
+    let Ok(mut file) = fs::File::open(path) else {
+        return false;
+    };
+    match kind {
+        Kind::Report => {
+            let mut head = Vec::new();
+            let read = file.take(HEAD).read_to_end(&mut head);
+            read.is_ok() && String::from_utf8_lossy(&head).contains(report::GENERATOR)
+        }
+        Kind::Json => {
+            let mut text = String::new();
+            let read = file.read_to_string(&mut text);
+            let value = serde_json::from_str::<serde_json::Value>(&text);
+            read.is_ok()
+                && value.is_ok_and(|value| {
+                    value.get("schema").is_some() && value.get("verdict").is_some()
+                })
+        }
+    }
+}
+
+fn check(kind: Kind, path: &Path) -> Result<(), Error> {
+    match standing(kind, path) {
+        Standing::Folder => {
+            return Err(Error::file(
+                path,
+                "it is a folder; give the name of a file in it",
+            ));
+        }
+        Standing::NotOurs => {
+            return Err(Error::file(
+                path,
+                "it is there already, and ctid did not write it; choose another name or delete it",
+            ));
+        }
+        Standing::Nothing | Standing::Ours => {}
+    }
+    let folder = atomic::folder(path);
+    if !folder.is_dir() {
+        return Err(Error::file(
+            path,
+            format!("there is no folder {}; make it first", folder.display()),
+        ));
+    }
+    // A file that vanishes at once shows whether the folder takes one, before hours of computing.
+    atomic::beside(path)
+        .and_then(tempfile::NamedTempFile::close)
+        .map_err(|error| {
+            Error::file(
+                path,
+                format!("nothing can be written there: {error}; choose another folder"),
+            )
+        })
+}
+
+/// Two paths lead to one file, whether it is there yet or not.
+pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
+    let resolve = |path: &Path| {
+        fs::canonicalize(path).ok().or_else(|| {
+            let folder = fs::canonicalize(atomic::folder(path)).ok()?;
+            Some(folder.join(path.file_name()?))
+        })
+    };
+    a == b || matches!((resolve(a), resolve(b)), (Some(a), Some(b)) if a == b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> String {
+        plan(wanted, inputs).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn only_what_ctid_wrote_is_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let json = folder.path().join("out.json");
+        let page = folder.path().join("out.html");
+        let both = [(Kind::Json, json.as_path()), (Kind::Report, page.as_path())];
+        assert_eq!(plan(&both, &[]).unwrap().len(), 2);
+
+        fs::write(&json, "{\"schema\": 1, \"verdict\": \"effect\"}").unwrap();
+        fs::write(&page, format!("<html><head>{}", report::GENERATOR)).unwrap();
+        plan(&both, &[]).unwrap();
+
+        for (path, kind, text) in [
+            (&json, Kind::Json, "{\"verdict\": 1}"),
+            (&json, Kind::Json, "not json"),
+            (&page, Kind::Report, "<html>my notes</html>"),
+        ] {
+            fs::write(path, text).unwrap();
+            let message = refused(&[(kind, path)], &[]);
+            assert!(
+                message.ends_with("choose another name or delete it"),
+                "{message}"
+            );
+            assert!(
+                message.starts_with(&path.display().to_string()),
+                "{message}"
+            );
+            assert_eq!(fs::read_to_string(path).unwrap(), text);
+        }
+    }
+
+    #[test]
+    fn an_input_is_never_an_output() {
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("data.csv");
+        fs::write(&data, "").unwrap();
+        let other_way = folder.path().join(".").join("data.csv");
+        let message = refused(&[(Kind::Json, &other_way)], &[&data]);
+        assert!(message.contains("one of the inputs"), "{message}");
+        let message = refused(
+            &[
+                (Kind::Json, Path::new("a")),
+                (Kind::Report, Path::new("./a")),
+            ],
+            &[],
+        );
+        assert!(message.contains("cannot share"), "{message}");
+    }
+
+    #[test]
+    fn a_place_that_takes_no_file_is_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = refused(&[(Kind::Json, &folder.path().join("no/out.json"))], &[]);
+        assert!(message.contains("there is no folder"), "{message}");
+        let message = refused(&[(Kind::Json, folder.path())], &[]);
+        assert!(message.contains("it is a folder"), "{message}");
+    }
+
+    #[test]
+    fn a_report_takes_the_next_free_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = |output: Output| output.path().file_name().unwrap().to_owned();
+        assert_eq!(name(free_report(folder.path()).unwrap()), "report.html");
+        fs::write(folder.path().join("report.html"), "mine").unwrap();
+        assert_eq!(name(free_report(folder.path()).unwrap()), "report-2.html");
+        fs::write(folder.path().join("report-2.html"), report::GENERATOR).unwrap();
+        assert_eq!(name(free_report(folder.path()).unwrap()), "report-2.html");
+    }
+}

@@ -1,0 +1,200 @@
+//! The tour: the bundled record with a hidden effect, from the first comparison to the error that falls.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use missing_effect::{Diagnosis, Options, Problem, Verdict};
+
+use crate::commands::say;
+use crate::input::Files;
+use crate::look::Look;
+use crate::progress::Bar;
+use crate::{Error, edit, output, terminal};
+
+const DATA: (&str, &str) = (
+    "tour.csv",
+    include_str!("../../../examples/records/tour.csv"),
+);
+const TEST: (&str, &str) = (
+    "tour-test.csv",
+    include_str!("../../../examples/records/tour-test.csv"),
+);
+const MODEL: (&str, &str) = (
+    "tour.toml",
+    include_str!("../../../examples/records/tour.toml"),
+);
+
+/// What the tour leaves behind.
+#[derive(Debug)]
+pub struct Tour {
+    /// The page that it wrote.
+    pub report: PathBuf,
+    /// What it found.
+    pub diagnosis: Diagnosis,
+}
+
+/// Walks through the five steps, tells them on `out`, and writes `report.html` into `folder`; where
+/// somebody else's file has that name, `report-2.html`, and so on.
+///
+/// # Errors
+/// Where the folder or `out` cannot be written to.
+pub fn run(folder: &Path, out: &mut dyn Write, look: Look, bar: &Bar) -> Result<Tour, Error> {
+    // Before anything is told: a tour that cannot end well does not begin.
+    let report = output::free_report(folder)?;
+    let problem = problem()?;
+    let options = Options::default();
+
+    say(out, &introduction(look))?;
+    bar.phase("fitting the model");
+    let compared = missing_effect::compare(&problem, &options);
+    bar.clear();
+    let compared = compared?;
+    say(out, &compare(&compared, look))?;
+    say(out, &where_it_fails(&compared, look))?;
+
+    let diagnosis = missing_effect::diagnose(&problem, &options, &|progress| bar.show(progress));
+    bar.clear();
+    let diagnosis = diagnosis?;
+    report.write(&diagnosis)?;
+    say(out, &what_is_missing(&diagnosis, look))?;
+    say(out, &add(&diagnosis, look)?)?;
+    say(out, &watch(&diagnosis, look))?;
+    say(out, &end(report.path(), look))?;
+    Ok(Tour {
+        report: report.path().to_path_buf(),
+        diagnosis,
+    })
+}
+
+/// The bundled records and model, read as a user's are: from files.
+fn problem() -> Result<Problem, Error> {
+    let folder = tempfile::tempdir()?;
+    let path = |name: &str| folder.path().join(name);
+    for (name, text) in [DATA, TEST, MODEL] {
+        fs::write(path(name), text)?;
+    }
+    Files {
+        data: vec![path(DATA.0)],
+        test: vec![path(TEST.0)],
+        model: path(MODEL.0),
+    }
+    .read()
+}
+
+fn step(number: usize, title: &str, text: &str, look: Look) -> String {
+    let rule = "─".repeat(look.width.saturating_sub(title.chars().count() + 6));
+    format!(
+        "{} {} {}\n{}\n",
+        look.good(format!("── {number}")),
+        look.strong(title),
+        look.faint(rule),
+        look.paragraph("", text)
+    )
+}
+
+fn introduction(look: Look) -> String {
+    let text = "A pump fills a tank, and the water leaves through a hole in the bottom. Half an hour was \
+                recorded: the voltage of the pump and the level. Somebody wrote down what they believe \
+                about the tank; one thing about it they do not know, and ctid is not told either.";
+    let mut said = format!(
+        "{}\n{}\n",
+        look.heading("ctid: what is your model missing?"),
+        look.paragraph("", text)
+    );
+    for line in MODEL.1.lines() {
+        said += format!("    {}", look.faint(line)).trim_end();
+        said.push('\n');
+    }
+    said + "\n"
+}
+
+fn compare(diagnosis: &Diagnosis, look: Look) -> String {
+    let text = "The model is fitted, then it runs on the pump's voltage alone: a simulation, never corrected \
+                by a measurement. A second record is held out; it takes part in no fit and no choice.";
+    let mut said = step(1, "Compare", text, look) + &terminal::header(diagnosis, look);
+    if let Some(first) = diagnosis.steps.first() {
+        said += &terminal::overlay(diagnosis, first, look);
+        said += &terminal::residuals(diagnosis, &[first], look);
+    }
+    said + &terminal::trail(diagnosis, look)
+}
+
+fn where_it_fails(diagnosis: &Diagnosis, look: Look) -> String {
+    let text = "A single number does not say what is wrong. So the residual is looked at by time, by level, \
+                by flow, by direction of change and by frequency, and tested for traces of the input.";
+    let mut said = step(2, "See where it fails", text, look);
+    for first in &diagnosis.steps {
+        said += &terminal::failures(diagnosis, first, look);
+    }
+    said
+}
+
+fn what_is_missing(diagnosis: &Diagnosis, look: Look) -> String {
+    let text = "Every effect of the catalogue is tried at every place where it can act, alone and together, \
+                and confirmed by a refit. `visible from` is the smallest size that these data would have shown.";
+    step(3, "Learn what is missing", text, look)
+        + &terminal::ranking(diagnosis, look)
+        + &terminal::groups(diagnosis, look)
+        + &terminal::findings(diagnosis, look)
+        + "\n"
+}
+
+fn add(diagnosis: &Diagnosis, look: Look) -> Result<String, Error> {
+    let text = "With a model file of your own you would now type the first line; it leaves the file as it \
+                is, but for the second.";
+    let mut said = step(4, "Add it", text, look);
+    let mut model = MODEL.1.to_string();
+    for (effect, step) in diagnosis.effects.iter().zip(diagnosis.steps.iter().skip(1)) {
+        model = edit::with_effect(MODEL.0, &model, effect, step.place.as_deref())?.text;
+        said += &format!(
+            "    {}\n",
+            look.strong(format!("ctid add {effect} --model {}", MODEL.0))
+        );
+    }
+    let line = model.lines().find(|line| line.starts_with("effects"));
+    said += &format!("    {}\n\n", line.unwrap_or_default());
+    Ok(said)
+}
+
+fn watch(diagnosis: &Diagnosis, look: Look) -> String {
+    let text = match diagnosis.verdict {
+        Verdict::Effect | Verdict::Undecided => {
+            "The same simulation, with the effect in the model. What is left is noise when the bars meet the \
+             noise floor and the residual has no shape."
+        }
+        Verdict::Unexplained | Verdict::Adequate => "The error, from step to step.",
+    };
+    let mut said = step(5, "Watch the error fall", text, look) + &terminal::trail(diagnosis, look);
+    if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
+        let shown = if diagnosis.steps.len() > 1 {
+            vec![first, last]
+        } else {
+            vec![first]
+        };
+        said += &terminal::residuals(diagnosis, &shown, look);
+        said += &terminal::parameters(diagnosis, last, look);
+    }
+    said
+}
+
+fn end(report: &Path, look: Look) -> String {
+    let report = report.strip_prefix(".").unwrap_or(report);
+    let mut said = format!(
+        "{}\n",
+        look.good(format!(
+            "{} holds all of this: open it in a browser.",
+            report.display()
+        ))
+    );
+    said +=
+        "With data of your own (a CSV with time, input and output, and a model file as above):\n";
+    for command in [
+        "ctid compare  data.csv --model tank.toml --test other.csv",
+        "ctid diagnose data.csv --model tank.toml --test other.csv --report report.html",
+        "ctid add EFFECT --model tank.toml",
+    ] {
+        said += &format!("    {}\n", look.strong(command));
+    }
+    said
+}

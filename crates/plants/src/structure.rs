@@ -203,10 +203,17 @@ impl Structure {
         }
     }
 
-    /// The parameters of one effect here.
+    /// The parameters of one effect here; their starts lie within their bounds, however short or narrow the record.
     #[must_use]
     pub fn effect_parameters(&self, placed: Placed) -> Vec<ParameterInfo> {
-        (placed.effect.parameters)(&self.site(placed))
+        let mut parameters = (placed.effect.parameters)(&self.site(placed));
+        for info in &mut parameters {
+            for start in &mut info.starts {
+                *start = start.min(info.upper).max(info.lower);
+            }
+            info.starts.dedup();
+        }
+        parameters
     }
 
     /// All parameters: the plant's, then each effect's in chain order. Initial levels are apart.

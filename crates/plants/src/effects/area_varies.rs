@@ -30,15 +30,21 @@ fn parameters(_: &Site) -> Vec<ParameterInfo> {
 struct AreaVaries<T> {
     taper: T,
     operating_level: f64,
+    /// What a change of level is compared with: the operating level, as a rule.
+    scale: f64,
 }
 
 pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
-    AreaVaries { taper: parameters[0], operating_level: site.operating_level() }
+    // Levels counted from a zero in their middle have no operating level to compare with: then their range is the measure.
+    let (low, high) = site.level();
+    let operating_level = site.operating_level();
+    let scale = if operating_level.abs() > 1e-3 * (high - low) { operating_level } else { (high - low).max(f64::MIN_POSITIVE) };
+    AreaVaries { taper: parameters[0], operating_level, scale }
 }
 
 impl<T: Scalar> Law<T> for AreaVaries<T> {
     fn area(&self, level: T, nominal: T) -> T {
-        let width = self.taper * (level - self.operating_level) * (1.0 / self.operating_level) + 1.0;
+        let width = self.taper * (level - self.operating_level) * (1.0 / self.scale) + 1.0;
         // A vessel that has narrowed to a tenth does not narrow further: the surface never vanishes.
         let width = width.max(T::constant(0.1));
         nominal * width * width

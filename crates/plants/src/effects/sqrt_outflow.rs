@@ -39,6 +39,14 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 impl<T: Scalar> Law<T> for SqrtOutflow<T> {
     fn outflow(&self, level: T, nominal: T, _t: f64) -> T {
         let root = self.operating_level.sqrt();
+        // More than the square root bends the outflow down again, from some level on. No outlet does that: what is added
+        // stays what it was there, and what it is at empty below.
+        let excess = self.curvature - 1.0;
+        let mut level = level.max(T::constant(0.0));
+        if excess.value() > 0.0 {
+            let share = self.curvature / excess;
+            level = level.min(share * share * self.operating_level);
+        }
         nominal + self.curvature * ((square_root(level) - root) * (2.0 * root) - (level - self.operating_level))
     }
 }

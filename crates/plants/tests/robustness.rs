@@ -1,0 +1,219 @@
+//! Whatever a fit may try and a user may record, the output stays finite and the levels within their vessels.
+
+mod support;
+
+use plants::{Command, Dual, Outlet, Plant, Simulator};
+use proptest::prelude::*;
+use support::{Case, base, difference, effect, placements, random_sets, reference};
+
+/// Somewhere between two bounds, by a share: on a scale of decades where both are positive and far apart.
+fn between(lower: f64, upper: f64, share: f64) -> f64 {
+    if lower > 0.0 && upper > 10.0 * lower {
+        lower * (upper / lower).powf(share)
+    } else {
+        lower + (upper - lower) * share
+    }
+}
+
+/// Runs a case and checks every level at every sample; how far a derivative went.
+fn run(case: &Case, input: &[(Command, f64)], substeps: usize) -> Result<f64, TestCaseError> {
+    let variables: Vec<Dual<16>> = case
+        .variables()
+        .iter()
+        .enumerate()
+        .map(|(lane, &value)| Dual::variable(value, lane))
+        .collect();
+    let (theta, levels) = variables.split_at(case.theta.len());
+    let mut simulator = Simulator::new(&case.structure, theta, levels, case.at_rest)
+        .map_err(|error| TestCaseError::fail(error.to_string()))?;
+    simulator.set_substeps(substeps);
+    let plant = case.structure.plant;
+    let names = case.structure.parameter_names();
+    let rim = names
+        .iter()
+        .position(|name| name == "overflow.rim")
+        .map(|i| case.theta[i]);
+    let brim = case
+        .structure
+        .effects()
+        .iter()
+        .find(|p| p.effect.id == "overflow")
+        .map(|p| p.vessel);
+    let mut largest = 0.0_f64;
+    for &(command, h) in input {
+        let y = simulator.read();
+        prop_assert!(
+            y.re.is_finite(),
+            "reading {} of {names:?} at {:?}",
+            y.re,
+            case.theta
+        );
+        for e in y.eps {
+            prop_assert!(
+                e.is_finite(),
+                "derivative {e} of {names:?} at {:?}",
+                case.theta
+            );
+            largest = largest.max(e.abs());
+        }
+        for (i, level) in simulator.levels().iter().enumerate().take(plant.vessels()) {
+            prop_assert!(level.re.is_finite());
+            // A rim below the bottom holds nothing: the bottom comes first.
+            if plant.outlet() == Outlet::Torricelli {
+                prop_assert!(level.re >= 0.0, "level {}", level.re);
+            }
+            if let (Some(rim), Some(vessel)) = (rim, brim)
+                && vessel == i
+                && (plant.outlet() == Outlet::Linear || rim >= 0.0)
+            {
+                prop_assert!(level.re <= rim, "level {} above the rim {rim}", level.re);
+            }
+        }
+        simulator.advance(command, h);
+    }
+    Ok(largest)
+}
+
+/// A command: often zero, now and then negative or huge, held or ramped, over a sampling interval or a gap.
+fn command(h: f64) -> impl Strategy<Value = (Command, f64)> {
+    let u = prop_oneof![Just(0.0), 0.0..10.0_f64, -10.0..0.0_f64, Just(1e3)];
+    let to = prop_oneof![Just(None), (0.0..10.0_f64).prop_map(Some), Just(Some(0.0))];
+    let step = prop_oneof![8 => Just(h), 1 => 0.1 * h..2.0 * h, 1 => Just(40.0 * h)];
+    (u, to, step).prop_map(|(from, to, h)| (Command { from, to }, h))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn anything_within_the_bounds_stays_finite(
+        plant in 0..Plant::ALL.len(),
+        seed in 0..100_000_u64,
+        size in 0..6_usize,
+        shares in proptest::collection::vec(prop_oneof![1 => Just(0.0), 1 => Just(1.0), 6 => 0.0..1.0_f64], 16),
+        levels in proptest::collection::vec(prop_oneof![Just(0.0), 0.0..40.0_f64], 2),
+        input in proptest::collection::vec(command(3.0), 40),
+        substeps in 1..4_usize,
+    ) {
+        let plant = Plant::ALL[plant];
+        let set = random_sets(plant, size, 1, seed).remove(0);
+        let mut case = base(plant).with_interior(&set);
+        prop_assume!(case.variables().len() <= 16);
+        for ((value, info), share) in case.theta.iter_mut().zip(case.structure.parameters()).zip(&shares) {
+            *value = between(info.lower, info.upper, *share);
+        }
+        case.levels = levels[..plant.vessels()].to_vec();
+        run(&case, &input, substeps)?;
+    }
+
+    /// Around believable numbers derivatives stay of the size that the plant can have: no step amplifies them.
+    #[test]
+    fn derivatives_do_not_run_away(
+        plant in 0..Plant::ALL.len(),
+        seed in 0..100_000_u64,
+        size in 0..4_usize,
+        stretch in 0.0..2.5_f64,
+    ) {
+        let plant = Plant::ALL[plant];
+        let mut set = random_sets(plant, size, 1, seed).remove(0);
+        // The hysteresis turns small differences into large ones by nature.
+        set.retain(|p| p.effect.id != "sensor_hysteresis");
+        let case = base(plant).with_interior(&set);
+        prop_assume!(case.variables().len() <= 16);
+        // Sampling from one to three hundred times as coarse, at a steady input: what decays must not grow.
+        let h = case.h * 10.0_f64.powf(stretch);
+        let input: Vec<(Command, f64)> = (0..300).map(|_| (Command::held(4.9), h)).collect();
+        let largest = run(&case, &input, 1)?;
+        prop_assert!(largest < 1e4, "a derivative of {largest}");
+    }
+}
+
+#[test]
+fn a_tank_that_runs_dry_and_fills_again_agrees_with_its_equation() {
+    for plant in [Plant::SingleTank, Plant::CascadedTanks] {
+        let case = base(plant);
+        let input: Vec<(Command, f64)> = (0..400)
+            .map(|k| {
+                (
+                    Command::held(if (k / 100) % 2 == 0 { 0.0 } else { 5.0 }),
+                    case.h,
+                )
+            })
+            .collect();
+        let reference = reference::run(&case, &input);
+        let one = case.run(&input, 1);
+        assert!(one.iter().all(|&y| y >= 0.0));
+        assert!(one.iter().any(|&y| y < 1e-3), "it runs dry");
+        let errors = [1, 4, 16].map(|n| difference(&case.run(&input, n), &reference));
+        println!("{errors:?} {}", plant.id());
+        // As an empty tank fills the outflow rises with a root of time: the order falls to one and a half, of a small
+        // error, down to where the root gives way to a parabola.
+        assert!(
+            errors[0] < 1e-3 && errors[1] < 0.2 * errors[0] && errors[2] < 0.2 * errors[1] + 1e-5,
+            "{errors:?}"
+        );
+    }
+}
+
+#[test]
+fn coarse_sampling_follows_the_equation() {
+    for plant in Plant::ALL {
+        for placed in placements(plant) {
+            let mut case = base(plant);
+            case.h *= 60.0;
+            let mut case = case.with_interior(&[placed]);
+            // Intervals of one to two time constants; lags and dead times as they were.
+            for (value, info) in case.theta.iter_mut().zip(case.structure.parameters()) {
+                if info.unit == plants::Unit::TIME
+                    && ["delay", "time_constant"].contains(&info.name)
+                {
+                    *value /= 60.0;
+                }
+            }
+            if placed.effect.id == "sensor_hysteresis" {
+                continue; // It shows every error of the level five times.
+            }
+            let input = support::input(support::DRIVES[0], 60, case.h, 77);
+            let error = difference(&case.run(&input, 1), &reference::run(&case, &input));
+            println!(
+                "{error:8.1e} {}@{} {}",
+                placed.effect.id,
+                placed.vessel,
+                plant.id()
+            );
+            assert!(
+                error < 0.02,
+                "{} {}: {error:e}",
+                placed.effect.id,
+                plant.id()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_record_around_zero_has_no_operating_level_to_divide_by() {
+    for plant in [
+        Plant::SingleTankLinear,
+        Plant::CascadedTanksLinear,
+        Plant::FirstOrder,
+    ] {
+        for id in ["area_varies", "sqrt_outflow"] {
+            let mut case = base(plant);
+            case.structure.scales.operating_level = [0.0; 2];
+            let placed = plants::Placed {
+                effect: effect(id),
+                vessel: 0,
+            };
+            let input = support::input(support::DRIVES[0], 60, case.h, 78);
+            let absent = case.with_absent(&[placed]).run(&input, 1);
+            assert_eq!(absent, case.run(&input, 1), "{id} {}", plant.id());
+            assert!(
+                case.with_interior(&[placed])
+                    .run(&input, 1)
+                    .iter()
+                    .all(|y| y.is_finite())
+            );
+        }
+    }
+}

@@ -42,9 +42,10 @@ impl Look {
         }
     }
 
-    /// A heading.
+    /// A heading, on as many lines as it needs.
     pub(crate) fn heading(self, text: &str) -> String {
-        self.paint(Style::new().bold().cyan(), text)
+        let lines = self.paragraph("", text);
+        self.paint(Style::new().bold().cyan(), lines.trim_end())
     }
 
     /// What matters most.

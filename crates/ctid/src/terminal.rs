@@ -114,6 +114,18 @@ fn step_name(diagnosis: &Diagnosis, step: &Step) -> String {
     }
 }
 
+/// The whole model of a step, in few words.
+fn model_name(diagnosis: &Diagnosis, step: &Step) -> String {
+    let added = diagnosis
+        .steps
+        .iter()
+        .position(|other| std::ptr::eq(other, step));
+    match added {
+        Some(count @ 2..) => format!("with {count} effects added"),
+        _ => step_name(diagnosis, step),
+    }
+}
+
 fn placed(effect: &str, place: Option<&str>) -> String {
     match place {
         Some(place) => format!("{effect} ({place})"),
@@ -266,7 +278,7 @@ pub(crate) fn residuals(diagnosis: &Diagnosis, steps: &[&Step], look: Look) -> S
         text += &format!(
             "{} {}\n{}\n",
             look.heading(&title),
-            step_name(diagnosis, step),
+            model_name(diagnosis, step),
             plot(
                 &[curve],
                 (0.0, length(record)),
@@ -287,10 +299,13 @@ fn first_record<'a>(diagnosis: &'a Diagnosis, step: &'a Step) -> Option<(&'a Sho
 
 /// Where a model fails, in words.
 pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
-    let title = format!(
-        "Where {} fails",
-        step_name(diagnosis, step).trim_start_matches("+ ")
-    );
+    let name = step_name(diagnosis, step);
+    let title = match diagnosis.verdict {
+        Verdict::Adequate if !compared(diagnosis) => {
+            format!("What is left in the residual of {name}")
+        }
+        _ => format!("Where {name} fails"),
+    };
     let mut text = format!("{}\n", look.heading(&title));
     for sentence in step.failures.sentences.iter().take(FAILURES) {
         text += &look.paragraph("  - ", sentence);
@@ -529,7 +544,10 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
             look.strong("`ctid diagnose` says whether anything is missing, and what")
         }
         Verdict::Adequate => look.good("The model is adequate"),
-        Verdict::Effect => look.good(format!("Missing: {}", diagnosis.effects.join(" and "))),
+        Verdict::Effect => {
+            let missing = format!("Missing: {}", diagnosis.effects.join(", "));
+            look.good(look.paragraph("", &missing).trim_end())
+        }
         Verdict::Undecided => {
             look.warning("Something is missing, and more than one effect fits these data")
         }

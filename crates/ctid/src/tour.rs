@@ -147,10 +147,12 @@ fn add(diagnosis: &Diagnosis, look: Look) -> Result<String, Error> {
     let mut model = MODEL.1.to_string();
     for (effect, step) in diagnosis.effects.iter().zip(diagnosis.steps.iter().skip(1)) {
         model = edit::with_effect(MODEL.0, &model, effect, step.place.as_deref())?.text;
-        said += &format!(
-            "    {}\n",
-            look.strong(format!("ctid add {effect} --model {}", MODEL.0))
-        );
+        let place = match &step.place {
+            Some(place) => format!(" --where {place}"),
+            None => String::new(),
+        };
+        let command = format!("ctid add {effect}{place} --model {}", MODEL.0);
+        said += &format!("    {}\n", look.strong(command));
     }
     let line = model.lines().find(|line| line.starts_with("effects"));
     said += &format!("    {}\n\n", line.unwrap_or_default());

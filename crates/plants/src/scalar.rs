@@ -133,6 +133,8 @@ macro_rules! operator {
     ($trait:ident, $method:ident, |$a:ident, $b:ident| $re:expr, |$i:ident| $eps:expr) => {
         impl<const N: usize> $trait for Dual<N> {
             type Output = Self;
+            // The product rule is a sum.
+            #[allow(clippy::suspicious_arithmetic_impl)]
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
                 let ($a, $b) = (&self, &other);

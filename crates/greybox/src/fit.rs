@@ -2,13 +2,17 @@
 
 use ct_signals::ArModel;
 use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::{
     Error, Setup, Stop, Stopping, Triangle,
     levenberg_marquardt::{held, minimise},
-    random_starts,
+    marginal, random_starts,
     starts::extend_levels,
 };
+
+/// Two ends are one minimum where twice the logarithm of their likelihood ratio is below this.
+const SAME_MINIMUM: f64 = 0.1;
 
 /// How to fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,6 +69,8 @@ pub struct Fit {
     /// Positions (among the fitted entries) that the gradient does not hold at a bound.
     interior: Vec<usize>,
     free: Vec<usize>,
+    /// Degrees of freedom of the variance of every interior entry.
+    freedom: Vec<f64>,
 }
 
 impl Fit {
@@ -100,6 +106,28 @@ impl Fit {
         errors
     }
 
+    /// Degrees of freedom of every standard error: the quantile of Student's distribution with as many makes an
+    /// interval of it. A noise model that was estimated with the fit leaves fewer than the samples do.
+    #[must_use]
+    pub fn freedom(&self) -> Vec<Option<f64>> {
+        let mut freedom = vec![None; self.x.len()];
+        for (&column, value) in self.interior.iter().zip(&self.freedom) {
+            freedom[self.free[column]] = Some(*value);
+        }
+        freedom
+    }
+
+    /// Half the width of the interval that holds the truth with probability `level` (0.95, say), for every entry that
+    /// has a standard error.
+    #[must_use]
+    pub fn half_widths(&self, level: f64) -> Vec<Option<f64>> {
+        self.std_errors()
+            .into_iter()
+            .zip(self.freedom())
+            .map(|(error, freedom)| Some(error? * student(level, freedom?)))
+            .collect()
+    }
+
     /// Correlations between the entries that have a standard error: their positions and the matrix.
     #[must_use]
     pub fn correlations(&self) -> Option<(Vec<usize>, Vec<Vec<f64>>)> {
@@ -122,6 +150,12 @@ impl Fit {
             matrix,
         ))
     }
+}
+
+/// The quantile of Student's distribution that bounds a two-sided interval.
+fn student(level: f64, freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom.max(1.0))
+        .map_or(f64::NAN, |t| t.inverse_cdf(0.5 + 0.5 * level))
 }
 
 /// Fits from random starts, with the noise's colour estimated.
@@ -168,9 +202,11 @@ pub fn fit_from(
         .iter()
         .map(|(_, minimum)| minimum.triangle.cost())
         .fold(f64::INFINITY, f64::min);
+    // Ends that the likelihood can hardly tell apart are one minimum.
+    let same = best * (SAME_MINIMUM / setup.samples() as f64).exp();
     let agree = minima
         .iter()
-        .filter(|(_, minimum)| minimum.triangle.cost() <= best * (1.0 + 1e-5))
+        .filter(|(_, minimum)| minimum.triangle.cost() <= same)
         .count();
     let (x, minimum) = minima
         .into_iter()
@@ -178,7 +214,7 @@ pub fn fit_from(
         .ok_or(Error::NoFiniteStart {
             starts: starts.len(),
         })?;
-    let interior = (0..free.len())
+    let interior: Vec<usize> = (0..free.len())
         .filter(|&j| !held(minimum.x[j], bounds[j], minimum.triangle.descent(j)))
         .collect();
     let samples = setup.samples();
@@ -203,6 +239,7 @@ pub fn fit_from(
         agree,
         stop: minimum.stop,
         triangle: minimum.triangle,
+        freedom: vec![samples.saturating_sub(free.len()).max(1) as f64; interior.len()],
         interior,
         free: free.to_vec(),
     })
@@ -235,9 +272,40 @@ pub fn coloured(setup: &Setup, fit: Fit, order: usize, stopping: Stopping) -> Re
             break;
         }
     }
+    // The likelihood, by which models are compared, is at its best now; the errors follow from the colour that
+    // the fit has not bent.
+    if fit.noise.order() > 0 {
+        let deviance = fit.deviance;
+        let noise = noise_of(setup, &fit, order)?;
+        fit = fit_from(setup, std::slice::from_ref(&fit.x), &noise, stopping)?;
+        fit.deviance = deviance;
+        if let Some(rows) = setup.rows(&fit.x) {
+            let own: Vec<usize> = (0..fit.interior.len()).collect();
+            let mut order = fit.interior.clone();
+            order.push(rows.columns - 1);
+            let variances = |noise: &ArModel, variance: f64| {
+                let covariance = rows.fold(&order, noise).covariance(&own)?;
+                Some(own.iter().map(|&i| covariance[i][i] * variance).collect())
+            };
+            if let Some(freedom) = marginal::freedom(&rows, &fit.interior, &fit.noise, variances) {
+                fit.freedom = freedom;
+            }
+        }
+    }
     fit.starts = starts;
     fit.agree = agree;
     Ok(fit)
+}
+
+/// The noise model of a fit's residual, of order zero to `order`, without the bias that fitting leaves in it.
+///
+/// # Errors
+/// Where the simulation is not finite.
+pub fn noise_of(setup: &Setup, fit: &Fit, order: usize) -> Result<ArModel, Error> {
+    let rows = setup
+        .rows(&fit.x)
+        .ok_or(Error::NoFiniteStart { starts: 1 })?;
+    marginal::noise(&rows, &fit.interior, order)
 }
 
 /// The initial levels that fit best with every parameter frozen; `parameters` are the vector's entries before the levels.

@@ -1,16 +1,18 @@
 //! Fits a plant to records by simulation error: bounds, many starts, exact sensitivities, a noise model,
 //! and uncertainty that is right.
 
+mod ar;
 mod error;
 mod fit;
 mod levenberg_marquardt;
+mod marginal;
 mod setup;
 mod starts;
 mod triangle;
 
 pub use error::Error;
-pub use fit::{Fit, FitOptions, coloured, fit, fit_from, fit_initial_levels};
+pub use fit::{Fit, FitOptions, coloured, fit, fit_from, fit_initial_levels, noise_of};
 pub use levenberg_marquardt::{Stop, Stopping};
-pub use setup::{Setup, Simulated};
-pub use starts::random_starts;
+pub use setup::{Rows, Setup, Simulated};
+pub use starts::{random_starts, starts_around};
 pub use triangle::Triangle;

@@ -38,6 +38,48 @@ pub struct Simulated {
     pub mean_level: [f64; MAX_VESSELS],
 }
 
+/// The derivatives and the residual of every sample, one record after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rows {
+    /// Entries of a row: the free entries of the vector, then the residual.
+    pub columns: usize,
+    /// Samples of each record.
+    pub lengths: Vec<usize>,
+    /// Row by row.
+    pub values: Vec<f64>,
+}
+
+impl Rows {
+    /// The rows of one record after the other, each a slice of `length x columns` values.
+    pub fn records(&self) -> impl Iterator<Item = &[f64]> {
+        let mut rest = self.values.as_slice();
+        self.lengths.iter().map(move |&length| {
+            let (record, after) = rest.split_at(length * self.columns);
+            rest = after;
+            record
+        })
+    }
+
+    /// The folded rows, whitened by a noise model, with columns chosen and put in this order.
+    pub(crate) fn fold(&self, order: &[usize], noise: &ArModel) -> Triangle {
+        let mut triangle = Triangle::new(order.len());
+        let mut whitener = noise.whitener(order.len());
+        let mut chosen = vec![0.0; order.len()];
+        for record in self.records() {
+            whitener.reset();
+            for row in record.chunks_exact(self.columns) {
+                for (to, &column) in chosen.iter_mut().zip(order) {
+                    *to = row[column];
+                }
+                whitener.push(&mut chosen);
+                triangle.push(&chosen);
+            }
+        }
+        triangle.finish();
+        triangle
+    }
+}
+
 /// Scales of records as the structure meets them first.
 pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<Scales> {
     let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
@@ -295,6 +337,36 @@ impl<'a> Setup<'a> {
     /// simulation is not finite.
     #[must_use]
     pub fn linearise(&self, x: &[f64], noise: &ArModel) -> Option<Triangle> {
+        let columns = self.free.len() + 1;
+        let mut triangle = Triangle::new(columns);
+        let mut whitener = noise.whitener(columns);
+        self.each_row(x, |first, row| {
+            if first {
+                whitener.reset();
+            }
+            whitener.push(row);
+            triangle.push(row);
+        })?;
+        triangle.finish();
+        Some(triangle)
+    }
+
+    /// The rows `[d model/d x_free, measured - model]`, one for each sample of all records, as they are; `None` where
+    /// the simulation is not finite.
+    #[must_use]
+    pub fn rows(&self, x: &[f64]) -> Option<Rows> {
+        let columns = self.free.len() + 1;
+        let mut values = Vec::with_capacity(self.samples() * columns);
+        self.each_row(x, |_, row| values.extend_from_slice(row))?;
+        Some(Rows {
+            columns,
+            lengths: self.records.iter().map(Record::len).collect(),
+            values,
+        })
+    }
+
+    /// Shows every row, and whether it is the first one of its record.
+    fn each_row(&self, x: &[f64], each: impl FnMut(bool, &mut [f64])) -> Option<()> {
         // Parameters and one record's initial levels; a few lane counts, so that short vectors stay cheap.
         let parameters = self
             .free
@@ -302,18 +374,20 @@ impl<'a> Setup<'a> {
             .filter(|&&i| i < self.parameter_count())
             .count();
         match parameters + self.structure.plant.vessels() {
-            0..=4 => self.linearise_lanes::<4>(x, noise),
-            5..=6 => self.linearise_lanes::<6>(x, noise),
-            7..=8 => self.linearise_lanes::<8>(x, noise),
-            9..=12 => self.linearise_lanes::<12>(x, noise),
-            _ => self.linearise_lanes::<16>(x, noise),
+            0..=4 => self.each_row_in_lanes::<4>(x, each),
+            5..=6 => self.each_row_in_lanes::<6>(x, each),
+            7..=8 => self.each_row_in_lanes::<8>(x, each),
+            9..=12 => self.each_row_in_lanes::<12>(x, each),
+            _ => self.each_row_in_lanes::<16>(x, each),
         }
     }
 
-    fn linearise_lanes<const L: usize>(&self, x: &[f64], noise: &ArModel) -> Option<Triangle> {
+    fn each_row_in_lanes<const L: usize>(
+        &self,
+        x: &[f64],
+        mut each: impl FnMut(bool, &mut [f64]),
+    ) -> Option<()> {
         let columns = self.free.len() + 1;
-        let mut triangle = Triangle::new(columns);
-        let mut whitener = noise.whitener(columns);
         let mut row = vec![0.0; columns];
         let count = self.parameter_count();
         for (r, record) in self.records.iter().enumerate() {
@@ -340,7 +414,6 @@ impl<'a> Setup<'a> {
                 simulator.set_substeps(self.substeps);
                 simulators.push(simulator);
             }
-            whitener.reset();
             let n = record.len();
             for k in 0..n {
                 row.fill(0.0);
@@ -359,12 +432,10 @@ impl<'a> Setup<'a> {
                 if !row.iter().all(|value| value.is_finite()) {
                     return None;
                 }
-                whitener.push(&mut row);
-                triangle.push(&row);
+                each(k == 0, &mut row);
             }
         }
-        triangle.finish();
-        Some(triangle)
+        Some(())
     }
 
     /// Takes the smallest number of substeps for which halving the step moves no reading by more than `1e-6` of the

@@ -101,3 +101,33 @@ pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
         x.push(y0);
     }
 }
+
+/// Starts around a vector: the plant's own parameters and the initial levels are scaled by up to a factor of 1.2 either
+/// way, an effect's parameters move by up to a tenth of their plausible range.
+#[must_use]
+pub fn starts_around(setup: &Setup, x: &[f64], n: usize, seed: u64) -> Vec<Vec<f64>> {
+    use rand::SeedableRng;
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let own = setup
+        .structure
+        .plant
+        .parameters(&setup.structure.scales)
+        .len();
+    let count = setup.parameter_count();
+    (0..n)
+        .map(|_| {
+            x.iter()
+                .zip(setup.bounds())
+                .enumerate()
+                .map(|(i, (value, &(lower, upper)))| {
+                    let moved = if i < own || i >= count {
+                        value * 1.2_f64.powf(rng.random_range(-1.0..1.0))
+                    } else {
+                        value + 0.1 * (upper - lower) * rng.random_range(-1.0..1.0)
+                    };
+                    moved.clamp(lower, upper)
+                })
+                .collect()
+        })
+        .collect()
+}

@@ -1,0 +1,258 @@
+//! The noise's colour from a fit's residual, by marginal (restricted) likelihood.
+//!
+//! **Why**: a fit with `p` free entries takes from its residual the part that its sensitivities span. Slow noise and
+//! slow sensitivities look alike, so an autoregressive model of the residual is too fast and too small, and the
+//! standard errors that follow from it are too small: at a correlation of 0.8 and 400 samples, intervals of 95 %
+//! hold the truth in 92 %.
+//!
+//! **Criterion**: with the rows `[J, r]` whitened by the model and folded to the triangle `R`, the likelihood of what
+//! `J` cannot explain,
+//! ```text
+//! -2 log l = (N - p) log(R_rr^2) + log|V| + 2 sum_j log|R_jj|,   V the noise's covariance over sigma^2,
+//! ```
+//! minimised over the partial correlations of the model, `k_i = tanh z_i`, by BFGS from Burg's solution.
+//! `R_rr^2/(N - p)` is then the innovations' variance. The order is Burg's.
+//!
+//! **Cost**: `O(N (p + 1) (p + q))` for an evaluation, about ten evaluations for each coefficient.
+//!
+//! **Reference**: G. Tunnicliffe Wilson, On the use of marginal likelihood in time series model estimation,
+//! J. R. Statist. Soc. B 51 (1989) 15-27.
+
+use ct_signals::ArModel;
+
+use crate::{Error, Rows, ar};
+
+/// The noise model of a residual that was fitted.
+///
+/// `columns` are the columns of `rows` that were free to follow the noise: those of entries at a bound are not.
+///
+/// # Errors
+/// Where the residual is not finite.
+pub(crate) fn noise(rows: &Rows, columns: &[usize], most: usize) -> Result<ArModel, Error> {
+    let residual = rows.columns - 1;
+    let series: Vec<Vec<f64>> = rows
+        .records()
+        .map(|record| {
+            record
+                .chunks_exact(rows.columns)
+                .map(|row| row[residual])
+                .collect()
+        })
+        .collect();
+    let segments: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
+    let burg = ArModel::fit(&segments, most)?;
+    let mut z = coordinates(&burg);
+    if !z.is_empty() {
+        z = bfgs(z, |z| {
+            model(z).map_or(f64::INFINITY, |model| {
+                Criterion::of(rows, columns, &model).value
+            })
+        });
+    }
+    let variance = Criterion::of(rows, columns, &model(&z)?).variance;
+    ar::from_reflections(&tanh(&z), variance.sqrt())
+}
+
+/// The degrees of freedom of variances that depend on an estimated noise model (F. E. Satterthwaite, An approximate
+/// distribution of estimates of variance components, Biometrics Bulletin 2 (1946) 110-114): twice over the variance
+/// of the variance's logarithm.
+///
+/// `variances` gives them for a noise model of unit innovations and the innovations' variance.
+pub(crate) fn freedom(
+    rows: &Rows,
+    columns: &[usize],
+    noise: &ArModel,
+    variances: impl Fn(&ArModel, f64) -> Option<Vec<f64>>,
+) -> Option<Vec<f64>> {
+    const STEP: f64 = 1e-3;
+    let z = coordinates(noise);
+    let q = z.len();
+    let at = |moves: &[(usize, f64)]| {
+        let mut z = z.clone();
+        for (i, by) in moves {
+            z[*i] += by * STEP;
+        }
+        let model = model(&z).ok()?;
+        let criterion = Criterion::of(rows, columns, &model);
+        Some((model, criterion))
+    };
+    let (_, centre) = at(&[])?;
+    // The criterion's curvature is twice the information on the partial correlations.
+    let mut hessian = vec![vec![0.0; q]; q];
+    let mut gradient: Vec<Vec<f64>> = Vec::with_capacity(q);
+    for i in 0..q {
+        let ((above, up), (below, down)) = (at(&[(i, 1.0)])?, at(&[(i, -1.0)])?);
+        hessian[i][i] = (up.value - 2.0 * centre.value + down.value) / (STEP * STEP);
+        let (above, below) = (
+            variances(&above, up.variance)?,
+            variances(&below, down.variance)?,
+        );
+        gradient.push(
+            above
+                .iter()
+                .zip(&below)
+                .map(|(a, b)| (a / b).ln() / (2.0 * STEP))
+                .collect(),
+        );
+        for j in 0..i {
+            let mixed = |a, b| Some(at(&[(i, a), (j, b)])?.1.value);
+            hessian[i][j] = (mixed(1.0, 1.0)? - mixed(1.0, -1.0)? - mixed(-1.0, 1.0)?
+                + mixed(-1.0, -1.0)?)
+                / (4.0 * STEP * STEP);
+            hessian[j][i] = hessian[i][j];
+        }
+    }
+    let factor = cholesky(hessian)?;
+    let count = variances(&model(&z).ok()?, centre.variance)?.len();
+    Some(
+        (0..count)
+            .map(|entry| {
+                // |F^-1 g|^2 = g' H^-1 g.
+                let mut solved: Vec<f64> = Vec::with_capacity(q);
+                for i in 0..q {
+                    let known: f64 = factor[i].iter().zip(&solved).map(|(f, s)| f * s).sum();
+                    solved.push((gradient[i][entry] - known) / factor[i][i]);
+                }
+                let colour: f64 = solved.iter().map(|s| 2.0 * s * s).sum();
+                2.0 / (2.0 / centre.left + colour)
+            })
+            .collect(),
+    )
+}
+
+/// The lower triangle whose square a positive definite matrix is.
+fn cholesky(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
+    for i in 0..a.len() {
+        for j in 0..=i {
+            let known: f64 = (0..j).map(|k| a[i][k] * a[j][k]).sum();
+            let rest = a[i][j] - known;
+            if i > j {
+                a[i][j] = rest / a[j][j];
+            } else if rest > 0.0 {
+                a[i][i] = rest.sqrt();
+            } else {
+                return None;
+            }
+        }
+    }
+    Some(a)
+}
+
+fn coordinates(noise: &ArModel) -> Vec<f64> {
+    ar::reflections(noise.coefficients())
+        .into_iter()
+        .map(f64::atanh)
+        .collect()
+}
+
+fn tanh(z: &[f64]) -> Vec<f64> {
+    z.iter().map(|z| z.tanh()).collect()
+}
+
+fn model(z: &[f64]) -> Result<ArModel, Error> {
+    ar::from_reflections(&tanh(z), 1.0)
+}
+
+struct Criterion {
+    /// Minus twice the logarithm of the marginal likelihood.
+    value: f64,
+    /// Variance of the innovations.
+    variance: f64,
+    /// Degrees of freedom that the residual keeps.
+    left: f64,
+}
+
+impl Criterion {
+    fn of(rows: &Rows, columns: &[usize], model: &ArModel) -> Self {
+        let p = columns.len();
+        let mut order = columns.to_vec();
+        order.push(rows.columns - 1);
+        let triangle = rows.fold(&order, model);
+        let log_det: f64 = rows.lengths.iter().map(|&n| model.log_det(n)).sum();
+        let mut rank = 0.0;
+        let mut volume = 0.0;
+        for j in 0..p {
+            let diagonal = triangle.at(j, j).abs();
+            // A direction that the record does not show takes nothing from the residual.
+            if diagonal > 1e-10 * triangle.column_norm(j) {
+                rank += 1.0;
+                volume += 2.0 * diagonal.ln();
+            }
+        }
+        let left = (triangle.rows() as f64 - rank).max(1.0);
+        let squares = triangle.at(p, p).powi(2).max(f64::MIN_POSITIVE);
+        Self {
+            value: left * squares.ln() + log_det + volume,
+            variance: squares / left,
+            left,
+        }
+    }
+}
+
+/// A local minimum of a smooth function by the BFGS method, derivatives by central differences, backtracking.
+fn bfgs(mut x: Vec<f64>, f: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+    const STEP: f64 = 1e-4;
+    let n = x.len();
+    let gradient = |x: &[f64]| -> Vec<f64> {
+        let mut at = x.to_vec();
+        (0..n)
+            .map(|i| {
+                at[i] = x[i] + STEP;
+                let above = f(&at);
+                at[i] = x[i] - STEP;
+                let below = f(&at);
+                at[i] = x[i];
+                (above - below) / (2.0 * STEP)
+            })
+            .collect()
+    };
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut value = f(&x);
+    let mut slope = gradient(&x);
+    // The curvature of -2 log l in z is about 2 N (1 - k^2): a first step of 1/|slope| at most does no harm.
+    let first = 0.1 / dot(&slope, &slope).sqrt().max(1.0);
+    let mut inverse = vec![vec![0.0; n]; n];
+    for (i, row) in inverse.iter_mut().enumerate() {
+        row[i] = first;
+    }
+    for _ in 0..30 {
+        let mut step: Vec<f64> = inverse.iter().map(|row| -dot(row, &slope)).collect();
+        if dot(&step, &slope) >= 0.0 {
+            step = slope.iter().map(|s| -first * s).collect();
+        }
+        let (mut to, mut to_value) = (x.clone(), f64::INFINITY);
+        let mut length = 1.0;
+        while length > 1e-6 {
+            to = x.iter().zip(&step).map(|(x, d)| x + length * d).collect();
+            to_value = f(&to);
+            if to_value <= value + 1e-4 * length * dot(&step, &slope) {
+                break;
+            }
+            length *= 0.4;
+        }
+        if to_value.is_nan() || to_value >= value {
+            break;
+        }
+        let to_slope = gradient(&to);
+        let moved: Vec<f64> = to.iter().zip(&x).map(|(a, b)| a - b).collect();
+        let change: Vec<f64> = to_slope.iter().zip(&slope).map(|(a, b)| a - b).collect();
+        let curvature = dot(&moved, &change);
+        if curvature > 0.0 {
+            let weighted: Vec<f64> = inverse.iter().map(|row| dot(row, &change)).collect();
+            let scale = (1.0 + dot(&change, &weighted) / curvature) / curvature;
+            for i in 0..n {
+                for j in 0..n {
+                    inverse[i][j] += scale * moved[i] * moved[j]
+                        - (weighted[i] * moved[j] + moved[i] * weighted[j]) / curvature;
+                }
+            }
+        }
+        let fall = value - to_value;
+        (x, value, slope) = (to, to_value, to_slope);
+        // A thousandth of a unit of -2 log l is far below what a record can tell.
+        if fall < 1e-4 {
+            break;
+        }
+    }
+    x
+}

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use ct_signals::{ArModel, Record};
-use greybox::{Setup, Stopping, coloured, fit_from, random_starts};
+use greybox::{Setup, Stopping, coloured, fit_from, random_starts, starts_around};
 use plants::{Known, Placed, Plant};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
     Diagnosis, Error, NoiseFloor, Score, Shown, Step, Verdict,
-    noise_floor::{NOISE_ORDER, colour, input_shows, slowness, structure_remains},
+    noise_floor::{NOISE_ORDER, colour, input_shows, slowness, wanders},
     search::{Breadth, Node, exchanges, grow, place, refine, singles, without},
     sentences::sentences,
     step,
@@ -80,6 +80,10 @@ const FALSE_CLAIM: f64 = 0.001;
 const GROUP_MARGIN: f64 = 6.0;
 /// Probability-weighted sizes: shown at 1 % false alarm with 90 % power.
 const VISIBLE: f64 = 2.576 + 1.282;
+/// Further starts of every step of the trail: its minimum must not hang on where the search came from.
+const STARTS_AROUND: usize = 11;
+/// Rounds of further starts where the last model's minimum was found once only.
+const MORE_ROUNDS: u64 = 3;
 const BREADTH: Breadth = Breadth {
     beam: 3,
     refits: 12,
@@ -158,22 +162,17 @@ pub fn diagnose(
     tell("confirming", 0, 3);
     let base_noise = in_metric(&base, &noise)?;
     let richest_noise = in_metric(&richest, &noise)?;
-    let by_simulation = confirm(richest_noise, &noise)?;
-    let mut confirmed = by_simulation.clone();
-    if noise.order() > 0 {
+    let mut confirmed = confirm(richest_noise, &noise)?;
+    let by_simulation = wanders(&richest, &noise) && !confirmed.added.is_empty();
+    if noise.order() > 0 && !by_simulation {
         // The noise's colour is known now: the search is repeated in its metric.
         let sizes = grow(&base_noise, &noise, breadth, pays, &|done, total| {
-            tell("searching in the noise's metric", done, total)
+            tell("searching in the noise's metric", done, total);
         });
         let other = confirm(refine(&chosen(&sizes, &base_noise), &noise, &[])?, &noise)?;
         if other.fit.bic() < confirmed.fit.bic() {
             confirmed = other;
         }
-    }
-    let remains = structure_remains(&richest, &confirmed, &noise);
-    if remains {
-        // The residual's colour is not the noise's, so the simulation error is what counts.
-        confirmed = by_simulation;
     }
     // Each model with the colour of its own residual: what a coloured noise explains needs no effect.
     let own_base = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
@@ -188,7 +187,7 @@ pub fn diagnose(
     }
 
     tell("telling apart", 1, 3);
-    let (metric, per_sample) = if remains {
+    let (metric, per_sample) = if by_simulation {
         (&white, slowness(&noise))
     } else {
         (&noise, 1.0)
@@ -226,7 +225,7 @@ pub fn diagnose(
     let mut steps: Vec<Step> = Vec::new();
     for node in &trail {
         let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?;
-        let node = if remains {
+        let node = if by_simulation {
             node.clone()
         } else {
             Node {
@@ -236,7 +235,7 @@ pub fn diagnose(
         };
         steps.push(step::report(&node, &own, floor.level, &problem.test)?);
     }
-    let last_remains = remains || input_shows(&last)?;
+    let last_remains = by_simulation || input_shows(&last)?;
     let verdict = match (last.added.is_empty(), last_remains) {
         (true, true) => Verdict::Unexplained,
         (true, false) => Verdict::Adequate,
@@ -385,9 +384,25 @@ fn trail<'a>(base: &Node<'a>, last: &Node<'a>, noise: &ArModel) -> Result<Vec<No
             .min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
         let Some(node) = best else { break };
         left.retain(|placed| Some(placed) != node.added.last());
+        let mut node = around(&node, noise, trail.len() as u64)?;
+        // The model that names the effects is held to the same as the believed one: its minimum is found twice.
+        let mut rounds = 0;
+        while left.is_empty() && node.fit.agree < 2 && rounds < MORE_ROUNDS {
+            rounds += 1;
+            node = around(&node, noise, 100 + rounds)?;
+        }
         trail.push(node);
     }
     Ok(trail)
+}
+
+/// The node's minimum against those that starts around it reach.
+fn around<'a>(node: &Node<'a>, noise: &ArModel, seed: u64) -> Result<Node<'a>, Error> {
+    refine(
+        node,
+        noise,
+        &starts_around(&node.setup, &node.fit.x, STARTS_AROUND, seed),
+    )
 }
 
 /// What each single effect does to the believed model.

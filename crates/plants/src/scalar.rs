@@ -131,6 +131,10 @@ impl<const N: usize> Scalar for Dual<N> {
 /// The operators are written as one pass that builds the result in place: by-value edits of a copy cost a `memcpy` each.
 macro_rules! operator {
     ($trait:ident, $method:ident, |$a:ident, $b:ident| $re:expr, |$i:ident| $eps:expr) => {
+        #[allow(
+            clippy::suspicious_arithmetic_impl,
+            reason = "the product rule is a sum"
+        )]
         impl<const N: usize> $trait for Dual<N> {
             type Output = Self;
             // The product rule is a sum.

@@ -1,4 +1,5 @@
 //! The controller around the simulator.
+#![allow(clippy::expect_used)]
 
 mod support;
 

@@ -97,24 +97,32 @@ impl Fit {
     /// Standard error of every entry of the vector; `None` for one that is fixed, held at a bound, or not determined.
     #[must_use]
     pub fn std_errors(&self) -> Vec<Option<f64>> {
-        let mut errors = vec![None; self.x.len()];
-        if let Some(covariance) = self.triangle.covariance(&self.interior) {
-            for (i, &column) in self.interior.iter().enumerate() {
-                errors[self.free[column]] = Some((covariance[i][i] * self.variance()).sqrt());
-            }
+        let Some(covariance) = self.triangle.covariance(&self.interior) else {
+            return vec![None; self.x.len()];
+        };
+        let variance = self.variance();
+        self.spread((0..self.interior.len()).map(|i| (covariance[i][i] * variance).sqrt()))
+    }
+
+    /// Values of the entries that are not at a bound, in their places of the vector.
+    pub(crate) fn spread(&self, values: impl Iterator<Item = f64>) -> Vec<Option<f64>> {
+        let mut all = vec![None; self.x.len()];
+        for (&column, value) in self.interior.iter().zip(values) {
+            all[self.free[column]] = Some(value);
         }
-        errors
+        all
+    }
+
+    /// Columns of the triangle whose entries are not at a bound.
+    pub(crate) fn interior(&self) -> &[usize] {
+        &self.interior
     }
 
     /// Degrees of freedom of every standard error: the quantile of Student's distribution with as many makes an
     /// interval of it. A noise model that was estimated with the fit leaves fewer than the samples do.
     #[must_use]
     pub fn freedom(&self) -> Vec<Option<f64>> {
-        let mut freedom = vec![None; self.x.len()];
-        for (&column, value) in self.interior.iter().zip(&self.freedom) {
-            freedom[self.free[column]] = Some(*value);
-        }
-        freedom
+        self.spread(self.freedom.iter().copied())
     }
 
     /// Half the width of the interval that holds the truth with probability `level` (0.95, say), for every entry that
@@ -153,7 +161,7 @@ impl Fit {
 }
 
 /// The quantile of Student's distribution that bounds a two-sided interval.
-fn student(level: f64, freedom: f64) -> f64 {
+pub(crate) fn student(level: f64, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1.0))
         .map_or(f64::NAN, |t| t.inverse_cdf(0.5 + 0.5 * level))
 }

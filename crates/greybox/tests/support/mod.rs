@@ -1,0 +1,190 @@
+//! Simulated rigs with a known truth.
+#![allow(dead_code)]
+
+use std::collections::BTreeMap;
+
+use ct_signals::{Hold, Record, Signal, excitation, noise};
+use greybox::{Setup, Stopping};
+use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// A plant, what is built into it, and the noise on its sensor.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    pub plant: Plant,
+    pub effects: Vec<(&'static str, usize, Vec<f64>)>,
+    pub theta: Vec<f64>,
+    /// Initial level of each vessel.
+    pub levels: Vec<f64>,
+    pub command: (f64, f64),
+    /// Standard deviation of the noise.
+    pub noise: f64,
+    /// Correlation of the noise from sample to sample; zero is white.
+    pub rho: f64,
+    pub samples: usize,
+    pub interval: f64,
+    pub hold: Hold,
+}
+
+impl Rig {
+    /// A tank of 154 cm^2 whose level stands near 16 cm; time constant about 100 s.
+    pub fn single_tank() -> Self {
+        Self {
+            plant: Plant::SingleTank,
+            effects: Vec::new(),
+            theta: vec![10.0, 12.5],
+            levels: vec![14.0],
+            command: (3.5, 6.5),
+            noise: 0.05,
+            rho: 0.0,
+            samples: 400,
+            interval: 4.0,
+            hold: Hold::Zero,
+        }
+    }
+
+    /// Two tanks in series, the lower one measured: time constants of about 50 s and 100 s, commands so wide that
+    /// the two cannot be mistaken for each other.
+    pub fn cascaded_tanks() -> Self {
+        Self {
+            plant: Plant::CascadedTanks,
+            theta: vec![10.0, 18.0, 12.5],
+            levels: vec![7.0, 14.0],
+            command: (2.0, 8.0),
+            samples: 500,
+            ..Self::single_tank()
+        }
+    }
+
+    /// A lag of 100 s with an offset.
+    pub fn linear_tank() -> Self {
+        Self {
+            plant: Plant::SingleTankLinear,
+            theta: vec![6.4, 100.0, -16.0],
+            ..Self::single_tank()
+        }
+    }
+
+    /// A rig for every plant.
+    pub fn all() -> Vec<Self> {
+        vec![
+            Self::single_tank(),
+            Self::cascaded_tanks(),
+            Self::linear_tank(),
+            Self {
+                plant: Plant::CascadedTanksLinear,
+                theta: vec![6.4, 60.0, 100.0, -16.0],
+                levels: vec![30.0, 14.0],
+                ..Self::single_tank()
+            },
+            Self {
+                plant: Plant::FirstOrder,
+                theta: vec![3.2, 100.0],
+                ..Self::single_tank()
+            },
+        ]
+    }
+
+    pub fn known(&self) -> Known {
+        let area = match self.plant {
+            Plant::SingleTank => [Some(154.0), None],
+            Plant::CascadedTanks => [Some(154.0), Some(154.0)],
+            _ => [None, None],
+        };
+        Known {
+            area,
+            tank_height: Some(60.0),
+            input_range: Some(10.0),
+        }
+    }
+
+    pub fn placed(&self) -> Vec<Placed> {
+        self.effects
+            .iter()
+            .map(|&(id, vessel, _)| Placed {
+                effect: EffectInfo::find(id).unwrap(),
+                vessel,
+            })
+            .collect()
+    }
+
+    /// The parameters of plant and effects, then the initial levels of `records` records.
+    pub fn truth(&self, records: usize) -> Vec<f64> {
+        let mut truth = self.theta.clone();
+        for (_, _, parameters) in &self.effects {
+            truth.extend(parameters);
+        }
+        for _ in 0..records {
+            truth.extend(&self.levels);
+        }
+        truth
+    }
+
+    /// Runs the rig under random steps; effects have to be listed in chain order.
+    pub fn record(&self, seed: u64) -> Record {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let (low, high) = self.command;
+        let u = excitation::steps(self.samples, 10..=40, low, high, &mut rng).unwrap();
+        let e = if self.rho == 0.0 {
+            noise::white(self.samples, self.noise, &mut rng)
+        } else {
+            noise::ar1(self.samples, self.noise, self.rho, &mut rng)
+        };
+        self.run(&u, &e)
+    }
+
+    /// Runs the rig under a given command and noise.
+    pub fn run(&self, u: &[f64], noise: &[f64]) -> Record {
+        let scales = Scales::from_ranges(
+            self.command,
+            (5.0, 25.0),
+            self.interval,
+            self.interval * self.samples as f64,
+        );
+        let mut structure = Structure::new(self.plant, self.known(), scales);
+        for placed in self.placed() {
+            structure = structure.with(placed).unwrap();
+        }
+        let theta = &self.truth(0);
+        let mut simulator = Simulator::new(&structure, theta, &self.levels, u[0]).unwrap();
+        let y = (0..u.len())
+            .map(|k| {
+                let reading = simulator.read() + noise[k];
+                if k + 1 < u.len() {
+                    let command = match self.hold {
+                        Hold::Zero => Command::held(u[k]),
+                        Hold::First => Command::ramp(u[k], u[k + 1]),
+                    };
+                    simulator.advance(command, self.interval);
+                }
+                reading
+            })
+            .collect();
+        Record {
+            name: "rig".into(),
+            time: (0..u.len()).map(|k| k as f64 * self.interval).collect(),
+            input: Signal::new("u", "V", u.to_vec()),
+            output: Signal::new("y", "cm", y),
+            reference: None,
+            hold: self.hold,
+        }
+    }
+
+    pub fn setup<'a>(&self, records: &'a [Record]) -> Setup<'a> {
+        Setup::from_records(
+            self.plant,
+            self.known(),
+            &self.placed(),
+            records,
+            BTreeMap::new(),
+        )
+        .unwrap()
+    }
+}
+
+/// Far beyond what a record can tell.
+pub const PRECISE: Stopping = Stopping {
+    evaluations: 300,
+    cost: 1e-14,
+};

@@ -20,8 +20,10 @@ pub struct Stopping {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stop {
-    /// The cost falls no more.
+    /// The cost falls no more, and a step of Gauss and Newton promises nothing.
     Converged,
+    /// The cost falls no more although its slope is not zero: the simulation is not smooth here.
+    Stuck,
     /// The evaluations were used up.
     Evaluations,
     /// The simulation is not finite at the start.
@@ -51,12 +53,22 @@ pub(crate) fn minimise(
     for (value, (lower, upper)) in x.iter_mut().zip(bounds) {
         *value = value.clamp(*lower, *upper);
     }
-    let Some(mut at) = evaluate(&x) else {
+    let Some(mut at) = evaluate(&x).filter(|at| at.cost().is_finite()) else {
         return Minimum {
             x,
             triangle: Triangle::new(p + 1),
             stop: Stop::NotFinite,
         };
+    };
+    // What an undamped step promises says whether it is a minimum; small steps alone may be the damping's doing.
+    let end = |at: &Triangle, free: &[usize]| {
+        let step = at.solve(free, &vec![1.0; p], 0.0);
+        let promised = at.cost() - at.predicted(&step);
+        if promised <= 1e3 * stopping.cost * at.cost() {
+            Stop::Converged
+        } else {
+            Stop::Stuck
+        }
     };
     let (mut damping, mut growth) = (1e-3, 2.0);
     let mut evaluations = 1;
@@ -94,10 +106,11 @@ pub(crate) fn minimise(
         let moved: Vec<f64> = trial.iter().zip(&x).map(|(to, from)| to - from).collect();
         let predicted = cost - at.predicted(&moved);
         if moved.iter().all(|d| *d == 0.0) || predicted.abs() <= 1e-15 * cost {
+            let stop = end(&at, &free);
             return Minimum {
                 x,
                 triangle: at,
-                stop: Stop::Converged,
+                stop,
             };
         }
         evaluations += 1;
@@ -115,7 +128,7 @@ pub(crate) fn minimise(
             } else {
                 0
             };
-            if small_steps == 2 {
+            if small_steps >= 2 && end(&at, &free) == Stop::Converged {
                 return Minimum {
                     x,
                     triangle: at,
@@ -124,10 +137,11 @@ pub(crate) fn minimise(
             }
         } else {
             if damping > 1e12 || predicted.abs() <= 1e-3 * stopping.cost * cost {
+                let stop = end(&at, &free);
                 return Minimum {
                     x,
                     triangle: at,
-                    stop: Stop::Converged,
+                    stop,
                 };
             }
             damping *= growth;

@@ -136,8 +136,9 @@ impl<'a> Setup<'a> {
             .filter(|&i| !fixed.contains_key(&names[i]))
             .collect();
         let reach = structure.scales.largest_level().max(1e-9);
+        // An empty tank is a trap: the outflow's slope is infinite there, and a step that overshot to it would stay.
         let lowest = if plant.outlet() == plants::Outlet::Torricelli {
-            0.0
+            1e-6 * reach
         } else {
             -1e3 * reach
         };

@@ -35,6 +35,7 @@ fn at_most_one_of_sixty_adequate_models_is_blamed() {
             effects: Vec::new(),
             start: Default::default(),
             fixed: Vec::new(),
+            controller: None,
             records: vec![record],
             test: Vec::new(),
         };

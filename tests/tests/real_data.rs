@@ -31,6 +31,7 @@ fn the_cascaded_tanks_give_up_their_effects() {
         effects: Vec::new(),
         start: Default::default(),
         fixed: Vec::new(),
+        controller: None,
         records: vec![read("estimation.csv")],
         test: vec![read("test.csv")],
     };

@@ -19,6 +19,7 @@ fn problem(rig: &Rig, record: Record) -> Problem {
         effects: Vec::new(),
         start: Default::default(),
         fixed: Vec::new(),
+        controller: None,
         records: vec![record],
         test: Vec::new(),
     }

@@ -146,13 +146,14 @@ impl Compare {
     }
 
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
-        let problem = self.files().read()?;
+        let files = self.files();
+        let problem = files.read()?;
         let outputs = self.outputs()?;
         let bar = Bar::new();
         bar.phase("fitting the model");
         let diagnosis = missing_effect::compare(&problem, &Options::default());
         bar.clear();
-        let diagnosis = diagnosis?;
+        let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
             &terminal::comparison(&diagnosis, look),
@@ -165,7 +166,8 @@ impl Compare {
 
 impl Diagnose {
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
-        let problem = self.compare.files().read()?;
+        let files = self.compare.files();
+        let problem = files.read()?;
         let outputs = self.compare.outputs()?;
         let mut options = Options::default();
         if let Some(most) = self.max_effects {
@@ -175,7 +177,7 @@ impl Diagnose {
         let diagnosis =
             missing_effect::diagnose(&problem, &options, &|progress| bar.show(progress));
         bar.clear();
-        let diagnosis = diagnosis?;
+        let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
             &terminal::diagnosis(&diagnosis, look),

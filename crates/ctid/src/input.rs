@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ct_signals::{ROWS_PER_PARAMETER, Record, read_csv};
 use missing_effect::Problem;
+use plants::controller::Pi;
 use plants::{Plant, Scales};
 
 use crate::model_file::{self, ModelFile};
@@ -49,6 +50,16 @@ impl Files {
         problem(&self.model.display().to_string(), model, records, test)
     }
 
+    /// An error of the computation, with the file that is to blame where that is known.
+    pub(crate) fn blame(&self, error: missing_effect::Error) -> Error {
+        match error {
+            missing_effect::Error::UnstableLoop { .. } => {
+                Error::file(&self.model, error.to_string())
+            }
+            other => other.into(),
+        }
+    }
+
     /// No record twice: a fitted one cannot be held out, and twice the same is not twice the data.
     fn check_repetition(&self) -> Result<(), Error> {
         let records: Vec<(&PathBuf, bool)> = self
@@ -88,12 +99,18 @@ pub fn problem(
     check_units(&records, &test)?;
     check_height(model_name, &model, records.iter().chain(&test))?;
     check_rows(&model, &records)?;
+    // The operating point plays no part in the loop's stability, and is not known.
+    let controller = model
+        .controller
+        .map(|c| Pi::new(c.gain, c.integral_time, (c.u_min, c.u_max), 0.0))
+        .transpose()?;
     Ok(Problem {
         plant: model.plant,
         known: model.known,
         effects: model.effects,
         start: model.start,
         fixed: model.fixed,
+        controller,
         records,
         test,
     })

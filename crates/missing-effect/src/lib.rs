@@ -4,17 +4,23 @@
 //! of effects that explain the failure, confirms each of them, groups what the data cannot tell apart, and returns
 //! the trail of the falling error.
 
+mod confirm;
+mod control_loop;
 mod diagnose;
 mod diagnosis;
 mod error;
 mod locate;
 mod noise_floor;
+mod problem;
+mod scores;
 mod search;
 mod sentences;
 mod step;
+mod trail;
 
-pub use diagnose::{Options, Problem, Progress, compare, diagnose};
+pub use diagnose::{compare, diagnose};
 pub use diagnosis::{
     Bin, Diagnosis, Failures, NoiseFloor, Parameter, ResidualTests, Score, Shown, Step, Verdict,
 };
 pub use error::Error;
+pub use problem::{Options, Problem, Progress};

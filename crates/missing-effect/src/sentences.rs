@@ -14,7 +14,10 @@ pub(crate) fn with_error(parameter: &Parameter) -> String {
             let digits = (1 - error.log10().floor() as i32).clamp(0, 12) as usize;
             format!("{:.digits$} ± {:.digits$}{unit}", parameter.value, error)
         }
-        _ => format!("{:.4}{unit}", parameter.value),
+        _ => format!(
+            "{:.4}{unit}, at the edge of what is plausible or of what the data determine",
+            parameter.value
+        ),
     }
 }
 
@@ -26,8 +29,28 @@ fn list(names: &[String]) -> String {
     }
 }
 
+/// What a comparison alone can say.
+pub(crate) fn of_comparison(diagnosis: &Diagnosis) -> Vec<String> {
+    let Some(step) = diagnosis.steps.first() else {
+        return Vec::new();
+    };
+    let unit = &diagnosis.output_unit;
+    vec![match diagnosis.verdict {
+        Verdict::Adequate => {
+            format!(
+                "The model explains the data: its simulation error of {:.3} {unit} rms looks like noise.",
+                step.rmse
+            )
+        }
+        _ => format!(
+            "The model does not explain the data: its simulation error of {:.3} {unit} rms holds more than noise.",
+            step.rmse
+        ),
+    }]
+}
+
 /// What there is to say, the verdict first.
-pub(crate) fn sentences(diagnosis: &Diagnosis, structure_remains: bool) -> Vec<String> {
+pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, structure_remains: bool) -> Vec<String> {
     let unit = &diagnosis.output_unit;
     let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
         return Vec::new();

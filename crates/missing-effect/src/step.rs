@@ -1,12 +1,12 @@
 //! From a fitted node to what is reported of it.
 
 use ct_signals::{Record, residual_tests};
-use greybox::{Fit, Setup, Stopping, fit_initial_levels};
+use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
 
 use crate::{
     Error, Parameter, ResidualTests, Step,
     locate::{Series, locate},
-    noise_floor::input_p,
+    noise_floor::{NOISE_ORDER, input_p},
     search::Node,
 };
 
@@ -58,21 +58,29 @@ fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
     }))
 }
 
+/// Standard errors under the colour of the node's own residual, whatever metric it was fitted in.
+fn std_errors(node: &Node) -> Result<Vec<Option<f64>>, Error> {
+    Ok(if node.fit.noise.order() > 0 {
+        node.fit.std_errors()
+    } else {
+        robust(&node.setup, &node.fit, NOISE_ORDER)?.std_errors
+    })
+}
+
 /// All entries of the vector with their standard errors.
-pub(crate) fn parameters(setup: &Setup, fit: &Fit) -> Vec<Parameter> {
+pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -> Vec<Parameter> {
     let record = &setup.records[0];
     let infos = setup.structure.parameters();
-    let errors = fit.std_errors();
     setup
         .names()
         .iter()
         .zip(&fit.x)
-        .zip(errors)
+        .zip(std_errors)
         .enumerate()
         .map(|(i, ((name, value), std_error))| Parameter {
             name: name.clone(),
             value: *value,
-            std_error,
+            std_error: *std_error,
             unit: infos.get(i).map_or_else(
                 || record.output.unit.clone(),
                 |info| {
@@ -85,8 +93,8 @@ pub(crate) fn parameters(setup: &Setup, fit: &Fit) -> Vec<Parameter> {
         .collect()
 }
 
-/// The report of one node; `floor` is the noise's standard deviation.
-pub(crate) fn report(node: &Node, own: &Fit, floor: f64, test: &[Record]) -> Result<Step, Error> {
+/// The report of one node; `bic` is its criterion under the colour of its own residual, `floor` the noise's standard deviation.
+pub(crate) fn report(node: &Node, bic: f64, floor: f64, test: &[Record]) -> Result<Step, Error> {
     let Node { setup, fit, added } = node;
     let last = added.last();
     let simulated = setup.simulate(&fit.x)?.output;
@@ -122,8 +130,8 @@ pub(crate) fn report(node: &Node, own: &Fit, floor: f64, test: &[Record]) -> Res
         place: last.and_then(|placed| place_name(node, *placed)),
         rmse: fit.rmse,
         rmse_test,
-        bic: own.bic(),
-        parameters: parameters(setup, fit),
+        bic,
+        parameters: parameters(setup, fit, &std_errors(node)?),
         starts: fit.starts,
         starts_agree: fit.agree,
         tests,

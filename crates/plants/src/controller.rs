@@ -48,6 +48,18 @@ impl Pi {
         })
     }
 
+    /// Proportional gain \[input/output\].
+    #[must_use]
+    pub fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// Integral time \[s\].
+    #[must_use]
+    pub fn integral_time(&self) -> f64 {
+        self.integral_time
+    }
+
     /// The command for a set point and a reading, to be held over the next `h` seconds.
     pub fn command(&mut self, reference: f64, reading: f64, h: f64) -> f64 {
         let error = reference - reading;

@@ -1,0 +1,118 @@
+//! What is to be diagnosed and how, and the fit of the believed model.
+
+use std::collections::BTreeMap;
+
+use ct_signals::{ArModel, Record};
+use greybox::{Setup, Stopping, fit_from, random_starts};
+use plants::{Known, Placed, Plant, controller::Pi};
+
+use crate::{Error, control_loop::check_stable, search::Node};
+
+/// What the fit of a believed model is taken to.
+pub(crate) const STOPPING: Stopping = Stopping {
+    evaluations: 120,
+    cost: 1e-9,
+};
+
+/// What is to be diagnosed.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// The believed plant.
+    pub plant: Plant,
+    /// What is known of it.
+    pub known: Known,
+    /// The effects that are on already.
+    pub effects: Vec<Placed>,
+    /// First guesses, by name: `alpha`, `overflow.rim`.
+    pub start: BTreeMap<String, f64>,
+    /// Names in `start` that are not fitted.
+    pub fixed: Vec<String>,
+    /// The records that are fitted together.
+    pub records: Vec<Record>,
+    /// The controller of the loop, where there is one: it must make the fitted plant stable.
+    pub controller: Option<Pi>,
+    /// Records that take no part in any fit or choice and are only scored.
+    pub test: Vec<Record>,
+}
+
+/// How to search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Largest number of effects to add.
+    pub max_effects: usize,
+    /// Random starts of the base fit, at least ten; more are drawn until the best minimum is found twice.
+    pub starts: usize,
+    /// Seed of the starts.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            max_effects: 6,
+            starts: 12,
+            seed: 1,
+        }
+    }
+}
+
+/// How far the computation is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// What is being done.
+    pub phase: &'static str,
+    /// Steps done.
+    pub done: usize,
+    /// Steps in all.
+    pub total: usize,
+}
+
+/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried.
+pub(crate) fn base<'a>(problem: &'a Problem, options: &Options) -> Result<Node<'a>, Error> {
+    let fixed: BTreeMap<String, f64> = problem
+        .fixed
+        .iter()
+        .filter_map(|name| problem.start.get(name).map(|value| (name.clone(), *value)))
+        .collect();
+    let mut setup = Setup::from_records(
+        problem.plant,
+        problem.known.clone(),
+        &problem.effects,
+        &problem.records,
+        fixed,
+    )?;
+    for record in &problem.records {
+        record.require_rows(setup.free().len())?;
+    }
+    let white = ArModel::white(1.0);
+    let mut starts = options.starts.max(10);
+    let fit = loop {
+        let mut all = random_starts(&setup, starts, options.seed);
+        if !problem.start.is_empty() {
+            let mut guessed = all[0].clone();
+            for (name, value) in setup.names().iter().zip(&mut guessed) {
+                *value = problem.start.get(name).copied().unwrap_or(*value);
+            }
+            all.push(guessed);
+        }
+        let fit = fit_from(&setup, &all, &white, STOPPING)?;
+        if fit.agree >= 2 || starts >= 96 {
+            break fit;
+        }
+        starts *= 2;
+    };
+    setup.choose_substeps(&fit.x)?;
+    // Levels that are not measured are known now: ranges and operating levels follow them.
+    setup.structure.scales = setup.scales_at(&fit.x)?;
+    let setup = setup.with_structure(setup.structure.clone())?;
+    let fit = fit_from(&setup, std::slice::from_ref(&fit.x), &white, STOPPING)?.continuing(&fit);
+    let node = Node {
+        setup,
+        fit,
+        added: Vec::new(),
+    };
+    if let Some(controller) = &problem.controller {
+        check_stable(&node, controller)?;
+    }
+    Ok(node)
+}

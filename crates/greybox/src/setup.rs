@@ -453,11 +453,13 @@ impl<'a> Setup<'a> {
                 (low.min(range.0), high.max(range.1))
             });
         let tolerance = 1e-6 * (high - low);
-        let mut coarse = {
-            self.substeps = 1;
-            self.simulate(x)?
-        };
-        while self.substeps < 32 {
+        // The simulator itself cuts steps that are long against a time constant: until its cuts are the longer ones,
+        // halving changes nothing, which says nothing.
+        let rounding = 1e-13 * low.abs().max(high.abs());
+        let mut enough = None;
+        self.substeps = 1;
+        let mut coarse = self.simulate(x)?;
+        while self.substeps < 64 {
             let n = self.substeps;
             self.substeps = 2 * n;
             let fine = self.simulate(x)?;
@@ -468,12 +470,17 @@ impl<'a> Setup<'a> {
                 .zip(fine.output.iter().flatten())
                 .map(|(a, b)| (a - b).abs())
                 .fold(0.0, f64::max);
-            if moved <= tolerance {
-                self.substeps = n;
-                return Ok(());
+            if moved > tolerance {
+                enough = None;
+            } else {
+                enough = enough.or(Some(n));
+                if moved > rounding {
+                    break;
+                }
             }
             coarse = fine;
         }
+        self.substeps = enough.unwrap_or(self.substeps);
         Ok(())
     }
 

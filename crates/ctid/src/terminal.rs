@@ -331,7 +331,7 @@ fn residual_tests(tests: &ResidualTests) -> String {
         value if value.is_nan() => "the input was not looked for in the residual".to_string(),
         value if value < 0.01 => format!("the input is still seen in the residual ({})", p(value)),
         value => format!(
-            "no trace of the input is left in the residual ({})",
+            "no linear trace of the input is left in the residual ({})",
             p(value)
         ),
     };

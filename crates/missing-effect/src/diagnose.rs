@@ -60,7 +60,13 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
             ..base
         }
     };
-    let step = step::report(&shown, own.bic(), floor.level, &problem.test)?;
+    // What the model lacks is in the residual too: what cannot be predicted from the residual's own past is not.
+    let noise = if lacking {
+        floor.innovation
+    } else {
+        floor.level
+    };
+    let step = step::report(&shown, own.bic(), noise, &problem.test)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
     diagnosis.sentences = sentences::of_comparison(&diagnosis);
     diagnosis.seconds = begun.elapsed().as_secs_f64();

@@ -286,7 +286,7 @@ impl Header<'_> {
 
 fn quoted<'a>(names: impl Iterator<Item = &'a String>) -> String {
     names
-        .map(|name| format!("\"{name}\""))
+        .map(|name| format!("\"{}\"", unit::shown(name)))
         .collect::<Vec<_>>()
         .join(", ")
 }

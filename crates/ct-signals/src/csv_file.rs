@@ -11,7 +11,7 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::columns::{Columns, Found, Layout};
 use crate::record::{MIN_ROWS, median_step};
-use crate::{Error, Hold, Record, Signal};
+use crate::{Error, Hold, Record, Signal, unit};
 
 /// A step of the time above this many median steps is a gap: half-way between one sample and two,
 /// so that jitter up to a quarter of the interval passes and one missing sample does not.
@@ -30,8 +30,8 @@ const SATURATED_RATIO: usize = 4;
 /// 1.5 times the median is a gap. Row numbers in messages are line numbers of the file.
 ///
 /// # Errors
-/// [`Error::CannotOpen`], [`Error::NotText`], [`Error::EmptyFile`], [`Error::NoHeader`],
-/// [`Error::MissingColumn`], [`Error::AmbiguousColumn`], [`Error::SharedColumn`],
+/// [`Error::CannotOpen`], [`Error::Folder`], [`Error::NotText`], [`Error::EmptyFile`],
+/// [`Error::NoHeader`], [`Error::MissingColumn`], [`Error::AmbiguousColumn`], [`Error::SharedColumn`],
 /// [`Error::UnitContradiction`], [`Error::UnknownTimeUnit`], [`Error::WrongFieldCount`],
 /// [`Error::EmptyCell`], [`Error::TextInCell`], [`Error::NotFinite`], [`Error::MixedDecimalMarks`],
 /// [`Error::RepeatedTime`], [`Error::BackwardTime`], [`Error::TooFewRows`] (below
@@ -39,6 +39,9 @@ const SATURATED_RATIO: usize = 4;
 /// [`Error::ConstantOutput`], [`Error::Saturated`].
 pub fn read_csv(path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Error> {
     let file = path.display().to_string();
+    if path.is_dir() {
+        return Err(Error::Folder { file });
+    }
     let bytes = std::fs::read(path).map_err(|source| Error::CannotOpen {
         file: file.clone(),
         source,
@@ -191,7 +194,7 @@ fn resolve(
         return Err(Error::NoHeader {
             file: file.into(),
             row,
-            first: record.iter().collect::<Vec<_>>().join(", "),
+            first: unit::shown(&record.iter().collect::<Vec<_>>().join(", ")),
         });
     }
     let headers: Vec<String> = record.iter().map(str::to_string).collect();
@@ -266,7 +269,7 @@ impl Numbers<'_> {
             file: file.clone(),
             row,
             column: header.clone(),
-            text: cell.into(),
+            text: unit::shown(cell),
             mend: if cell.contains(',') {
                 "write decimals with a point and without separators for thousands"
             } else {

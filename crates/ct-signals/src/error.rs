@@ -15,6 +15,12 @@ pub enum Error {
         /// What the operating system says.
         source: std::io::Error,
     },
+    /// A folder where a file is expected.
+    #[error("{file}: it is a folder; name a file in it")]
+    Folder {
+        /// The path as it was given.
+        file: String,
+    },
     /// The file is not text in an encoding that is understood.
     #[error("{file}: this is not a UTF-8 text file but {found}; export it as CSV (UTF-8)")]
     NotText {

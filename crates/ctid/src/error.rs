@@ -53,3 +53,40 @@ impl Error {
         }
     }
 }
+
+/// A message on one line, without what would steer the terminal: files and their names are quoted
+/// in messages, whatever they hold.
+#[must_use]
+pub fn one_line(message: &str) -> String {
+    let mut line = String::with_capacity(message.len());
+    for part in message.lines().map(str::trim).filter(|l| !l.is_empty()) {
+        if !line.is_empty() {
+            line += if line.ends_with([':', ';', ',']) {
+                " "
+            } else {
+                "; "
+            };
+        }
+        line.extend(part.chars().map(|c| if c.is_control() { ' ' } else { c }));
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_one_line_of_printable_text() {
+        let usage = "error: no such option\n\n  tip: another one\n\nUsage: ctid\n";
+        assert_eq!(
+            one_line(usage),
+            "error: no such option; tip: another one; Usage: ctid"
+        );
+        assert_eq!(
+            one_line("these are missing:\n  --model <M>\n"),
+            "these are missing: --model <M>"
+        );
+        assert_eq!(one_line("a \u{1b}[31mred\r cell"), "a  [31mred  cell");
+    }
+}

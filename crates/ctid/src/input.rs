@@ -43,7 +43,13 @@ impl Files {
         let read = |paths: &[PathBuf]| -> Result<Vec<Record>, ct_signals::Error> {
             paths
                 .iter()
-                .map(|path| read_csv(path, &model.columns, model.hold))
+                .map(|path| {
+                    let mut record = read_csv(path, &model.columns, model.hold)?;
+                    if self.shares_its_name(path) {
+                        record.name = path.display().to_string();
+                    }
+                    Ok(record)
+                })
                 .collect()
         };
         let (records, test) = (read(&self.data)?, read(&self.test)?);
@@ -58,6 +64,13 @@ impl Files {
             }
             other => other.into(),
         }
+    }
+
+    /// Another record has the same file name: only its folder tells it apart.
+    fn shares_its_name(&self, path: &Path) -> bool {
+        let records = self.data.iter().chain(&self.test);
+        let same = records.filter(|other| other.file_name() == path.file_name());
+        same.count() > 1
     }
 
     /// No record twice: a fitted one cannot be held out, and twice the same is not twice the data.

@@ -29,4 +29,4 @@ pub mod terminal;
 pub mod tour;
 
 pub use commands::{Cli, run};
-pub use error::Error;
+pub use error::{Error, one_line};

@@ -92,6 +92,9 @@ pub fn read(path: &Path) -> Result<ModelFile, Error> {
 /// The text of a model file.
 pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     let cannot = |what: String| Error::file(path, what);
+    if path.is_dir() {
+        return Err(cannot("it is a folder; name a file in it".to_string()));
+    }
     let bytes = std::fs::read(path).map_err(|error| {
         cannot(format!(
             "the model file cannot be opened: {error}; check the path and the permissions"
@@ -387,14 +390,14 @@ impl Source<'_> {
             Some(number) => self.finite(key, number),
             None => Err(self.at(at, format!("[controller] has no {key}; write {key} = ..."))),
         };
-        let limit = |number: &Option<Spanned<Number>>, none: f64| {
-            number.as_ref().map_or(none, |n| n.as_ref().value())
+        let limit = |key: &str, number: &Option<Spanned<Number>>, none: f64| {
+            number.as_ref().map_or(Ok(none), |n| self.finite(key, n))
         };
         let settings = ControllerSettings {
             gain: needed("gain", &raw.gain)?,
             integral_time: needed("integral_time", &raw.integral_time)?,
-            u_min: limit(&raw.u_min, f64::NEG_INFINITY),
-            u_max: limit(&raw.u_max, f64::INFINITY),
+            u_min: limit("u_min", &raw.u_min, f64::NEG_INFINITY)?,
+            u_max: limit("u_max", &raw.u_max, f64::INFINITY)?,
         };
         let limits = (settings.u_min, settings.u_max);
         Pi::new(settings.gain, settings.integral_time, limits, 0.0)

@@ -242,8 +242,17 @@ impl<T: Scalar> Actuator<T> {
         }
     }
 
+    /// The inflow over a stretch of length `h`: the signal behind the lag, times the pump's gain.
+    #[inline]
+    pub(crate) fn inflow(&mut self, h: T, command: Signal<T>, gain: T) -> Inflow<T> {
+        if command.held && self.lag.is_none() {
+            return Inflow::held(gain * command.value);
+        }
+        self.lagged(h, command).map(|u| gain * u)
+    }
+
     /// The signal behind the lag over a stretch of length `h`, as the parabola with the same first three moments.
-    pub(crate) fn lagged(&mut self, h: T, command: Signal<T>) -> Inflow<T> {
+    fn lagged(&mut self, h: T, command: Signal<T>) -> Inflow<T> {
         let ahead = command.over(h);
         let Some(lag) = self.lag else { return ahead };
         // The lag follows continuously: what the command jumps by is added to the excess.

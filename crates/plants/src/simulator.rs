@@ -178,7 +178,7 @@ impl<T: Scalar> Simulator<T> {
                 };
                 for i in 0..parts {
                     let signal = signal.from(part * i as f64);
-                    let inflow = actuator.lagged(part, signal).map(|u| gain * u);
+                    let inflow = actuator.inflow(part, signal, gain);
                     if sensor.has_lag() {
                         let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
                         vessels.step(part, inflow, now, &mut Some(&mut follow));

@@ -17,8 +17,8 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
-    // A zero that is wrong by more than this would have been seen.
-    let most = 0.1 * low.abs().max(high.abs());
+    // A live zero (4 to 20 mA, 2 to 10 V) reads a fifth of the range for an empty tank; more would have been seen.
+    let most = 0.25 * low.abs().max(high.abs());
     vec![ParameterInfo {
         name: "offset",
         unit: Unit::LEVEL,

@@ -78,11 +78,21 @@ pub(crate) fn freedom(
     };
     let (_, centre) = at(&[])?;
     // The criterion's curvature is twice the information on the partial correlations.
-    let mut hessian = vec![vec![0.0; q]; q];
+    let value = |moves: &[(usize, f64)]| Some(at(moves)?.1.value);
+    // The lower triangle.
+    let mut hessian: Vec<Vec<f64>> = Vec::with_capacity(q);
     let mut gradient: Vec<Vec<f64>> = Vec::with_capacity(q);
     for i in 0..q {
         let ((above, up), (below, down)) = (at(&[(i, 1.0)])?, at(&[(i, -1.0)])?);
-        hessian[i][i] = (up.value - 2.0 * centre.value + down.value) / (STEP * STEP);
+        let own = (up.value - 2.0 * centre.value + down.value) / (STEP * STEP);
+        let mixed = |j: usize| {
+            let same = value(&[(i, 1.0), (j, 1.0)])? + value(&[(i, -1.0), (j, -1.0)])?;
+            let other = value(&[(i, 1.0), (j, -1.0)])? + value(&[(i, -1.0), (j, 1.0)])?;
+            Some((same - other) / (4.0 * STEP * STEP))
+        };
+        let mut row = (0..i).map(mixed).collect::<Option<Vec<f64>>>()?;
+        row.push(own);
+        hessian.push(row);
         let (above, below) = (
             variances(&above, up.variance)?,
             variances(&below, down.variance)?,
@@ -94,13 +104,6 @@ pub(crate) fn freedom(
                 .map(|(a, b)| (a / b).ln() / (2.0 * STEP))
                 .collect(),
         );
-        for j in 0..i {
-            let mixed = |a, b| Some(at(&[(i, a), (j, b)])?.1.value);
-            hessian[i][j] = (mixed(1.0, 1.0)? - mixed(1.0, -1.0)? - mixed(-1.0, 1.0)?
-                + mixed(-1.0, -1.0)?)
-                / (4.0 * STEP * STEP);
-            hessian[j][i] = hessian[i][j];
-        }
     }
     let factor = cholesky(hessian)?;
     let count = variances(&model(&z).ok()?, centre.variance)?.len();

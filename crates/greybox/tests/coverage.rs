@@ -1,5 +1,6 @@
 //! Intervals of 95 % hold the truth in 95 % of simulated records, for every parameter and initial level, whatever the
 //! noise's colour, which the fit is not told.
+#![allow(clippy::unwrap_used)]
 
 mod support;
 

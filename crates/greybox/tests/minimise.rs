@@ -1,4 +1,5 @@
 //! The minimiser against the crate `levenberg-marquardt`, its bounds, and what it says of its end.
+#![allow(clippy::unwrap_used)]
 
 mod support;
 

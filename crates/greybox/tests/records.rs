@@ -1,4 +1,5 @@
 //! Several records, initial levels on a head, and the step of the simulation.
+#![allow(clippy::unwrap_used)]
 
 mod support;
 

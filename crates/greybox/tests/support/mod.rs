@@ -1,5 +1,5 @@
 //! Simulated rigs with a known truth.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 

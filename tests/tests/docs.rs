@@ -1,4 +1,7 @@
-//! The worked example of docs/adding-an-effect.md compiles, is the one that the page shows, and keeps the contract.
+//! What the pages in the repository say holds: the worked example of docs/adding-an-effect.md compiles, is the one that
+//! the page shows, and keeps the contract; the model file of the README is the bundled one; links lead somewhere.
+
+use std::path::Path;
 
 use plants::{
     Dual, EffectInfo, Law, Outlet, ParameterInfo, Place, Plant, Scalar, Scales, Site, Unit,
@@ -67,5 +70,41 @@ fn its_parameters_have_starts_within_their_bounds() {
     for p in parameters {
         assert_eq!(p.unit, Unit::LEVEL);
         assert!(p.starts.iter().all(|s| (p.lower..=p.upper).contains(s)));
+    }
+}
+
+#[test]
+fn the_readme_shows_the_bundled_model_file() {
+    let readme = include_str!("../../README.md");
+    let model = include_str!("../../examples/records/tour.toml");
+    assert!(
+        readme.contains(&format!("```toml\n{model}```\n")),
+        "README.md does not show examples/records/tour.toml as it stands"
+    );
+}
+
+#[test]
+fn links_lead_to_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    for page in [
+        "README.md",
+        "CONTRIBUTING.md",
+        "docs/adding-an-effect.md",
+        "docs/design.md",
+        "docs/gallery.md",
+    ] {
+        let page = root.join(page);
+        let text = std::fs::read_to_string(&page).unwrap();
+        for link in text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split(')').next())
+        {
+            if link.starts_with("http") || link.starts_with('#') {
+                continue;
+            }
+            let there = page.parent().unwrap().join(link);
+            assert!(there.exists(), "{}: no {link}", page.display());
+        }
     }
 }

@@ -9,7 +9,7 @@ use greybox::{FitOptions, Setup, coloured, fit, fit_from, random_starts, robust}
 use rayon::prelude::*;
 use support::Rig;
 
-const RECORDS: u64 = 400;
+const RECORDS: u64 = 800;
 
 /// Half widths and centres of one record's intervals.
 type Intervals = (Vec<f64>, Vec<Option<f64>>);

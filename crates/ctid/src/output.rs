@@ -82,11 +82,13 @@ impl Output {
     }
 }
 
-/// The first of `report.html`, `report-2.html`, `report-3.html`, ... that may be written in a folder.
+/// The first of `report.html`, `report-2.html`, `report-3.html`, ... in a folder that is free, or
+/// that is a report on this record already: nobody asked for that name, so a report on anything
+/// else stays.
 ///
 /// # Errors
 /// Where the folder cannot be written to.
-pub fn free_report(folder: &Path) -> Result<Output, Error> {
+pub fn free_report(folder: &Path, record: &str) -> Result<Output, Error> {
     let mut number = 1;
     loop {
         let name = match number {
@@ -94,14 +96,22 @@ pub fn free_report(folder: &Path) -> Result<Output, Error> {
             n => format!("report-{n}.html"),
         };
         let path = folder.join(name);
-        if matches!(
-            standing(Kind::Report, &path),
-            Standing::Nothing | Standing::Ours
-        ) {
+        let free = match standing(Kind::Report, &path) {
+            Standing::Nothing => true,
+            Standing::Ours => is_empty_or_shows(record, &path),
+            Standing::Folder | Standing::NotOurs => false,
+        };
+        if free {
             return Ok(plan(&[(Kind::Report, &path)], &[])?.remove(0));
         }
         number += 1;
     }
+}
+
+/// A report on this record, as its data name it.
+fn is_empty_or_shows(record: &str, path: &Path) -> bool {
+    let name = format!("\"{record}\"");
+    fs::read_to_string(path).is_ok_and(|page| page.is_empty() || page.contains(&name))
 }
 
 /// What stands where a result is to go.
@@ -264,11 +274,17 @@ mod tests {
     #[test]
     fn a_report_takes_the_next_free_name() {
         let folder = tempfile::tempdir().unwrap();
-        let name = |output: Output| output.path().file_name().unwrap().to_owned();
-        assert_eq!(name(free_report(folder.path()).unwrap()), "report.html");
-        fs::write(folder.path().join("report.html"), "mine").unwrap();
-        assert_eq!(name(free_report(folder.path()).unwrap()), "report-2.html");
-        fs::write(folder.path().join("report-2.html"), report::GENERATOR).unwrap();
-        assert_eq!(name(free_report(folder.path()).unwrap()), "report-2.html");
+        let name = || {
+            let output = free_report(folder.path(), "a.csv").unwrap();
+            output.path().file_name().unwrap().to_owned()
+        };
+        let page = |record: &str| format!("{}{{\"name\":\"{record}\"}}", report::GENERATOR);
+        assert_eq!(name(), "report.html");
+        fs::write(folder.path().join("report.html"), "mine, on \"a.csv\"").unwrap();
+        assert_eq!(name(), "report-2.html");
+        fs::write(folder.path().join("report-2.html"), page("data.csv")).unwrap();
+        assert_eq!(name(), "report-3.html");
+        fs::write(folder.path().join("report-3.html"), page("a.csv")).unwrap();
+        assert_eq!(name(), "report-3.html");
     }
 }

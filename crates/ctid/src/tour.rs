@@ -35,13 +35,13 @@ pub struct Tour {
 }
 
 /// Walks through the five steps, tells them on `out`, and writes `report.html` into `folder`; where
-/// somebody else's file has that name, `report-2.html`, and so on.
+/// a file that is not of an earlier tour has that name, `report-2.html`, and so on.
 ///
 /// # Errors
 /// Where the folder or `out` cannot be written to.
 pub fn run(folder: &Path, out: &mut dyn Write, look: Look, bar: &Bar) -> Result<Tour, Error> {
     // Before anything is told: a tour that cannot end well does not begin.
-    let report = output::free_report(folder)?;
+    let report = output::free_report(folder, DATA.0)?;
     let problem = problem()?;
     let options = Options::default();
 

@@ -299,11 +299,12 @@ impl Tanks {
             structure = structure.with(Placed { effect, vessel }).unwrap();
             theta.extend(parameters);
         }
-        let mut simulator = Simulator::new(&structure, &theta, &self.levels, 5.0).unwrap();
+        // At rest until the first step.
+        let (mut u, mut until) = (5.0, 30);
+        let mut simulator = Simulator::new(&structure, &theta, &self.levels, u).unwrap();
         simulator.set_substeps(4);
         let mut random = Random(self.seed);
         let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
-        let (mut u, mut until) = (5.0, 0);
         for k in 0..self.rows {
             if k == until {
                 u = ((3.5 + 3.0 * random.uniform()) * 100.0).round() / 100.0;

@@ -1,0 +1,548 @@
+//! What the program gives for good input: the JSON of the contract, the same whatever the form of
+//! the file, the number of threads and the run, and files that are written where they were asked for.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::process::Stdio;
+
+use common::{Place, Tanks, bundled, csv, lasting, outcome};
+use plants::CATALOGUE;
+use serde_json::Value;
+
+const DIAGNOSE: &str = "diagnose tour.csv --model tour.toml";
+
+fn texts(value: &Value) -> Vec<&str> {
+    let list = value.as_array().unwrap();
+    list.iter().map(|text| text.as_str().unwrap()).collect()
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .filter(|number| number.is_finite())
+        .unwrap_or_else(|| panic!("{value} is not a finite number"))
+}
+
+/// Names and values of the parameters of a step.
+fn parameters(step: &Value) -> Vec<(String, f64)> {
+    let named = |p: &Value| (p["name"].as_str().unwrap().to_string(), number(&p["value"]));
+    step["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(named)
+        .collect()
+}
+
+/// The keys, types and rules that DESIGN.md promises of the JSON of `diagnose`.
+fn fulfils_the_contract(json: &Value, held_out: bool) {
+    assert_eq!(json["schema"], 1);
+    let verdict = json["verdict"].as_str().unwrap();
+    let effects = texts(&json["effects"]);
+    let groups: Vec<Vec<&str>> = json["groups"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(texts)
+        .collect();
+    let ranked = texts(&json["ranked"]);
+    let steps = json["steps"].as_array().unwrap();
+
+    let known: BTreeSet<&str> = CATALOGUE.iter().map(|effect| effect.id).collect();
+    let named = effects.iter().chain(groups.iter().flatten());
+    for id in named.chain(ranked.iter().filter(|id| **id != "none")) {
+        assert!(known.contains(id), "{id} is not in the catalogue");
+    }
+    assert_eq!(effects.len(), groups.len());
+    for (effect, group) in effects.iter().zip(&groups) {
+        assert!(group.contains(effect), "{effect} is not in {group:?}");
+    }
+    let distinct: BTreeSet<&&str> = ranked.iter().collect();
+    assert_eq!(distinct.len(), ranked.len(), "{ranked:?}");
+    assert_eq!(
+        ranked.first() == Some(&"none"),
+        verdict == "adequate",
+        "{verdict}: {ranked:?}"
+    );
+    match verdict {
+        "effect" => {
+            assert!(!effects.is_empty());
+            assert!(groups.iter().all(|group| group.len() == 1), "{groups:?}");
+        }
+        "undecided" => assert!(groups.iter().any(|group| group.len() > 1), "{groups:?}"),
+        "unexplained" => {}
+        "adequate" => assert!(effects.is_empty()),
+        other => panic!("verdict {other}"),
+    }
+
+    assert_eq!(steps.len(), 1 + effects.len());
+    assert!(steps[0]["added"].is_null());
+    for (step, effect) in steps[1..].iter().zip(&effects) {
+        assert_eq!(step["added"], *effect);
+    }
+    for pair in steps.windows(2) {
+        assert!(number(&pair[1]["rmse"]) < number(&pair[0]["rmse"]));
+    }
+    for step in steps {
+        assert!(number(&step["rmse"]) > 0.0);
+        number(&step["bic"]);
+        if held_out {
+            assert!(number(&step["rmse_test"]) > 0.0);
+        } else {
+            assert!(step["rmse_test"].is_null());
+        }
+        let parameters = step["parameters"].as_array().unwrap();
+        assert!(!parameters.is_empty());
+        for parameter in parameters {
+            assert!(!parameter["name"].as_str().unwrap().is_empty());
+            assert!(parameter["unit"].is_string());
+            number(&parameter["value"]);
+            let error = &parameter["std_error"];
+            assert!(error.is_null() || number(error) > 0.0, "{parameter}");
+        }
+    }
+    assert!(number(&json["noise_floor"]) > 0.0);
+    assert!(number(&json["seconds"]) > 0.0);
+}
+
+#[test]
+fn the_bundled_records_give_the_json_of_the_contract() {
+    let place = Place::new();
+    let json = place.result(&format!("{DIAGNOSE} --test tour-test.csv"));
+    fulfils_the_contract(&json, true);
+    assert_eq!(json["verdict"], "effect");
+    assert_eq!(json["effects"], serde_json::json!(["overflow"]));
+    assert_eq!(json["ranked"][0], "overflow");
+    let unit = |index: usize| json["steps"][0]["parameters"][index]["unit"].clone();
+    assert_eq!((unit(0), unit(1)), ("cm^3/(V s)".into(), "cm^2.5/s".into()));
+    fulfils_the_contract(&place.result(DIAGNOSE), false);
+}
+
+/// The exit code is 0 whatever is found: [`Place::result`] asks for it.
+fn diagnosed(record: &str, model: &str) -> Value {
+    let place = Place::empty();
+    place.write("data.csv", record);
+    place.write("model.toml", model);
+    let json = place.result("diagnose data.csv --model model.toml");
+    fulfils_the_contract(&json, false);
+    json
+}
+
+#[test]
+fn an_adequate_model_is_a_result() {
+    for tanks in [Tanks::single(), Tanks::cascaded()] {
+        let json = diagnosed(&tanks.csv(), &tanks.model());
+        assert_eq!(json["verdict"], "adequate");
+        let rmse = number(&json["steps"][0]["rmse"]);
+        assert!((rmse / tanks.noise - 1.0).abs() < 0.1, "{rmse}");
+    }
+}
+
+#[test]
+fn an_effect_of_the_lower_of_two_tanks_is_found_at_its_place() {
+    let rim = 16.5;
+    let tanks = Tanks {
+        hidden: vec![("overflow", 1, vec![rim])],
+        ..Tanks::cascaded()
+    };
+    let json = diagnosed(&tanks.csv(), &tanks.model());
+    assert_eq!(json["effects"], serde_json::json!(["overflow"]));
+    assert_eq!(json["steps"][1]["place"], "lower");
+    let found = parameters(&json["steps"][1])
+        .into_iter()
+        .find(|(name, _)| name == "overflow.rim");
+    let (_, found) = found.unwrap();
+    assert!((found - rim).abs() < 0.1, "{found}");
+}
+
+#[test]
+fn an_effect_with_a_stand_in_is_a_result() {
+    let tanks = Tanks {
+        hidden: vec![("pump_lag", 0, vec![8.0])],
+        ..Tanks::single()
+    };
+    let json = diagnosed(&tanks.csv(), &tanks.model());
+    assert_eq!(json["verdict"], "undecided");
+    let group: BTreeSet<&str> = texts(&json["groups"][0]).into_iter().collect();
+    assert!(group.contains("pump_lag") && group.contains("sensor_lag"));
+}
+
+#[test]
+fn something_that_nothing_explains_is_a_result() {
+    // A sensor that is off by a wave of its reading: no effect of the catalogue. Chance decides
+    // whether one of them imitates it on a record.
+    let unexplained = (1..8).any(|seed| {
+        let tanks = Tanks {
+            seed,
+            ..Tanks::single()
+        };
+        let (inputs, mut outputs) = tanks.run();
+        for y in &mut outputs {
+            *y += 0.7 * (2.5 * *y).sin();
+        }
+        diagnosed(&csv(&inputs, &outputs), &tanks.model())["verdict"] == "unexplained"
+    });
+    assert!(unexplained);
+}
+
+#[test]
+fn at_most_so_many_effects_are_added() {
+    let tanks = Tanks {
+        hidden: vec![("pump_lag", 0, vec![25.0]), ("overflow", 0, vec![17.0])],
+        ..Tanks::single()
+    };
+    let place = Place::empty();
+    place.write("data.csv", tanks.csv());
+    place.write("model.toml", tanks.model());
+    let json = place.result("diagnose data.csv --model model.toml --max-effects 1");
+    fulfils_the_contract(&json, false);
+    assert!(json["effects"].as_array().unwrap().len() <= 1);
+    let json = place.result("diagnose data.csv --model model.toml --max-effects 3");
+    fulfils_the_contract(&json, false);
+    assert!(json["effects"].as_array().unwrap().len() > 1);
+}
+
+#[test]
+fn add_compare_remove_is_a_round_trip() {
+    for (name, text) in [
+        ("as bundled", bundled("tour.toml")),
+        ("windows", bundled("tour.toml").replace('\n', "\r\n")),
+        (
+            "no list",
+            bundled("tour.toml").replace("effects = []", "# effects: none yet"),
+        ),
+        (
+            "one a line",
+            bundled("tour.toml").replace(
+                "effects = []",
+                "effects = [\n    \"pump_lag\", # slow relay\n]",
+            ),
+        ),
+    ] {
+        let place = Place::new();
+        place.write("tour.toml", &text);
+        let rmse = || {
+            let json = place.result("compare tour.csv --model tour.toml");
+            assert_eq!(json["steps"].as_array().unwrap().len(), 1);
+            number(&json["steps"][0]["rmse"])
+        };
+        let before = rmse();
+        let said = place.succeeds("add overflow --model tour.toml");
+        assert!(said.contains("tour.toml: added overflow"), "{said}");
+        let with = place.read("tour.toml");
+        assert!(with.contains("\"overflow\"") && with.contains("# measured with a tape"));
+        assert!(rmse() < 0.1 * before, "{name}");
+        let said = place.succeeds("remove overflow --model tour.toml");
+        assert!(said.contains("tour.toml: removed overflow"), "{said}");
+        let after = place.read("tour.toml");
+        if name == "no list" {
+            // The list that `add` made stays, and is empty.
+            assert!(after.contains("effects = []"), "{after}");
+            assert_eq!(after.replace("effects = []\n", ""), text, "{name}");
+        } else {
+            assert_eq!(after, text, "{name}");
+        }
+        assert_eq!(rmse(), before, "{name}");
+    }
+}
+
+#[test]
+fn an_effect_at_a_place_comes_and_goes() {
+    let place = Place::empty();
+    let text = "plant = \"cascaded-tanks\" # two\neffects = [] # none\n";
+    place.write("two.toml", text);
+    let said = place.succeeds("add overflow --where lower --model two.toml");
+    assert!(said.contains("at the lower vessel"), "{said}");
+    let with = place.read("two.toml");
+    assert!(
+        with.contains("effects = [\"overflow\"] # none") && with.contains("where = \"lower\""),
+        "{with}"
+    );
+    place.succeeds("remove overflow --model two.toml");
+    assert!(place.read("two.toml").starts_with(text));
+}
+
+#[test]
+fn every_effect_of_the_catalogue_is_listed_and_described() {
+    let place = Place::empty();
+    let list = place.succeeds("effects");
+    for effect in CATALOGUE {
+        let entry = list
+            .lines()
+            .any(|line| line.split_whitespace().next() == Some(effect.id));
+        assert!(entry, "{} is not listed", effect.id);
+        let description = place.succeeds(&format!("effects {}", effect.id));
+        let command = format!("ctid add {} --model MODEL.toml", effect.id);
+        assert!(description.contains(&command), "{description}");
+    }
+    assert_eq!(place.snapshot().len(), 0);
+}
+
+#[test]
+fn two_records_are_fitted_together() {
+    let place = Place::new();
+    place.succeeds("add overflow --model tour.toml");
+    let steps = |data: &str| {
+        let json = place.result(&format!("compare {data} --model tour.toml"));
+        json["steps"][0].clone()
+    };
+    let (first, second) = (steps("tour.csv"), steps("tour-test.csv"));
+    let both = steps("tour.csv tour-test.csv");
+    let error = |step: &Value, name: &str| {
+        let list = step["parameters"].as_array().unwrap();
+        let parameter = list.iter().find(|parameter| parameter["name"] == name);
+        number(&parameter.unwrap()["std_error"])
+    };
+    let value = |step: &Value, name: &str| {
+        let found = parameters(step).into_iter().find(|(own, _)| own == name);
+        found.unwrap().1
+    };
+    for name in ["pump_gain", "alpha", "overflow.rim"] {
+        assert!(error(&both, name) < error(&first, name), "{name}");
+        assert!(error(&both, name) < error(&second, name), "{name}");
+        let (low, high) = (value(&first, name), value(&second, name));
+        let (low, high) = (low.min(high), low.max(high));
+        let slack = error(&both, name);
+        let together = value(&both, name);
+        assert!(
+            low - slack < together && together < high + slack,
+            "{name}: {together} is not between {low} and {high}"
+        );
+    }
+    // An initial level for each record.
+    assert_eq!(parameters(&both).len(), parameters(&first).len() + 1);
+    // Which comes first is of no account.
+    let swapped = steps("tour-test.csv tour.csv");
+    for name in ["pump_gain", "alpha", "overflow.rim"] {
+        let (a, b) = (value(&both, name), value(&swapped, name));
+        assert!((a - b).abs() < 0.1 * error(&both, name), "{name}: {a}, {b}");
+    }
+}
+
+#[test]
+fn a_held_out_record_changes_no_fit_and_no_choice() {
+    let place = Place::new();
+    let without = lasting(place.result(DIAGNOSE));
+    for test in [
+        bundled("tour-test.csv"),
+        // Held-out data that contradict the model altogether.
+        Tanks {
+            theta: vec![30.0, 20.0],
+            rows: 100,
+            ..Tanks::single()
+        }
+        .csv(),
+    ] {
+        place.write("held-out.csv", test);
+        let mut with = lasting(place.result(&format!("{DIAGNOSE} --test held-out.csv")));
+        for step in with["steps"].as_array_mut().unwrap() {
+            assert!(number(&step["rmse_test"]) > 0.0);
+            step["rmse_test"] = Value::Null;
+        }
+        // The findings in words tell of the held-out error.
+        with["sentences"] = without["sentences"].clone();
+        assert_eq!(with, without);
+    }
+}
+
+#[test]
+fn a_decimal_comma_changes_nothing() {
+    let place = Place::new();
+    let points = lasting(place.result(&format!("{DIAGNOSE} --test tour-test.csv")));
+    for name in ["tour.csv", "tour-test.csv"] {
+        let text = bundled(name).replace(',', ";").replace('.', ",");
+        // As spreadsheets write it.
+        place.write(name, format!("\u{feff}{}", text.replace('\n', "\r\n")));
+    }
+    let commas = lasting(place.result(&format!("{DIAGNOSE} --test tour-test.csv")));
+    assert_eq!(points, commas);
+}
+
+#[test]
+fn tabs_comments_and_other_columns_change_nothing() {
+    let place = Place::new();
+    let plain = lasting(place.result(DIAGNOSE));
+    let mut text = String::from("# logger 7\n\n");
+    for (index, line) in bundled("tour.csv").lines().enumerate() {
+        let remark = if index == 0 { "remark" } else { "ok, so far" };
+        text += &format!("{remark}\t{}\n", line.replace(',', "\t "));
+    }
+    place.write("tour.csv", text);
+    assert_eq!(plain, lasting(place.result(DIAGNOSE)));
+}
+
+#[test]
+fn minutes_are_as_good_as_seconds() {
+    let place = Place::new();
+    place.write(
+        "tour.toml",
+        bundled("tour.toml").replace("time = \"t [s]\"", "time = \"t\""),
+    );
+    let seconds = place.result(DIAGNOSE);
+    let mut text = String::from("t [min],u [V],y [cm]\n");
+    for line in bundled("tour.csv").lines().skip(1) {
+        let (time, rest) = line.split_once(',').unwrap();
+        text += &format!("{},{rest}\n", time.parse::<f64>().unwrap() / 60.0);
+    }
+    place.write("tour.csv", text);
+    let minutes = place.result(DIAGNOSE);
+    for key in ["verdict", "effects", "groups"] {
+        assert_eq!(seconds[key], minutes[key]);
+    }
+    let steps = |json: &Value| json["steps"].as_array().unwrap().clone();
+    for (a, b) in steps(&seconds).iter().zip(&steps(&minutes)) {
+        let (a, b) = (parameters(a), parameters(b));
+        assert_eq!(a.len(), b.len());
+        for ((name, a), (_, b)) in a.iter().zip(&b) {
+            assert!((a - b).abs() < 1e-5 * a.abs(), "{name}: {a} and {b}");
+        }
+    }
+}
+
+#[test]
+fn a_result_is_the_same_in_every_run_with_any_number_of_threads() {
+    let place = Place::new();
+    let words = format!("{DIAGNOSE} --test tour-test.csv --json a.json --report a.html");
+    let run = |threads: &str| {
+        let mut command = place.command(&words);
+        command.env("RAYON_NUM_THREADS", threads);
+        let outcome = outcome(command);
+        assert_eq!(outcome.code, Some(0), "{outcome:?}");
+        (
+            outcome.out,
+            lasting(place.json("a.json")),
+            place.read("a.html"),
+        )
+    };
+    let first = run("1");
+    for threads in ["1", "4", "4"] {
+        let again = run(threads);
+        assert_eq!(first.0, again.0);
+        assert_eq!(first.1, again.1);
+        assert!(first.2 == again.2, "the reports differ");
+    }
+}
+
+#[test]
+fn a_pipe_gets_plain_text() {
+    let place = Place::new();
+    for words in [
+        "effects",
+        "effects overflow",
+        "compare tour.csv --model tour.toml",
+        DIAGNOSE,
+        "--help",
+        "",
+    ] {
+        for (name, value) in [("NO_COLOR", "1"), ("TERM", "xterm-256color")] {
+            let mut command = place.command(words);
+            command.env(name, value);
+            let outcome = outcome(command);
+            assert_eq!(outcome.code, Some(0));
+            assert!(outcome.out.len() > 100, "{words}: {}", outcome.out);
+            let plain = |c: char| c == '\n' || !c.is_control();
+            assert!(outcome.out.chars().all(plain), "{words}: {}", outcome.out);
+            assert_eq!(outcome.err, "");
+        }
+    }
+}
+
+#[test]
+fn a_reader_that_goes_early_is_no_error() {
+    let place = Place::new();
+    for words in [
+        "effects".to_string(),
+        "--help".to_string(),
+        format!("{DIAGNOSE} --json early.json"),
+    ] {
+        let mut child = place.command(&words).spawn().unwrap();
+        drop(child.stdout.take());
+        let end = child.wait_with_output().unwrap();
+        let err = String::from_utf8(end.stderr).unwrap();
+        assert_eq!(end.status.code(), Some(0), "{words}: {err}");
+        assert_eq!(err, "", "{words}");
+    }
+    // What was asked for is there all the same.
+    assert_eq!(place.json("early.json")["verdict"], "effect");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn standard_output_that_takes_nothing_is_an_error() {
+    let place = Place::new();
+    for words in ["effects", "compare tour.csv --model tour.toml"] {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut command = place.command(words);
+        command.stdout(Stdio::from(full));
+        let outcome = outcome(command);
+        assert_eq!(outcome.code, Some(2));
+        assert!(
+            outcome
+                .err
+                .starts_with("error: cannot write to standard output"),
+            "{}",
+            outcome.err
+        );
+        assert_eq!(outcome.err.lines().count(), 1);
+    }
+}
+
+#[test]
+fn an_earlier_result_of_ctid_is_replaced_and_nothing_is_left_beside_it() {
+    let place = Place::new();
+    let words = "compare tour.csv --model tour.toml --json a.json --report a.html";
+    place.succeeds(words);
+    let (json, page) = (place.json("a.json"), place.read("a.html"));
+    let files: Vec<_> = place.snapshot().into_keys().collect();
+    place.succeeds("add overflow --model tour.toml");
+    let said = place.succeeds(words);
+    assert!(
+        said.contains("wrote a.json") && said.contains("wrote a.html"),
+        "{said}"
+    );
+    assert!(number(&place.json("a.json")["steps"][0]["rmse"]) < number(&json["steps"][0]["rmse"]));
+    assert!(place.read("a.html") != page);
+    assert_eq!(files, place.snapshot().into_keys().collect::<Vec<_>>());
+}
+
+#[test]
+fn the_inputs_stay_as_they_are() {
+    let place = Place::new();
+    place.succeeds(&format!("{DIAGNOSE} --test tour-test.csv --json a.json"));
+    for name in common::BUNDLED {
+        assert_eq!(place.read(name), bundled(name));
+    }
+    assert_eq!(place.snapshot().len(), common::BUNDLED.len() + 1);
+}
+
+#[test]
+fn a_tour_writes_its_report_and_a_second_one_destroys_nothing() {
+    let place = Place::empty();
+    let first = place.succeeds("");
+    assert!(first.contains("report.html holds all of this"), "{first}");
+    assert_eq!(place.snapshot().len(), 1);
+    let page = place.read("report.html");
+    assert!(page.contains(ctid::report::GENERATOR) && page.contains("tour.csv"));
+
+    // Again: its own page, once more.
+    assert_eq!(place.succeeds(""), first);
+    assert_eq!(place.snapshot().len(), 1);
+    assert!(place.read("report.html") == page);
+
+    // A page that somebody wrote, or that ctid wrote on other data, stays.
+    let tanks = Tanks::single();
+    place.write("my.csv", tanks.csv());
+    place.write("my.toml", tanks.model());
+    place.succeeds("compare my.csv --model my.toml --report report.html");
+    place.write("report-2.html", "<p>notes</p>");
+    let mut before = place.snapshot();
+    let said = place.succeeds("");
+    assert!(said.contains("report-3.html holds all of this"), "{said}");
+    assert!(place.read("report-3.html") == page);
+    before.insert(place.path("report-3.html"), Some(page.into_bytes()));
+    assert!(place.snapshot() == before);
+}

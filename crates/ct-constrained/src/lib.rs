@@ -1,0 +1,2 @@
+//! Recursive least squares in continuous time with equality constraints, penalties and projections.
+#![no_std]

@@ -1,0 +1,173 @@
+//! The estimator for a number of parameters that is known only at run time: [`ExactHold`](crate::ExactHold) on factors
+//! in vectors. The same code does the step, so the numbers are the same to the bit.
+
+extern crate alloc;
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::estimator::{Health, Innovation, Outcome, RecursiveEstimator};
+use crate::integrator::sealed::{Capped, Refusal};
+use crate::rls::{Guard, check_theta};
+use crate::{Error, Guards, Weights, factor};
+
+/// One sample for a [`DynamicRls`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct DynamicSample {
+    /// Regressor, one entry for each parameter.
+    pub phi: DVector<f64>,
+    /// Output, the unit of `theta' phi`.
+    pub y: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Factors {
+    u: Vec<f64>,
+    d: Vec<f64>,
+}
+
+impl Capped for Factors {
+    fn trace(&self) -> f64 {
+        factor::trace(&self.u, &self.d)
+    }
+
+    fn scale(&mut self, by: f64) {
+        for d in &mut self.d {
+            *d *= by;
+        }
+    }
+}
+
+/// Recursive least squares in continuous time with the exact step, for any number of parameters; allocates when it is made.
+#[derive(Clone, Debug)]
+pub struct DynamicRls {
+    theta: DVector<f64>,
+    state: Factors,
+    scratch: [Vec<f64>; 2],
+    weights: Weights,
+    guard: Guard,
+}
+
+impl DynamicRls {
+    /// As [`ContinuousRls::new`](crate::ContinuousRls::new), with the number of parameters of `theta`.
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::Theta`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`].
+    pub fn new(theta: DVector<f64>, p: &DMatrix<f64>, weights: Weights) -> Result<Self, Error> {
+        check_theta(theta.as_slice())?;
+        let state = factors(p, theta.len())?;
+        let guard = Guard::new(state.trace());
+        let scratch = [vec![0.0; theta.len()], vec![0.0; theta.len()]];
+        Ok(Self {
+            theta,
+            state,
+            scratch,
+            weights,
+            guard,
+        })
+    }
+
+    /// The same estimator with other guards against wind-up.
+    ///
+    /// # Errors
+    /// [`Error::Guard`], [`Error::TraceAboveLimit`].
+    pub fn with_guards(mut self, guards: Guards) -> Result<Self, Error> {
+        self.guard.set(guards, self.state.trace())?;
+        Ok(self)
+    }
+
+    /// Starts `P` again and keeps the estimates: after a jump of the parameters.
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`], [`Error::TraceAboveLimit`]; nothing is
+    /// changed then.
+    pub fn reset_covariance(&mut self, p: &DMatrix<f64>) -> Result<(), Error> {
+        let state = factors(p, self.theta.len())?;
+        self.guard.restart(state.trace())?;
+        self.state = state;
+        Ok(())
+    }
+
+    /// [`update`](RecursiveEstimator::update) from a slice, with weights for this step alone; allocates nothing.
+    pub fn update_with(&mut self, phi: &[f64], y: f64, dt: f64, weights: &Weights) -> Innovation {
+        if phi.len() != self.theta.len() {
+            return Innovation::unused(f64::NAN, self.guard.skip(Outcome::BadSize));
+        }
+        let prediction: f64 = phi.iter().zip(&self.theta).map(|(a, b)| a * b).sum();
+        let epsilon = y - prediction;
+        let (step, outcome) = match self.guard.begin(phi, dt, weights.eta()) {
+            Ok(begun) => begun,
+            Err(outcome) => return Innovation::unused(epsilon, outcome),
+        };
+        let [f, k] = &mut self.scratch;
+        let made = factor::exact_step(
+            (
+                &mut self.state.u,
+                &mut self.state.d,
+                self.theta.as_mut_slice(),
+            ),
+            (f, k),
+            phi,
+            epsilon,
+            weights,
+            (step.growth, step.length),
+        );
+        let Some(s) = made else {
+            return Innovation::unused(epsilon, self.guard.refused(Refusal::NotFinite));
+        };
+        let outcome = self.guard.grown(step.growth, outcome, &mut self.state);
+        Innovation {
+            epsilon,
+            s,
+            outcome,
+        }
+    }
+}
+
+fn factors(p: &DMatrix<f64>, n: usize) -> Result<Factors, Error> {
+    for found in [p.nrows(), p.ncols()] {
+        if found != n {
+            return Err(Error::Size {
+                what: "P(0)",
+                found,
+                expected: n,
+            });
+        }
+    }
+    let (mut u, mut d) = (p.as_slice().to_vec(), vec![0.0; n]);
+    factor::factorise(&mut u, &mut d)?;
+    Ok(Factors { u, d })
+}
+
+impl RecursiveEstimator for DynamicRls {
+    type Sample = DynamicSample;
+    type Theta = DVector<f64>;
+    type Covariance = DMatrix<f64>;
+    type Error = Error;
+
+    fn update(&mut self, sample: &DynamicSample, dt: f64) -> Innovation {
+        let weights = self.weights;
+        self.update_with(sample.phi.as_slice(), sample.y, dt, &weights)
+    }
+
+    fn theta(&self) -> &DVector<f64> {
+        &self.theta
+    }
+
+    fn covariance(&self) -> DMatrix<f64> {
+        let n = self.theta.len();
+        DMatrix::from_fn(n, n, |i, j| {
+            factor::entry(&self.state.u, &self.state.d, i, j)
+        })
+    }
+
+    fn health(&self) -> Result<Health, Error> {
+        self.guard.running()?;
+        let mut m = self.covariance();
+        let largest = factor::largest_eigenvalue(m.as_mut_slice(), self.theta.len());
+        let smallest = self.state.d.iter().fold(f64::INFINITY, |a, &d| a.min(d));
+        Ok(self.guard.health(largest, smallest, self.state.trace()))
+    }
+}

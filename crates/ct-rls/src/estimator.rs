@@ -1,0 +1,102 @@
+//! What every recursive estimator offers.
+
+/// A recursive estimator of `theta` in `y = theta' phi`, or of something that contains it.
+pub trait RecursiveEstimator {
+    /// One sample of the signals.
+    type Sample;
+    /// The estimates.
+    type Theta: ?Sized;
+    /// The matrix that stands for their covariance.
+    type Covariance;
+    /// Why a run has stopped.
+    type Error;
+
+    /// Advances the estimates by `dt` seconds (above 0) over which `sample` is held.
+    ///
+    /// Never panics and never spoils the estimates: a sample that cannot be used leaves them as they are,
+    /// and [`Innovation::outcome`] says why.
+    fn update(&mut self, sample: &Self::Sample, dt: f64) -> Innovation;
+
+    /// The estimates, in the order of the regressor.
+    fn theta(&self) -> &Self::Theta;
+
+    /// The matrix `P`, symmetric.
+    fn covariance(&self) -> Self::Covariance;
+
+    /// How the estimator fares. Costs an eigenvalue problem: call it now and then.
+    ///
+    /// # Errors
+    /// Why the run has stopped, where it has.
+    fn health(&self) -> Result<Health, Self::Error>;
+}
+
+/// What one sample said.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Innovation {
+    /// `eps = y - theta^' phi` before the update, unit of y.
+    pub epsilon: f64,
+    /// `s = phi' P phi` before the update; times `gamma h` it says how much is learnt: above 1, much.
+    pub s: f64,
+    /// What was done with the sample.
+    pub outcome: Outcome,
+}
+
+impl Innovation {
+    pub(crate) fn unused(epsilon: f64, outcome: Outcome) -> Self {
+        Self {
+            epsilon,
+            s: f64::NAN,
+            outcome,
+        }
+    }
+}
+
+/// What an update did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Outcome {
+    /// The sample was used.
+    Updated,
+    /// The sample was used; the trace of `P` is at its cap, so less was forgotten.
+    Capped,
+    /// The regressor is silent: nothing was forgotten.
+    Silent,
+    /// A signal is not finite, or too large to square: nothing was done.
+    NotFinite,
+    /// `dt` is not above 0 and finite, or `eta dt` is above 300: nothing was done.
+    BadStep,
+    /// The regressor has a wrong length (run-time sizes only): nothing was done.
+    BadSize,
+    /// The run has stopped; the health says why. Nothing was done.
+    Stopped,
+}
+
+impl Outcome {
+    /// Whether the estimates took the sample in.
+    pub fn used(self) -> bool {
+        matches!(self, Self::Updated | Self::Capped | Self::Silent)
+    }
+}
+
+/// How an estimator fares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Health {
+    /// Smallest eigenvalue of the information matrix `P^-1`, unit of `1/theta^2`: what is known about the
+    /// combination of parameters that is known worst. It stays away from 0 while the excitation persists.
+    pub excitation: f64,
+    /// Smallest pivot of `P = U D U'`, unit of `theta^2`: above 0 where `P` is positive definite.
+    pub smallest_pivot: f64,
+    /// Trace of `P`, unit of `theta^2`; it grows as `e^{eta t}` in wind-up.
+    pub trace: f64,
+    /// Samples used since the start.
+    pub used: u64,
+    /// Samples that could not be used since the start.
+    pub unused: u64,
+    /// Steps in which the cap on the trace limited forgetting, since the start.
+    pub capped: u64,
+    /// Steps without forgetting because the regressor was silent, since the start.
+    pub silent: u64,
+}

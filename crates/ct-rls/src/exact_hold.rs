@@ -1,0 +1,99 @@
+//! The exact solution of the estimator's equations over a step with held signals.
+//!
+//! Model: `y = theta' phi`, `eps = y - theta^' phi`; [U] 2.14:
+//! ```text
+//! dtheta^/dt = c P phi eps
+//! dP/dt      = eta P - gamma P phi phi' P
+//! ```
+//! Assumptions: `phi`, `y`, `c`, `gamma` and `eta` are constant over the step `h`. For smooth signals holding the value
+//! at the step's start costs first order in `h`, holding [`Sample::midway`](crate::Sample::midway) second order.
+//!
+//! Equations:
+//! ```text
+//! b      = (e^{eta h} - 1)/eta                (h for eta = 0)
+//! s      = phi' P phi,   D = 1 + gamma b s
+//! P+     = e^{eta h} (P - gamma b P phi phi' P / D)
+//! theta+ = theta + P phi eps (1 - D^{-c/gamma})/s
+//! ```
+//! The last factor is `c b/D` for `gamma = c` and `(1 - e^{-c b s})/s` for `gamma = 0`. With
+//! `V = delta' P^-1 delta`, `delta = theta - theta^`, and signals that obey the model,
+//! ```text
+//! V+ = e^{-eta h} (V - eps^2 (1 - D^{1 - 2c/gamma})/s)
+//! ```
+//! Convergence: `V` decreases for every step, every regressor and every `P(0) > 0` where `0 <= gamma < 2 c` and
+//! `eta >= 0`; `theta^` converges as `e^{-eta t/2}` where the regressor excites persistently, so that
+//! `P^-1` stays above some multiple of the identity.
+//!
+//! Cost per update: `2 p^2` multiplications and `p` divisions, on the factors `P = U D U'`, which cannot lose definiteness.
+//!
+//! Reference: A. J. Udink ten Cate, *On optimal and suboptimal least squares identification in continuous time*, WP-85-54,
+//! IIASA, Laxenburg, 1985.
+
+use nalgebra::SMatrix;
+
+use crate::integrator::sealed::{Capped, Covariance, Refusal, Rule};
+use crate::settings::{Step, Weights};
+use crate::{Error, UdFactor, factor};
+
+/// The exact solution for held signals, on `P = U D U'`: the default. Positive definite whatever the step.
+#[derive(Clone, Copy, Debug)]
+pub struct ExactHold;
+
+impl Rule for ExactHold {
+    const NAME: &'static str = "ExactHold";
+    type State<const P: usize> = UdFactor<P>;
+
+    #[inline(always)]
+    fn step<const P: usize>(
+        theta: &mut [f64; P],
+        state: &mut UdFactor<P>,
+        phi: &[f64; P],
+        epsilon: f64,
+        weights: &Weights,
+        step: &Step,
+    ) -> Result<f64, Refusal> {
+        let (mut f, mut k) = ([0.0; P], [0.0; P]);
+        factor::exact_step(
+            (state.u.as_flattened_mut(), &mut state.d, theta),
+            (&mut f, &mut k),
+            phi,
+            epsilon,
+            weights,
+            (step.growth, step.length),
+        )
+        .ok_or(Refusal::NotFinite)
+    }
+}
+
+impl<const P: usize> Capped for UdFactor<P> {
+    fn trace(&self) -> f64 {
+        self.trace()
+    }
+
+    fn scale(&mut self, factor: f64) {
+        for d in &mut self.d {
+            *d *= factor;
+        }
+    }
+}
+
+impl<const P: usize> Covariance<P> for UdFactor<P> {
+    fn from_matrix(matrix: &SMatrix<f64, P, P>) -> Result<Self, Error> {
+        Self::new(matrix)
+    }
+
+    fn to_matrix(&self) -> SMatrix<f64, P, P> {
+        self.to_matrix()
+    }
+
+    fn smallest_pivot(&self) -> Result<f64, (usize, f64)> {
+        let mut smallest = f64::INFINITY;
+        for (j, &d) in self.d.iter().enumerate() {
+            if !(d > 0.0 && d.is_finite()) {
+                return Err((j, d));
+            }
+            smallest = smallest.min(d);
+        }
+        Ok(smallest)
+    }
+}

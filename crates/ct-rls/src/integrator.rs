@@ -1,0 +1,116 @@
+//! How `theta` and `P` are carried over a step: the exact solution, or one of two rules to compare it with.
+
+use core::fmt::Debug;
+
+use crate::{Euler, ExactHold, Rk4};
+
+/// A rule that carries `theta` and `P` over a step: [`ExactHold`], [`Euler`] or [`Rk4`].
+pub trait Integrator: sealed::Rule + Copy + Debug {}
+
+impl Integrator for ExactHold {}
+impl Integrator for Euler {}
+impl Integrator for Rk4 {}
+
+pub(crate) mod sealed {
+    use core::fmt::Debug;
+
+    use nalgebra::SMatrix;
+
+    use crate::Error;
+    use crate::settings::{Step, Weights};
+
+    /// What the cap on the trace needs.
+    pub trait Capped {
+        fn trace(&self) -> f64;
+        fn scale(&mut self, factor: f64);
+    }
+
+    /// `P` in the form that a rule keeps it in.
+    pub trait Covariance<const P: usize>: Capped + Clone + Debug {
+        fn from_matrix(matrix: &SMatrix<f64, P, P>) -> Result<Self, Error>;
+        fn to_matrix(&self) -> SMatrix<f64, P, P>;
+        /// Smallest pivot, or the place and the value of the first one that is not above 0.
+        fn smallest_pivot(&self) -> Result<f64, (usize, f64)>;
+    }
+
+    /// Why a step was not made; the state is as before.
+    pub enum Refusal {
+        /// The sample is of no use.
+        NotFinite,
+        /// The rule is at its end.
+        Stop(Error),
+    }
+
+    pub trait Rule {
+        const NAME: &'static str;
+        type State<const P: usize>: Covariance<P>;
+
+        /// One step with `phi` and `y` held, given `eps` at its start; returns `phi' P phi` at its start.
+        fn step<const P: usize>(
+            theta: &mut [f64; P],
+            state: &mut Self::State<P>,
+            phi: &[f64; P],
+            epsilon: f64,
+            weights: &Weights,
+            step: &Step,
+        ) -> Result<f64, Refusal>;
+    }
+}
+
+/// `P` as it stands, for the rules that have no factored form; symmetric to the bit.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain<const P: usize>(pub(crate) [[f64; P]; P]);
+
+impl<const P: usize> Plain<P> {
+    /// `P x`
+    pub(crate) fn times(&self, x: &[f64; P]) -> [f64; P] {
+        core::array::from_fn(|i| self.0[i].iter().zip(x).map(|(p, x)| p * x).sum())
+    }
+}
+
+impl<const P: usize> sealed::Capped for Plain<P> {
+    fn trace(&self) -> f64 {
+        (0..P).map(|i| self.0[i][i]).sum()
+    }
+
+    fn scale(&mut self, factor: f64) {
+        for x in self.0.as_flattened_mut() {
+            *x *= factor;
+        }
+    }
+}
+
+impl<const P: usize> sealed::Covariance<P> for Plain<P> {
+    fn from_matrix(matrix: &nalgebra::SMatrix<f64, P, P>) -> Result<Self, crate::Error> {
+        // the same demands as of a factored P
+        let factor = crate::UdFactor::new(matrix)?;
+        Ok(Self(factor.to_matrix().data.0))
+    }
+
+    fn to_matrix(&self) -> nalgebra::SMatrix<f64, P, P> {
+        nalgebra::SMatrix::from_fn(|i, j| self.0[i][j])
+    }
+
+    fn smallest_pivot(&self) -> Result<f64, (usize, f64)> {
+        let mut m = self.0;
+        let mut smallest = f64::INFINITY;
+        for j in (0..P).rev() {
+            let pivot = m[j][j];
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return Err((j, pivot));
+            }
+            smallest = smallest.min(pivot);
+            for k in 0..j {
+                let (row, ratio) = (m[j], m[j][k] / pivot);
+                for (x, from) in m[k].iter_mut().zip(row).take(k + 1) {
+                    *x -= from * ratio;
+                }
+            }
+        }
+        Ok(smallest)
+    }
+}
+
+pub(crate) fn dot<const P: usize>(a: &[f64; P], b: &[f64; P]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,57 @@
+//! Recursive least squares in continuous time with forgetting, which stays positive definite. No `std`, no allocation.
+//!
+//! | question | answer |
+//! |---|---|
+//! | Where do I start? | [`ContinuousRls::new`], then [`update`](RecursiveEstimator::update) once per sample |
+//! | The number of parameters is known only at run time | `DynamicRls`, with the feature `alloc` |
+//! | Which `eta`, `c`, `gamma`? | [`Weights`]: `least_squares(eta)`, `1/eta` 5 to 10 dominant time constants |
+//! | The signals are silent for hours | [`Guards`]: forgetting stops at a cap, or while the regressor is silent |
+//! | The parameters have jumped | [`ContinuousRls::reset_covariance`] |
+//! | Can I trust the estimates? | [`health`](RecursiveEstimator::health): excitation, definiteness, trace |
+//! | Parameters that are related, or bounded | the crate `ct-constrained` |
+//! | How does Euler's rule compare? | [`ContinuousRls::with_integrator`] with [`Euler`] or [`Rk4`] |
+//!
+//! # Why not a plain covariance matrix
+//! `P = (P - k g')/lambda`, with `g = P phi` and the gain `k = g/(lambda + phi'g)`, dies for every `lambda < 1` when the whole
+//! matrix is stored, with unit Gaussian regressors and no noise: `k g'` is symmetric, so nothing takes the rounding in `P - P'`
+//! away, and it is divided by `lambda` at every step. Samples until `P` is not positive definite, or `theta` off by 1 %,
+//! median (smallest to largest) of 20 seeds; alive: not within 200 000; the last column is this crate after 200 000:
+//!
+//! | lambda | `k g'`, p = 2 | `k g'`, p = 5 | `k phi'P`, p = 2 | `k phi'P`, p = 5 | this crate: relative error |
+//! |---|---|---|---|---|---|
+//! | 0.95 | 692 (543 to 772) | 541 (533 to 587) | alive | alive | 0e0 |
+//! | 0.98 | 1642 (1311 to 1953) | 1341 (1309 to 1393) | alive | alive | 2e-16 |
+//! | 0.99 | 2813 (2614 to 3714) | 2620 (2572 to 2740) | alive | alive | 3e-16 |
+//! | 0.999 | 28843 (24649 to 36190) | 24035 (23460 to 24480) | alive | alive | 4e-15 |
+//!
+//! `cargo run --release -p ct-rls --example textbook_dies` prints it again. The product `k phi'P` costs twice as much and survives
+//! good data; a factored `P` survives bad data too.
+//!
+//! # Why not Euler's rule
+//! It keeps `P` only while `gamma h phi'P phi < 1 + eta h`, which ties the step to `P(0)`. The exact step has no such limit.
+#![no_std]
+
+mod error;
+mod estimator;
+mod euler;
+mod exact_hold;
+mod factor;
+mod integrator;
+mod rk4;
+mod rls;
+mod settings;
+
+#[cfg(feature = "alloc")]
+mod dynamic;
+
+#[cfg(feature = "alloc")]
+pub use dynamic::{DynamicRls, DynamicSample};
+pub use error::Error;
+pub use estimator::{Health, Innovation, Outcome, RecursiveEstimator};
+pub use euler::Euler;
+pub use exact_hold::ExactHold;
+pub use factor::UdFactor;
+pub use integrator::Integrator;
+pub use rk4::Rk4;
+pub use rls::{ContinuousRls, Sample};
+pub use settings::{Guards, Weights};

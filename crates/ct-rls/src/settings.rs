@@ -1,0 +1,228 @@
+//! The three constants of the estimator, checked once, and the guards against wind-up.
+
+use crate::Error;
+
+/// `c`, `gamma` and `eta` of `dtheta/dt = c P phi eps`, `dP/dt = eta P - gamma P phi phi' P`.
+///
+/// A value of this type is valid: `c > 0`, `0 <= gamma < 2 c`, `eta >= 0`, all finite. They may
+/// vary in time: hand other weights to an update, made once and kept.
+///
+/// Which `eta`? The memory is `1/eta` seconds; take at least 5 to 10 of the process's dominant time
+/// constants. `c` sets how much one second of data weighs against `P(0)`. `gamma = c` is least
+/// squares; `gamma` below `c` lets `P` shrink slower, which helps to follow parameters that vary.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Unchecked"))]
+pub struct Weights {
+    c: f64,
+    gamma: f64,
+    eta: f64,
+}
+
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked {
+    c: f64,
+    gamma: f64,
+    eta: f64,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for Weights {
+    type Error = Error;
+
+    fn try_from(w: Unchecked) -> Result<Self, Error> {
+        Self::new(w.c, w.gamma, w.eta)
+    }
+}
+
+impl Weights {
+    /// Weights from the paper's symbols.
+    ///
+    /// - `c`: weight of the output error, 1/(s unit(y)^2) where `P` has the unit of `theta theta'`; above 0.
+    /// - `gamma`: gain of the Riccati equation, as `c`; `0 <= gamma < 2 c`.
+    /// - `eta`: forgetting rate, 1/s; at least 0.
+    ///
+    /// # Errors
+    /// [`Error::Weight`], [`Error::Gamma`], [`Error::Forgetting`].
+    pub fn new(c: f64, gamma: f64, eta: f64) -> Result<Self, Error> {
+        if !(c > 0.0 && c.is_finite()) {
+            return Err(Error::Weight { c });
+        }
+        if !(0.0..2.0 * c).contains(&gamma) {
+            return Err(Error::Gamma { gamma, c });
+        }
+        if !(eta >= 0.0 && eta.is_finite()) {
+            return Err(Error::Forgetting { eta });
+        }
+        Ok(Self { c, gamma, eta })
+    }
+
+    /// Least squares, `c = gamma = 1`, with the forgetting rate `eta` in 1/s, at least 0.
+    ///
+    /// # Errors
+    /// [`Error::Forgetting`].
+    pub fn least_squares(eta: f64) -> Result<Self, Error> {
+        Self::new(1.0, 1.0, eta)
+    }
+
+    /// Least squares that forgets as a discrete estimator with the factor `lambda` (0 < lambda <= 1)
+    /// at every step of `dt` seconds: `eta = -ln(lambda)/dt`.
+    ///
+    /// # Errors
+    /// [`Error::Lambda`].
+    pub fn from_forgetting_factor(lambda: f64, dt: f64) -> Result<Self, Error> {
+        if !(lambda > 0.0 && lambda <= 1.0 && dt > 0.0 && dt.is_finite()) {
+            return Err(Error::Lambda { lambda, dt });
+        }
+        Self::least_squares(-libm::log(lambda) / dt)
+    }
+
+    /// Weight of the output error.
+    pub fn c(&self) -> f64 {
+        self.c
+    }
+
+    /// Gain of the Riccati equation.
+    pub fn gamma(&self) -> f64 {
+        self.gamma
+    }
+
+    /// Forgetting rate, 1/s.
+    pub fn eta(&self) -> f64 {
+        self.eta
+    }
+}
+
+/// What keeps `P` from growing without end where the regressor says nothing (wind-up).
+///
+/// Both only ever forget less than `eta` asks for, so the Lyapunov function still decreases.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Guards {
+    /// Forgetting stops raising `P` where its trace reaches this: unit of `theta^2`, at least the trace of `P(0)`;
+    /// `f64::INFINITY` for no cap. An estimator starts with 1e6 times the trace of its `P(0)`.
+    ///
+    /// A regressor that stays in a subspace for long makes the other directions reach the cap; while they are
+    /// there, forgetting is nearly off in all directions.
+    pub trace_limit: f64,
+    /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`, at least 0.
+    /// At 0, the start, only an exactly silent regressor counts.
+    pub silent_below: f64,
+}
+
+impl Guards {
+    pub(crate) fn check(&self, trace: f64) -> Result<(), Error> {
+        let limit = self.trace_limit;
+        if limit.is_nan() || limit <= 0.0 {
+            return Err(Error::Guard {
+                guard: "trace_limit",
+                value: limit,
+                range: "above 0, or f64::INFINITY for no cap",
+            });
+        }
+        if !(self.silent_below >= 0.0 && self.silent_below.is_finite()) {
+            return Err(Error::Guard {
+                guard: "silent_below",
+                value: self.silent_below,
+                range: "at least 0 and finite, in the unit of phi",
+            });
+        }
+        if trace > limit {
+            return Err(Error::TraceAboveLimit { trace, limit });
+        }
+        Ok(())
+    }
+}
+
+/// `e^{eta h}` and `(e^{eta h} - 1)/eta` of one step, kept while `eta` and `h` stay as they are.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    eta: f64,
+    /// The step h, s.
+    pub dt: f64,
+    /// `e^{eta h}`
+    pub growth: f64,
+    /// `(e^{eta h} - 1)/eta`, s; h for `eta = 0`.
+    pub length: f64,
+}
+
+/// Beyond this, one step forgets everything, and `e^{eta h}` leaves the floating-point range.
+const MAX_ETA_DT: f64 = 300.0;
+
+impl Step {
+    /// No step yet: matches none.
+    pub fn none() -> Self {
+        Self {
+            eta: f64::NAN,
+            dt: f64::NAN,
+            growth: 1.0,
+            length: 0.0,
+        }
+    }
+
+    #[inline]
+    pub fn matches(&self, eta: f64, dt: f64) -> bool {
+        self.eta == eta && self.dt == dt
+    }
+
+    /// `None` for a step that is not above 0 or over which everything is forgotten.
+    #[cold]
+    pub fn new(eta: f64, dt: f64) -> Option<Self> {
+        let x = eta * dt;
+        if !(dt > 0.0 && dt.is_finite() && x <= MAX_ETA_DT) {
+            return None;
+        }
+        let growth_less_one = libm::expm1(x);
+        // below that, eta may be subnormal and the quotient lose digits
+        let length = if x < f64::EPSILON {
+            dt
+        } else {
+            growth_less_one / eta
+        };
+        Some(Self {
+            eta,
+            dt,
+            growth: 1.0 + growth_less_one,
+            length,
+        })
+    }
+
+    /// The same step without forgetting.
+    pub fn remembering(&self) -> Self {
+        Self {
+            eta: 0.0,
+            dt: self.dt,
+            growth: 1.0,
+            length: self.dt,
+        }
+    }
+
+    pub fn eta(&self) -> f64 {
+        self.eta
+    }
+}
+
+/// `(1 - D^{-c/gamma})/s` with `D = 1 + gamma b s`: what multiplies `P phi eps` in the exact step.
+#[inline]
+pub(crate) fn gain(w: &Weights, length: f64, s: f64, denominator: f64) -> f64 {
+    if w.gamma == w.c {
+        return w.c * length / denominator;
+    }
+    general_gain(w, length, s)
+}
+
+fn general_gain(w: &Weights, length: f64, s: f64) -> f64 {
+    let b_s = length * s;
+    if w.c * b_s < f64::EPSILON {
+        return w.c * length;
+    }
+    // q = ln(1 + gamma b s)/gamma, b s for gamma -> 0
+    let x = w.gamma * b_s;
+    let q = if x < f64::EPSILON {
+        b_s
+    } else {
+        libm::log1p(x) / w.gamma
+    };
+    -libm::expm1(-w.c * q) / s
+}

@@ -1,0 +1,91 @@
+//! The twin for sizes known at run time gives the same numbers.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod support;
+
+use ct_rls::{
+    ContinuousRls, DynamicRls, DynamicSample, Error, Guards, Outcome, RecursiveEstimator, Sample,
+    Weights,
+};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use support::{normal, normals, rng, spd};
+
+#[test]
+fn the_same_numbers() {
+    const P: usize = 6;
+    let mut rng = rng(8);
+    let weights = Weights::new(1.0, 0.7, 0.05).unwrap();
+    let p0: SMatrix<f64, P, P> = spd::<P>(&mut rng) * 1e4;
+    let guards = Guards {
+        trace_limit: 1e6,
+        silent_below: 0.1,
+    };
+    let mut fixed = ContinuousRls::<P>::new(SVector::zeros(), p0, weights)
+        .unwrap()
+        .with_guards(guards)
+        .unwrap();
+    let dynamic_p0 = DMatrix::from_column_slice(P, P, p0.as_slice());
+    let mut dynamic = DynamicRls::new(DVector::zeros(P), &dynamic_p0, weights)
+        .unwrap()
+        .with_guards(guards)
+        .unwrap();
+    for k in 0..5000 {
+        let size = if (2000..3000).contains(&k) { 0.01 } else { 1.0 };
+        let phi = normals::<P>(&mut rng) * size;
+        let y = if k == 77 { f64::NAN } else { normal(&mut rng) };
+        let a = fixed.update(&Sample { phi, y }, 0.5);
+        let sample = DynamicSample {
+            phi: DVector::from_column_slice(phi.as_slice()),
+            y,
+        };
+        let b = dynamic.update(&sample, 0.5);
+        assert_eq!(a.outcome, b.outcome);
+    }
+    let off = fixed
+        .theta()
+        .iter()
+        .zip(dynamic.theta())
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
+    assert!(off < 1e-12, "{off:e}");
+    let (a, b) = (fixed.health().unwrap(), dynamic.health().unwrap());
+    assert!(
+        (a.trace - b.trace).abs() < 1e-12 * a.trace
+            && (a.excitation - b.excitation).abs() < 1e-12 * a.excitation
+    );
+    assert_eq!(
+        (a.used, a.unused, a.silent, a.capped),
+        (b.used, b.unused, b.silent, b.capped)
+    );
+    assert!(a.silent > 900);
+}
+
+#[test]
+fn sizes_that_do_not_fit() {
+    let weights = Weights::least_squares(0.0).unwrap();
+    let new = |n, r, c| DynamicRls::new(DVector::zeros(n), &DMatrix::identity(r, c), weights);
+    assert!(matches!(
+        new(3, 2, 3),
+        Err(Error::Size {
+            found: 2,
+            expected: 3,
+            ..
+        })
+    ));
+    assert!(matches!(new(3, 3, 4), Err(Error::Size { found: 4, .. })));
+    let mut rls = new(3, 3, 3).unwrap();
+    assert_eq!(
+        rls.update_with(&[1.0, 2.0], 1.0, 0.1, &weights).outcome,
+        Outcome::BadSize
+    );
+    assert!(
+        rls.update_with(&[1.0, 2.0, 3.0], 1.0, 0.1, &weights)
+            .outcome
+            .used()
+    );
+    assert!(matches!(
+        rls.reset_covariance(&DMatrix::identity(2, 2)),
+        Err(Error::Size { .. })
+    ));
+    assert!(rls.reset_covariance(&DMatrix::identity(3, 3)).is_ok());
+}

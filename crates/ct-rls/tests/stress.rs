@@ -1,0 +1,152 @@
+//! Ten million updates that forget as with 0.98 a step, with excitation that goes away and comes back, and nearly collinear
+//! regressors; and what the textbook's update does on the same data.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod support;
+
+use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};
+use nalgebra::{SMatrix, SVector, vector};
+use rand_chacha::ChaCha8Rng;
+use support::textbook::{Form, Textbook};
+use support::{normal, normals, rng};
+
+const DT: f64 = 0.1;
+const LAMBDA: f64 = 0.98;
+
+fn estimator<const P: usize>() -> ContinuousRls<P> {
+    let weights = Weights::from_forgetting_factor(LAMBDA, DT).unwrap();
+    ContinuousRls::new(SVector::zeros(), SMatrix::identity() * 1e3, weights).unwrap()
+}
+
+/// Regressors of each phase: how far the second entry is from the first.
+fn regressor(rng: &mut ChaCha8Rng, collinear: f64) -> SVector<f64, 2> {
+    let phi: SVector<f64, 2> = normals(rng);
+    vector![
+        phi[0],
+        phi[0] * (1.0 - collinear.min(1.0)) + collinear * phi[1]
+    ]
+}
+
+#[test]
+fn ten_million_updates() {
+    let theta = vector![2.0, -0.5];
+    let mut rls = estimator::<2>();
+    let mut textbook = Textbook::<2>::new(Form::Outer, 1e3, LAMBDA);
+    let mut rng = rng(1);
+    let mut textbook_died = None;
+    let mut count = 0_u64;
+    let healthy = |rls: &ContinuousRls<2>, at: u64| {
+        let health = rls.health().unwrap();
+        assert!(
+            health.smallest_pivot > 0.0 && health.trace.is_finite() && health.excitation > 0.0,
+            "{at}: {health:?}"
+        );
+        let p = rls.covariance();
+        assert_eq!(p, p.transpose(), "{at}");
+        assert!(rls.theta().iter().all(|x| x.is_finite()), "{at}");
+    };
+    // (samples, size of the regressor, distance from collinearity): the squared condition number is 1e14 at a distance of 1e-7
+    let phases = [
+        (400_000_u64, 1.0, 1.0),
+        (100_000, 0.0, 1.0),
+        (400_000, 1.0, 1.0),
+        (100_000, 1e-9, 1.0),
+        (400_000, 1.0, 1.0),
+        (500_000, 1.0, 1e-7),
+        (100_000, 1.0, 1.0),
+    ];
+    while count < 10_000_000 {
+        for (samples, size, collinear) in phases {
+            for _ in 0..samples {
+                let phi = regressor(&mut rng, collinear) * size;
+                let y = theta.dot(&phi) + 1e-3 * size * normal(&mut rng);
+                let innovation = rls.update(&Sample { phi, y }, DT);
+                assert!(innovation.outcome.used());
+                count += 1;
+                if textbook_died.is_none() {
+                    textbook.update(&phi, y);
+                    if !textbook.positive_definite() {
+                        textbook_died = Some(count);
+                    }
+                }
+                if count.is_multiple_of(10_007) {
+                    healthy(&rls, count);
+                }
+            }
+            healthy(&rls, count);
+            if size == 1.0 && collinear == 1.0 {
+                let off = (rls.theta() - theta).norm();
+                // about 1e-3 sqrt(2 * 0.01): the noise over the memory
+                assert!(off < 2e-3, "{count}: {off}");
+            }
+        }
+    }
+    let died = textbook_died.expect("the textbook's update should not survive");
+    println!("the textbook's update lost definiteness after {died} of {count} updates");
+    assert!(died < 5_000, "{died}");
+}
+
+/// Regressors a distance of 1e-7 apart from the start, without noise: the information's condition number is 1e14.
+#[test]
+fn nearly_collinear_from_the_start() {
+    let theta = vector![2.0, -0.5];
+    let mut rls = estimator::<2>();
+    let mut rng = rng(2);
+    for _ in 0..100_000 {
+        let phi = regressor(&mut rng, 1e-7);
+        rls.update(
+            &Sample {
+                phi,
+                y: theta.dot(&phi),
+            },
+            DT,
+        );
+    }
+    let health = rls.health().unwrap();
+    assert!(health.smallest_pivot > 0.0);
+    // the sum is known, the difference hardly
+    assert!((rls.theta().sum() - theta.sum()).abs() < 1e-6);
+    for _ in 0..2_000 {
+        let phi = normals(&mut rng);
+        rls.update(
+            &Sample {
+                phi,
+                y: theta.dot(&phi),
+            },
+            DT,
+        );
+    }
+    assert!(
+        (rls.theta() - theta).norm() < 1e-9,
+        "{:e}",
+        (rls.theta() - theta).norm()
+    );
+}
+
+/// What a short test does not see: unit Gaussian regressors, no noise, nothing ill about the data.
+#[test]
+fn the_textbook_dies_on_healthy_data() {
+    fn died<const P: usize>(seed: u64) -> u32 {
+        let mut rng = rng(seed);
+        let mut textbook = Textbook::<P>::new(Form::Outer, 1e3, LAMBDA);
+        let mut rls = estimator::<P>();
+        let theta: SVector<f64, P> = normals(&mut rng);
+        for k in 1..100_000 {
+            let phi: SVector<f64, P> = normals(&mut rng);
+            let y = theta.dot(&phi);
+            textbook.update(&phi, y);
+            rls.update(&Sample { phi, y }, DT);
+            if !textbook.positive_definite() {
+                assert!((rls.theta() - theta).norm() < 1e-9);
+                return k;
+            }
+        }
+        u32::MAX
+    }
+    for seed in 0..5 {
+        for k in [died::<2>(seed), died::<5>(seed)] {
+            // 30/(1 - 0.98) = 1500
+            assert!((1000..2500).contains(&k), "{k}");
+        }
+    }
+}

@@ -24,6 +24,10 @@ const SATURATED_SHARE: f64 = 1.0 / 3.0;
 /// quantised output has many samples at every level, a saturated one only at its limits.
 const SATURATED_RATIO: usize = 4;
 
+/// Inputs, outputs and sampling intervals between its inverse and this can be raised to the powers
+/// that a fit takes, with many digits to spare.
+const LARGEST: f64 = 1e15;
+
 /// Reads a record; `columns` says which column is what, `hold` what the input does in between.
 ///
 /// The time is converted to seconds. Its steps may vary, but no sample may be missing: a step above
@@ -36,7 +40,8 @@ const SATURATED_RATIO: usize = 4;
 /// [`Error::EmptyCell`], [`Error::TextInCell`], [`Error::NotFinite`], [`Error::MixedDecimalMarks`],
 /// [`Error::RepeatedTime`], [`Error::BackwardTime`], [`Error::TooFewRows`] (below
 /// [`MIN_ROWS`]), [`Error::Gap`], [`Error::ConstantInput`],
-/// [`Error::ConstantOutput`], [`Error::Saturated`].
+/// [`Error::ConstantOutput`], [`Error::InvalidInterval`], [`Error::TooLarge`], [`Error::TooSmall`],
+/// [`Error::Saturated`].
 pub fn read_csv(path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Error> {
     let file = path.display().to_string();
     if path.is_dir() {
@@ -358,7 +363,42 @@ impl Table {
                 rows,
             });
         }
+        self.check_scale(file, layout)?;
         self.check_saturation(file, &layout.output)
+    }
+
+    fn check_scale(&self, file: &str, layout: &Layout) -> Result<(), Error> {
+        let interval = median_step(&self.time) * layout.seconds;
+        if !(1.0 / LARGEST..=LARGEST).contains(&interval) {
+            return Err(Error::InvalidInterval {
+                file: file.into(),
+                column: layout.time.header.clone(),
+                interval: rounded(interval),
+                low: 1.0 / LARGEST,
+                high: LARGEST,
+            });
+        }
+        for (column, values) in [(&layout.input, &self.input), (&layout.output, &self.output)] {
+            if let Some(k) = values.iter().position(|value| value.abs() > LARGEST) {
+                return Err(Error::TooLarge {
+                    file: file.into(),
+                    row: self.rows[k],
+                    column: column.header.clone(),
+                    value: values[k],
+                    limit: LARGEST,
+                });
+            }
+            let largest = values.iter().fold(0.0, |high: f64, v| high.max(v.abs()));
+            if largest < 1.0 / LARGEST {
+                return Err(Error::TooSmall {
+                    file: file.into(),
+                    column: column.header.clone(),
+                    value: rounded(largest),
+                    limit: 1.0 / LARGEST,
+                });
+            }
+        }
+        Ok(())
     }
 
     fn check_gaps(&self, file: &str, column: &Found) -> Result<(), Error> {
@@ -373,7 +413,7 @@ impl Table {
                     missing: (step / interval).round() as u64 - 1,
                     previous: pair[0],
                     time: pair[1],
-                    interval,
+                    interval: rounded(interval),
                 });
             }
         }
@@ -421,6 +461,11 @@ impl Table {
             limits,
         })
     }
+}
+
+/// A number without the last digits, which are an accident of binary arithmetic.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
 }
 
 /// The value of a signal that stays the same to a part in a billion.

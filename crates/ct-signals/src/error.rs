@@ -278,6 +278,52 @@ pub enum Error {
         /// The number of rows.
         rows: usize,
     },
+    /// A value whose powers overflow.
+    #[error(
+        "{file}, row {row}, column \"{column}\": {value:e} is too large to compute with; correct the cell, or give the column in a larger unit: below {limit:e}"
+    )]
+    TooLarge {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The value.
+        value: f64,
+        /// What has to be larger than it.
+        limit: f64,
+    },
+    /// Values whose powers vanish.
+    #[error(
+        "{file}, column \"{column}\": no value is beyond {value:e}, which is too small to compute with; give the column in a smaller unit: above {limit:e}"
+    )]
+    TooSmall {
+        /// The path as it was given.
+        file: String,
+        /// The column's header.
+        column: String,
+        /// The largest of the values, without its sign.
+        value: f64,
+        /// What has to be smaller than it.
+        limit: f64,
+    },
+    /// A sampling interval that no process has.
+    #[error(
+        "{file}, column \"{column}\": the time steps by {interval:e} s, and between {low:e} and {high:e} s can be computed with; check the column and its unit"
+    )]
+    InvalidInterval {
+        /// The path as it was given.
+        file: String,
+        /// The column's header.
+        column: String,
+        /// The median step \[s\].
+        interval: f64,
+        /// Smallest possible \[s\].
+        low: f64,
+        /// Largest possible \[s\].
+        high: f64,
+    },
     /// The output sits at its limit for much of the record.
     #[error(
         "{file}, column \"{column}\": {count} of {rows} samples sit exactly at a limit of the output ({limits}), where the sensor no longer sees the process; keep the experiment within the sensor's range, or cut those rows out and give the parts: they are fitted together"

@@ -146,8 +146,20 @@ fn a_gap() {
         &[
             "bad.csv, row 50, column \"t [s]\"",
             "2 samples are missing",
-            "from 94 to 100",
+            "from 94 to 100, elsewhere by 2)",
             "split the file",
+        ],
+    );
+    // Steps that are not exact in binary.
+    record_refused(
+        Rows::new()
+            .each(0, |t| (t / 2.0).round() / 10.0)
+            .without(50)
+            .text(),
+        &[
+            "bad.csv, row 50, column \"t [s]\"",
+            "1 sample is missing",
+            "from 4.7 to 4.9, elsewhere by 0.1)",
         ],
     );
 }
@@ -243,6 +255,34 @@ fn a_constant_output() {
             "bad.csv, column \"y [cm]\"",
             "the output is 7.5 in all 900 rows",
             "check the sensor",
+        ],
+    );
+}
+
+#[test]
+fn numbers_beyond_all_measure() {
+    record_refused(
+        Rows::new().with(25, 2, "1e300").text(),
+        &[
+            "bad.csv, row 25, column \"y [cm]\"",
+            "1e300 is too large",
+            "correct the cell",
+        ],
+    );
+    record_refused(
+        Rows::new().each(2, |y| 1e-150 * y).text(),
+        &[
+            "bad.csv, column \"y [cm]\"",
+            "e-149, which is too small",
+            "a smaller unit",
+        ],
+    );
+    record_refused(
+        Rows::new().each(0, |t| 1e-40 * t).text(),
+        &[
+            "bad.csv, column \"t [s]\"",
+            "the time steps by 2e-40 s",
+            "check the column and its unit",
         ],
     );
 }

@@ -1,5 +1,7 @@
 //! Nothing panics, whatever the numbers: the answer is a number, an error, or "no".
 
+#![allow(clippy::unwrap_used, clippy::panic)] // also in helpers, which clippy does not know to be tests
+
 use ct_lti::{
     Complex64, Hold, Polynomial, Simulator, StateSpace, StateVariableFilter, TransferFunction,
 };

@@ -1,6 +1,8 @@
 //! Positive realness against a fine grid with roots, the closed forms of orders one and two, and borders that only
 //! exact arithmetic can tell.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // also in helpers, which clippy does not know to be tests
+
 use ct_lti::{Polynomial, Positivity, TransferFunction};
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};

@@ -1,5 +1,7 @@
 //! Roots: backward error, known roots, and what is promised of their form.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // also in helpers, which clippy does not know to be tests
+
 use ct_lti::{Complex64, Polynomial};
 use proptest::prelude::*;
 

@@ -1,5 +1,7 @@
 //! Exact sampling against 80-digit references, closed forms, and itself.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // also in helpers, which clippy does not know to be tests
+
 use approx::assert_relative_eq;
 use ct_lti::{Error, Hold, Polynomial, Simulator, StateSpace, TransferFunction};
 use proptest::prelude::*;

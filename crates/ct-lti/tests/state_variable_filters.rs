@@ -1,5 +1,7 @@
 //! State variable filters: derivatives of sinusoids in closed form, and regressions on filtered signals.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // also in helpers, which clippy does not know to be tests
+
 use approx::assert_relative_eq;
 use ct_lti::{
     Complex64, Error, Hold, Polynomial, Simulator, Start, StateSpace, StateVariableFilter,

@@ -1,5 +1,7 @@
 //! Connections against the algebra of complex gains, step responses against closed forms.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // also in helpers, which clippy does not know to be tests
+
 use approx::assert_relative_eq;
 use ct_lti::{Complex64, Error, Polynomial, StateSpace, TransferFunction};
 use proptest::prelude::*;

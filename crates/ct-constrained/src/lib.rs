@@ -1,2 +1,21 @@
-//! Recursive least squares in continuous time with equality constraints, penalties and projections.
+//! Recursive least squares in continuous time with equality constraints, penalties and projections. No `std`, no allocation.
+//!
+//! | what is known of the parameters | answer |
+//! |---|---|
+//! | a balance, a ratio, a static gain: `f' theta = chi` | [`Row::equal`] in a [`ConstrainedRls`]; it also counts as excitation |
+//! | a sign or a bound that should be kept to softly | [`Row::at_most`], [`Row::at_least`] in a [`ConstrainedRls`] |
+//! | a sign or a bound that must be kept to | [`project_box`] or [`project`] after each update |
+//! | a balance that varies in time | [`ConstrainedRls::set_row`] |
+//!
+//! The example `known_balance` (`cargo run --release -p ctid-examples --bin known_balance`) shows a tank with and without them.
 #![no_std]
+
+mod constrained;
+mod error;
+mod projection;
+mod row;
+
+pub use constrained::ConstrainedRls;
+pub use error::Error;
+pub use projection::{project, project_box};
+pub use row::{Relation, Row};

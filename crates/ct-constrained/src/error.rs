@@ -1,0 +1,68 @@
+//! What can be wrong with a constraint: each message carries the numbers that disagree and the mend.
+
+/// Everything this crate can refuse.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// From the estimator inside.
+    #[error(transparent)]
+    Rls(#[from] ct_rls::Error),
+    /// The weights of the data are no least squares, so that constraints would bias the estimates.
+    #[error(
+        "gamma is {gamma} with c = {c}, but with constraints the criterion is minimised only for gamma = c; take gamma = {c}"
+    )]
+    GammaNotWeight {
+        /// Gain of the Riccati equation.
+        gamma: f64,
+        /// Weight of the output error.
+        c: f64,
+    },
+    /// A coefficient or the right-hand side of a row is not finite.
+    #[error("{what} of the row is {value}, but must be finite")]
+    NotFinite {
+        /// `a coefficient` or `chi`.
+        what: &'static str,
+        /// The value that was given.
+        value: f64,
+    },
+    /// The weight of a row is negative or not finite.
+    #[error(
+        "the weight of the row is {weight}, but must be at least 0 and finite; take 0 to switch the row off"
+    )]
+    Weight {
+        /// The value that was given.
+        weight: f64,
+    },
+    /// There is no such row.
+    #[error("row {index} does not exist: there are {rows} rows, counted from 0")]
+    NoSuchRow {
+        /// The index that was given.
+        index: usize,
+        /// Number of rows.
+        rows: usize,
+    },
+    /// The lower bound of a parameter is above the upper one, or a bound is NaN.
+    #[error(
+        "parameter {index} is bounded below by {lower} and above by {upper}; the lower bound must not be above the upper one"
+    )]
+    Bounds {
+        /// Which parameter, from 0.
+        index: usize,
+        /// Its lower bound.
+        lower: f64,
+        /// Its upper bound.
+        upper: f64,
+    },
+    /// The projection found no point that obeys all rows.
+    #[error(
+        "no estimate obeys all rows: after {sweeps} sweeps row {row} is still violated by {violation}; drop a row that contradicts the others, or one of two that are nearly parallel"
+    )]
+    NoCommonPoint {
+        /// The row that is violated most, from 0; of a box, lower bounds come first.
+        row: usize,
+        /// By how much, the unit of its chi.
+        violation: f64,
+        /// Sweeps over all rows.
+        sweeps: u32,
+    },
+}

@@ -1,0 +1,114 @@
+//! One linear statement about the parameters, `f' theta = chi` or `f' theta <= chi`, and its weight.
+
+use nalgebra::SVector;
+
+use crate::Error;
+
+/// What a row says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Relation {
+    /// `f' theta = chi`
+    Equal,
+    /// `f' theta <= chi`
+    AtMost,
+    /// `f' theta >= chi`
+    AtLeast,
+}
+
+/// One linear statement about `P` parameters. `f` and `chi` may vary in time: give the row again.
+///
+/// How large a weight? A row is soft. Over a second it pulls as `w`, the data as `c`, so an equality row wants `w` well above
+/// `c |phi|^2/|f|^2`. A penalty, which leaves `P` as it is, wants `w` much above the mean squared error of the output: at 1 it
+/// may be useless where 1e3 holds. [`project`](crate::project) has no weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Row<const P: usize> {
+    f: SVector<f64, P>,
+    chi: f64,
+    weight: f64,
+    relation: Relation,
+}
+
+impl<const P: usize> Row<P> {
+    /// A row of any relation.
+    ///
+    /// - `f`: coefficients, one for each parameter.
+    /// - `chi`: right-hand side, unit of `f' theta`.
+    /// - `weight`: 1/(s unit(chi)^2) where the data's weight `c` is per unit(y)^2; at least 0, 0 switches the row off.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`], [`Error::Weight`].
+    pub fn new(relation: Relation, f: [f64; P], chi: f64, weight: f64) -> Result<Self, Error> {
+        let not_finite = |what, value| Err(Error::NotFinite { what, value });
+        if let Some(&value) = f.iter().find(|x| !x.is_finite()) {
+            return not_finite("a coefficient", value);
+        }
+        if !chi.is_finite() {
+            return not_finite("chi", chi);
+        }
+        if !(weight >= 0.0 && weight.is_finite()) {
+            return Err(Error::Weight { weight });
+        }
+        Ok(Self {
+            f: SVector::from(f),
+            chi,
+            weight,
+            relation,
+        })
+    }
+
+    /// `f' theta = chi` with a weight: see [`Row::new`].
+    ///
+    /// # Errors
+    /// As of [`Row::new`].
+    pub fn equal(f: [f64; P], chi: f64, weight: f64) -> Result<Self, Error> {
+        Self::new(Relation::Equal, f, chi, weight)
+    }
+
+    /// `f' theta <= chi`, a penalty with a weight where it is violated: see [`Row::new`].
+    ///
+    /// # Errors
+    /// As of [`Row::new`].
+    pub fn at_most(f: [f64; P], chi: f64, weight: f64) -> Result<Self, Error> {
+        Self::new(Relation::AtMost, f, chi, weight)
+    }
+
+    /// `f' theta >= chi`, a penalty with a weight where it is violated: see [`Row::new`].
+    ///
+    /// # Errors
+    /// As of [`Row::new`].
+    pub fn at_least(f: [f64; P], chi: f64, weight: f64) -> Result<Self, Error> {
+        Self::new(Relation::AtLeast, f, chi, weight)
+    }
+
+    /// Coefficients.
+    pub fn f(&self) -> &SVector<f64, P> {
+        &self.f
+    }
+
+    /// Right-hand side.
+    pub fn chi(&self) -> f64 {
+        self.chi
+    }
+
+    /// Weight.
+    pub fn weight(&self) -> f64 {
+        self.weight
+    }
+
+    /// What the row says.
+    pub fn relation(&self) -> Relation {
+        self.relation
+    }
+
+    /// `f' theta - chi` where the row is violated, 0 where it is obeyed; unit of `chi`.
+    pub fn violation(&self, theta: &SVector<f64, P>) -> f64 {
+        let r = self.f.dot(theta) - self.chi;
+        match self.relation {
+            Relation::Equal => r,
+            Relation::AtMost => r.max(0.0),
+            Relation::AtLeast => r.min(0.0),
+        }
+    }
+}

@@ -55,14 +55,12 @@ pub enum Error {
     },
     /// The projection found no point that obeys all rows.
     #[error(
-        "no estimate obeys all rows: after {sweeps} sweeps row {row} is still violated by {violation}; drop a row that contradicts the others, or one of two that are nearly parallel"
+        "no estimate obeys all rows: row {row} is violated by {violation} where the others are obeyed; drop a row that contradicts the others, or one of two that are nearly parallel"
     )]
     NoCommonPoint {
-        /// The row that is violated most, from 0; of a box, lower bounds come first.
+        /// The row, from 0; of a box, lower bounds come first.
         row: usize,
         /// By how much, the unit of its chi.
         violation: f64,
-        /// Sweeps over all rows.
-        sweeps: u32,
     },
 }

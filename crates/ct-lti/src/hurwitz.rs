@@ -5,7 +5,7 @@
 //! A zero in the first column or a whole row of zeros means roots on the axis or to its right, and is answered with
 //! no; nothing is perturbed.
 //!
-//! Cost: O(n^2), 50 ns for n = 3; the integers, needed only near the border, some microseconds.
+//! Cost: O(n^2), 60 ns for n = 3, 150 ns for n = 10; the integers, needed only near the border, 300 ns for n = 3.
 //!
 //! Reference: E. J. Routh (1877), as in F. R. Gantmacher, The Theory of Matrices, volume 2, chapter XV.
 

@@ -13,7 +13,10 @@
 //! phi0 keeps the digits of slow modes beside fast ones: near the identity phi0 has lost them already. A is balanced
 //! first, by powers of 2, so that states of different units do no harm.
 //!
-//! Cost: 15 + 3 s products of n x n matrices, a microsecond for n = 3.
+//! Cost: 15 + 3 s products of n x n matrices: 0.6, 0.9, 3.3 us for n = 2, 3, 6.
+//!
+//! Accuracy, entry by entry, against 80 digits: 1e-15 for poles of one size, in one place too; 5e-14 after a rotation by 35
+//! rad; 6e-14 for a slow pole beside one that is 1e9 times faster, at worst 4e-12 for its second derivative.
 //!
 //! Reference: N. J. Higham, Functions of Matrices (2008), chapter 10, for scaling and squaring; the doubling of phi1
 //! and phi2 is elementary. The choice of E is ours.

@@ -12,7 +12,8 @@
 //! Their mean is accurate. Ask [`Polynomial::is_hurwitz`], not the roots, whether all lie in the left half plane: that
 //! is decided exactly.
 //!
-//! Cost: O(n^2) an iteration, 5 to 20 iterations.
+//! Cost: O(n^2) an iteration, 5 to 20 iterations; 2 to 7 us for order 4, 4 to 13 us for order 6, the more the closer the
+//! roots.
 //!
 //! Reference: D. A. Bini, Numerical computation of polynomial zeros by means of Aberth's method, Numer. Algorithms 13
 //! (1996).

@@ -9,7 +9,12 @@ use alloc::{vec, vec::Vec};
 use crate::error::finite;
 use crate::matrix::apply;
 use crate::phi::PhiFunctions;
-use crate::{Error, Hold, Start, StateSpace};
+use crate::{Error, Hold, StateSpace};
+
+pub(crate) const OUT_OF_RANGE: Error = Error::Overflow {
+    what: "the state or the output",
+    mend: "check for unstable poles, and the units of the signal",
+};
 
 /// Steps of different length that are remembered.
 const REMEMBERED: usize = 4;
@@ -86,6 +91,7 @@ pub(crate) struct Sampler {
     remembered: [Sampled; REMEMBERED],
     /// Which is overwritten next.
     oldest: usize,
+    /// The state being computed; between steps the one before the last step.
     next_state: Vec<f64>,
 }
 
@@ -127,13 +133,15 @@ impl Sampler {
             *next += g0 * u0 + g1 * u1;
         }
         if self.next_state.iter().any(|x| !x.is_finite()) {
-            return Err(Error::Overflow {
-                what: "the state",
-                mend: "check for unstable poles, and the units of the signal",
-            });
+            return Err(OUT_OF_RANGE);
         }
-        x.copy_from_slice(&self.next_state);
+        x.swap_with_slice(&mut self.next_state);
         Ok(())
+    }
+
+    /// Takes the last step back, once.
+    pub(crate) fn undo(&mut self, x: &mut [f64]) {
+        x.swap_with_slice(&mut self.next_state);
     }
 }
 
@@ -211,21 +219,20 @@ impl Simulator {
         if let Some(last) = self.input {
             self.sampler.advance(&mut self.state, last, input, step)?;
         }
+        let output = self.system.output(&self.state, input);
+        if !output.is_finite() {
+            if self.input.is_some() {
+                self.sampler.undo(&mut self.state);
+            }
+            return Err(OUT_OF_RANGE);
+        }
         self.input = Some(input);
-        Ok(self.system.output(&self.state, input))
+        Ok(output)
     }
 
     /// Forgets all samples, and sets all states to 0.
     pub fn reset(&mut self) {
         self.state.fill(0.0);
         self.input = None;
-    }
-}
-
-/// The state that a constant input of 1 leaves at rest, for a canonical form with `x[0]' = x[1]` and so on.
-pub(crate) fn started(start: Start, first: f64) -> f64 {
-    match start {
-        Start::Zero => 0.0,
-        Start::Rest => first,
     }
 }

@@ -72,7 +72,11 @@ proptest! {
         let _ = (states.feedback(&states), states.series(&states), states.parallel(&states));
         let mut simulator = Simulator::new(states, Hold::First);
         for (u, step) in [(1.0, 1.0), (x, step), (1.0, 1.0), (x, 0.5)] {
-            let _ = simulator.update(u, step);
+            let before = simulator.state().to_vec();
+            match simulator.update(u, step) {
+                Ok(y) => prop_assert!(y.is_finite()),
+                Err(_) => prop_assert_eq!(simulator.state(), before),
+            }
             prop_assert!(simulator.state().iter().all(|x| x.is_finite()));
         }
     }
@@ -82,7 +86,11 @@ proptest! {
         let Ok(e) = Polynomial::new(e) else { return Ok(()) };
         let Ok(mut filter) = StateVariableFilter::new(&e, Hold::Zero) else { return Ok(()) };
         for (u, step) in [(1.0, 1.0), (x, step), (1.0, 1.0), (x, 0.5)] {
-            let _ = filter.update(u, step);
+            let before = filter.derivatives().to_vec();
+            match filter.update(u, step) {
+                Ok(derivatives) => prop_assert!(derivatives.iter().all(|d| d.is_finite())),
+                Err(_) => prop_assert_eq!(filter.derivatives(), before),
+            }
         }
     }
 }

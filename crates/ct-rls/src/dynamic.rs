@@ -54,11 +54,12 @@ impl DynamicRls {
     /// As [`ContinuousRls::new`](crate::ContinuousRls::new), with the number of parameters of `theta`.
     ///
     /// # Errors
-    /// [`Error::Size`], [`Error::Theta`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`].
+    /// [`Error::Size`], [`Error::Theta`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`],
+    /// [`Error::TraceAboveLimit`] beyond 1e100.
     pub fn new(theta: DVector<f64>, p: &DMatrix<f64>, weights: Weights) -> Result<Self, Error> {
         check_theta(theta.as_slice())?;
         let state = factors(p, theta.len())?;
-        let guard = Guard::new(state.trace());
+        let guard = Guard::new(state.trace())?;
         let scratch = [vec![0.0; theta.len()], vec![0.0; theta.len()]];
         Ok(Self {
             theta,

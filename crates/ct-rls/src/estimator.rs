@@ -63,9 +63,9 @@ pub enum Outcome {
     Capped,
     /// The regressor is silent: nothing was forgotten.
     Silent,
-    /// A signal is not finite, or too large to square: nothing was done.
+    /// A signal is not finite, or beyond any sense: a regressor above 1e30, an output error above 1e100. Nothing was done.
     NotFinite,
-    /// `dt` is not above 0 and finite, or `eta dt` is above 300: nothing was done.
+    /// `dt` is not above 0 and at most 1e30 s, or `eta dt` is above 300: nothing was done.
     BadStep,
     /// The regressor has a wrong length (run-time sizes only): nothing was done.
     BadSize,

@@ -13,7 +13,7 @@
 use crate::Error;
 use crate::integrator::sealed::{Refusal, Rule};
 use crate::integrator::{Plain, dot};
-use crate::settings::{Step, Weights};
+use crate::settings::{MAX_EPSILON, Step, Weights};
 
 /// Euler's rule, on `P` as it stands. Stops where its step is too long.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ impl Rule for Euler {
         let k = state.times(phi);
         let s = dot(&k, phi);
         let (gain, limit) = (weights.gamma() * step.dt * s, 1.0 + step.eta() * step.dt);
-        if !(gain.is_finite() && (epsilon * epsilon).is_finite()) {
+        if !(gain.is_finite() && epsilon.abs() <= MAX_EPSILON) {
             return Err(Refusal::NotFinite);
         }
         if gain >= limit {

@@ -15,7 +15,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::Error;
-use crate::settings::{Weights, gain};
+use crate::settings::{MAX_EPSILON, MAX_TRACE, Weights, gain};
 
 /// Entries of `P(0)` that should be equal may differ by this, relative to the diagonal.
 const SYMMETRY: f64 = 1e-9;
@@ -41,7 +41,7 @@ pub(crate) fn factorise(u: &mut [f64], d: &mut [f64]) -> Result<(), Error> {
     }
     for j in (0..p).rev() {
         let (diagonal, pivot) = (d[j], u[j * p + j]);
-        if !(pivot > f64::EPSILON * diagonal && pivot.is_finite()) {
+        if !(pivot > f64::EPSILON * diagonal && pivot > 1.0 / MAX_TRACE && pivot.is_finite()) {
             return Err(Error::NotPositiveDefinite {
                 index: j,
                 pivot,
@@ -146,7 +146,7 @@ pub(crate) fn exact_step(
     let s = project(u, d, phi, f);
     let a = weights.gamma() * length;
     let denominator = 1.0 + a * s;
-    if !(denominator.is_finite() && (epsilon * epsilon).is_finite()) {
+    if !(denominator.is_finite() && epsilon.abs() <= MAX_EPSILON) {
         return None;
     }
     absorb(u, d, f, a, growth, k);

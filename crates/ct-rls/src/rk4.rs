@@ -9,7 +9,7 @@
 use crate::Error;
 use crate::integrator::sealed::{Covariance, Refusal, Rule};
 use crate::integrator::{Plain, dot};
-use crate::settings::{Step, Weights};
+use crate::settings::{MAX_EPSILON, Step, Weights};
 
 /// Runge-Kutta of fourth order, on `P` as it stands. Stops where `P` is no longer positive definite.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +28,7 @@ impl Rule for Rk4 {
         step: &Step,
     ) -> Result<f64, Refusal> {
         let s = dot(&state.times(phi), phi);
-        if !(s.is_finite() && (epsilon * epsilon).is_finite()) {
+        if !(s.is_finite() && epsilon.abs() <= MAX_EPSILON) {
             return Err(Refusal::NotFinite);
         }
         let (eta, gamma, c, h) = (step.eta(), weights.gamma(), weights.c(), step.dt);

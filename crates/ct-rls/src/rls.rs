@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::estimator::{Health, Innovation, Outcome, RecursiveEstimator};
 use crate::integrator::sealed::{Capped, Covariance, Refusal};
-use crate::settings::{Guards, Step, Weights};
+use crate::settings::{Guards, MAX_EPSILON, MAX_PHI_SQUARED, Step, Weights};
 use crate::{Error, ExactHold, Integrator, UdFactor, factor};
 
 /// One sample: the output `y` and the regressor `phi`, held over the step.
@@ -71,7 +71,7 @@ impl<const P: usize> ContinuousRls<P> {
     ///   diagonal is usual, 1e6 does no harm.
     ///
     /// # Errors
-    /// [`Error::Theta`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`].
+    /// [`Error::Theta`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`], [`Error::TraceAboveLimit`] beyond 1e100.
     pub fn new(
         theta: SVector<f64, P>,
         p: SMatrix<f64, P, P>,
@@ -97,7 +97,9 @@ impl<const P: usize> ContinuousRls<P> {
     pub fn absorb(&mut self, f: &SVector<f64, P>, chi: f64, information: f64) -> Option<f64> {
         // with c = gamma, the product of weight and length is all that counts
         let weights = Weights::new(1.0, 1.0, 0.0).ok()?;
-        if information.is_nan() || information < 0.0 {
+        if !(0.0..=MAX_PHI_SQUARED).contains(&information)
+            || !(0.0..=MAX_PHI_SQUARED).contains(&f.norm_squared())
+        {
             return None;
         }
         let epsilon = chi - f.dot(&self.theta);
@@ -125,7 +127,7 @@ impl<const P: usize> ContinuousRls<P> {
     pub fn relax(&mut self, f: &SVector<f64, P>, chi: f64, pull: f64) -> Option<f64> {
         let epsilon = chi - f.dot(&self.theta);
         let (k, s) = self.state.times(f);
-        if !(pull >= 0.0 && (epsilon * epsilon).is_finite() && s.is_finite()) {
+        if !(pull >= 0.0 && epsilon.abs() <= MAX_EPSILON && f.norm_squared() <= MAX_PHI_SQUARED) {
             return None;
         }
         if s > 0.0 {
@@ -148,7 +150,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     ) -> Result<Self, Error> {
         check_theta(theta.as_slice())?;
         let state = I::State::<P>::from_matrix(&p)?;
-        let guard = Guard::new(state.trace());
+        let guard = Guard::new(state.trace())?;
         Ok(Self {
             theta,
             state,
@@ -278,6 +280,8 @@ pub(crate) struct Guard {
     pub guards: Guards,
     /// At least the trace of `P`: only `eta` raises it, so the trace itself is seldom needed.
     bound: f64,
+    /// The cap in force.
+    limit: f64,
     silent_below_squared: f64,
     pub step: Step,
     failure: Option<Error>,
@@ -288,13 +292,16 @@ pub(crate) struct Guard {
 }
 
 impl Guard {
-    pub fn new(trace: f64) -> Self {
-        Self {
-            guards: Guards {
-                trace_limit: TRACE_LIMIT * trace,
-                silent_below: 0.0,
-            },
+    pub fn new(trace: f64) -> Result<Self, Error> {
+        let guards = Guards {
+            trace_limit: TRACE_LIMIT * trace,
+            silent_below: 0.0,
+        };
+        guards.check(trace)?;
+        Ok(Self {
+            guards,
             bound: trace,
+            limit: guards.cap(),
             silent_below_squared: 0.0,
             step: Step::none(),
             failure: None,
@@ -302,12 +309,13 @@ impl Guard {
             unused: 0,
             capped: 0,
             silent: 0,
-        }
+        })
     }
 
     pub fn set(&mut self, guards: Guards, trace: f64) -> Result<(), Error> {
         guards.check(trace)?;
         self.guards = guards;
+        self.limit = guards.cap();
         self.silent_below_squared = guards.silent_below * guards.silent_below;
         Ok(())
     }
@@ -343,8 +351,10 @@ impl Guard {
         let squared: f64 = phi.iter().map(|x| x * x).sum();
         if squared <= self.silent_below_squared {
             Ok((self.step.remembering(), Outcome::Silent))
-        } else {
+        } else if squared <= MAX_PHI_SQUARED {
             Ok((self.step, Outcome::Updated))
+        } else {
+            Err(self.skip(Outcome::NotFinite))
         }
     }
 
@@ -366,7 +376,7 @@ impl Guard {
         self.used += 1;
         self.silent += u64::from(outcome == Outcome::Silent);
         self.bound *= growth;
-        if self.bound > self.guards.trace_limit && self.capped(state) {
+        if self.bound > self.limit && self.capped(state) {
             Outcome::Capped
         } else {
             outcome
@@ -375,7 +385,7 @@ impl Guard {
 
     #[cold]
     fn capped<S: Capped>(&mut self, state: &mut S) -> bool {
-        let (trace, limit) = (state.trace(), self.guards.trace_limit);
+        let (trace, limit) = (state.trace(), self.limit);
         if trace > limit {
             state.scale(limit / trace);
             self.bound = limit;

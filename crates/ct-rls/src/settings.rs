@@ -101,7 +101,7 @@ impl Weights {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Guards {
     /// Forgetting stops raising `P` where its trace reaches this: unit of `theta^2`, at least the trace of `P(0)`;
-    /// `f64::INFINITY` for no cap. An estimator starts with 1e6 times the trace of its `P(0)`.
+    /// `f64::INFINITY` for none below 1e100. An estimator starts with 1e6 times the trace of its `P(0)`.
     ///
     /// A regressor that stays in a subspace for long makes the other directions reach the cap; while they are
     /// there, forgetting is nearly off in all directions.
@@ -118,7 +118,7 @@ impl Guards {
             return Err(Error::Guard {
                 guard: "trace_limit",
                 value: limit,
-                range: "above 0, or f64::INFINITY for no cap",
+                range: "above 0, or f64::INFINITY for none",
             });
         }
         if !(self.silent_below >= 0.0 && self.silent_below.is_finite()) {
@@ -128,10 +128,16 @@ impl Guards {
                 range: "at least 0 and finite, in the unit of phi",
             });
         }
+        let limit = self.cap();
         if trace > limit {
             return Err(Error::TraceAboveLimit { trace, limit });
         }
         Ok(())
+    }
+
+    /// The cap in force.
+    pub(crate) fn cap(&self) -> f64 {
+        self.trace_limit.min(MAX_TRACE)
     }
 }
 
@@ -146,6 +152,15 @@ pub struct Step {
     /// `(e^{eta h} - 1)/eta`, s; h for `eta = 0`.
     pub length: f64,
 }
+
+/// Signals and steps beyond these are taken for faults: within them no number of updates leaves the floating-point range.
+pub(crate) const MAX_PHI_SQUARED: f64 = 1e60;
+/// As above, for the output error.
+pub(crate) const MAX_EPSILON: f64 = 1e100;
+/// As above, for the step, s.
+const MAX_DT: f64 = 1e30;
+/// As above, for the trace of P; its pivots start above the inverse of it.
+pub(crate) const MAX_TRACE: f64 = 1e100;
 
 /// Beyond this, one step forgets everything, and `e^{eta h}` leaves the floating-point range.
 const MAX_ETA_DT: f64 = 300.0;
@@ -170,7 +185,7 @@ impl Step {
     #[cold]
     pub fn new(eta: f64, dt: f64) -> Option<Self> {
         let x = eta * dt;
-        if !(dt > 0.0 && dt.is_finite() && x <= MAX_ETA_DT) {
+        if !(dt > 0.0 && dt <= MAX_DT && x <= MAX_ETA_DT) {
             return None;
         }
         let growth_less_one = libm::expm1(x);

@@ -1,4 +1,5 @@
 //! The traps that make a tool of this kind lie.
+#![allow(clippy::unwrap_used)]
 
 use ct_signals::{ArModel, Record};
 use ctid_tests::{Drive, Rig};

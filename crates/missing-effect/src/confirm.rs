@@ -50,8 +50,8 @@ fn candidates(node: &Node) -> f64 {
         .candidates()
         .into_iter()
         .map(|placed| {
-            let site = node.setup.structure.site(placed);
-            (placed.effect.parameters)(&site)
+            let parameters = node.setup.structure.effect_parameters(placed);
+            parameters
                 .iter()
                 .map(|p| p.starts.len() as f64)
                 .product::<f64>()

@@ -51,7 +51,7 @@ pub(crate) fn minimise(
 ) -> Minimum {
     let p = x.len();
     for (value, (lower, upper)) in x.iter_mut().zip(bounds) {
-        *value = value.clamp(*lower, *upper);
+        *value = value.max(*lower).min(*upper);
     }
     let Some(mut at) = evaluate(&x).filter(|at| at.cost().is_finite()) else {
         return Minimum {
@@ -100,7 +100,7 @@ pub(crate) fn minimise(
                 } else {
                     lower
                 };
-                (x + d).clamp(lower, upper.max(lower))
+                (x + d).max(lower).min(upper.max(lower))
             })
             .collect();
         let moved: Vec<f64> = trial.iter().zip(&x).map(|(to, from)| to - from).collect();

@@ -8,7 +8,7 @@
 use plants::{Outlet, Plant};
 use rand::RngExt;
 
-use crate::Setup;
+use crate::{Setup, levenberg_marquardt::within};
 
 /// One start for the plant's own parameters and the initial levels; effects start at their first start value.
 #[must_use]
@@ -127,7 +127,7 @@ pub fn starts_around(setup: &Setup, x: &[f64], n: usize, seed: u64) -> Vec<Vec<f
                     } else {
                         value + 0.1 * (upper - lower) * rng.random_range(-1.0..1.0)
                     };
-                    moved.max(lower).min(upper)
+                    within(moved, (lower, upper))
                 })
                 .collect()
         })

@@ -65,7 +65,7 @@ impl Pi {
         let error = reference - reading;
         let wanted =
             self.operating_point + self.gain * (error + self.integral / self.integral_time);
-        let given = wanted.max(self.limits.0).min(self.limits.1);
+        let given = wanted.clamp(self.limits.0, self.limits.1);
         let outwards = (wanted - given) * self.gain * error > 0.0;
         if !outwards {
             self.integral += error * h;

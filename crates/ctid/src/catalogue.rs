@@ -76,10 +76,10 @@ pub fn describe(id: &str, look: Look) -> Result<String, Error> {
     Ok(text)
 }
 
-fn applies_to(effect: &EffectInfo) -> impl Iterator<Item = Plant> {
+fn applies_to(effect: &'static EffectInfo) -> impl Iterator<Item = Plant> {
     Plant::ALL
         .into_iter()
-        .filter(|&plant| (effect.applies)(plant))
+        .filter(|&plant| effect.sites(plant).next().is_some())
 }
 
 fn place(effect: &EffectInfo) -> String {

@@ -11,14 +11,27 @@ pub struct Rim<T> {
     pub fraction: T,
 }
 
+/// A side tank: it exchanges water with a vessel through a pipe, and fills and empties with it.
+#[derive(Debug, Clone, Copy)]
+pub struct Side<T> {
+    /// Its surface, as a share of the vessel's.
+    pub share: T,
+    /// Time constant with which its level follows the vessel's \[s\].
+    pub time_constant: T,
+}
+
 /// An effect with its parameters bound, at its place in the chain. Every method has a default that
 /// changes nothing, so a law says only what it does.
 ///
 /// Smoothness is part of the contract: at the absent value the law returns its argument bit for bit,
 /// and its derivative there is the one of the limit.
 pub trait Law<T: Scalar>: Send {
-    /// Actuator: the command that acts, for the command that was given \[input unit\]. It may have memory
-    /// and is called in the order of time: once an interval that is held, more often on a ramp.
+    /// Actuator: where what the command moves stands, for a law with memory, which must be the first in the chain. Asked
+    /// once for each recorded command, in the order of time; on a ramp it runs straight between the two ends.
+    fn position(&mut self, _u: f64) -> Option<T> {
+        None
+    }
+    /// Actuator: the command that acts, for the command that was given \[input unit\]. Without memory.
     fn command(&mut self, u: T, _t: f64) -> T {
         u
     }
@@ -35,13 +48,33 @@ pub trait Law<T: Scalar>: Send {
     fn actuator_lag(&self) -> Option<T> {
         None
     }
-    /// Vessel: outflow to the next vessel at a level, given what the law before it says \[flow\].
-    fn outflow(&self, _level: T, nominal: T, _t: f64) -> T {
+    /// Actuator: by which factor the pump's gain differs at a time from that of the plant.
+    fn gain(&self, _t: T) -> Option<T> {
+        None
+    }
+    /// Vessel: the head that drives the outflow, which a law may take for another than the level, given the level of the
+    /// next vessel \[level unit\].
+    fn head(&self, level: T, _next: T) -> T {
+        level
+    }
+    /// Vessel: outflow to the next vessel at a head, given what the law before it says \[flow\].
+    fn outflow(&self, _level: T, nominal: T, _t: T) -> T {
         nominal
     }
     /// Vessel: the net inflow with what this law takes out and what is lost \[flow\].
-    fn net(&self, _level: T, net: T, _t: f64) -> T {
+    fn net(&self, _level: T, net: T, _t: T) -> T {
         net
+    }
+    /// Vessel: the instant at which the law jumps, if it does \[s\]. A step is cut there, and [`Law::switch_over`] called
+    /// between the two parts; a law that asked the time instead could not tell the two sides of the cut apart.
+    fn switch(&self) -> Option<T> {
+        None
+    }
+    /// Vessel: the instant of [`Law::switch`] has come.
+    fn switch_over(&mut self) {}
+    /// Vessel: a side tank that it adds to a plant of one vessel.
+    fn side(&self) -> Option<Side<T>> {
+        None
     }
     /// Vessel: surface at a level \[area\].
     fn area(&self, _level: T, nominal: T) -> T {

@@ -173,7 +173,7 @@ impl<T: Scalar> Simulator<T> {
             ..
         } = self;
         let gain = *pump_gain;
-        let mut now = *time;
+        let mut now = T::constant(*time);
         actuator.pieces(
             command.from,
             command.to,
@@ -190,14 +190,14 @@ impl<T: Scalar> Simulator<T> {
                 };
                 for i in 0..parts {
                     let signal = signal.from(part * i as f64);
-                    let inflow = actuator.inflow(part, signal, gain);
+                    let inflow = actuator.inflow(part, signal, gain, now);
                     if sensor.has_lag() {
                         let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
                         vessels.step(part, inflow, now, &mut Some(&mut follow));
                     } else {
                         vessels.step(part, inflow, now, &mut None);
                     }
-                    now += part.value();
+                    now = now + part;
                 }
             },
         );

@@ -22,6 +22,8 @@ pub struct Scales {
     pub operating_level: [f64; MAX_VESSELS],
     /// Area of each vessel, one where it is not known.
     pub area: [f64; MAX_VESSELS],
+    /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
+    pub reading_step: f64,
     /// Mean throughput \[area x level/s\].
     pub flow: f64,
     /// Median sampling interval \[s\].
@@ -93,6 +95,11 @@ impl Site<'_> {
     pub fn operating_level(&self) -> f64 {
         self.scales.operating_level[self.vessel]
     }
+    /// Length of the record \[s\].
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.scales.duration.max(f64::MIN_POSITIVE)
+    }
     /// Smallest and largest level of the measured vessel.
     #[must_use]
     pub fn measured_level(&self) -> (f64, f64) {
@@ -148,7 +155,7 @@ impl Structure {
         if self.effects.iter().any(|on| on.effect.id == effect.id) {
             return Err(Error::EffectTwice { effect: effect.id });
         }
-        if !(effect.applies)(self.plant) {
+        if vessel < self.plant.vessels() && !(effect.applies)(self.plant, vessel) {
             return Err(Error::EffectDoesNotApply {
                 effect: effect.id,
                 plant: self.plant.id(),
@@ -180,15 +187,11 @@ impl Structure {
     pub fn candidates(&self) -> Vec<Placed> {
         effects::CATALOGUE
             .iter()
-            .filter(|effect| (effect.applies)(self.plant))
             .filter(|effect| self.effects.iter().all(|on| on.effect.id != effect.id))
             .flat_map(|&effect| {
-                let places = if effect.place == Place::Vessel {
-                    self.plant.vessels()
-                } else {
-                    1
-                };
-                (0..places).map(move |vessel| Placed { effect, vessel })
+                effect
+                    .sites(self.plant)
+                    .map(move |vessel| Placed { effect, vessel })
             })
             .collect()
     }
@@ -300,6 +303,7 @@ impl Scales {
             level: [output; MAX_VESSELS],
             operating_level: [middle; MAX_VESSELS],
             area: [1.0; MAX_VESSELS],
+            reading_step: 0.0,
             flow: middle.abs() / (0.1 * duration),
             sample_interval,
             duration,

@@ -3,7 +3,7 @@
 
 use std::ops::Mul;
 
-use crate::{Law, Outlet, Rim, Scalar, linear::Propagators, structure::MAX_VESSELS};
+use crate::{Law, Outlet, Rim, Scalar, Side, linear::Propagators, structure::MAX_VESSELS};
 
 /// Below this level Torricelli's root, whose slope is infinite at zero, gives way to a parabola \[level unit\].
 const NEARLY_EMPTY: f64 = 1e-4;
@@ -114,6 +114,14 @@ pub(crate) struct Vessels<T: Scalar> {
     pub(crate) levels: Levels<T>,
     /// For linear vessels without a rim.
     linear: Option<LinearFlow<T>>,
+    /// A side tank of an only vessel; its level follows the vessels' in `levels`.
+    side: Option<Side<T>>,
+    /// Levels that move: the vessels' and the side tank's.
+    states: usize,
+    /// Laws that switch over at an instant that is still to come.
+    switches: Vec<usize>,
+    /// Beginning and length of the present step, where they have derivatives.
+    clock: Option<(T, T)>,
     /// Some vessel has a rim.
     rims: bool,
     /// All are Torricelli's, of areas without derivatives, and nothing acts in them.
@@ -172,6 +180,10 @@ impl<T: Scalar> Vessels<T> {
             }
             bound.push(law);
         }
+        let side = bound.iter().find_map(|law| law.side());
+        let states = vessels.len() + usize::from(side.is_some());
+        let switches = (0..bound.len()).filter(|&law| bound[law].switch().is_some());
+        let switches = switches.collect();
         let rims = vessels.iter().any(|v| v.rim.level.value() != f64::INFINITY);
         let bare = bound.is_empty()
             && vessels
@@ -201,11 +213,19 @@ impl<T: Scalar> Vessels<T> {
             laws: bound,
             levels: initial,
             linear,
+            side,
+            states,
+            switches,
+            clock: None,
             rims,
             bare,
             parts_per_second,
         };
         all.keep_within();
+        if states > all.vessels.len() {
+            // At rest a side tank stands as high as its vessel.
+            all.levels[states - 1] = all.levels[0];
+        }
         all
     }
 
@@ -221,27 +241,66 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    /// What flows out of vessel `i` to the next one at a level.
-    #[inline(always)]
-    fn outflow(&self, i: usize, level: T, t: f64) -> T {
-        let vessel = &self.vessels[i];
-        let mut outflow = match vessel.outlet {
-            Outlet::Torricelli => vessel.coefficient * square_root(level),
-            Outlet::Linear => level - vessel.coefficient,
+    /// A time within the present step, with its derivatives.
+    fn time(&self, t: f64) -> T {
+        let Some((start, length)) = self.clock else {
+            return T::constant(t);
         };
-        for &law in &vessel.laws {
-            outflow = self.laws[law].outflow(level, outflow, t);
+        let share = if length.value() == 0.0 {
+            0.0
+        } else {
+            (t - start.value()) / length.value()
+        };
+        // The value is `t` to the last bit, as it is where there are no derivatives.
+        let moved = start + length * share;
+        moved - moved.value() + t
+    }
+
+    /// The head that drives the outflow of vessel `i` at a level, the other levels being `levels`.
+    #[inline(always)]
+    fn head(&self, i: usize, level: T, levels: &Levels<T>) -> T {
+        let mut head = level;
+        if i + 1 < self.vessels.len() {
+            for &law in &self.vessels[i].laws {
+                head = self.laws[law].head(head, levels[i + 1]);
+            }
+        }
+        head
+    }
+
+    /// What flows out of vessel `i` to the next one at a level, the other levels being `levels`.
+    #[inline(always)]
+    fn outflow(&self, i: usize, level: T, levels: &Levels<T>, t: f64) -> T {
+        let vessel = &self.vessels[i];
+        let head = self.head(i, level, levels);
+        let mut outflow = match vessel.outlet {
+            Outlet::Torricelli => vessel.coefficient * square_root(head),
+            Outlet::Linear => head - vessel.coefficient,
+        };
+        if !vessel.laws.is_empty() {
+            let t = self.time(t);
+            for &law in &vessel.laws {
+                outflow = self.laws[law].outflow(head, outflow, t);
+            }
         }
         outflow
     }
 
     /// What flows out of vessel `i` to the next one, and its net inflow, at a level.
     #[inline(always)]
-    fn balance(&self, i: usize, level: T, inflow: T, t: f64) -> (T, T) {
-        let outflow = self.outflow(i, level, t);
+    fn balance(&self, i: usize, inflow: T, levels: &Levels<T>, t: f64) -> (T, T) {
+        let (level, vessel) = (levels[i], &self.vessels[i]);
+        let outflow = self.outflow(i, level, levels, t);
         let mut net = inflow - outflow;
-        for &law in &self.vessels[i].laws {
-            net = self.laws[law].net(level, net, t);
+        if !vessel.laws.is_empty() {
+            let t = self.time(t);
+            for &law in &vessel.laws {
+                net = self.laws[law].net(level, net, t);
+            }
+            if let Some(side) = self.side {
+                let per_level = vessel.area * side.share / side.time_constant;
+                net = net - per_level * (level - levels[i + 1]);
+            }
         }
         (outflow, net)
     }
@@ -280,7 +339,7 @@ impl<T: Scalar> Vessels<T> {
         let mut inflow = q;
         for (i, vessel) in self.vessels.iter().enumerate() {
             let level = levels[i];
-            let (outflow, net) = self.balance(i, level, inflow, t);
+            let (outflow, net) = self.balance(i, inflow, levels, t);
             inflow = outflow;
             if vessel.spilling {
                 // The level stands at the rim, and the net inflow spills; where it turns negative the mode ends.
@@ -288,6 +347,10 @@ impl<T: Scalar> Vessels<T> {
             } else {
                 rates[i] = self.rate(i, level, net);
             }
+        }
+        if let Some(side) = self.side {
+            let last = self.states - 1;
+            rates[last] = (levels[last - 1] - levels[last]) / side.time_constant;
         }
         rates
     }
@@ -312,7 +375,7 @@ impl<T: Scalar> Vessels<T> {
         T: Mul<H, Output = T>,
     {
         let mut to = *from;
-        for i in 0..self.vessels.len() {
+        for i in 0..self.states {
             to[i] = to[i] + by[i] * h;
         }
         to
@@ -410,7 +473,7 @@ impl<T: Scalar> Vessels<T> {
     {
         let sixth = h * (1.0 / 6.0);
         let mut next = *from;
-        for i in 0..self.vessels.len() {
+        for i in 0..self.states {
             next[i] = next[i] + (k1[i] + k2[i] * 2.0 + k3[i] * 2.0 + k4[i]) * sixth;
         }
         next
@@ -466,8 +529,9 @@ impl<T: Scalar> Vessels<T> {
                         let outflow = vessel.coefficient.value() * square_root(height);
                         (outflow, height * vessel.area.value())
                     } else {
-                        let outflow = self.outflow(i, level, t).value();
-                        (outflow, level.value() * self.area(i, level).value())
+                        let outflow = self.outflow(i, level, &self.levels, t).value();
+                        let head = self.head(i, level, &self.levels).value();
+                        (outflow, head * self.area(i, level).value())
                     };
                     // Without the division in the common case; an empty vessel has no content and no outflow.
                     if h * outflow > 2.0 * STEP_LIMIT * content {
@@ -478,6 +542,9 @@ impl<T: Scalar> Vessels<T> {
                 Outlet::Linear => most = most.max(0.5 * h * self.slope(i, t).abs()),
             }
         }
+        if let Some(side) = self.side {
+            most = most.max(h * (1.0 + side.share.value()) / side.time_constant.value());
+        }
         most
     }
 
@@ -485,8 +552,10 @@ impl<T: Scalar> Vessels<T> {
     fn slope(&self, i: usize, t: f64) -> f64 {
         let level = self.levels[i];
         let step = 1e-6 * (level.value().abs() + 1e-3);
-        let (low, high) = (self.outflow(i, level, t), self.outflow(i, level + step, t));
-        (high.value() - low.value()) / (step * self.area(i, level).value())
+        let outflow = |level: T| self.outflow(i, level, &self.levels, t).value();
+        let own = (outflow(level + step) - outflow(level)) / (step * self.area(i, level).value());
+        let exchange = |side: Side<T>| side.share.value() / side.time_constant.value();
+        own + self.side.map_or(0.0, exchange)
     }
 
     /// One step that cannot overshoot, whatever its length: implicit in each vessel's own level, of order one.
@@ -495,7 +564,7 @@ impl<T: Scalar> Vessels<T> {
         let mut inflow = q.end;
         for (i, to) in next.iter_mut().enumerate().take(self.vessels.len()) {
             let level = self.levels[i];
-            let (outflow, net) = self.balance(i, level, inflow, t);
+            let (outflow, net) = self.balance(i, inflow, &self.levels, t);
             let slope = self.slope(i, t).max(0.0);
             let damped = 1.0 / (1.0 + h.value() * slope);
             *to = level + self.rate(i, level, net) * h * damped;
@@ -506,10 +575,15 @@ impl<T: Scalar> Vessels<T> {
             *to = (*to).max(T::constant(low)).min(self.vessels[i].rim.level);
             // What left the vessel is what its balance says; the rest of the step it is near its new level.
             inflow = if slope * h.value() > 1.0 {
-                self.outflow(i, *to, t)
+                self.outflow(i, *to, &self.levels, t)
             } else {
                 outflow
             };
+        }
+        if let Some(side) = self.side {
+            let last = self.states - 1;
+            let drawn = h / side.time_constant;
+            next[last] = (next[last] + drawn * next[last - 1]) / (drawn + 1.0);
         }
         if let Some(watch) = watch {
             // The transient is over at once; what is left looks straight.
@@ -531,7 +605,7 @@ impl<T: Scalar> Vessels<T> {
     fn settle_modes(&mut self, q: T, t: f64, released: Option<usize>) {
         let mut inflow = q;
         for i in 0..self.vessels.len() {
-            let (outflow, net) = self.balance(i, self.levels[i], inflow, t);
+            let (outflow, net) = self.balance(i, inflow, &self.levels, t);
             let vessel = &mut self.vessels[i];
             vessel.spilling = self.levels[i].value() >= vessel.rim.level.value()
                 && net.value() > 0.0
@@ -543,8 +617,40 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    /// Moves on by `h` from time `t`; `watch` sees every smooth stretch of the measured level in turn.
-    pub(crate) fn step(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    /// Moves on by `h` from time `start`; `watch` sees every smooth stretch of the measured level in turn.
+    pub(crate) fn step(&mut self, h: T, q: Inflow<T>, start: T, watch: &mut Watch<T>) {
+        let (mut h, mut q, mut start) = (h, q, start);
+        while let Some((law, at)) = self.next_switch(start, h) {
+            let (begin, whole) = (start, h);
+            let first = at - begin;
+            if first.value() >= 0.0 {
+                let share = first / whole;
+                self.stretch(first, q.part(T::constant(0.0), share), begin, watch);
+                (h, start) = (whole - first, at);
+                q = q.part(share, T::constant(1.0));
+            }
+            self.laws[law].switch_over();
+            self.switches.retain(|&waiting| waiting != law);
+        }
+        self.stretch(h, q, start, watch);
+    }
+
+    /// The first law to switch over before the end of a step, and when.
+    fn next_switch(&self, start: T, h: T) -> Option<(usize, T)> {
+        let end = start.value() + h.value();
+        self.switches
+            .iter()
+            .filter_map(|&law| Some((law, self.laws[law].switch()?)))
+            .filter(|(_, at)| at.value() < end)
+            .min_by(|a, b| a.1.value().total_cmp(&b.1.value()))
+    }
+
+    /// A step within which no law switches over.
+    fn stretch(&mut self, h: T, q: Inflow<T>, start: T, watch: &mut Watch<T>) {
+        let zero = T::constant(0.0);
+        let fixed = h.same_derivatives(zero) && start.same_derivatives(zero);
+        self.clock = (!fixed && !self.laws.is_empty()).then_some((start, h));
+        let t = start.value();
         let wanted = self.parts_per_second * h.value();
         if wanted.is_nan() || wanted <= 1.0 {
             self.part(h, q, t, watch);
@@ -617,12 +723,14 @@ impl<T: Scalar> Vessels<T> {
     fn step_with_rims(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let (mut h, mut q, mut t) = (h, q, t);
         let mut released = None;
+        let whole = self.clock;
         // Each vessel can meet its rim and leave it a few times within a step; more is chatter.
         for _ in 0..MOST_EVENTS {
             self.settle_modes(q.start, t, released);
             let next = self.trial(h, q, t);
             let Some(event) = self.first_event(&next, h, q, t) else {
                 self.accept(next, h, q, t, watch);
+                self.clock = whole;
                 return;
             };
             let (Event::Rim(_, part) | Event::Release(_, part)) = event;
@@ -636,12 +744,16 @@ impl<T: Scalar> Vessels<T> {
                 }
                 Event::Release(i, _) => Some(i),
             };
+            // The instant of the event has derivatives, and with it the time from which the rest is counted.
+            let instant = self.time(t) + h * part;
             t += (h * part).value();
             q = q.part(part, T::constant(1.0));
             h = h - h * part;
+            self.clock = Some((instant, h));
         }
         let next = self.trial(h, q, t);
         self.accept(next, h, q, t, watch);
+        self.clock = whole;
     }
 
     fn accept(&mut self, next: Levels<T>, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
@@ -666,13 +778,13 @@ impl<T: Scalar> Vessels<T> {
     fn net(&self, i: usize, levels: &Levels<T>, q: T, t: f64) -> T {
         let mut inflow = q;
         for (k, vessel) in self.vessels.iter().enumerate().take(i) {
-            let (outflow, net) = self.balance(k, levels[k], inflow, t);
+            let (outflow, net) = self.balance(k, inflow, levels, t);
             inflow = outflow;
             if vessel.spilling {
                 inflow = inflow + net * vessel.rim.fraction;
             }
         }
-        self.balance(i, levels[i], inflow, t).1
+        self.balance(i, inflow, levels, t).1
     }
 
     /// The first thing to happen within the step that would lead to `next`, if anything does.

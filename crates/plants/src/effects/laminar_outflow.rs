@@ -35,7 +35,7 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for LaminarOutflow<T> {
-    fn outflow(&self, level: T, nominal: T, _t: f64) -> T {
+    fn outflow(&self, level: T, nominal: T, _t: T) -> T {
         nominal + self.0 * level
     }
 }

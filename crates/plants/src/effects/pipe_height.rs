@@ -1,0 +1,48 @@
+//! `pipe_height`: the outlet pipe leads down, and its height adds to the head that drives the outflow.
+
+use super::{EffectInfo, Place, torricelli_plant};
+use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "pipe_height",
+    place: Place::Vessel,
+    physics: "The outlet pipe leads down: its height adds to the level that drives the outflow.",
+    equation: "Q_out = alpha sqrt(H + h_pipe)",
+    applies: torricelli_plant,
+    parameters,
+    confused_with: &["sensor_offset", "laminar_outflow", "const_leak"],
+    confirm: "Measure from the bottom of the tank down to the open end of the pipe.",
+    source: "E. Torricelli, De motu gravium, 1643.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (low, high) = site.level();
+    let most = low.abs().max(high.abs());
+    vec![ParameterInfo {
+        name: "height",
+        unit: Unit::LEVEL,
+        meaning: "height from the bottom of the tank to the end of the pipe",
+        absent: 0.0,
+        lower: 0.0,
+        // A pipe that is longer than the tank is deep would have been noticed.
+        upper: most,
+        starts: vec![0.1 * most],
+    }]
+}
+
+struct PipeHeight<T>(T);
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    PipeHeight(parameters[0])
+}
+
+impl<T: Scalar> Law<T> for PipeHeight<T> {
+    fn outflow(&self, level: T, nominal: T, _t: T) -> T {
+        // An empty tank lets nothing out, however long its pipe.
+        if level.value() <= 0.0 {
+            return nominal;
+        }
+        // alpha sqrt(H) sqrt(1 + h/H): at h = 0 a factor of exactly one.
+        nominal * (self.0 / level + 1.0).sqrt()
+    }
+}

@@ -6,6 +6,7 @@ mod error;
 mod fit;
 mod levenberg_marquardt;
 mod marginal;
+mod reading_step;
 mod sandwich;
 mod setup;
 mod starts;

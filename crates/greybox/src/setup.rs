@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use ct_signals::{ArModel, Hold, Record};
 use plants::{Command, Dual, MAX_VESSELS, Scalar, Scales, Simulator, Structure};
 
-use crate::{Error, Triangle};
+use crate::{Error, Triangle, reading_step::reading_step};
 
 /// A structure, the records, and which parameters are free.
 ///
@@ -96,6 +96,7 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
     if let Some(range) = input_range {
         scales.input_range = range;
     }
+    scales.reading_step = reading_step(records).unwrap_or(0.0);
     Some(scales)
 }
 

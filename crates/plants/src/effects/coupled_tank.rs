@@ -8,7 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     id: "coupled_tank",
     place: Place::Vessel,
     physics: "Another body of water pushes back: a side tank fills and empties with an only tank; of two tanks the outflow of the upper one feels the lower level.",
-    equation: "one tank: S_b dH_b/dt = c (H - H_b), S dH/dt = ... - c (H - H_b), S_b = share S, c = S_b/T_b; two tanks: the head of the upper outflow is max(H_1 - c H_2, 0)",
+    equation: "one tank: S_b dH_b/dt = c (H - H_b), S dH/dt = ... - c (H - H_b), S_b = share S, c = S_b/T_b; two tanks: the head of the upper outflow is max(H_1 - b H_2, 0)",
     applies: first_vessel,
     parameters,
     confused_with: &["area_varies", "pump_lag"],
@@ -16,9 +16,10 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "K. J. Astrom, A.-B. Ostberg, A teaching laboratory for process control, IEEE Control Systems Magazine 6(5), 1986: coupled tanks.",
 };
 
-/// Below the last vessel there is nothing that could push back on it, but beside an only one.
-fn first_vessel(_: Plant, vessel: usize) -> bool {
-    vessel == 0
+/// Nothing below the last vessel could push back on it, but beside an only one. Two linear tanks that push on each other are two
+/// linear tanks of other time constants, and no data can show it.
+fn first_vessel(plant: Plant, vessel: usize) -> bool {
+    vessel == 0 && plant != Plant::CascadedTanksLinear
 }
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {

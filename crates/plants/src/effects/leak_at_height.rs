@@ -35,8 +35,9 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             unit: Unit::LEVEL,
             meaning: "level from which on it leaks",
             absent: f64::NAN,
-            lower: low,
-            upper: low + 0.98 * span,
+            // Levels that are not measured are known from the believed model alone, which may be off.
+            lower: low - 0.5 * span,
+            upper: high + 0.5 * span,
             starts: spread(low, high, 5),
         },
     ]

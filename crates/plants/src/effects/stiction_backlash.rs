@@ -15,9 +15,9 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "Q. P. He, J. Wang, M. Pottmann, S. J. Qin, A curve fitting method for detecting valve stiction in oscillating control loops, Ind. Eng. Chem. Res. 46, 2007.",
 };
 
-/// Widths that are tried, as shares of the range of the command. The position at one width says nothing of that at another
-/// which is twice as large, and the slope of [`StictionBacklash::position`] reaches a twentieth of a width.
-const WIDTHS: [f64; 6] = [0.02, 0.04, 0.08, 0.14, 0.22, 0.34];
+/// Widths that are tried, as shares of the range of the command: the least, how many, and the factor from one to the next. Where
+/// it sticks the error is in plain sight only within a tenth of the true width, so the grid has to be this fine.
+const WIDTHS: (f64, i32, f64) = (0.03, 15, 1.2);
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.scales.input;
@@ -30,7 +30,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             absent: 0.0,
             lower: 0.0,
             upper: 0.6 * span,
-            starts: WIDTHS.map(|share| share * span).to_vec(),
+            starts: (0..WIDTHS.1).map(|i| WIDTHS.0 * WIDTHS.2.powi(i) * span).collect(),
         },
         ParameterInfo {
             name: "jump",
@@ -64,42 +64,44 @@ impl Element {
     }
 }
 
-/// The slope of a position by its width is zero almost everywhere for an element that slips, and so is that by the jump: the
-/// position changes where a slip is won or lost. The slopes are therefore those of a chord: elements a little narrower and
-/// wider, and of a little less and more jump, follow the same command beside it.
+/// The slope of a position by its width is zero almost everywhere for an element that slips: the position changes where a slip is
+/// won or lost. The slope is therefore that of a chord: an element a little narrower and one a little wider follow the same
+/// command beside it. Which of the two it is, backlash or stiction, is a choice, made by the starts; it has no slope, and
+/// a fit does not move it.
 struct StictionBacklash<T> {
     width: T,
-    jump: T,
-    /// The element itself, the narrower, the wider, that of less and that of more jump.
-    elements: [Element; 5],
+    element: Element,
+    narrower: Element,
+    wider: Element,
     begun: bool,
 }
 
 pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
-    let (width, jump) = (parameters[0], parameters[1]);
-    let (w, j) = (width.value(), jump.value());
+    let (width, jump) = (parameters[0].value(), parameters[1].value());
     let (low, high) = site.scales.input;
     // At no width at all the chord is short and lies on the one side that there is.
-    let reach = (VARIED * w).max(1e-6 * (high - low).abs());
-    let at = |width: f64, jump: f64| Element { width: width.max(0.0), jump: jump.clamp(0.0, 1.0), position: 0.0 };
-    let elements = [at(w, j), at(w - reach, j), at(w + reach, j), at(w, j - VARIED), at(w, j + VARIED)];
-    StictionBacklash { width, jump, elements, begun: false }
+    let reach = (VARIED * width).max(1e-6 * (high - low).abs());
+    let at = |width: f64| Element { width: width.max(0.0), jump, position: 0.0 };
+    StictionBacklash {
+        width: parameters[0],
+        element: at(width),
+        narrower: at(width - reach),
+        wider: at(width + reach),
+        begun: false,
+    }
 }
 
 impl<T: Scalar> Law<T> for StictionBacklash<T> {
     fn position(&mut self, u: f64) -> Option<T> {
-        for element in &mut self.elements {
-            if self.begun {
+        let begun = std::mem::replace(&mut self.begun, true);
+        for element in [&mut self.element, &mut self.narrower, &mut self.wider] {
+            if begun {
                 element.follow(u);
             } else {
                 element.position = u;
             }
         }
-        self.begun = true;
-        let [own, narrower, wider, less, more] = self.elements;
-        let by_width = (wider.position - narrower.position) / (wider.width - narrower.width);
-        let by_jump = (more.position - less.position) / (more.jump - less.jump);
-        let (width, jump) = (self.width - self.width.value(), self.jump - self.jump.value());
-        Some(width * by_width + jump * by_jump + own.position)
+        let chord = (self.wider.position - self.narrower.position) / (self.wider.width - self.narrower.width);
+        Some((self.width - self.width.value()) * chord + self.element.position)
     }
 }

@@ -266,8 +266,8 @@ fn start(setup: &Setup, x: &[f64], base: &Setup, values: &[f64]) -> Vec<f64> {
 /// Within three standard errors in each parameter, with no more error than the noise.
 ///
 /// Two effects have no slope that an error could be had from. What sticks and slips moves in jumps as its width is fitted: its
-/// width is asked to a tenth. A reading in steps leaves whole steps where the level is near an edge: its step is asked to
-/// a thousandth, and half of what it left unexplained.
+/// width is asked to a tenth. A reading in steps errs by whole steps where the level is near an edge, so that much error is
+/// left: its step is asked to a thousandth.
 fn found(case: &Case, outcome: &Outcome) -> bool {
     let within = |share: f64| {
         let truth = case.parameters();
@@ -276,55 +276,54 @@ fn found(case: &Case, outcome: &Outcome) -> bool {
     };
     match (case.id, case.parameters.last()) {
         ("stiction_backlash", Some(1.0)) => within(0.1),
-        ("coarse_quantisation", _) => within(1e-3) && outcome.left < 0.5 * outcome.base,
+        ("coarse_quantisation", _) => within(1e-3) && outcome.left < outcome.base,
         _ => outcome.left < 1.1 && outcome.z.iter().flatten().all(|z| z.abs() < 3.0),
     }
 }
 
-fn table(records: u64) -> Vec<(String, usize)> {
-    let wanted = std::env::var("EFFECT").unwrap_or_default();
+/// How many of so many records are found, for every case whose name contains `wanted`.
+fn table(wanted: &str, records: u64) -> Vec<(String, usize)> {
+    let name = |case: &Case| format!("{}@{} {}", case.id, case.vessel, case.plant.id());
     cases()
         .par_iter()
-        .filter(|case| format!("{}@{} {}", case.id, case.vessel, case.plant.id()).contains(&wanted))
+        .filter(|case| name(case).contains(wanted))
         .map(|case| {
-            let outcomes: Vec<Outcome> = (0..records)
-                .into_par_iter()
-                .map(|k| one(case, 1000 + k))
-                .collect();
-            let hits = outcomes
-                .iter()
-                .filter(|outcome| found(case, outcome))
-                .count();
-            let mut name = format!("{}@{} {}", case.id, case.vessel, case.plant.id());
+            let seeds = (1000..1000 + records).into_par_iter();
+            let outcomes: Vec<Outcome> = seeds.map(|seed| one(case, seed)).collect();
+            let (found, lost): (Vec<_>, Vec<_>) = outcomes.iter().partition(|o| found(case, o));
+            let hits = found.len();
             let mean =
                 |f: fn(&Outcome) -> f64| outcomes.iter().map(f).sum::<f64>() / records as f64;
-            name += &format!(" truth {:?}", case.parameters());
-            println!(
-                "{hits:4} of {records}  base {:.2} left {:.3}  {name}",
-                mean(|o| o.base),
-                mean(|o| o.left)
-            );
-            for outcome in outcomes.iter().filter(|outcome| !found(case, outcome)) {
-                println!(
-                    "      {:.4?} z {:.1?} left {:.3}",
-                    outcome.estimate, outcome.z, outcome.left
-                );
+            let name = format!("{} {:?}", name(case), case.parameters());
+            let (base, left) = (mean(|o| o.base), mean(|o| o.left));
+            println!("{hits:4} of {records}  error/noise {base:.2} -> {left:.3}  {name}");
+            for o in lost {
+                println!("      {:.4?} z {:.1?} left {:.3}", o.estimate, o.z, o.left);
             }
             (name, hits)
         })
         .collect()
 }
 
-/// `cargo test -p greybox --release --test effects -- --ignored --nocapture`
 #[test]
-#[ignore = "takes minutes; the table of the effects that are found again"]
-fn every_effect_is_found_again_from_its_own_starts() {
-    let records = std::env::var("RECORDS").map_or(10, |n| n.parse().unwrap());
-    let table = table(records);
-    for (name, hits) in table {
-        assert!(
-            10 * hits >= 8 * records as usize,
-            "{name}: {hits} of {records}"
-        );
+fn every_effect_of_one_tank_is_found_again_from_its_own_starts() {
+    for (name, hits) in table(" single-tank", 1) {
+        assert_eq!(hits, 1, "{name}");
     }
+}
+
+/// `RECORDS=20 EFFECT=valve_step cargo test -p greybox --test effects -- --ignored --nocapture`; by default ten records of
+/// every case.
+#[test]
+#[ignore = "takes minutes; the table of what is found again"]
+fn most_records_of_every_effect_are_found_again() {
+    let records = std::env::var("RECORDS").map_or(10, |n| n.parse().unwrap());
+    let wanted = std::env::var("EFFECT").unwrap_or_default();
+    let mut missed = Vec::new();
+    for (name, hits) in table(&wanted, records) {
+        if 10 * hits < 8 * records as usize {
+            missed.push(format!("{name}: {hits} of {records}"));
+        }
+    }
+    assert!(missed.is_empty(), "{missed:#?}");
 }

@@ -3,7 +3,7 @@
 use plants::{CATALOGUE, EffectInfo, Place, Placed, Plant};
 
 use crate::look::{Look, Side, table};
-use crate::{Error, model_file, names, numbers};
+use crate::{Error, model_file, names, numbers, signature};
 
 /// The whole catalogue, by place.
 #[must_use]
@@ -69,11 +69,27 @@ pub fn describe(id: &str, look: Look) -> Result<String, Error> {
     text += &entry("confirm", effect.confirm);
     text += &entry("source", effect.source);
     text.push('\n');
+    if let Some(picture) = signature::picture(effect, look) {
+        text += &picture;
+        text.push('\n');
+    }
     text += &entry(
         "add it",
         &format!("ctid add {} --model MODEL.toml", effect.id),
     );
     Ok(text)
+}
+
+/// The traces of all effects as a page of Markdown, for `docs/gallery.md`.
+#[must_use]
+pub fn gallery() -> String {
+    let mut text = String::new();
+    for effect in CATALOGUE {
+        if let Some(picture) = signature::picture(effect, Look::plain()) {
+            text += &format!("### `{}`\n\n```text\n{picture}```\n\n", effect.id);
+        }
+    }
+    text
 }
 
 fn applies_to(effect: &'static EffectInfo) -> impl Iterator<Item = Plant> {

@@ -25,6 +25,7 @@ pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
+mod signature;
 pub mod terminal;
 pub mod tour;
 

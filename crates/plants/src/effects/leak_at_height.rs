@@ -20,6 +20,9 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let span = (high - low).max(f64::MIN_POSITIVE);
     // Half the throughput through a hole that is halfway up would have been seen.
     let whole = site.scales.flow.abs() / (0.5 * span).sqrt();
+    // A level that is not measured is known from the believed model alone, which has its water leave by another way and may have
+    // it far too low.
+    let beyond = if site.is_last() { 0.5 } else { 3.0 } * span;
     vec![
         ParameterInfo {
             name: "coefficient",
@@ -35,9 +38,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             unit: Unit::LEVEL,
             meaning: "level from which on it leaks",
             absent: f64::NAN,
-            // Levels that are not measured are known from the believed model alone, which may be off.
             lower: low - 0.5 * span,
-            upper: high + 0.5 * span,
+            upper: high + beyond,
             starts: spread(low, high, 5),
         },
     ]

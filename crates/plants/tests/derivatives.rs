@@ -149,6 +149,7 @@ fn what_sticks_has_the_slope_of_a_chord_of_a_twentieth() {
             effect: effect("stiction_backlash"),
             vessel: 0,
         };
+        let mut largest = 0.0_f64;
         for (seed, drive) in DRIVES.into_iter().enumerate() {
             let input = input(drive, 200, base.h, 300 + seed as u64);
             for (width, jump) in [(0.61, 0.43), (0.3, 0.9), (0.3, 1.0), (0.8, 0.0)] {
@@ -162,16 +163,15 @@ fn what_sticks_has_the_slope_of_a_chord_of_a_twentieth() {
                 };
                 // A linear plant passes the chord of the position on as it is; what jumps is a choice and has no slope.
                 let (narrow, wide) = (at(0.95 * width), at(1.05 * width));
-                let mut largest = 0.0_f64;
                 for (k, y) in exact.iter().enumerate() {
                     let chord = (wide[k] - narrow[k]) / (0.1 * width);
                     largest = largest.max(chord.abs());
                     assert!((chord - y.eps[own]).abs() < 1e-9, "{drive:?} {k}");
                     assert_eq!(y.eps[own + 1], 0.0);
                 }
-                assert!(largest > 0.1, "it shows");
             }
         }
+        assert!(largest > 0.1, "it shows");
     }
 }
 
@@ -199,6 +199,44 @@ fn a_reading_in_steps_has_the_slope_of_a_whole_step() {
                 y.eps[own + 1..own + 1 + levels],
                 smooth.eps[own..own + levels]
             );
+        }
+    }
+}
+
+#[test]
+fn an_instant_on_a_sample_has_the_derivative_of_its_neighbours() {
+    for plant in Plant::ALL {
+        let base = base(plant);
+        let own = base.theta.len();
+        for vessel in 0..plant.vessels() {
+            let placed = Placed {
+                effect: effect("valve_step"),
+                vessel,
+            };
+            for drive in [DRIVES[0], DRIVES[2]] {
+                let input = input(drive, 120, base.h, 500);
+                let mut case = base.with_interior(&[placed]);
+                let instant = 40.0 * base.h;
+                case.theta[own + 1] = instant;
+                let exact = case.run_dual(&input, 1);
+                let at = |instant: f64| {
+                    let mut moved = case.clone();
+                    moved.theta[own + 1] = instant;
+                    moved.run(&input, 1)
+                };
+                let step = 1e-4 * base.h;
+                let (up, down) = (at(instant + step), at(instant - step));
+                let largest = exact
+                    .iter()
+                    .fold(0.0_f64, |m, y| m.max(y.eps[own + 1].abs()));
+                assert!(largest > 1e-3, "it shows");
+                // The reading at the instant itself has a corner there.
+                for (k, y) in exact.iter().enumerate().filter(|(k, _)| *k != 40) {
+                    let difference = (up[k] - down[k]) / (2.0 * step);
+                    let error = (difference - y.eps[own + 1]).abs();
+                    assert!(error < 1e-5 * largest, "{} {drive:?} {k}", plant.id());
+                }
+            }
         }
     }
 }

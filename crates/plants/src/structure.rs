@@ -149,19 +149,19 @@ impl Structure {
     /// The same structure with one more effect.
     ///
     /// # Errors
-    /// Where the effect is on already, does not act on this plant, or the vessel does not exist.
+    /// Where the effect is on already, does not act on this plant, or not in this vessel.
     pub fn with(&self, placed: Placed) -> Result<Self, Error> {
         let Placed { effect, vessel } = placed;
         if self.effects.iter().any(|on| on.effect.id == effect.id) {
             return Err(Error::EffectTwice { effect: effect.id });
         }
-        if vessel < self.plant.vessels() && !(effect.applies)(self.plant, vessel) {
+        if effect.sites(self.plant).next().is_none() {
             return Err(Error::EffectDoesNotApply {
                 effect: effect.id,
                 plant: self.plant.id(),
             });
         }
-        if vessel >= self.plant.vessels() || (effect.place != Place::Vessel && vessel != 0) {
+        if effect.sites(self.plant).all(|site| site != vessel) {
             return Err(Error::NoSuchVessel {
                 effect: effect.id,
                 plant: self.plant.id(),

@@ -56,6 +56,12 @@ impl EffectInfo {
         CATALOGUE.iter().copied().find(|effect| effect.id == id)
     }
 
+    /// The vessel that it acts in where nobody says which.
+    #[must_use]
+    pub fn usual_site(&'static self, plant: Plant) -> usize {
+        self.sites(plant).next().unwrap_or(0)
+    }
+
     /// The vessels of a plant that it may act in: zero alone for one at the actuator or the sensor, none where it makes no
     /// sense.
     pub fn sites(&'static self, plant: Plant) -> impl Iterator<Item = usize> {

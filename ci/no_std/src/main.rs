@@ -1,8 +1,12 @@
 //! Runs the estimators without std, without an allocator and without libc, and ends with 0 where they are right.
+//! With the feature `heap` also what needs an allocator, on one of the program's own.
 //!
 //! Linux on x86-64 or aarch64. `bash ci/no_std/run` builds and runs it.
 #![no_std]
 #![no_main]
+
+#[cfg(feature = "heap")]
+mod heap;
 
 use core::arch::asm;
 
@@ -17,6 +21,14 @@ enum Failure {
     Health = 3,
     Constraint = 4,
     Projection = 5,
+    #[cfg(feature = "heap")]
+    Filter = 6,
+    #[cfg(feature = "heap")]
+    Positivity = 7,
+    #[cfg(feature = "heap")]
+    RunTimeSize = 8,
+    #[cfg(feature = "heap")]
+    Allocates = 9,
     Panic = 101,
 }
 
@@ -56,6 +68,8 @@ fn check() -> Result<(), Failure> {
     if (constrained.theta()[0] - 1.0).abs() > 1e-9 {
         return Err(Failure::Projection);
     }
+    #[cfg(feature = "heap")]
+    heap::check()?;
     Ok(())
 }
 

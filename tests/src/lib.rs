@@ -1,6 +1,7 @@
 //! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
 
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
+use missing_effect::Problem;
 use plants::{
     Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, controller::Pi,
 };
@@ -92,6 +93,20 @@ impl Rig {
             area,
             tank_height: Some(60.0),
             input_range: Some(10.0),
+        }
+    }
+
+    /// The plant without what is hidden, beside one record.
+    pub fn problem(&self, record: Record) -> Problem {
+        Problem {
+            plant: self.plant,
+            known: self.known(),
+            effects: Vec::new(),
+            start: Default::default(),
+            fixed: Vec::new(),
+            controller: None,
+            records: vec![record],
+            test: Vec::new(),
         }
     }
 

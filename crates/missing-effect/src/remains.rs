@@ -180,3 +180,78 @@ fn period(record: &Record, residual: &[f64], level: f64) -> Result<Option<Remain
         .filter(|(chance, _)| lines.len() as f64 * chance.exp() < level)
         .map(|(_, cycles)| Remains::Period(record.duration() / cycles as f64)))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::panic)]
+    use super::*;
+    use ct_signals::{Hold, Signal, noise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    const SAMPLES: usize = 800;
+
+    fn record() -> Record {
+        Record {
+            name: "r".to_string(),
+            time: (0..SAMPLES).map(|k| 2.0 * k as f64).collect(),
+            input: Signal::new("u", "V", vec![0.0; SAMPLES]),
+            output: Signal::new("y", "cm", vec![0.0; SAMPLES]),
+            reference: None,
+            hold: Hold::Zero,
+        }
+    }
+
+    #[test]
+    fn noise_of_any_colour_has_no_period_and_no_instant() {
+        let record = record();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        // At a level of one in a hundred, 600 series: chance exceeds 15 of them once in a thousand.
+        let (mut periods, mut instants) = (0, 0);
+        for run in 0..600 {
+            let colour = [0.0, 0.8, 0.95][run % 3];
+            let e = noise::ar1(SAMPLES, 0.1, colour, &mut rng);
+            let model = ArModel::from_coefficients(&[colour], 1.0).unwrap();
+            periods += usize::from(period(&record, &e, 0.01).unwrap().is_some());
+            instants += usize::from(instant(&record, &standardised(&model, &e), 0.01).is_some());
+        }
+        assert!(periods <= 15 && instants <= 15, "{periods}, {instants}");
+    }
+
+    #[test]
+    fn a_period_is_found_with_its_length_in_noise_of_its_own_size() {
+        let record = record();
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for wanted in [5.0, 21.3, 160.0, 400.0] {
+            let e: Vec<f64> = noise::white(SAMPLES, 0.1, &mut rng)
+                .into_iter()
+                .zip(&record.time)
+                .map(|(e, t)| e + 0.14 * (2.0 * PI * t / wanted).sin())
+                .collect();
+            let Some(Remains::Period(found)) = period(&record, &e, NOT_NOISE).unwrap() else {
+                panic!("no period of {wanted} s");
+            };
+            // To the width of a line.
+            assert!((1.0 / found - 1.0 / wanted).abs() < 1.0 / record.duration());
+        }
+    }
+
+    #[test]
+    fn an_instant_is_found_where_it_is() {
+        let record = record();
+        let mut white = noise::white(SAMPLES, 1.0, &mut ChaCha8Rng::seed_from_u64(3));
+        white[300] += 8.0;
+        assert_eq!(
+            instant(&record, &white, NOT_NOISE),
+            Some(Remains::Instant(600.0, 2.0))
+        );
+        white[300] -= 8.0;
+        for value in &mut white[500..520] {
+            *value += 2.0;
+        }
+        let Some(Remains::Instant(from, length)) = instant(&record, &white, NOT_NOISE) else {
+            panic!("nothing was found");
+        };
+        assert!((from - 1000.0).abs() < 20.0 && (length - 40.0).abs() < 30.0);
+    }
+}

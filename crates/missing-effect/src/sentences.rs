@@ -39,6 +39,12 @@ fn two_digits(value: f64) -> String {
 
 /// What is left in the residual of a step, as the end of a sentence.
 fn left_over(remains: Remains, step: &Step, diagnosis: &Diagnosis) -> String {
+    // A comparison has not looked into the catalogue.
+    let effect = if diagnosis.scores.is_empty() {
+        "an effect that the model lacks"
+    } else {
+        "an effect outside the catalogue"
+    };
     let (rmse, unit) = (step.rmse, &diagnosis.output_unit);
     let record = diagnosis
         .records
@@ -48,11 +54,11 @@ fn left_over(remains: Remains, step: &Step, diagnosis: &Diagnosis) -> String {
     match remains {
         Remains::Input => format!("the input still shows in the residual of {rmse:.3} {unit} rms"),
         Remains::Period(period) => format!(
-            "the residual of {rmse:.3} {unit} rms swings with a period of about {} s, which noise does not: it may be a disturbance or an effect outside the catalogue",
+            "the residual of {rmse:.3} {unit} rms swings with a period of about {} s, which noise does not: it may be a disturbance or {effect}",
             two_digits(period)
         ),
         Remains::Instant(at, length) => format!(
-            "the residual of {rmse:.3} {unit} rms holds something sudden, {} s, which noise does not: it may be a disturbance, a fault of the sensor or an effect outside the catalogue",
+            "the residual of {rmse:.3} {unit} rms holds something sudden, {} s, which noise does not: it may be a disturbance, a fault of the sensor or {effect}",
             if length > 0.0 {
                 format!("from {at:.0} to {:.0}", at + length)
             } else {
@@ -60,7 +66,7 @@ fn left_over(remains: Remains, step: &Step, diagnosis: &Diagnosis) -> String {
             }
         ),
         Remains::Slow(wander, process) => format!(
-            "the residual of {rmse:.3} {unit} rms wanders more slowly than the process: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or an effect outside the catalogue",
+            "the residual of {rmse:.3} {unit} rms wanders more slowly than the process: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or {effect}",
             if wander < record {
                 format!("{} s", two_digits(wander))
             } else {

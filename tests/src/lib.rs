@@ -39,6 +39,9 @@ pub struct Rig {
     pub samples: usize,
     /// Sampling interval \[s\].
     pub interval: f64,
+    /// What no model tells of: at a time \[s\], what the pump is given beside the command \[V\], and what the sensor
+    /// reads beside the level \[cm\].
+    pub outside: fn(f64) -> (f64, f64),
 }
 
 impl Rig {
@@ -56,6 +59,7 @@ impl Rig {
             drive: Drive::Open,
             samples: 1000,
             interval: 2.0,
+            outside: |_| (0.0, 0.0),
         }
     }
 
@@ -160,12 +164,13 @@ impl Rig {
             Vec::with_capacity(self.samples),
         );
         for k in 0..self.samples {
-            let reading = simulator.read() + e[k];
+            let (unseen, misread) = (self.outside)(k as f64 * self.interval);
+            let reading = simulator.read() + misread + e[k];
             let command = match self.drive {
                 Drive::Open => wanted[k],
                 Drive::Closed => controller.command(wanted[k], reading, self.interval),
             };
-            simulator.advance(Command::held(command), self.interval);
+            simulator.advance(Command::held(command + unseen), self.interval);
             y.push(reading);
             u.push(command);
         }

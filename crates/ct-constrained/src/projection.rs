@@ -19,7 +19,7 @@
 //! Reference: D. Goldfarb, A. Idnani, *A numerically stable dual method for solving strictly convex quadratic programs*,
 //! Mathematical Programming 27 (1983) 1-33.
 
-use ct_rls::{ContinuousRls, RecursiveEstimator};
+use ct_rls::{ContinuousRls, Integrator, RecursiveEstimator};
 use nalgebra::SVector;
 
 use crate::{Error, Relation, Row};
@@ -37,8 +37,8 @@ const STEPS: usize = 20;
 ///
 /// # Errors
 /// [`Error::NoCommonPoint`] where the rows contradict each other; nothing is changed then.
-pub fn project<const P: usize, const R: usize>(
-    rls: &mut ContinuousRls<P>,
+pub fn project<const P: usize, const R: usize, I: Integrator>(
+    rls: &mut ContinuousRls<P, I>,
     rows: &[Row<P>; R],
 ) -> Result<bool, Error> {
     let statement = |i: usize| {
@@ -56,21 +56,12 @@ pub fn project<const P: usize, const R: usize>(
 ///
 /// # Errors
 /// [`Error::Bounds`]; nothing is changed then.
-pub fn project_box<const P: usize>(
-    rls: &mut ContinuousRls<P>,
+pub fn project_box<const P: usize, I: Integrator>(
+    rls: &mut ContinuousRls<P, I>,
     lower: &SVector<f64, P>,
     upper: &SVector<f64, P>,
 ) -> Result<bool, Error> {
-    for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
-        let possible = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
-        if !possible {
-            return Err(Error::Bounds {
-                index,
-                lower,
-                upper,
-            });
-        }
-    }
+    check_box(lower, upper)?;
     let statement = |i: usize| {
         let mut f = SVector::zeros();
         let (entry, sign, bound) = if i < P {
@@ -82,6 +73,23 @@ pub fn project_box<const P: usize>(
         (f, bound, false)
     };
     nearest(rls, 2 * P, statement)
+}
+
+pub(crate) fn check_box<const P: usize>(
+    lower: &SVector<f64, P>,
+    upper: &SVector<f64, P>,
+) -> Result<(), Error> {
+    for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
+        let possible = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
+        if !possible {
+            return Err(Error::Bounds {
+                index,
+                lower,
+                upper,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// An active row.
@@ -146,8 +154,8 @@ fn multiplier_rates<const P: usize>(active: &[Active<P>], n: &SVector<f64, P>) -
 }
 
 /// The dual method; `statement(i)` is `(f, chi, equality)` of `f' theta <= chi`.
-fn nearest<const P: usize>(
-    rls: &mut ContinuousRls<P>,
+fn nearest<const P: usize, I: Integrator>(
+    rls: &mut ContinuousRls<P, I>,
     rows: usize,
     statement: impl Fn(usize) -> (SVector<f64, P>, f64, bool),
 ) -> Result<bool, Error> {
@@ -170,7 +178,7 @@ fn nearest<const P: usize>(
             return Ok(moved);
         };
         last = (row, excess);
-        let (k, s) = rls.factor().times(&f);
+        let (k, s) = rls.times(&f);
         let mut lambda = 0.0;
         loop {
             let r = multiplier_rates(&active[..q], &f);

@@ -72,13 +72,15 @@ fn over_seeds<I: Integrator>(scale: f64) -> Result<(usize, f64), Error> {
 }
 
 fn main() -> Result<(), Error> {
-    println!("| P(0) | Euler's rule fails | median error | exact step fails | median error |");
+    println!(
+        "| P(0) times | Euler's rule fails | median error | exact step fails | median error |"
+    );
     println!("|---|---|---|---|---|");
     for scale in SCALES {
         let (euler, euler_error) = over_seeds::<Euler>(scale)?;
         let (exact, exact_error) = over_seeds::<ExactHold>(scale)?;
         println!(
-            "| x{scale:e} | {euler} of {SEEDS} | {euler_error:.2} | {exact} of {SEEDS} | {exact_error:.2} |"
+            "| {scale:e} | {euler} of {SEEDS} | {euler_error:.2} | {exact} of {SEEDS} | {exact_error:.2} |"
         );
     }
     Ok(())

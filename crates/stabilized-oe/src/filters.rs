@@ -9,10 +9,8 @@
 
 use ct_lti::{Hold, Start, StateVariableFilter};
 
+use crate::derivatives::plausible;
 use crate::{Derivatives, Error, IoSample};
-
-/// An output beyond this is a fault, and taken for a gap.
-const LARGEST: f64 = 1e100;
 
 /// State variable filters for a model of order `N`.
 #[derive(Clone, Debug)]
@@ -42,9 +40,12 @@ impl<const N: usize> Derivatives<N> for StateVariableFilters<N> {
     type Sample = IoSample;
 
     fn take(&mut self, sample: &IoSample, since: f64, inputs: &mut [f64]) -> Option<f64> {
+        if !plausible(sample.u) {
+            return None;
+        }
         self.u.update(sample.u, since).ok()?;
         // the filter of the output runs through gaps on the value before
-        let measured = sample.y.abs() <= LARGEST;
+        let measured = plausible(sample.y);
         let y = if measured { sample.y } else { self.last_y };
         let measured = self.y.update(y, since).is_ok() && measured;
         self.last_y = y;

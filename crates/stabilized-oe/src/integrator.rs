@@ -157,22 +157,20 @@ fn functions<const N: usize>(z: &Matrix<N>) -> (Matrix<N>, Matrix<N>) {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
+    use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
 
     use super::sealed::ModelRule;
     use super::*;
 
     /// The largest difference from `ct_lti`'s simulation, relative to the output's range, over 50 steps.
     fn differs<const N: usize>(times: [f64; N], dt: f64, hold: Hold) -> f64 {
-        let mut whole = alloc::vec![1.0];
+        let mut whole = Polynomial::one();
         for time in times {
-            whole.push(0.0);
-            for i in (1..whole.len()).rev() {
-                whole[i] += time * whole[i - 1];
-            }
+            whole = &whole * &Polynomial::new([1.0, time]).unwrap();
         }
+        let whole = whole.coefficients();
         let a = core::array::from_fn(|i| whole[i + 1]);
-        let plant = TransferFunction::from_coefficients(&[1.0], &whole).unwrap();
+        let plant = TransferFunction::from_coefficients(&[1.0], whole).unwrap();
         let mut plant = Simulator::new(StateSpace::controllable(&plant).unwrap(), hold);
         let mut state = [0.0; N];
         let input = |k: u32| libm::sin(0.7 * f64::from(k)) + if k % 14 < 7 { 1.0 } else { -1.0 };

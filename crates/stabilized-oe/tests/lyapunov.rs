@@ -5,7 +5,7 @@
 mod support;
 
 use ct_constrained::Bounds;
-use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
+use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
 use ct_rls::{ContinuousRls, ExactHold, Guards, RecursiveEstimator, Weights};
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
@@ -24,16 +24,14 @@ struct Plant<const N: usize> {
 impl<const N: usize> Plant<N> {
     fn random(rng: &mut ChaCha8Rng) -> Self {
         // product of (1 + s T)
-        let mut coefficients = vec![1.0];
+        let mut whole = Polynomial::one();
         for _ in 0..N {
             let time: f64 = rng.random_range(0.3..3.0);
-            coefficients.push(0.0);
-            for i in (1..coefficients.len()).rev() {
-                coefficients[i] += time * coefficients[i - 1];
-            }
+            whole = &whole * &Polynomial::new([1.0, time]).unwrap();
         }
+        let coefficients = whole.coefficients();
         let b = rng.random_range(0.5..2.0);
-        let system = TransferFunction::from_coefficients(&[b], &coefficients).unwrap();
+        let system = TransferFunction::from_coefficients(&[b], coefficients).unwrap();
         let system = StateSpace::controllable(&system).unwrap();
         Self {
             a: core::array::from_fn(|i| coefficients[i + 1]),

@@ -57,9 +57,9 @@ fn corners_decide<const N: usize>(seed: u64, cases: usize, spread: f64) -> [usiz
         // (1 + s)^N, roughly, and C near it
         let mut a = [0.0; N];
         let mut binomial = 1.0;
-        for i in 0..N {
+        for (i, a) in a.iter_mut().enumerate() {
             binomial *= (N - i) as f64 / (i + 1) as f64;
-            a[i] = binomial * rng.random_range(0.8..1.25);
+            *a = binomial * rng.random_range(0.8..1.25);
         }
         let lower = a.map(|a| a * (1.0 - spread * rng.random_range(0.0..1.0)));
         let upper = a.map(|a| a * (1.0 + spread * rng.random_range(0.0..1.0)));

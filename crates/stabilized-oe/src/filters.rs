@@ -6,6 +6,9 @@
 //!
 //! Assumption: the input is held between samples, the output runs on lines. Noise passes the filter: it no longer is white, and
 //! `c^` goes elsewhere; bounds on it matter all the same.
+//!
+//! Accuracy: of second order in the step for `m < n`. For `m = n` the highest derivative of `u_f` jumps with `u`, and the line that the
+//! model takes it for is of first order: 1 % for n = 1 and a step of a fortieth of the time constant.
 
 use ct_lti::{Hold, Start, StateVariableFilter};
 

@@ -92,3 +92,20 @@ fn bad_boxes_are_refused_with_their_numbers() {
         assert!(unit_box().kept_by(Keep::Penalty { weight }).is_err());
     }
 }
+
+/// The estimate at a bound of 0 is no measure of its own rounding: it must not be chased down to the smallest numbers.
+#[test]
+fn a_bound_of_zero_is_kept_exactly() {
+    let positive = Bounds::new([0.0; 3], [f64::INFINITY; 3]).unwrap();
+    let weights = Weights::least_squares(0.01).unwrap();
+    for k in 1..2000 {
+        let k = f64::from(k);
+        let theta = SVector::from([-1e-3 * k, 0.3 / k, (k * 0.7).sin()]);
+        let r = 0.9 * (0.1 * k).sin();
+        let p = matrix![1.0, r, 0.1; r, 1.0, 0.2 * r; 0.1, 0.2 * r, k];
+        let mut rls = ContinuousRls::<3>::new(theta, p, weights).unwrap();
+        assert_eq!(positive.enforce(&mut rls, 0.1), Ok(true));
+        assert!(positive.contains(rls.theta()), "{}", rls.theta());
+        assert_eq!(positive.enforce(&mut rls, 0.1), Ok(false));
+    }
+}

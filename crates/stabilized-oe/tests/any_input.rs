@@ -49,6 +49,8 @@ fn survives<const N: usize, const P: usize, D: Derivatives<N, Sample = IoSample>
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     #[test]
     fn estimates_stay_numbers(
         record in prop::collection::vec((any_number(), any_number(), any_step()), 1..60),

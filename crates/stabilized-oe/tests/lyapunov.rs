@@ -180,7 +180,7 @@ fn block_distance<const N: usize, const P: usize>(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn full(seed: u64, p0 in -3.0..3.0f64, ratio in 0.0..1.95f64, eta in 0.0..0.05f64) {

@@ -13,6 +13,7 @@ use core::arch::asm;
 use ct_constrained::{ConstrainedRls, Row, project_box};
 use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};
 use nalgebra::{SMatrix, SVector};
+use stabilized_oe::{BlockDiagonal, IoSample, LateDifference, StabilizedOe};
 
 /// What ended the program, as its exit code.
 enum Failure {
@@ -29,6 +30,7 @@ enum Failure {
     RunTimeSize = 8,
     #[cfg(feature = "heap")]
     Allocates = 9,
+    OutputError = 10,
     Panic = 101,
 }
 
@@ -68,8 +70,42 @@ fn check() -> Result<(), Failure> {
     if (constrained.theta()[0] - 1.0).abs() > 1e-9 {
         return Err(Failure::Projection);
     }
+    output_error()?;
     #[cfg(feature = "heap")]
     heap::check()?;
+    Ok(())
+}
+
+/// A lag of 10 s and a gain of 2, from 5 s and 1.
+fn output_error() -> Result<(), Failure> {
+    let weights = Weights::least_squares(0.01).map_err(|_| Failure::Settings)?;
+    let theta = ContinuousRls::with_integrator(
+        SVector::from([5.0, 1.0]),
+        SMatrix::from_diagonal(&SVector::from([10.0, 1.0])),
+        weights,
+    );
+    let filter = ContinuousRls::with_integrator(
+        SVector::from([10.0]),
+        SMatrix::identity(),
+        Weights::least_squares(0.0).map_err(|_| Failure::Settings)?,
+    );
+    let gain = BlockDiagonal::<1, 2>::new(
+        theta.map_err(|_| Failure::Settings)?,
+        filter.map_err(|_| Failure::Settings)?,
+    );
+    let mut estimator =
+        StabilizedOe::new(gain, LateDifference::<3>::new()).map_err(|_| Failure::Settings)?;
+    // 1 - e^(-dt/10)
+    let (dt, share, mut y) = (0.5, 0.048_770_575_499_285_99, 0.0);
+    for k in 0..4000 {
+        let u = if k % 120 < 60 { 1.0 } else { -1.0 };
+        estimator.update(&IoSample { u, y }, dt);
+        y += share * (2.0 * u - y);
+    }
+    let theta = estimator.theta();
+    if (theta[0] - 10.0).abs() > 0.1 || (theta[1] - 2.0).abs() > 0.02 {
+        return Err(Failure::OutputError);
+    }
     Ok(())
 }
 

@@ -159,8 +159,8 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
             }
         }
         for row in &self.rows {
-            if row.relation() != Relation::Equal && row.violation(self.rls.theta()) != 0.0 {
-                self.rls.relax(row.f(), row.chi(), row.weight() * dt);
+            if row.relation() != Relation::Equal {
+                row.penalize(&mut self.rls, dt);
             }
         }
         innovation

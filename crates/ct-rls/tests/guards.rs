@@ -226,10 +226,30 @@ fn bad_settings_are_refused_with_their_numbers() {
         guarded(1.9, 0.0),
         Err(Error::TraceAboveLimit { .. })
     ));
-    for (limit, silent) in [(0.0, 0.0), (f64::NAN, 0.0), (10.0, -1.0), (10.0, f64::NAN)] {
+    for (limit, silent) in [
+        (0.0, 0.0),
+        (f64::NAN, 0.0),
+        (10.0, f64::NEG_INFINITY),
+        (10.0, f64::NAN),
+    ] {
         assert!(matches!(guarded(limit, silent), Err(Error::Guard { .. })));
     }
     assert!(guarded(f64::INFINITY, 0.0).is_ok());
+}
+
+#[test]
+fn below_zero_even_an_exact_silence_is_forgotten_in() {
+    let silent = Sample::new([0.0, 0.0], 0.0);
+    for (silent_below, grows) in [(0.0, false), (-1.0, true)] {
+        let guards = Guards {
+            trace_limit: f64::INFINITY,
+            silent_below,
+        };
+        let mut rls = estimator(0.1).with_guards(guards).unwrap();
+        let before = rls.factor().trace();
+        rls.update(&silent, 1.0);
+        assert_eq!(rls.factor().trace() > before, grows);
+    }
 }
 
 #[test]

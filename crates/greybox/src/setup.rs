@@ -530,6 +530,9 @@ impl<'a> Setup<'a> {
 
     /// The scales that a simulation shows: levels of every vessel and the throughput.
     ///
+    /// A level that is not measured is what the model makes it, a wrong model several times too high or too low: its
+    /// range reaches down to an empty vessel.
+    ///
     /// # Errors
     /// As [`Setup::simulate`].
     pub fn scales_at(&self, x: &[f64]) -> Result<Scales, Error> {
@@ -539,7 +542,12 @@ impl<'a> Setup<'a> {
         for vessel in 0..plant.vessels() {
             let (low, high) = simulated.level[vessel];
             if low.is_finite() && high.is_finite() && high > low {
-                scales.level[vessel] = (low, high);
+                let measured = vessel + 1 == plant.vessels();
+                scales.level[vessel] = if measured {
+                    (low, high)
+                } else {
+                    (low.min(0.0), high.max(0.0))
+                };
                 scales.operating_level[vessel] = simulated.mean_level[vessel];
             }
         }

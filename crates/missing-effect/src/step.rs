@@ -6,7 +6,8 @@ use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
 use crate::{
     Error, Parameter, ResidualTests, Step,
     locate::{Series, locate},
-    noise_floor::{NOISE_ORDER, input_p},
+    noise_floor::NOISE_ORDER,
+    remains::input_p,
     search::Node,
 };
 

@@ -735,6 +735,10 @@ impl<T: Scalar> Vessels<T> {
             };
             let (Event::Rim(_, part) | Event::Release(_, part)) = event;
             let first = q.part(T::constant(0.0), part);
+            // The instant of the event has derivatives, and with it every time of the step that leads there and the one from which
+            // the rest is counted.
+            let begin = self.time(t);
+            self.clock = Some((begin, h * part));
             let there = self.trial(h * part, first, t);
             self.accept(there, h * part, first, t, watch);
             released = match event {
@@ -744,8 +748,7 @@ impl<T: Scalar> Vessels<T> {
                 }
                 Event::Release(i, _) => Some(i),
             };
-            // The instant of the event has derivatives, and with it the time from which the rest is counted.
-            let instant = self.time(t) + h * part;
+            let instant = begin + h * part;
             t += (h * part).value();
             q = q.part(part, T::constant(1.0));
             h = h - h * part;

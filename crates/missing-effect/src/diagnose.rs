@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use crate::{
     Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step, Verdict,
     confirm::{BIC_MARGIN, beyond_chance, confirm, least_useful},
-    noise_floor::{NOISE_ORDER, colour, residual_colour, slowness, wanders},
+    noise_floor::{NOISE_ORDER, bic_in_colour, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
     remains::remains,
     scores::scores,
-    search::{Breadth, Node, exchanges, grow, refine, singles},
+    search::{Breadth, Node, exchanges, grow, refine, singles, without_clock},
     sentences, step,
     trail::trail,
 };
@@ -100,9 +100,15 @@ pub fn diagnose(
 
     // The richest model in play, by simulation error; its residual gives the noise.
     let white = ArModel::white(1.0);
-    let sizes = grow(&base, &white, breadth, pays, &|done, total| {
+    // While the colour is not known, a coloured noise would pay for one effect after the other: what counts is what remains of
+    // the gain where each model has the colour of its own residual.
+    let pays_in_colour = |before: &Node, after: &Node| {
+        let fall = || Ok::<_, Error>(bic_in_colour(before)? - bic_in_colour(after)?);
+        pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
+    };
+    let sizes = grow(&base, &white, breadth, pays_in_colour, &|done, total| {
         tell("searching sets of effects", done, total)
-    });
+    })?;
     let richest = chosen(&sizes, &base);
     let richest = refine(&richest, &white, &[])?;
     let noise = colour(&richest)?;
@@ -118,7 +124,7 @@ pub fn diagnose(
         // The noise's colour is known now: the search is repeated in its metric.
         let sizes = grow(&base_noise, &noise, breadth, pays, &|done, total| {
             tell("searching in the noise's metric", done, total);
-        });
+        })?;
         let other = confirm(refine(&chosen(&sizes, &base_noise), &noise, &[])?, &noise)?;
         if other.fit.bic() < confirmed.fit.bic() {
             confirmed = other;
@@ -134,6 +140,11 @@ pub fn diagnose(
     )?;
     if !confirmed.added.is_empty() && own_base.bic() - own_last.bic() < BIC_MARGIN {
         confirmed = base_noise.clone();
+    }
+    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise.
+    let by_clock = confirmed.added.iter().any(|placed| placed.effect.by_clock);
+    if by_clock && remains(&confirmed, &own_last)?.is_some() {
+        confirmed = confirm(without_clock(&confirmed, &noise)?, &noise)?;
     }
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;

@@ -83,6 +83,11 @@ const FOLLOWED: usize = 2;
 
 /// A rough fit this near in the criterion may come within a group's margin.
 const NEAR: f64 = 25.0;
+/// Effects of a set that follow the clock alone. One plant may well have two; three drifts, swings and steps are a series that
+/// fits any course of time, whatever made it.
+const BY_CLOCK: usize = 2;
+/// Sets are one where what they explain differs by less than this part of it.
+const SAME_TAKEN: f64 = 0.15;
 /// Stand-ins that are refitted for each effect, the most promising first.
 const EXCHANGED: usize = 6;
 
@@ -189,15 +194,59 @@ fn realise<'a>(proposal: Proposal<'a>, noise: &ArModel, stopping: Stopping) -> O
 
 /// All single extensions of a node, refitted, best first.
 pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Node<'a>> {
-    let mut nodes: Vec<Node> = parent
-        .setup
-        .structure
-        .candidates()
+    let mut nodes: Vec<Node> = candidates(parent)
         .into_par_iter()
         .filter_map(|placed| realise(propose(parent, placed, noise)?, noise, ROUGH))
         .collect();
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
+}
+
+/// What may be added to a set.
+fn candidates(parent: &Node) -> Vec<Placed> {
+    let mut candidates = parent.setup.structure.candidates();
+    let on = parent.setup.structure.effects().iter();
+    if on.filter(|placed| placed.effect.by_clock).count() >= BY_CLOCK {
+        candidates.retain(|placed| !placed.effect.by_clock);
+    }
+    candidates
+}
+
+/// The best sets that say different things, best first.
+///
+/// Two sets that take nearly the same out of the base's residual are one under two names (a dead zone and a leak, say), and
+/// what is added to the one makes what is added to the other. Grown side by side they would fill the beam.
+fn distinct<'n, 'a>(
+    base: &Node<'a>,
+    nodes: &'n [Node<'a>],
+    most: usize,
+) -> Result<Vec<&'n Node<'a>>, Error> {
+    let residual = |node: &Node| Ok::<_, Error>(node.setup.residuals(&node.fit.x)?.concat());
+    let before = residual(base)?;
+    let mut chosen: Vec<(&Node, Vec<f64>)> = Vec::new();
+    for node in nodes {
+        let taken: Vec<f64> = residual(node)?
+            .iter()
+            .zip(&before)
+            .map(|(after, before)| before - after)
+            .collect();
+        let size = squares(taken.iter().copied());
+        let named = chosen.iter().any(|(_, other)| {
+            let apart = squares(taken.iter().zip(other).map(|(a, b)| a - b));
+            apart < SAME_TAKEN.powi(2) * size
+        });
+        if !named {
+            chosen.push((node, taken));
+        }
+        if chosen.len() == most {
+            break;
+        }
+    }
+    Ok(chosen.into_iter().map(|(node, _)| node).collect())
+}
+
+fn squares(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(|value| value * value).sum()
 }
 
 /// Grows sets of effects from a base; the best sets of every size, best first within a size.
@@ -207,7 +256,7 @@ pub(crate) fn grow<'a>(
     breadth: Breadth,
     worth: impl Fn(&Node, &Node) -> bool,
     progress: &(dyn Fn(usize, usize) + Sync),
-) -> Vec<Vec<Node<'a>>> {
+) -> Result<Vec<Vec<Node<'a>>>, Error> {
     let mut sizes: Vec<Vec<Node<'a>>> = vec![vec![base.clone()]];
     let mut idle = 0;
     for size in 1..=breadth.most {
@@ -221,8 +270,8 @@ pub(crate) fn grow<'a>(
         };
         let mut wanted: Vec<(&Node, Placed)> = Vec::new();
         let mut seen = std::collections::HashSet::new();
-        for parent in parents.iter().take(width) {
-            for placed in parent.setup.structure.candidates() {
+        for parent in distinct(base, parents, width)? {
+            for placed in candidates(parent) {
                 let mut added = parent.added.clone();
                 added.push(placed);
                 if seen.insert(key(&added)) {
@@ -263,7 +312,7 @@ pub(crate) fn grow<'a>(
         }
     }
     progress(breadth.most, breadth.most);
-    sizes
+    Ok(sizes)
 }
 
 /// Fits a node's structure anew to the end, from where it is and from the given further starts.
@@ -298,6 +347,15 @@ pub(crate) fn without<'a>(
     Ok(Node { setup, fit, added })
 }
 
+/// The node without its effects that follow the clock alone, refitted from where it was.
+pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+    let mut node = node.clone();
+    while let Some(position) = node.added.iter().position(|placed| placed.effect.by_clock) {
+        node = without(&node, position, noise)?;
+    }
+    Ok(node)
+}
+
 /// The node with one of its effects exchanged for each other candidate, refitted, best first.
 pub(crate) fn exchanges<'a>(
     node: &Node<'a>,
@@ -306,10 +364,7 @@ pub(crate) fn exchanges<'a>(
 ) -> Result<Vec<Node<'a>>, Error> {
     let lacking = without(node, position, noise)?;
     let own = node.added[position];
-    let mut proposals: Vec<Proposal> = lacking
-        .setup
-        .structure
-        .candidates()
+    let mut proposals: Vec<Proposal> = candidates(&lacking)
         .into_par_iter()
         .filter(|placed| *placed != own)
         .filter_map(|placed| propose(&lacking, placed, noise))

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "area_varies",
     place: Place::Vessel,
+    by_clock: false,
     physics: "The vessel widens or narrows with the level, as a cone does.",
     equation: "S(H) = S (1 + c (H - H_op)/H_op)^2",
     applies: any_plant,

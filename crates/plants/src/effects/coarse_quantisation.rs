@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "coarse_quantisation",
     place: Place::Sensor,
+    by_clock: false,
     physics: "The reading moves in steps: a coarse converter, a float switch with many contacts, digits that were cut off.",
     equation: "y = D round(H/D)",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "const_leak",
     place: Place::Vessel,
+    by_clock: false,
     physics: "A constant flow leaves the vessel beside the outlet: a leak, or a consumer that nobody recorded.",
     equation: "S dH/dt = ... - q0",
     applies: any_plant,

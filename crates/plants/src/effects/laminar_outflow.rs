@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "laminar_outflow",
     place: Place::Vessel,
+    by_clock: false,
     physics: "A part of the outflow is laminar and grows in proportion to the level, as through a long thin pipe.",
     equation: "Q_out = a H + b sqrt(H)",
     applies: torricelli_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "leak_at_height",
     place: Place::Vessel,
+    by_clock: false,
     physics: "Water leaves through a hole in the wall, or over a side outlet, once the level stands above it.",
     equation: "S dH/dt = ... - c sqrt(max(H - h_leak, 0))",
     applies: any_plant,

@@ -33,6 +33,8 @@ pub struct EffectInfo {
     pub id: &'static str,
     /// Where it acts.
     pub place: Place,
+    /// It follows the time alone, whatever the command and the level do. Such effects fit courses of any origin.
+    pub by_clock: bool,
     /// Its physics in a sentence.
     pub physics: &'static str,
     /// Its equation.

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "periodic_disturbance",
     place: Place::Vessel,
+    by_clock: true,
     physics: "A flow that nobody measures comes and goes with a period: a consumer that switches, a pump that pulsates.",
     equation: "S dH/dt = ... + A sin(2 pi t/P + phi) = ... + s sin(2 pi t/P) + c cos(2 pi t/P); A = sqrt(s^2 + c^2), phi = atan2(c, s)",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Plant, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pipe_height",
     place: Place::Vessel,
+    by_clock: false,
     physics: "The outlet pipe leads down: its height adds to the level that drives the outflow.",
     equation: "Q_out = alpha sqrt(H + h_pipe)",
     applies: measured_vessel,

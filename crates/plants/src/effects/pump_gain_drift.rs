@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pump_gain_drift",
     place: Place::Actuator,
+    by_clock: true,
     physics: "The pump delivers more or less for the same command as the record goes on: it wears, or it warms up and settles.",
     equation: "k(t) = k (1 + r (1 - exp(-t/T_w))/(1 - exp(-T_rec/T_w))); T_w above T_rec: k (1 + r t/T_rec)",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "sensor_drift",
     place: Place::Sensor,
+    by_clock: true,
     physics: "The zero of the sensor drifts over the record, with temperature or with dirt.",
     equation: "y = H + D t/T_rec",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "sensor_nonlinearity",
     place: Place::Sensor,
+    by_clock: false,
     physics: "The reading bends away from the level; it is right when empty and at the highest level.",
     equation: "y = H + g H (H/h_range - 1), h_range the highest level of the record",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "stiction_backlash",
     place: Place::Actuator,
+    by_clock: false,
     physics: "What the command moves has play, or sticks until the command has moved on far enough and then slips.",
     equation: "pos stays while |u - pos| <= w (1 + j)/2, else pos = u - sign(u - pos) w (1 - j)/2; j = 0: backlash of width w, j = 1: stiction, it moves only when |u - pos| > w",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "valve_drift",
     place: Place::Vessel,
+    by_clock: true,
     physics: "The outlet slowly clogs, or opens, over the record.",
     equation: "Q_out(t) = (1 + r t/T_rec) Q_out; clogging: r < 0",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "valve_step",
     place: Place::Vessel,
+    by_clock: true,
     physics: "At one instant the outlet changes: somebody turned the valve, or something lodged in it.",
     equation: "Q_out(t) = (1 + s) Q_out from t_s on",
     applies: any_plant,

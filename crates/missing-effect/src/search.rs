@@ -78,6 +78,8 @@ const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
+/// Damping of the step that a promise takes, against what the data do not determine.
+const PROMISE_DAMPING: f64 = 1e-6;
 /// Starts of a new effect that are followed down, the most promising of its grid.
 const FOLLOWED: usize = 2;
 
@@ -89,7 +91,7 @@ const BY_CLOCK: usize = 2;
 /// Sets are one where what they explain differs by less than this part of it.
 const SAME_TAKEN: f64 = 0.15;
 /// Stand-ins that are refitted for each effect, the most promising first.
-const EXCHANGED: usize = 6;
+const EXCHANGED: usize = 12;
 
 /// A child's starts: the parent's vector, with the new effect's parameters on the grid of its starts.
 fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
@@ -138,12 +140,15 @@ fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
         .collect()
 }
 
-/// The cost after one damped step from a start, as the linearised model predicts it.
+/// The cost after one step from a start, as the linearised model predicts it.
+///
+/// The step is hardly damped: an effect that the other parameters nearly imitate takes long steps in both, and a damped one would
+/// leave the start's own error in the promise.
 fn promise(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<f64> {
     let triangle = setup.linearise(x, noise)?;
     let free: Vec<usize> = (0..setup.free().len()).collect();
     let scale: Vec<f64> = free.iter().map(|&j| triangle.column_norm(j)).collect();
-    let mut step = triangle.solve(&free, &scale, 1e-2);
+    let mut step = triangle.solve(&free, &scale, PROMISE_DAMPING);
     for (d, &i) in step.iter_mut().zip(setup.free()) {
         let (lower, upper) = setup.bounds()[i];
         let lower = if lower > 0.0 {

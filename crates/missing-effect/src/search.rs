@@ -73,6 +73,11 @@ const ROUGH: Stopping = Stopping {
     evaluations: 20,
     cost: 1e-3,
 };
+/// Which of many are worth a first fit.
+const QUICK: Stopping = Stopping {
+    evaluations: 5,
+    cost: 1e-3,
+};
 /// What a fit is taken to once its structure has a name.
 const FINE: Stopping = Stopping {
     evaluations: 80,
@@ -326,9 +331,18 @@ pub(crate) fn refine<'a>(
     noise: &ArModel,
     more: &[Vec<f64>],
 ) -> Result<Node<'a>, Error> {
+    fitted(node, noise, FINE, more)
+}
+
+fn fitted<'a>(
+    node: &Node<'a>,
+    noise: &ArModel,
+    stopping: Stopping,
+    more: &[Vec<f64>],
+) -> Result<Node<'a>, Error> {
     let mut starts = vec![node.fit.x.clone()];
     starts.extend_from_slice(more);
-    let fit = fit_from(&node.setup, &starts, noise, FINE)?;
+    let fit = fit_from(&node.setup, &starts, noise, stopping)?;
     Ok(Node {
         setup: node.setup.clone(),
         fit,
@@ -369,16 +383,21 @@ pub(crate) fn exchanges<'a>(
 ) -> Result<Vec<Node<'a>>, Error> {
     let lacking = without(node, position, noise)?;
     let own = node.added[position];
-    let mut proposals: Vec<Proposal> = candidates(&lacking)
+    let proposals: Vec<Proposal> = candidates(&lacking)
         .into_par_iter()
         .filter(|placed| *placed != own)
         .filter_map(|placed| propose(&lacking, placed, noise))
         .collect();
-    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
-    proposals.truncate(EXCHANGED);
-    let mut nodes: Vec<Node> = proposals
+    // A promise is that of a straight line; where a time constant or a threshold bends it, only a few steps show what it is worth.
+    let mut begun: Vec<Node> = proposals
         .into_par_iter()
-        .filter_map(|proposal| realise(proposal, noise, ROUGH))
+        .filter_map(|proposal| realise(proposal, noise, QUICK))
+        .collect();
+    begun.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+    begun.truncate(EXCHANGED);
+    let mut nodes: Vec<Node> = begun
+        .into_par_iter()
+        .filter_map(|node| fitted(&node, noise, ROUGH, &[]).ok())
         .map(|rough| {
             // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
             if rough.fit.bic() - node.fit.bic() < NEAR {

@@ -174,14 +174,33 @@ pub enum Error {
         /// Its index.
         index: usize,
     },
-    /// The simulation left the range of numbers.
+    /// Parameters that the data do not tell apart.
     #[error(
-        "{record}: the simulated loop is not finite at sample {index}; check the units of the signals"
+        "{samples} samples do not determine {parameters} parameters: a combination of them leaves the output as it is; lower the orders, or excite the loop more"
     )]
-    NotFiniteSimulation {
-        /// The record's name.
-        record: String,
-        /// The sample.
-        index: usize,
+    NotDetermined {
+        /// Parameters, estimated levels included.
+        parameters: usize,
+        /// Samples in all records.
+        samples: usize,
     },
+    /// Noise of another length than r.
+    #[error("the noise has {found} samples but r has {expected}; give one for each")]
+    NoiseLength {
+        /// Samples of r.
+        expected: usize,
+        /// Samples of the noise.
+        found: usize,
+    },
+    /// A loop with a sampled controller that is not stable.
+    #[error(
+        "the loop with a controller sampled every {period} has left the range of numbers; sample it faster, or lower its gain"
+    )]
+    Diverged {
+        /// The controller's period \[time\].
+        period: f64,
+    },
+    /// The simulation left the range of numbers.
+    #[error("the loop simulated at the start is not finite; check the units of the signals and the start")]
+    NotFiniteSimulation,
 }

@@ -1,0 +1,261 @@
+//! What the residual is made of, and what its colour does to the standard errors.
+//!
+//! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, and behind it, for noise that
+//! circulates in the loop, `F = A S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo,
+//! Habbadi, (13)). No autoregression of modest order stands for F: with an integrator in S it has a zero at frequency 0,
+//! just where the sensitivities of a slow experiment live, and standard errors without it are too large.
+//!
+//! Method: the residual is whitened with both, F inverted exactly from sample to sample, `w = F^-1 v`, and an
+//! autoregression fitted to what is left; the one with the smaller Bayesian information criterion stays. Where S has
+//! a root at 0, the constant that F cannot see is removed from w.
+//!
+//! ```text
+//! cov(theta) = (J'J)^-1 J' V J (J'J)^-1,     (J'VJ) = sum_{k,l} R(k-l) s_k s_l',   R the autocovariance of v
+//! R(0) = C Sigma C' + D^2,  R(j) = C A^{j-1} G,  G = A Sigma C' + B D,  Sigma = A Sigma A' + B B'     (sigma^2 = 1)
+//! ```
+//! so that the double sum is one filter of the sensitivities, `f_k = sum_{l<k} R(k-l) s_l`, and J'VJ = sum
+//! `R(0) s s' + s f' + f s'`: no more memory for a longer record.
+//!
+//! Cost: `q nu^2` products a sample, for q columns and nu states of H.
+//!
+//! Reference: P. J. Huber, Proc. 5th Berkeley Symposium 1 (1967) 221-233, for the form of the covariance.
+
+use ct_lti::{Hold, StateSpace};
+use ct_signals::ArModel;
+use serde::Serialize;
+
+use crate::{ClosedLoop, Error};
+
+/// Where the noise enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoisePath {
+    /// On the record: the controller does not see it.
+    Record,
+    /// In the loop: the residual is `A S/P w`.
+    Loop,
+}
+
+/// A model of the residual.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoiseModel {
+    /// Where the noise enters.
+    pub path: NoisePath,
+    /// The noise there.
+    pub ar: ArModel,
+}
+
+impl NoiseModel {
+    /// The better of the two paths for the residuals of all records, each with its sampling interval; or `path`.
+    pub(crate) fn of_residuals(
+        residuals: &[(f64, Vec<f64>)],
+        closed: &ClosedLoop,
+        path: Option<NoisePath>,
+        max_order: usize,
+    ) -> Result<Self, Error> {
+        let fit = |series: &[Vec<f64>]| -> Result<(f64, ArModel), Error> {
+            let segments: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
+            let ar = ArModel::fit(&segments, max_order)?;
+            let n: usize = segments.iter().map(|s| s.len()).sum();
+            let squares = |s: &&[f64]| ar.whiten(s).iter().map(|w| w * w).sum::<f64>();
+            let sum: f64 = segments.iter().map(squares).sum();
+            let log_det: f64 = segments.iter().map(|s| ar.log_det(s.len())).sum();
+            let n = n as f64;
+            let bic = n * (sum / n).max(f64::MIN_POSITIVE).ln() + log_det + ar.order() as f64 * n.ln();
+            Ok((bic, ar))
+        };
+        let plain: Vec<Vec<f64>> = residuals.iter().map(|(_, e)| e.clone()).collect();
+        let on_record = fit(&plain)?;
+        let unfiltered = match path {
+            Some(NoisePath::Record) => None,
+            _ => unfiltered(residuals, closed)?,
+        };
+        let in_loop = unfiltered.map(|series| fit(&series)).transpose()?;
+        Ok(match in_loop {
+            Some((bic, ar)) if path.is_some() || bic < on_record.0 => Self {
+                path: NoisePath::Loop,
+                ar,
+            },
+            _ => Self {
+                path: NoisePath::Record,
+                ar: on_record.1,
+            },
+        })
+    }
+}
+
+/// `w = F^-1 v` for each record; none where that grows without bound: a plant that is unstable without its controller.
+fn unfiltered(
+    residuals: &[(f64, Vec<f64>)],
+    closed: &ClosedLoop,
+) -> Result<Option<Vec<Vec<f64>>>, Error> {
+    let of_w = closed.disturbance()?;
+    let blind = of_w.numerator().coefficient(0) == 0.0;
+    let system = StateSpace::controllable(&of_w)?;
+    let mut all = Vec::with_capacity(residuals.len());
+    for (step, v) in residuals {
+        let sampled = system.sampled(Hold::Zero, *step)?;
+        let mut x = vec![0.0; system.order()];
+        let mut w: Vec<f64> = Vec::with_capacity(v.len());
+        for v in v {
+            let own = (v - system.output(&x, 0.0)) / system.d();
+            let rows = sampled.phi.chunks_exact(x.len().max(1)).zip(&sampled.g0);
+            x = rows.map(|(row, g)| dot(row, &x) + g * own).collect();
+            w.push(own);
+        }
+        let size = |s: &[f64]| s.iter().map(|s| s * s).sum::<f64>();
+        if blind {
+            let mean = w.iter().sum::<f64>() / w.len().max(1) as f64;
+            w.iter_mut().for_each(|w| *w -= mean);
+        }
+        let grown = size(&w);
+        if !(grown.is_finite() && grown <= 1e8 * size(v)) {
+            return Ok(None);
+        }
+        all.push(w);
+    }
+    Ok(Some(all))
+}
+
+/// `H` as a system in discrete time with innovations of variance 1, and the autocovariance of its output.
+pub(crate) struct Colour {
+    nu: usize,
+    /// Row by row.
+    a: Vec<f64>,
+    c: Vec<f64>,
+    g: Vec<f64>,
+    r0: f64,
+}
+
+impl Colour {
+    pub(crate) fn new(noise: &NoiseModel, closed: &ClosedLoop, step: f64) -> Result<Self, Error> {
+        let ar = noise.ar.coefficients();
+        let o = ar.len();
+        let system = match noise.path {
+            NoisePath::Record => StateSpace::new(vec![], vec![], vec![], 1.0)?,
+            NoisePath::Loop => StateSpace::controllable(&closed.disturbance()?)?,
+        };
+        let sampled = system.sampled(Hold::Zero, step)?;
+        let n = system.order();
+        let nu = o + n;
+        // States: the last o values of w, then those of F. w = ar' history + e.
+        let mut a = vec![0.0; nu * nu];
+        let mut b = vec![0.0; nu];
+        let mut c = vec![0.0; nu];
+        if o > 0 {
+            a[..o].copy_from_slice(ar);
+            b[0] = 1.0;
+        }
+        for i in 1..o {
+            a[i * nu + i - 1] = 1.0;
+        }
+        for i in 0..n {
+            let row = (o + i) * nu;
+            for (j, ar) in ar.iter().enumerate() {
+                a[row + j] = sampled.g0[i] * ar;
+            }
+            a[row + o..row + nu].copy_from_slice(&sampled.phi[i * n..(i + 1) * n]);
+            b[o + i] = sampled.g0[i];
+        }
+        for (c, ar) in c.iter_mut().zip(ar) {
+            *c = system.d() * ar;
+        }
+        c[o..].copy_from_slice(system.c());
+        let sigma = stationary(nu, &a, &b);
+        let of_c: Vec<f64> = (0..nu).map(|i| dot(&sigma[i * nu..(i + 1) * nu], &c)).collect();
+        let g = (0..nu).map(|i| dot(&a[i * nu..(i + 1) * nu], &of_c) + b[i] * system.d());
+        Ok(Self {
+            g: g.collect(),
+            r0: dot(&c, &of_c) + system.d() * system.d(),
+            nu,
+            a,
+            c,
+        })
+    }
+
+    /// A filter for rows of q sensitivities.
+    pub(crate) fn filter(&self, q: usize) -> Meat<'_> {
+        Meat {
+            colour: self,
+            q,
+            states: vec![0.0; q * self.nu],
+            next: vec![0.0; self.nu],
+            past: vec![0.0; q],
+            sum: vec![0.0; q * q],
+        }
+    }
+}
+
+/// `Sigma = A Sigma A' + b b'` by doubling.
+fn stationary(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
+    let product = |x: &[f64], y: &[f64], transposed: bool| -> Vec<f64> {
+        let at = |i: usize, j: usize| -> f64 {
+            (0..n)
+                .map(|k| x[i * n + k] * if transposed { y[j * n + k] } else { y[k * n + j] })
+                .sum()
+        };
+        (0..n * n).map(|ij| at(ij / n, ij % n)).collect()
+    };
+    let mut sigma: Vec<f64> = (0..n * n).map(|ij| b[ij / n] * b[ij % n]).collect();
+    let mut power = a.to_vec();
+    // 2^50 steps: poles up to 1e-15 from the unit circle.
+    for _ in 0..50 {
+        let more = product(&product(&power, &sigma, false), &power, true);
+        let size = |m: &[f64]| m.iter().map(|m| m.abs()).sum::<f64>();
+        let small = size(&more) <= 1e-17 * size(&sigma);
+        sigma.iter_mut().zip(&more).for_each(|(s, m)| *s += m);
+        if small {
+            break;
+        }
+        power = product(&power, &power, false);
+    }
+    sigma
+}
+
+/// Sums `J'VJ` row by row.
+pub(crate) struct Meat<'a> {
+    colour: &'a Colour,
+    q: usize,
+    /// The filter's states, column by column of J.
+    states: Vec<f64>,
+    next: Vec<f64>,
+    past: Vec<f64>,
+    /// `sum R(0)/2 s s' + s f'`, to be made symmetric.
+    sum: Vec<f64>,
+}
+
+impl Meat<'_> {
+    /// The next row of a record.
+    pub(crate) fn push(&mut self, row: &[f64]) {
+        let Colour { nu, a, c, g, r0 } = self.colour;
+        let nu = *nu;
+        for ((past, s), state) in self.past.iter_mut().zip(row).zip(self.states.chunks_exact_mut(nu.max(1))) {
+            *past = 0.5 * r0 * s + dot(c, state);
+            for ((next, a), g) in self.next.iter_mut().zip(a.chunks_exact(nu.max(1))).zip(g) {
+                *next = dot(a, state) + g * s;
+            }
+            state.copy_from_slice(&self.next);
+        }
+        if nu == 0 {
+            for (past, s) in self.past.iter_mut().zip(row) {
+                *past = 0.5 * r0 * s;
+            }
+        }
+        for (sums, s) in self.sum.chunks_exact_mut(self.q.max(1)).zip(row) {
+            for (sum, past) in sums.iter_mut().zip(&self.past) {
+                *sum += s * past;
+            }
+        }
+    }
+
+    /// What was pushed so far, symmetric, row by row.
+    pub(crate) fn finish(self) -> Vec<f64> {
+        let q = self.q;
+        let at = |ij: usize| self.sum[ij] + self.sum[(ij % q) * q + ij / q];
+        (0..q * q).map(at).collect()
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

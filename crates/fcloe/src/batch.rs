@@ -178,9 +178,7 @@ impl Problem {
         ClosedLoop::new(start, self.controller())?.require_stable()?;
         let mut x = self.start(start);
         let scale = self.scale(start, settings.coordinates)?;
-        let mut at = self
-            .evaluate(&x)
-            .map_err(|_| Error::NotFiniteSimulation)?;
+        let mut at = self.evaluate(&x).map_err(|_| Error::NotFiniteSimulation)?;
         let mut run = Run {
             mu: match settings.method {
                 Method::LevenbergMarquardt { mu, .. } => mu,

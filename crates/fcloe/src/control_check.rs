@@ -62,7 +62,9 @@ pub fn controller_mismatch(
         let left: Vec<f64> = (0..u.len())
             .map(|k| u[k] - mean - (of_r[k] - of_y[k]))
             .collect();
-        let Some(own) = explained(&own_columns, &left) else { continue };
+        let Some(own) = explained(&own_columns, &left) else {
+            continue;
+        };
         let total: f64 = left.iter().map(|v| v * v).sum::<f64>();
         let rest = (total - own).max(0.0);
         let more = explained(&all_columns, &left).map_or(0.0, |both| (both - own).max(0.0));
@@ -113,7 +115,12 @@ fn ladder(r: &[f64], record: &LoopRecord) -> Result<Vec<Vec<f64>>, Error> {
     while lag < 0.25 * record.step * r.len() as f64 {
         let filter = TransferFunction::from_coefficients(&[1.0], &[1.0, lag])?;
         let filter = StateSpace::controllable(&filter)?;
-        columns.push(response(&filter, record.r_hold, moves.iter().copied(), record.step)?);
+        columns.push(response(
+            &filter,
+            record.r_hold,
+            moves.iter().copied(),
+            record.step,
+        )?);
         lag *= 3.0;
     }
     Ok(columns)

@@ -201,6 +201,8 @@ pub enum Error {
         period: f64,
     },
     /// The simulation left the range of numbers.
-    #[error("the loop simulated at the start is not finite; check the units of the signals and the start")]
+    #[error(
+        "the loop simulated at the start is not finite; check the units of the signals and the start"
+    )]
     NotFiniteSimulation,
 }

@@ -61,7 +61,8 @@ impl NoiseModel {
             let sum: f64 = segments.iter().map(squares).sum();
             let log_det: f64 = segments.iter().map(|s| ar.log_det(s.len())).sum();
             let n = n as f64;
-            let bic = n * (sum / n).max(f64::MIN_POSITIVE).ln() + log_det + ar.order() as f64 * n.ln();
+            let bic =
+                n * (sum / n).max(f64::MIN_POSITIVE).ln() + log_det + ar.order() as f64 * n.ln();
             Ok((bic, ar))
         };
         let plain: Vec<Vec<f64>> = residuals.iter().map(|(_, e)| e.clone()).collect();
@@ -162,7 +163,9 @@ impl Colour {
         }
         c[o..].copy_from_slice(system.c());
         let sigma = stationary(nu, &a, &b);
-        let of_c: Vec<f64> = (0..nu).map(|i| dot(&sigma[i * nu..(i + 1) * nu], &c)).collect();
+        let of_c: Vec<f64> = (0..nu)
+            .map(|i| dot(&sigma[i * nu..(i + 1) * nu], &c))
+            .collect();
         let g = (0..nu).map(|i| dot(&a[i * nu..(i + 1) * nu], &of_c) + b[i] * system.d());
         Ok(Self {
             g: g.collect(),
@@ -191,7 +194,14 @@ fn stationary(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
     let product = |x: &[f64], y: &[f64], transposed: bool| -> Vec<f64> {
         let at = |i: usize, j: usize| -> f64 {
             (0..n)
-                .map(|k| x[i * n + k] * if transposed { y[j * n + k] } else { y[k * n + j] })
+                .map(|k| {
+                    x[i * n + k]
+                        * if transposed {
+                            y[j * n + k]
+                        } else {
+                            y[k * n + j]
+                        }
+                })
                 .sum()
         };
         (0..n * n).map(|ij| at(ij / n, ij % n)).collect()
@@ -229,7 +239,12 @@ impl Meat<'_> {
     pub(crate) fn push(&mut self, row: &[f64]) {
         let Colour { nu, a, c, g, r0 } = self.colour;
         let nu = *nu;
-        for ((past, s), state) in self.past.iter_mut().zip(row).zip(self.states.chunks_exact_mut(nu.max(1))) {
+        for ((past, s), state) in self
+            .past
+            .iter_mut()
+            .zip(row)
+            .zip(self.states.chunks_exact_mut(nu.max(1)))
+        {
             *past = 0.5 * r0 * s + dot(c, state);
             for ((next, a), g) in self.next.iter_mut().zip(a.chunks_exact(nu.max(1))).zip(g) {
                 *next = dot(a, state) + g * s;

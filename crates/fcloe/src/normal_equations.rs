@@ -79,7 +79,11 @@ impl NormalEquations {
         let mut l = vec![0.0; q * q];
         for i in 0..q {
             for j in 0..=i {
-                let own = if i == j { 1.0 } else { self.jj(i, j) * scale[i] * scale[j] };
+                let own = if i == j {
+                    1.0
+                } else {
+                    self.jj(i, j) * scale[i] * scale[j]
+                };
                 let known: f64 = (0..j).map(|k| l[i * q + k] * l[j * q + k]).sum();
                 let rest = own - known;
                 l[i * q + j] = if i > j {

@@ -12,7 +12,9 @@ use ct_lti::Hold;
 use crate::control_check::{Mismatch, controller_mismatch};
 use crate::normal_equations::NormalEquations;
 use crate::simulation::BLOCK;
-use crate::{ClosedLoop, Controller, Error, LoopRecord, LoopSimulator, Offsets, Orders, PlantModel};
+use crate::{
+    ClosedLoop, Controller, Error, LoopRecord, LoopSimulator, Offsets, Orders, PlantModel,
+};
 
 /// A fit of parameters to fewer samples than this, or than 5 for each of them, is refused.
 const MIN_SAMPLES: usize = 20;
@@ -95,7 +97,8 @@ impl Problem {
                 drive: if open { point.u } else { point.r },
                 y: point.y,
             };
-            let less = |v: &[f64], level: f64| -> Vec<f64> { v.iter().map(|v| v - level).collect() };
+            let less =
+                |v: &[f64], level: f64| -> Vec<f64> { v.iter().map(|v| v - level).collect() };
             let estimated = record.offsets == Offsets::Estimated;
             prepared.push(Prepared {
                 name: record.name.clone(),
@@ -212,14 +215,15 @@ impl Problem {
     /// J and its derivatives at x.
     pub(crate) fn evaluate(&self, x: &[f64]) -> Result<NormalEquations, Refused> {
         let plant = self.plant(x).map_err(|_| Refused::NotFinite)?;
-        let closed =
-            ClosedLoop::new(&plant, &self.controller).map_err(|_| Refused::NotFinite)?;
+        let closed = ClosedLoop::new(&plant, &self.controller).map_err(|_| Refused::NotFinite)?;
         if !closed.is_stable() {
             return Err(Refused::Unstable);
         }
         let mut equations = NormalEquations::new(self.columns);
-        self.visit(&closed, &plant, x, |_, columns, e| equations.add(columns, e))
-            .map_err(|_| Refused::NotFinite)?;
+        self.visit(&closed, &plant, x, |_, columns, e| {
+            equations.add(columns, e)
+        })
+        .map_err(|_| Refused::NotFinite)?;
         if equations.is_finite() {
             Ok(equations)
         } else {

@@ -91,7 +91,9 @@ impl Problem {
             }
         })?;
         for filter in filters {
-            meat.iter_mut().zip(filter.finish()).for_each(|(m, f)| *m += f);
+            meat.iter_mut()
+                .zip(filter.finish())
+                .for_each(|(m, f)| *m += f);
         }
 
         let n = self.samples() as f64;
@@ -109,8 +111,12 @@ impl Problem {
             .collect();
         let white = sums.cost() / (n - q as f64).max(1.0);
         Ok(Uncertainty {
-            std_errors: (0..parameters).map(|i| covariance[i][i].max(0.0).sqrt()).collect(),
-            white_std_errors: (0..parameters).map(|i| (white * bread[i][i]).sqrt()).collect(),
+            std_errors: (0..parameters)
+                .map(|i| covariance[i][i].max(0.0).sqrt())
+                .collect(),
+            white_std_errors: (0..parameters)
+                .map(|i| (white * bread[i][i]).sqrt())
+                .collect(),
             covariance,
             noise,
             freedom,

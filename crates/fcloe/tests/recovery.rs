@@ -23,7 +23,12 @@ fn record(plant: &PlantModel, controller: &Controller, step: f64, n: usize) -> L
 /// The same plant with parameters that are off by up to 30 %.
 fn start(plant: &PlantModel) -> PlantModel {
     let factors = [1.3, 0.8, 1.2, 0.75, 1.25, 0.7, 1.1];
-    let theta: Vec<f64> = plant.theta().iter().zip(factors).map(|(t, f)| t * f).collect();
+    let theta: Vec<f64> = plant
+        .theta()
+        .iter()
+        .zip(factors)
+        .map(|(t, f)| t * f)
+        .collect();
     PlantModel::from_theta(plant.orders(), &theta).unwrap()
 }
 
@@ -41,7 +46,11 @@ fn cases() -> Vec<(PlantModel, Controller, f64)> {
     let third = plant(&[230.0, 13000.0, 180000.0], &[5.0, 40.0]);
     vec![
         (first.clone(), Controller::pi(0.2292, 0.0021).unwrap(), 1.0),
-        (first.clone(), Controller::pid(0.2292, 0.0021, 0.8, 4.0).unwrap(), 1.0),
+        (
+            first.clone(),
+            Controller::pid(0.2292, 0.0021, 0.8, 4.0).unwrap(),
+            1.0,
+        ),
         (first, pi.clone().with_sensor_filter(0.6618).unwrap(), 1.0),
         (second.clone(), pi.clone(), 4.0),
         (second.clone(), pid.clone(), 4.0),
@@ -65,7 +74,12 @@ fn noise_free_recovery() {
             fit.stop
         );
         assert!(fit.stop.was_successful());
-        assert!(error(&plant, &fit) < 1e-8, "{:?}: {:.1e}", plant.orders(), error(&plant, &fit));
+        assert!(
+            error(&plant, &fit) < 1e-8,
+            "{:?}: {:.1e}",
+            plant.orders(),
+            error(&plant, &fit)
+        );
     }
 }
 
@@ -122,7 +136,11 @@ fn a_diagonal_damping_knows_no_units() {
     let problem = disturbed(plant, controller, *step);
     let way = |damping, coordinates| {
         let method = Method::LevenbergMarquardt { mu: 0.1, damping };
-        let settings = Settings { method, coordinates, ..Settings::default() };
+        let settings = Settings {
+            method,
+            coordinates,
+            ..Settings::default()
+        };
         problem.fit(&start(plant), &settings).unwrap().way
     };
     let (theta, delta) = (

@@ -8,6 +8,9 @@ pub enum Error {
     /// A polynomial, a transfer function or a sampling step that is no such thing.
     #[error(transparent)]
     Lti(#[from] ct_lti::Error),
+    /// What the recursive least squares refuse.
+    #[error(transparent)]
+    Rls(#[from] ct_rls::Error),
     /// A series or a setting that `ct-signals` refuses.
     #[error(transparent)]
     Signals(#[from] ct_signals::Error),
@@ -199,6 +202,14 @@ pub enum Error {
     Diverged {
         /// The controller's period \[time\].
         period: f64,
+    },
+    /// No regression gave a plant whose loop is stable.
+    #[error(
+        "none of the plants from {tried} filter bandwidths has a stable loop; check the controller's sign and units, or give bandwidths lambda of 2 to 10 times the loop's poles"
+    )]
+    NoStart {
+        /// Bandwidths that were tried.
+        tried: usize,
     },
     /// The simulation left the range of numbers.
     #[error(

@@ -42,7 +42,7 @@ fn main() {
         let controller = Controller::pi(kp, ki).unwrap();
         for (filter, n) in [(Filter::Fixed, 1270 * bit), (Filter::Adaptive, 254 * bit)] {
             let (r, y) = record(&plant, &controller, bit, n);
-            let settings = RecursiveSettings::new(100.0, -0.98_f64.ln(), 300.0, 0.05);
+            let settings = RecursiveSettings::new(100.0, -0.98_f64.ln(), 1000.0, 0.2);
             let table = TableOfStarts::run(
                 &plant,
                 &controller,

@@ -28,8 +28,8 @@ pub struct Condition {
     pub frequency: f64,
 }
 
-/// The answer of condition (14), and how bad it is where it fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// The answer of condition (14), and how bad it is where it fails; the worse, the greater.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// `Re (P^/P) > 1/2` at every frequency: the recursion converges with this filter.

@@ -1,9 +1,10 @@
 //! How the recursive estimator fares, condition (14) included.
 
+use ct_rls::RecursiveEstimator;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::{Filter, RecursiveFcloe};
+use super::RecursiveFcloe;
 use crate::{ClosedLoop, Condition, Error, PlantModel};
 
 /// What an operator wants to see now and then.
@@ -34,7 +35,7 @@ impl RecursiveFcloe {
         let mut worst = self.condition(&self.plant()?)?;
         for plant in self.plausible_plants() {
             let condition = self.condition(&plant)?;
-            if condition.verdict as u8 > worst.verdict as u8
+            if condition.verdict > worst.verdict
                 || (condition.verdict == worst.verdict && condition.least < worst.least)
             {
                 worst = condition;
@@ -42,7 +43,7 @@ impl RecursiveFcloe {
         }
         let [shortened, refused, limited] = self.counts();
         Ok(LoopHealth {
-            least_squares: ct_rls::RecursiveEstimator::health(self.least_squares())?,
+            least_squares: self.least_squares().health()?,
             residual_rms: self.residual_rms(),
             shortened,
             refused,
@@ -62,13 +63,13 @@ impl RecursiveFcloe {
 
     /// `theta +- 2 sd` along the columns of a Cholesky factor of the covariance; those that are no plant are left out.
     fn plausible_plants(&self) -> Vec<PlantModel> {
-        let covariance: DMatrix<f64> = ct_rls::RecursiveEstimator::covariance(self.least_squares())
-            * self.residual_rms().powi(2);
+        let covariance: DMatrix<f64> =
+            self.least_squares().covariance() * self.residual_rms().powi(2);
         let Some(root) = covariance.cholesky() else {
             return Vec::new();
         };
         let root = root.l();
-        let theta = ct_rls::RecursiveEstimator::theta(self);
+        let theta = self.theta();
         let at = |column: usize, sign: f64| {
             let moved: Vec<f64> = (0..theta.len())
                 .map(|i| theta[i] + sign * 2.0 * root[(i, column)] * self.scale()[i])
@@ -80,12 +81,5 @@ impl RecursiveFcloe {
             .flat_map(|column| [at(column, 1.0), at(column, -1.0)])
             .flatten()
             .collect()
-    }
-}
-
-impl Filter {
-    /// Whether it follows the estimates.
-    pub(super) fn renews(self) -> bool {
-        self == Self::Adaptive
     }
 }

@@ -228,7 +228,7 @@ impl RecursiveFcloe {
         1.0 - at_once * (-self.time / self.settings.fading).exp()
     }
 
-    /// One step of Gauss-Newton from the output error; false where the sample was not used.
+    /// One step of Gauss-Newton from the output error.
     fn learn(&mut self, drive: f64, epsilon: f64, dt: f64) -> Innovation {
         let unused = |outcome| Innovation {
             epsilon,
@@ -295,7 +295,8 @@ impl RecursiveFcloe {
                 *delta += share * step;
             }
             self.theta.copy_from_slice(&self.tried);
-            self.model.set(&self.theta, self.settings.filter.renews());
+            self.model
+                .set(&self.theta, self.settings.filter == Filter::Adaptive);
         } else {
             self.refused += 1;
         }
@@ -390,5 +391,50 @@ impl RecursiveEstimator for RecursiveFcloe {
     /// Of the least squares inside, in the relative parameters; [`RecursiveFcloe::loop_health`] says more.
     fn health(&self) -> Result<Health, Error> {
         Ok(self.rls.health()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The factors give what the equations of the head say of F itself, step by step.
+    #[test]
+    fn the_textbook_recursion() {
+        let plant = PlantModel::new(&[210.0, 9000.0], &[5.0, 40.0]).unwrap();
+        let controller = Controller::pi(0.3, 0.004).unwrap();
+        let (f0, eta, fading, dt) = (0.3, 0.01, 200.0, 2.0);
+        let mut settings = RecursiveSettings::new(f0, eta, fading, 1e9);
+        // The start is so near that neither limit nor border acts.
+        settings.range = 1e6;
+        let mut estimator = RecursiveFcloe::new(&plant, &controller, settings).unwrap();
+        let mut f = DMatrix::identity(4, 4) * f0;
+        for k in 0..600 {
+            let drive = if (k / 20 + k / 70) % 2 == 0 {
+                1.0
+            } else {
+                -1.0
+            };
+            let before = estimator.theta.clone();
+            let y = estimator.model.signals(drive).0 + 1e-4 * f64::from(k % 7);
+            let innovation = estimator.update(&LoopSample { drive, y }, dt);
+            let s = DVector::from_column_slice(&estimator.s);
+            let l = 1.0 - (1.0 - (-eta * dt).exp()) * (-f64::from(k) * dt / fading).exp();
+            let g = &f * &s / (l + (s.transpose() * &f * &s)[0]);
+            f = (&f - &g * (s.transpose() * &f)) / l;
+            f = (&f + f.transpose()) * 0.5;
+            if f.trace() > 4.0 * f0 {
+                f *= 4.0 * f0 / f.trace();
+            }
+            for i in 0..4 {
+                let step = plant.theta()[i] * g[i] * innovation.epsilon;
+                let expected = before[i] + step;
+                assert!((estimator.theta[i] - expected).abs() < 1e-9 * plant.theta()[i]);
+            }
+            let covariance = estimator.rls.covariance();
+            assert!((&covariance - &f).norm() < 1e-8 * f.norm(), "{k}");
+        }
+        assert_eq!(estimator.counts(), [0, 0, 0]);
+        assert!(f.trace() < 3.8 * f0, "nothing was learnt: {}", f.trace());
     }
 }

@@ -243,3 +243,80 @@ fn root_bound(p: &[f64]) -> f64 {
     let bound = p[..n].iter().enumerate().map(at).fold(0.0, f64::max);
     2.0 * bound
 }
+
+#[cfg(test)]
+mod tests {
+    use ct_lti::Hold;
+
+    use super::*;
+    use crate::{LoopSimulator, PlantModel};
+
+    /// With parameters that rest it is the batch fit's simulation, to rounding: y^ and all sensitivities, for any step.
+    #[test]
+    fn as_the_exact_simulation() {
+        let pid = Controller::pid(0.3, 0.004, 4.0, 10.0).unwrap();
+        let loops = [
+            (
+                vec![110.0],
+                vec![6.0],
+                Controller::pi(0.2292, 0.0021).unwrap(),
+            ),
+            (vec![210.0, 9000.0], vec![5.0, 40.0], pid.clone()),
+            (
+                vec![210.0, 9000.0],
+                vec![5.0, 40.0, 300.0],
+                pid.with_sensor_filter(0.2).unwrap(),
+            ),
+            (
+                vec![230.0, 13_000.0, 180_000.0],
+                vec![5.0, 40.0],
+                Controller::pi(0.3, 0.004).unwrap(),
+            ),
+            (vec![210.0, 9000.0], vec![5.0, 40.0], Controller::none()),
+            (
+                vec![20.0],
+                vec![2.0, 3.0],
+                Controller::new(1.5.into(), 1.0.into()).unwrap(),
+            ),
+        ];
+        for (a, b, controller) in loops {
+            let plant = PlantModel::new(&a, &b).unwrap();
+            // 300 is many times the fastest time constant.
+            for step in [0.5, 4.0, 300.0] {
+                let mut exact = LoopSimulator::new(&plant, &controller, Hold::Zero, step).unwrap();
+                let mut moving = MovingLoop::new(plant.orders(), &controller);
+                moving.set(plant.theta(), true);
+                let drive: Vec<f64> = (0..60).map(|k| f64::from(k * k % 11) - 5.0).collect();
+                let block = exact.sensitivities(&drive);
+                let p = plant.theta().len();
+                let (ones, mut sigma) = (vec![1.0; p], vec![0.0; p]);
+                let size = |v: &[f64]| v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+                for (k, &r) in drive.iter().enumerate() {
+                    let (y, _) = moving.signals(r);
+                    assert!(
+                        (y - block.y()[k]).abs() < 1e-11 * size(block.y()),
+                        "{plant:?} {step}"
+                    );
+                    moving.sensitivities(r, &ones, &mut sigma);
+                    for (j, sigma) in sigma.iter().enumerate() {
+                        let exact = block.sigma(j);
+                        assert!(
+                            (sigma - exact[k]).abs() < 1e-10 * size(exact),
+                            "{plant:?} {step}: sigma {j} at {k}: {sigma} {}",
+                            exact[k]
+                        );
+                    }
+                    assert!(moving.advance(r, step));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bound_of_the_roots() {
+        assert_eq!(root_bound(&[3.0]), 0.0);
+        // (p + 1)(p + 10)
+        assert!((10.0..40.0).contains(&root_bound(&[10.0, 11.0, 1.0])));
+        assert!(root_bound(&[0.0, 0.0, 1.0]) == 0.0);
+    }
+}

@@ -26,7 +26,7 @@ pub enum Stage {
     Instruments,
     /// Filter and instruments renewed with the estimates.
     Refined,
-    /// All poles at one place, and the gain from u and y: nothing better had a stable loop.
+    /// All poles at one place, and the gain that y and u have in step with r: nothing better had a stable loop.
     Guess,
 }
 
@@ -148,8 +148,9 @@ pub fn pipeline(
         }
     }
     if found.is_empty() {
-        for &lambda in &lambdas {
-            for plant in guesses(records, controller, orders, lambda) {
+        // Poles at the lower end of where a filter of that bandwidth would look for them.
+        for lambda in lambda_ladder(records, controller, None)? {
+            for plant in guesses(records, controller, orders, lambda / RUNGS[2]) {
                 if let Some(residual_rms) = residual(records, controller, &plant) {
                     found.push(Candidate {
                         plant,
@@ -208,31 +209,31 @@ fn residual(records: &[LoopRecord], controller: &Controller, plant: &PlantModel)
     rms.is_finite().then_some(rms)
 }
 
-/// `K/(1 + p/lambda)^n` with the gain that u and y suggest at rest, and parts of it.
+/// `K/(1 + p/pole)^n` with the gain that y and u have in step with r, and parts of it; in open loop, in step with u.
 fn guesses(
     records: &[LoopRecord],
     controller: &Controller,
     orders: Orders,
-    lambda: f64,
+    pole: f64,
 ) -> Vec<PlantModel> {
-    let (mut uy, mut uu) = (0.0, 0.0);
+    let (mut ry, mut ru) = (0.0, 0.0);
     for record in records {
-        let Ok(signals) = Signals::measured(record, controller) else {
+        let (Ok(signals), Ok((drive, _))) = (
+            Signals::measured(record, controller),
+            record.drive(controller),
+        ) else {
             continue;
         };
-        uy += signals
-            .u
-            .iter()
-            .zip(&signals.y)
-            .map(|(u, y)| u * y)
-            .sum::<f64>();
-        uu += signals.u.iter().map(|u| u * u).sum::<f64>();
+        let mean = drive.iter().sum::<f64>() / drive.len().max(1) as f64;
+        for ((r, y), u) in drive.iter().zip(&signals.y).zip(&signals.u) {
+            ry += (r - mean) * y;
+            ru += (r - mean) * u;
+        }
     }
-    let gain = uy / uu;
     let guess = |share: f64| {
-        let a = Polynomial::new([1.0, 1.0 / lambda]).ok()?.pow(orders.n);
+        let a = Polynomial::new([1.0, 1.0 / pole]).ok()?.pow(orders.n);
         let mut b = vec![0.0; orders.m + 1];
-        b[0] = share * gain;
+        b[0] = share * ry / ru;
         PlantModel::new(&a.coefficients()[1..], &b).ok()
     };
     [1.0, 0.3, 0.1].into_iter().filter_map(guess).collect()

@@ -21,25 +21,28 @@ fn main() {
                 "on the record"
             }
         );
-        for rig in [
-            Rig::first_order(in_loop),
-            Rig::second_order(in_loop),
-            Rig::filtered_pid(in_loop),
-        ] {
-            let (hits, white, placed) = rig.coverage(RUNS);
-            let share = |hits: &[usize]| -> String {
-                let share = hits
-                    .iter()
-                    .map(|h| format!("{:6.3}", *h as f64 / RUNS as f64));
-                share.collect::<Vec<_>>().join(" ")
-            };
-            println!("  {}", rig.name);
-            println!("    with the residual's colour {}", share(&hits));
-            println!("    as if it were white        {}", share(&white));
-            println!(
-                "    noise placed rightly in    {:6.3}",
-                placed as f64 / RUNS as f64
-            );
-        }
+        show(&Rig::first_order(in_loop));
+        show(&Rig::second_order(in_loop));
+        show(&Rig::second_order(in_loop).with_unknown_levels());
+        show(&Rig::filtered_pid(in_loop));
     }
+    println!("noise on the record");
+    show(&Rig::open_loop());
+}
+
+fn show(rig: &Rig) {
+    let (hits, white, placed) = rig.coverage(RUNS);
+    let share = |hits: &[usize]| -> String {
+        let share = hits
+            .iter()
+            .map(|h| format!("{:6.3}", *h as f64 / RUNS as f64));
+        share.collect::<Vec<_>>().join(" ")
+    };
+    println!("  {}", rig.name);
+    println!("    with the residual's colour {}", share(&hits));
+    println!("    as if it were white        {}", share(&white));
+    println!(
+        "    noise placed rightly in    {:6.3}",
+        placed as f64 / RUNS as f64
+    );
 }

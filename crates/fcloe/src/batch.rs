@@ -299,7 +299,7 @@ impl Run {
                     .collect();
                 let slope: f64 = along.iter().enumerate().map(|(i, d)| d * at.je(i)).sum();
                 let curvature = at.length_squared(&along);
-                if !(curvature > 0.0) {
+                if curvature.is_nan() || curvature <= 0.0 {
                     return Err(Stop::Rounding);
                 }
                 let rho = slope / curvature;

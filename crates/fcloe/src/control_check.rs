@@ -13,7 +13,6 @@ use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
 use serde::Serialize;
 
 use crate::normal_equations::NormalEquations;
-use crate::simulation::BLOCK;
 use crate::{Controller, Error, LoopRecord, Offsets};
 
 /// How far a controller is from the u that was measured, unit of u.
@@ -130,15 +129,8 @@ fn ladder(r: &[f64], record: &LoopRecord) -> Result<Vec<Vec<f64>>, Error> {
 /// nothing to project on.
 fn explained(columns: &[&[f64]], left: &[f64]) -> Option<f64> {
     let mut sums = NormalEquations::new(columns.len());
-    for from in (0..left.len()).step_by(BLOCK) {
-        let to = (from + BLOCK).min(left.len());
-        let part: Vec<(usize, &[f64])> = columns
-            .iter()
-            .enumerate()
-            .map(|(i, column)| (i, &column[from..to]))
-            .collect();
-        sums.add(&part, &left[from..to]);
-    }
+    let columns: Vec<(usize, &[f64])> = columns.iter().copied().enumerate().collect();
+    sums.add(&columns, left);
     let factor = sums.factor(|i| 1e-9 * sums.jj(i, i))?;
     let x = factor.solve(|i| sums.je(i));
     let along: f64 = x.iter().enumerate().map(|(i, x)| x * sums.je(i)).sum();

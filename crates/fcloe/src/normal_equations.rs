@@ -3,8 +3,6 @@
 //! Systems are solved by Cholesky's factors after a scaling to a diagonal of 1, which takes the units of the parameters
 //! out of the condition: for `n = 2, m = 1` it falls from 1e8 to 1e2.
 
-use crate::simulation::BLOCK;
-
 /// A column whose part outside the columns before it has less than this share of its square is their combination.
 const DEPENDENT: f64 = 1e-13;
 
@@ -122,6 +120,13 @@ impl Factor {
         x.iter().zip(&self.scale).map(|(x, s)| x * s).collect()
     }
 
+    /// `log |M|`.
+    pub(crate) fn log_det(&self) -> f64 {
+        let q = self.scale.len();
+        let pivot = |i: usize| 2.0 * (self.l[i * q + i] / self.scale[i]).ln();
+        (0..q).map(pivot).sum()
+    }
+
     /// `M^-1`, row by row.
     pub(crate) fn inverse(&self) -> Vec<Vec<f64>> {
         let q = self.scale.len();
@@ -133,7 +138,6 @@ impl Factor {
 
 /// Eight sums side by side, which the compiler turns into vectors.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    debug_assert!(a.len() == b.len() && a.len() <= BLOCK);
     let mut sums = [0.0; 8];
     let (a8, a_rest) = a.as_chunks::<8>();
     let (b8, b_rest) = b.as_chunks::<8>();

@@ -172,9 +172,10 @@ impl Problem {
         &self.mismatches
     }
 
-    /// Sampling interval of each record.
-    pub(crate) fn steps(&self) -> impl Iterator<Item = f64> {
-        self.records.iter().map(|record| record.step)
+    /// Sampling interval of each record, and whether its levels are estimated.
+    pub(crate) fn steps_and_free_levels(&self) -> impl Iterator<Item = (f64, bool)> {
+        let records = self.records.iter();
+        records.map(|record| (record.step, record.column.is_some()))
     }
 
     /// Parameters of the plant and estimated levels.

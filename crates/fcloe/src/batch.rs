@@ -23,6 +23,9 @@ use crate::normal_equations::NormalEquations;
 use crate::problem::Refused;
 use crate::{ClosedLoop, Error, Levels, PlantModel, Problem};
 
+/// Where no step lowers J, a minimum this near counts as reached: J itself tells no more.
+const AT_ROUNDING: f64 = 1e-5;
+
 /// What is added to J''.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -68,8 +71,8 @@ pub struct Settings {
     pub method: Method,
     /// What is iterated.
     pub coordinates: Coordinates,
-    /// The fit ends with a step that changes no parameter by more than this share of itself, or y^ by more than this
-    /// share of the residual (root mean square both).
+    /// The fit ends with a step that changes no parameter by more than this share of itself, or from a point whose
+    /// minimum of the linearised model changes y^ by no more than this share of the residual (root mean square both).
     pub tolerance: f64,
     /// Most steps that are taken.
     pub max_iterations: usize,
@@ -244,8 +247,17 @@ impl Problem {
                 .iter()
                 .zip(&step[parameters..])
                 .all(|(scale, d)| d.abs() <= tolerance * scale);
-        relative || at.length_squared(step) <= tolerance * tolerance * at.cost()
+        relative || at_minimum(at, tolerance)
     }
+}
+
+/// Whether the lowest point of the linearised model is nearer than this share of the residual, root mean squares of y^.
+/// The step itself is no measure: damping makes it small far from any minimum too.
+fn at_minimum(at: &NormalEquations, tolerance: f64) -> bool {
+    at.factor(|_| 0.0).is_some_and(|factor| {
+        let step = factor.solve(|i| at.je(i));
+        at.length_squared(&step) <= tolerance * tolerance * at.cost()
+    })
 }
 
 fn check(settings: &Settings) -> Result<(), Error> {
@@ -395,7 +407,7 @@ impl Run {
                 // What the linearised model promises.
                 let slope: f64 = step.iter().enumerate().map(|(i, d)| d * at.je(i)).sum();
                 let promised = 2.0 * slope - at.length_squared(step);
-                if promised <= 1e-13 * at.cost() {
+                if promised <= 1e-13 * at.cost() && at_minimum(at, AT_ROUNDING) {
                     Tried::Level
                 } else {
                     Tried::Higher

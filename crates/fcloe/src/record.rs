@@ -91,7 +91,8 @@ impl LoopRecord {
         }
     }
 
-    /// From a record as it is read from a file; times have to be evenly spaced to 1e-6 of the step.
+    /// From a record as it is read from a file; times have to be evenly spaced to 1e-6 of the step; r is taken
+    /// as held, u as the record says.
     ///
     /// # Errors
     /// [`Error::UnevenGrid`], [`Error::Signals`] where the record is not valid.

@@ -3,7 +3,12 @@
 //! Equations: see the head of `noise_model.rs`. The innovations' variance counts the fitted parameters and the
 //! noise model's coefficients as degrees of freedom that are spent.
 //!
-//! Assumptions: the minimum was reached; the noise is stationary and independent of r; the model's structure is right.
+//! Assumptions: the minimum was reached; the noise is stationary and independent of r, and, counted in samples, of one
+//! colour in all records; the model's structure is right.
+//!
+//! Figures, 4000 runs for each of nine settings at 20 dB, n = 1 and 2, noise in the loop and on the record, white and
+//! coloured, levels known and estimated: 95 % intervals hold the truth in 94.2 to 96.0 % for every parameter, where those
+//! of a white residual hold it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`).
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};

@@ -45,6 +45,30 @@ fn an_unstable_loop_at_the_start() {
     assert!(error.to_string().contains("1.2"), "{error}");
 }
 
+/// An output that goes the wrong way asks for a negative gain, which this controller does not stabilise: the fit stays
+/// inside, and says why it ended.
+#[test]
+fn a_fit_never_leaves_the_stable_loops() {
+    let mut record = record();
+    record.u = None;
+    record.y.iter_mut().for_each(|y| *y = -*y);
+    let problem = Problem::new(&[record], &pi(), ORDERS).unwrap();
+    let start = PlantModel::first_order(3.0, 60.0).unwrap();
+    for method in [Settings::default().method, fcloe::Method::GaussNewton] {
+        let settings = Settings {
+            method,
+            ..Settings::default()
+        };
+        let fit = problem.fit(&start, &settings).unwrap();
+        assert!(fit.refused > 0 && !fit.stop.was_successful(), "{fit:?}");
+        for at in &fit.way {
+            let plant = PlantModel::from_theta(ORDERS, &at.theta).unwrap();
+            assert!(fcloe::ClosedLoop::new(&plant, &pi()).unwrap().is_stable());
+        }
+        assert!(fit.way.windows(2).all(|pair| pair[1].cost < pair[0].cost));
+    }
+}
+
 #[test]
 fn a_controller_that_does_not_match() {
     let wrong = |kp: f64, ki: f64| Controller::pi(kp, ki).unwrap();

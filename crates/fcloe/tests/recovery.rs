@@ -201,3 +201,36 @@ fn far_starts() {
     println!("of {starts} starts reach the best minimum: {reached:?}");
     assert!(reached.iter().all(|reached| *reached >= 54), "{reached:?}");
 }
+
+/// What is not told of the loop goes into the plant: a sensor's filter that is ignored, and digits of the controller
+/// that were lost in print (110/480 and 1/480 as 0.2292 and 0.0021).
+#[test]
+fn what_the_controller_is_not_told() {
+    let plant = PlantModel::first_order(6.0, 110.0).unwrap();
+    let fitted = |made: &Controller, told: &Controller| {
+        let r = ct_signals::excitation::prbs(2800, 50, -1.0, 1.0, 5).unwrap();
+        let data = continuous_loop(&plant, made, 1.0, &r, Hold::Zero, Noise::None).unwrap();
+        let record = LoopRecord::closed_loop(1.0, r, Some(data.u), data.y, Offsets::Deviations);
+        let problem = Problem::new(&[record], told, plant.orders()).unwrap();
+        let fit = problem.fit(&start(&plant), &Settings::default()).unwrap();
+        assert!(fit.stop.was_successful());
+        let theta = fit.plant.theta();
+        (theta[1], theta[0])
+    };
+    let pi = Controller::pi(0.5515, 0.0074).unwrap();
+    let filtered = pi.clone().with_sensor_filter(0.6618).unwrap();
+    let (gain, tau) = fitted(&filtered, &filtered);
+    assert!((gain - 6.0).abs() < 1e-7 && (tau - 110.0).abs() < 1e-6);
+    let (gain, _) = fitted(&filtered, &pi);
+    assert!((1.04..1.3).contains(&(gain / 6.0)), "{gain}");
+
+    let printed = Controller::pi(0.2292, 0.0021).unwrap();
+    let (gain, tau) = fitted(
+        &Controller::pi(110.0 / 480.0, 1.0 / 480.0).unwrap(),
+        &printed,
+    );
+    assert!(
+        (gain - 5.952).abs() < 2e-3 && (tau - 109.14).abs() < 0.05,
+        "{gain} {tau}"
+    );
+}

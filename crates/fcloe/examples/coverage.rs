@@ -27,6 +27,7 @@ fn main() {
         show(Rig::second_order(in_loop));
         show(Rig::second_order(in_loop).with_unknown_levels());
         show(Rig::filtered_pid(in_loop));
+        show(Rig::direct_term(in_loop));
     }
     println!("noise on the record");
     show(&Rig::open_loop(), runs);

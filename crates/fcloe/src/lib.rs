@@ -58,6 +58,7 @@
 //! | speed | see `benches/README.md` | `cargo bench -p ctid-benches --bench fcloe` |
 
 mod batch;
+mod batch_settings;
 mod closed_loop;
 mod control_check;
 mod controller;
@@ -71,7 +72,8 @@ mod record;
 mod simulation;
 mod uncertainty;
 
-pub use batch::{Coordinates, Damping, Fit, Iterate, Method, Settings, Stop};
+pub use batch::{Fit, Iterate, Stop};
+pub use batch_settings::{Coordinates, Damping, Method, Settings};
 pub use closed_loop::ClosedLoop;
 pub use control_check::{Mismatch, controller_mismatch};
 pub use controller::Controller;

@@ -108,7 +108,12 @@ impl NoiseModel {
         let (on_record, ar) = autoregression(on_record, max_order)?;
         let in_loop = match (path, in_loop) {
             (Some(NoisePath::Record), _) | (_, None) => None,
-            (_, Some(series)) => Some(autoregression(series, max_order)?),
+            (_, Some(series)) => {
+                let (criterion, ar) = autoregression(series, max_order)?;
+                // A direct term other than 1 scales w: its part in the likelihood of the residual.
+                let samples: usize = residuals.iter().map(|r| r.values.len()).sum();
+                Some((criterion + 2.0 * samples as f64 * system.d().abs().ln(), ar))
+            }
         };
         Ok(match in_loop {
             Some((criterion, ar)) if path.is_some() || criterion < on_record => Self {

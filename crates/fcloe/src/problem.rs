@@ -74,7 +74,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`Error::NoRecord`]; [`Error::OrderZero`], [`Error::Improper`] for the orders; a record that is not valid, see
-    /// [`LoopRecord::validate`]; [`Error::MissingSignal`]; [`Error::ConstantDrive`]; [`Error::TooShort`];
+    /// [`LoopRecord::validate`]; [`Error::MissingReference`], [`Error::MissingInput`]; [`Error::ConstantDrive`]; [`Error::TooShort`];
     /// [`Error::ControllerMismatch`] where u is in the record and the controller misses more than 10 % of it.
     pub fn new(
         records: &[LoopRecord],
@@ -134,6 +134,7 @@ impl Problem {
         for (record, mismatch) in prepared.iter().zip(&mismatches) {
             if let Some(mismatch) = mismatch
                 && mismatch.systematic > LARGEST_MISMATCH * mismatch.size
+                && mismatch.systematic > 2.0 * mismatch.by_chance
             {
                 return Err(Error::ControllerMismatch {
                     record: record.name.clone(),

@@ -33,6 +33,7 @@ fn check(rig: &Rig) -> (Vec<usize>, Vec<usize>) {
 fn noise_in_the_loop() {
     check(&Rig::first_order(true));
     check(&Rig::second_order(true));
+    check(&Rig::direct_term(true));
     // Here a white residual's intervals are too narrow.
     let (_, white) = check(&Rig::filtered_pid(true));
     assert!(white.iter().any(|hits| !plausible(*hits)), "{white:?}");
@@ -42,6 +43,7 @@ fn noise_in_the_loop() {
 fn noise_on_the_record() {
     check(&Rig::first_order(false));
     check(&Rig::second_order(false));
+    check(&Rig::direct_term(false));
     check(&Rig::filtered_pid(false));
 }
 

@@ -74,6 +74,17 @@ impl Rig {
         }
     }
 
+    /// A plant that passes its input on at once: so does the loop with the noise.
+    pub fn direct_term(in_loop: bool) -> Self {
+        Self {
+            name: "n = 1, m = 1, PI, pseudo-random",
+            plant: PlantModel::new(&[3.0], &[2.0, 0.7]).unwrap(),
+            controller: Controller::pi(0.5, 0.2).unwrap(),
+            step: 0.3,
+            ..Self::second_order(in_loop)
+        }
+    }
+
     pub fn with_unknown_levels(self) -> Self {
         Self {
             name: "the same, levels estimated",

@@ -81,7 +81,7 @@ pub enum Error {
     /// A record of a loop without its reference.
     #[error(
         "{record}: there is no reference r, which drives the model in closed loop; give it, or fit in open loop from u, \
-         which noise in the loop biases"
+         which coloured noise in the loop biases"
     )]
     MissingReference {
         /// The record's name.

@@ -52,7 +52,7 @@
 //! # Figures
 //! | | | command |
 //! |---|---|---|
-//! | 95 % intervals hold the truth, 4000 runs for each of nine settings | in 94.2 to 96.0 % for every parameter | `cargo run --release -p fcloe --example coverage` |
+//! | 95 % intervals hold the truth, 4000 runs for each of eleven settings | in 94.2 to 96.0 % for every parameter | `cargo run --release -p fcloe --example coverage` |
 //! | sensitivities against central differences of an adaptive integration | within 1e-7 | `cargo test -p fcloe --test sensitivities` |
 //! | noise-free recovery, n = 1 to 3, PI and filtered PID | within 1e-8 | `cargo test -p fcloe --test recovery` |
 //! | speed | see `benches/README.md` | `cargo bench -p ctid-benches --bench fcloe` |

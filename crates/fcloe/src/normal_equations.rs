@@ -149,3 +149,38 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     rest + sums.iter().sum::<f64>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn by_hand() {
+        let (a, b, e) = ([1.0, 2.0, 2.0], [1e6, 0.0, 1e6], [3.0, 0.0, 3.0]);
+        let mut sums = NormalEquations::new(2);
+        sums.add(&[(0, &a), (1, &b)], &e);
+        assert_eq!(
+            (sums.jj(0, 0), sums.jj(0, 1), sums.jj(1, 1)),
+            (9.0, 3e6, 2e12)
+        );
+        assert_eq!((sums.je(0), sums.je(1), sums.cost()), (9.0, 6e6, 18.0));
+        let factor = sums.factor(|_| 0.0).unwrap();
+        // e = 3e-6 b.
+        let x = factor.solve(|i| sums.je(i));
+        assert!(x[0].abs() < 1e-14 && (x[1] - 3e-6).abs() < 1e-20);
+        assert!((sums.length_squared(&x) - 18.0).abs() < 1e-13);
+        // |M| = 18e12 - 9e12.
+        assert!((factor.log_det() - 9e12_f64.ln()).abs() < 1e-13);
+        assert!((factor.inverse()[0][0] - 2.0 / 9.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn dependent_columns_have_no_factors() {
+        let (a, b) = ([1.0, 2.0, 3.0], [2.0, 4.0, 6.0]);
+        let mut sums = NormalEquations::new(2);
+        sums.add(&[(0, &a), (1, &b)], &a);
+        assert!(sums.factor(|_| 0.0).is_none());
+        assert!(sums.factor(|_| 1.0).is_some());
+        assert!(NormalEquations::new(1).factor(|_| 0.0).is_none());
+    }
+}

@@ -21,74 +21,12 @@ use serde::Serialize;
 
 use crate::normal_equations::NormalEquations;
 use crate::problem::Refused;
-use crate::{ClosedLoop, Error, Levels, PlantModel, Problem};
+use crate::{
+    ClosedLoop, Coordinates, Damping, Error, Levels, Method, PlantModel, Problem, Settings,
+};
 
-/// What is added to J''.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Damping {
-    /// `mu I`: depends on the units.
-    Identity,
-    /// `mu diag(J'')`: does not.
-    Diagonal,
-}
-
-/// How a step is made.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// Along the gradient, the first length tried being the one to the lowest point of the linearised model. Slow in
-    /// a narrow valley: iterate in delta, and allow many iterations.
-    Gradient,
-    /// To the lowest point of the linearised model, halved until J falls.
-    GaussNewton,
-    /// Damped.
-    LevenbergMarquardt {
-        /// The first mu, above 0. The paper takes 0.1, and 1 after a poor start.
-        mu: f64,
-        /// What it multiplies.
-        damping: Damping,
-    },
-}
-
-/// What is iterated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Coordinates {
-    /// The parameters.
-    Theta,
-    /// `theta = theta0 (1 + delta)`; estimated levels are scaled by the spread of their signal.
-    Delta,
-}
-
-/// How to fit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Settings {
-    /// How a step is made.
-    pub method: Method,
-    /// What is iterated.
-    pub coordinates: Coordinates,
-    /// The fit ends with a step that changes no parameter by more than this share of itself, or y^ by more than this
-    /// share of the residual (root mean square both).
-    pub tolerance: f64,
-    /// Most steps that are taken.
-    pub max_iterations: usize,
-}
-
-impl Default for Settings {
-    /// Levenberg-Marquardt with `0.1 diag(J'')` in theta, to 1e-8.
-    fn default() -> Self {
-        Self {
-            method: Method::LevenbergMarquardt {
-                mu: 0.1,
-                damping: Damping::Diagonal,
-            },
-            coordinates: Coordinates::Theta,
-            tolerance: 1e-8,
-            max_iterations: 100,
-        }
-    }
-}
+/// Where no step lowers J, a minimum this near counts as reached: J itself tells no more.
+const AT_ROUNDING: f64 = 1e-5;
 
 /// Why a fit has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -166,7 +104,7 @@ impl Problem {
     /// [`Error::Setting`]; [`Error::Length`] for a start of other orders; [`Error::UnstableLoop`] for a start whose
     /// loop is not stable; [`Error::ZeroStart`] in delta; [`Error::NotFiniteSimulation`].
     pub fn fit(&self, start: &PlantModel, settings: &Settings) -> Result<Fit, Error> {
-        check(settings)?;
+        settings.check()?;
         let (expected, found) = (self.orders().parameters(), start.theta().len());
         if start.orders() != self.orders() {
             return Err(Error::Length {
@@ -244,21 +182,17 @@ impl Problem {
                 .iter()
                 .zip(&step[parameters..])
                 .all(|(scale, d)| d.abs() <= tolerance * scale);
-        relative || at.length_squared(step) <= tolerance * tolerance * at.cost()
+        relative || at_minimum(at, tolerance)
     }
 }
 
-fn check(settings: &Settings) -> Result<(), Error> {
-    let setting = |what, value, range| Err(Error::Setting { what, value, range });
-    if !(settings.tolerance > 0.0 && settings.tolerance < 1.0) {
-        return setting("the tolerance", settings.tolerance, "between 0 and 1");
-    }
-    match settings.method {
-        Method::LevenbergMarquardt { mu, .. } if !(mu > 0.0 && mu.is_finite()) => {
-            setting("mu", mu, "finite and above 0")
-        }
-        _ => Ok(()),
-    }
+/// Whether the lowest point of the linearised model is nearer than this share of the residual, root mean squares of y^.
+/// The step itself is no measure: damping makes it small far from any minimum too.
+fn at_minimum(at: &NormalEquations, tolerance: f64) -> bool {
+    at.factor(|_| 0.0).is_some_and(|factor| {
+        let step = factor.solve(|i| at.je(i));
+        at.length_squared(&step) <= tolerance * tolerance * at.cost()
+    })
 }
 
 /// A step, and the sums where it ends.
@@ -299,7 +233,7 @@ impl Run {
                     .collect();
                 let slope: f64 = along.iter().enumerate().map(|(i, d)| d * at.je(i)).sum();
                 let curvature = at.length_squared(&along);
-                if !(curvature > 0.0) {
+                if curvature.is_nan() || curvature <= 0.0 {
                     return Err(Stop::Rounding);
                 }
                 let rho = slope / curvature;
@@ -395,7 +329,7 @@ impl Run {
                 // What the linearised model promises.
                 let slope: f64 = step.iter().enumerate().map(|(i, d)| d * at.je(i)).sum();
                 let promised = 2.0 * slope - at.length_squared(step);
-                if promised <= 1e-13 * at.cost() {
+                if promised <= 1e-13 * at.cost() && at_minimum(at, AT_ROUNDING) {
                     Tried::Level
                 } else {
                     Tried::Higher

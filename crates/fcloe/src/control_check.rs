@@ -1,20 +1,28 @@
 //! Whether the measured u is what the controller makes of r and y.
 //!
-//! Method. The controller is run on the recorded r and y; its unknown initial state and the offset of u are fitted.
-//! What is left is the mismatch. Noise on y that the controller never saw is part of it, so it is split: the
-//! *systematic* part is what r explains, filtered by a ladder of lags `1/(1 + T p)`, less what chance would explain. A
-//! wrong gain, sign or unit of time shows there; noise does not, because r knows nothing of it.
+//! Method. The controller is run on the recorded r and y, and compared with u; both sides go through `H = (p/(p +
+//! lambda))^q`, q the number of integrators in S and 1/lambda a twentieth of the record, or else noise on y that the controller
+//! never saw would be a random walk, which seems to follow anything. The unknown initial states and the offset of u
+//! are fitted. What is left is the mismatch. Noise is part of it, so it is split: the *systematic* part is what r
+//! explains, filtered by a ladder of lags `1/(1 + T p)`, less what noise of that colour would show. A wrong gain, sign
+//! or unit of time shows there; noise does not, because r knows nothing of it.
 //!
 //! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better.
 //!
-//! Limits: a controller that is sampled much more slowly than the record's dynamics is not the continuous one, and shows.
+//! Limits: what is wrong only at frequencies below lambda is not seen; a controller that is sampled much more slowly than the record's dynamics is not the continuous one, and shows.
 
-use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
+use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
+use ct_signals::ArModel;
 use serde::Serialize;
 
 use crate::normal_equations::NormalEquations;
-use crate::simulation::BLOCK;
 use crate::{Controller, Error, LoopRecord, Offsets};
+
+/// Frequencies below this over the length of the record are left out.
+const SLOWEST: f64 = 20.0;
+
+/// Added to the diagonal, as a share of it, so that dependent columns do no harm.
+const RIDGE: f64 = 1e-9;
 
 /// How far a controller is from the u that was measured, unit of u.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -23,7 +31,9 @@ pub struct Mismatch {
     pub rms: f64,
     /// Root mean square of that part of it which follows r.
     pub systematic: f64,
-    /// Standard deviation of u.
+    /// Root mean square of what noise alone would show of that; it is taken off.
+    pub by_chance: f64,
+    /// Root mean square of u, its slowest moves left out where the controller integrates.
     pub size: f64,
 }
 
@@ -39,13 +49,34 @@ pub fn controller_mismatch(
     let (Some(r), Some(u)) = (&record.r, &record.u) else {
         return Ok(None);
     };
-    let n = u.len() as f64;
-    let mean = u.iter().sum::<f64>() / n;
-    let size = (u.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / n).sqrt();
-    if controller.is_open_loop() || size == 0.0 {
+    if controller.is_open_loop() || record.is_empty() {
         return Ok(None);
     }
-    let law = StateSpace::controllable(&controller.law()?)?;
+    let (n, length) = (u.len() as f64, record.step * u.len() as f64);
+    let law = controller.law()?;
+    let s = law.denominator().coefficients();
+    let integrators = s.iter().take_while(|s| **s == 0.0).count();
+    let slow = Polynomial::new([SLOWEST / length, 1.0])?.pow(integrators);
+    let rest = &Polynomial::new(&s[integrators..])? * &slow;
+    let law = TransferFunction::new(law.numerator().clone(), rest)?;
+    let law = StateSpace::controllable(&law)?;
+    let high = TransferFunction::new(Polynomial::p().pow(integrators), slow)?;
+    let high = StateSpace::controllable(&high)?;
+    // u jumps with r by the direct term, and is smooth beside that.
+    let direct = law.d();
+    let smooth = u.iter().zip(r).map(|(u, r)| u - direct * r);
+    let mean = smooth.clone().sum::<f64>() / n;
+    let smooth = response(&high, Hold::First, smooth.map(|u| u - mean), record.step)?;
+    let jumps = response(&high, record.r_hold, r.iter().copied(), record.step)?;
+    let u: Vec<f64> = smooth
+        .iter()
+        .zip(jumps)
+        .map(|(u, r)| u + direct * r)
+        .collect();
+    let size = (u.iter().map(|u| u * u).sum::<f64>() / n).sqrt();
+    if size == 0.0 {
+        return Ok(None);
+    }
     // Raw signals are what the controller acts on; a known point may hold a scaling's offset.
     let (r0, y0) = match record.offsets {
         Offsets::Known(point) => (point.r, point.y),
@@ -53,32 +84,48 @@ pub fn controller_mismatch(
     };
     let of_r = response(&law, record.r_hold, r.iter().map(|r| r - r0), record.step)?;
     let free = free_responses(&law, u.len(), record.step)?;
-    let ladder = ladder(r, record)?;
-    let own_columns: Vec<&[f64]> = free.iter().map(Vec::as_slice).collect();
-    let all_columns: Vec<&[f64]> = free.iter().chain(&ladder).map(Vec::as_slice).collect();
+    let ladder: Vec<Vec<f64>> = ladder(r, record)?
+        .iter()
+        .map(|column| residual(&free, column))
+        .collect();
     let mut best: Option<Mismatch> = None;
     for hold in [Hold::First, Hold::Zero] {
         let of_y = response(&law, hold, record.y.iter().map(|y| y - y0), record.step)?;
-        let left: Vec<f64> = (0..u.len())
-            .map(|k| u[k] - mean - (of_r[k] - of_y[k]))
-            .collect();
-        let Some(own) = explained(&own_columns, &left) else {
-            continue;
-        };
-        let total: f64 = left.iter().map(|v| v * v).sum::<f64>();
-        let rest = (total - own).max(0.0);
-        let more = explained(&all_columns, &left).map_or(0.0, |both| (both - own).max(0.0));
-        let by_chance = ladder.len() as f64 * (rest - more) / n;
-        let found = Mismatch {
-            rms: (rest / n).sqrt(),
-            systematic: ((more - by_chance).max(0.0) / n).sqrt(),
-            size,
-        };
-        if best.is_none_or(|best| found.rms < best.rms) {
-            best = Some(found);
+        let missed: Vec<f64> = (0..u.len()).map(|k| u[k] - (of_r[k] - of_y[k])).collect();
+        let missed = residual(&free, &missed);
+        let rms = (missed.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
+        if rms.is_finite() && best.is_none_or(|best| rms < best.rms) {
+            let (follows, by_chance) = following(&free, &ladder, &missed)?;
+            best = Some(Mismatch {
+                rms,
+                systematic: ((follows - by_chance).max(0.0) / n).sqrt(),
+                by_chance: (by_chance / n).sqrt(),
+                size,
+            });
         }
     }
     Ok(best)
+}
+
+/// The square of that part of what is missed which follows the ladder, and what noise of the same colour would show of
+/// it, by generalised least squares.
+fn following(free: &[Vec<f64>], ladder: &[Vec<f64>], missed: &[f64]) -> Result<(f64, f64), Error> {
+    let noise = ArModel::fit(&[&residual(ladder, missed)], 4)?;
+    let whitened: Vec<Vec<f64>> = ladder.iter().chain(free).map(|c| noise.whiten(c)).collect();
+    let sums = sums(&whitened, &noise.whiten(missed));
+    let Some(factor) = sums.factor(|i| RIDGE * sums.jj(i, i)) else {
+        return Ok((0.0, 0.0));
+    };
+    let mut x = factor.solve(|i| sums.je(i));
+    x.truncate(ladder.len());
+    let covariance = factor.inverse();
+    let plain = self::sums(ladder, missed);
+    let variance = noise.sigma() * noise.sigma();
+    let by_chance: f64 = (0..ladder.len())
+        .flat_map(|i| (0..ladder.len()).map(move |j| (i, j)))
+        .map(|(i, j)| variance * covariance[i][j] * plain.jj(i, j))
+        .sum();
+    Ok((plain.length_squared(&x), by_chance))
 }
 
 fn response(
@@ -126,21 +173,24 @@ fn ladder(r: &[f64], record: &LoopRecord) -> Result<Vec<Vec<f64>>, Error> {
     Ok(columns)
 }
 
-/// The part of `sum left^2` that lies in the span of the columns, dependent ones weighed down; none where there is
-/// nothing to project on.
-fn explained(columns: &[&[f64]], left: &[f64]) -> Option<f64> {
-    let mut sums = NormalEquations::new(columns.len());
-    for from in (0..left.len()).step_by(BLOCK) {
-        let to = (from + BLOCK).min(left.len());
-        let part: Vec<(usize, &[f64])> = columns
-            .iter()
-            .enumerate()
-            .map(|(i, column)| (i, &column[from..to]))
-            .collect();
-        sums.add(&part, &left[from..to]);
+/// What is left of a signal beside its projection on the columns, dependent ones weighed down.
+fn residual(columns: &[Vec<f64>], signal: &[f64]) -> Vec<f64> {
+    let sums = sums(columns, signal);
+    let mut left = signal.to_vec();
+    let Some(factor) = sums.factor(|i| RIDGE * sums.jj(i, i)) else {
+        return left;
+    };
+    for (x, column) in factor.solve(|i| sums.je(i)).iter().zip(columns) {
+        for (left, c) in left.iter_mut().zip(column) {
+            *left -= x * c;
+        }
     }
-    let factor = sums.factor(|i| 1e-9 * sums.jj(i, i))?;
-    let x = factor.solve(|i| sums.je(i));
-    let along: f64 = x.iter().enumerate().map(|(i, x)| x * sums.je(i)).sum();
-    Some(2.0 * along - sums.length_squared(&x))
+    left
+}
+
+fn sums(columns: &[Vec<f64>], signal: &[f64]) -> NormalEquations {
+    let mut sums = NormalEquations::new(columns.len());
+    let columns: Vec<(usize, &[f64])> = columns.iter().map(Vec::as_slice).enumerate().collect();
+    sums.add(&columns, signal);
+    sums
 }

@@ -81,17 +81,28 @@ pub enum Error {
     /// No record at all.
     #[error("there is no record; give at least one")]
     NoRecord,
-    /// The signal that drives the model is not in the record.
-    #[error("{record}: there is no {signal}, which drives the model {where_}; give it{instead}")]
-    MissingSignal {
+    /// A record of a loop without its reference.
+    #[error(
+        "{record}: there is no reference r, which drives the model in closed loop; give it, or fit in open loop from u, \
+         which coloured noise in the loop biases"
+    )]
+    MissingReference {
         /// The record's name.
         record: String,
-        /// `reference r` or `input u`.
-        signal: &'static str,
-        /// `in closed loop` or `in open loop`.
-        where_: &'static str,
-        /// What else can be done.
-        instead: &'static str,
+    },
+    /// A record of a plant alone without its input.
+    #[error("{record}: there is no input u, which drives the model in open loop; give it")]
+    MissingInput {
+        /// The record's name.
+        record: String,
+    },
+    /// A record without u where signals are regressed on one another.
+    #[error(
+        "{record}: there is no input u, which a regression needs in closed loop too; give it, or start from a plant of your own"
+    )]
+    RegressionWithoutInput {
+        /// The record's name.
+        record: String,
     },
     /// Signals of one record with different lengths.
     #[error(
@@ -158,7 +169,7 @@ pub enum Error {
     /// The measured u is not what the controller makes of r - y.
     #[error(
         "{record}: the measured u is not R/S (r - y): they differ by {mismatch:.3e} rms where u moves by {size:.3e} rms ({percent:.1} %); \
-         check the controller's coefficients, their units of time, the sign, and the signals' order",
+         check the controller's coefficients, their units of time, the sign, and the signals' order; if it is right, leave u out",
         percent = 100.0 * mismatch / size
     )]
     ControllerMismatch {

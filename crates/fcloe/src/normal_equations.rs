@@ -3,8 +3,6 @@
 //! Systems are solved by Cholesky's factors after a scaling to a diagonal of 1, which takes the units of the parameters
 //! out of the condition: for `n = 2, m = 1` it falls from 1e8 to 1e2.
 
-use crate::simulation::BLOCK;
-
 /// A column whose part outside the columns before it has less than this share of its square is their combination.
 const DEPENDENT: f64 = 1e-13;
 
@@ -122,6 +120,13 @@ impl Factor {
         x.iter().zip(&self.scale).map(|(x, s)| x * s).collect()
     }
 
+    /// `log |M|`.
+    pub(crate) fn log_det(&self) -> f64 {
+        let q = self.scale.len();
+        let pivot = |i: usize| 2.0 * (self.l[i * q + i] / self.scale[i]).ln();
+        (0..q).map(pivot).sum()
+    }
+
     /// `M^-1`, row by row.
     pub(crate) fn inverse(&self) -> Vec<Vec<f64>> {
         let q = self.scale.len();
@@ -133,7 +138,6 @@ impl Factor {
 
 /// Eight sums side by side, which the compiler turns into vectors.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    debug_assert!(a.len() == b.len() && a.len() <= BLOCK);
     let mut sums = [0.0; 8];
     let (a8, a_rest) = a.as_chunks::<8>();
     let (b8, b_rest) = b.as_chunks::<8>();
@@ -144,4 +148,39 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     rest + sums.iter().sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn by_hand() {
+        let (a, b, e) = ([1.0, 2.0, 2.0], [1e6, 0.0, 1e6], [3.0, 0.0, 3.0]);
+        let mut sums = NormalEquations::new(2);
+        sums.add(&[(0, &a), (1, &b)], &e);
+        assert_eq!(
+            (sums.jj(0, 0), sums.jj(0, 1), sums.jj(1, 1)),
+            (9.0, 3e6, 2e12)
+        );
+        assert_eq!((sums.je(0), sums.je(1), sums.cost()), (9.0, 6e6, 18.0));
+        let factor = sums.factor(|_| 0.0).unwrap();
+        // e = 3e-6 b.
+        let x = factor.solve(|i| sums.je(i));
+        assert!(x[0].abs() < 1e-14 && (x[1] - 3e-6).abs() < 1e-20);
+        assert!((sums.length_squared(&x) - 18.0).abs() < 1e-13);
+        // |M| = 18e12 - 9e12.
+        assert!((factor.log_det() - 9e12_f64.ln()).abs() < 1e-13);
+        assert!((factor.inverse()[0][0] - 2.0 / 9.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn dependent_columns_have_no_factors() {
+        let (a, b) = ([1.0, 2.0, 3.0], [2.0, 4.0, 6.0]);
+        let mut sums = NormalEquations::new(2);
+        sums.add(&[(0, &a), (1, &b)], &a);
+        assert!(sums.factor(|_| 0.0).is_none());
+        assert!(sums.factor(|_| 1.0).is_some());
+        assert!(NormalEquations::new(1).factor(|_| 0.0).is_none());
+    }
 }

@@ -74,7 +74,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`Error::NoRecord`]; [`Error::OrderZero`], [`Error::Improper`] for the orders; a record that is not valid, see
-    /// [`LoopRecord::validate`]; [`Error::MissingSignal`]; [`Error::ConstantDrive`]; [`Error::TooShort`];
+    /// [`LoopRecord::validate`]; [`Error::MissingReference`], [`Error::MissingInput`]; [`Error::ConstantDrive`]; [`Error::TooShort`];
     /// [`Error::ControllerMismatch`] where u is in the record and the controller misses more than 10 % of it.
     pub fn new(
         records: &[LoopRecord],
@@ -134,6 +134,7 @@ impl Problem {
         for (record, mismatch) in prepared.iter().zip(&mismatches) {
             if let Some(mismatch) = mismatch
                 && mismatch.systematic > LARGEST_MISMATCH * mismatch.size
+                && mismatch.systematic > 2.0 * mismatch.by_chance
             {
                 return Err(Error::ControllerMismatch {
                     record: record.name.clone(),
@@ -172,9 +173,10 @@ impl Problem {
         &self.mismatches
     }
 
-    /// Sampling interval of each record.
-    pub(crate) fn steps(&self) -> impl Iterator<Item = f64> {
-        self.records.iter().map(|record| record.step)
+    /// Sampling interval of each record, and whether its levels are estimated.
+    pub(crate) fn steps_and_free_levels(&self) -> impl Iterator<Item = (f64, bool)> {
+        let records = self.records.iter();
+        records.map(|record| (record.step, record.column.is_some()))
     }
 
     /// Parameters of the plant and estimated levels.

@@ -91,7 +91,8 @@ impl LoopRecord {
         }
     }
 
-    /// From a record as it is read from a file; times have to be evenly spaced to 1e-6 of the step.
+    /// From a record as it is read from a file; times have to be evenly spaced to 1e-6 of the step; r is taken
+    /// as held, u as the record says.
     ///
     /// # Errors
     /// [`Error::UnevenGrid`], [`Error::Signals`] where the record is not valid.
@@ -178,31 +179,17 @@ impl LoopRecord {
     /// The signal that drives the model, r in closed loop and u in open loop, and its hold.
     ///
     /// # Errors
-    /// [`Error::MissingSignal`].
+    /// [`Error::MissingReference`], [`Error::MissingInput`].
     pub fn drive(&self, controller: &Controller) -> Result<(&[f64], Hold), Error> {
-        let open = controller.is_open_loop();
-        let (signal, hold) = if open {
-            (&self.u, self.u_hold)
-        } else {
-            (&self.r, self.r_hold)
-        };
-        match signal {
-            Some(signal) => Ok((signal, hold)),
-            None => Err(Error::MissingSignal {
-                record: self.name.clone(),
-                signal: if open { "input u" } else { "reference r" },
-                where_: if open {
-                    "in open loop"
-                } else {
-                    "in closed loop"
-                },
-                instead: if open {
-                    ""
-                } else {
-                    ", or fit in open loop from u, which noise in the loop biases"
-                },
-            }),
+        let record = || self.name.clone();
+        if controller.is_open_loop() {
+            let u = self.u.as_deref();
+            let u = u.ok_or_else(|| Error::MissingInput { record: record() })?;
+            return Ok((u, self.u_hold));
         }
+        let r = self.r.as_deref();
+        let r = r.ok_or_else(|| Error::MissingReference { record: record() })?;
+        Ok((r, self.r_hold))
     }
 
     /// The levels that are subtracted: where [`Offsets::Estimated`], those of the first row, as a start. 0 for a

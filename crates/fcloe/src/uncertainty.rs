@@ -3,12 +3,17 @@
 //! Equations: see the head of `noise_model.rs`. The innovations' variance counts the fitted parameters and the
 //! noise model's coefficients as degrees of freedom that are spent.
 //!
-//! Assumptions: the minimum was reached; the noise is stationary and independent of r; the model's structure is right.
+//! Assumptions: the minimum was reached; the noise is stationary and independent of r, and, counted in samples, of one
+//! colour in all records; the model's structure is right.
+//!
+//! Figures, 4000 runs for each of eleven settings at 20 dB, n = 1 and 2, noise in the loop and on the record, white and
+//! coloured, levels known and estimated: 95 % intervals hold the truth in 94.2 to 96.0 % for every parameter, where those
+//! of a white residual hold it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`).
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::noise_model::{Colour, NoiseModel, NoisePath};
+use crate::noise_model::{Colour, NoiseModel, NoisePath, Residual};
 use crate::{ClosedLoop, Error, Fit, Problem};
 
 /// Orders of autoregressive noise that are tried: 0 to this.
@@ -66,18 +71,22 @@ impl Problem {
             samples: self.samples(),
         })?;
 
-        let mut residuals: Vec<(f64, Vec<f64>)> =
-            self.steps().map(|step| (step, Vec::new())).collect();
+        let residual = |(step, free_level)| Residual {
+            step,
+            free_level,
+            values: Vec::new(),
+        };
+        let mut residuals: Vec<Residual> = self.steps_and_free_levels().map(residual).collect();
         self.visit(&closed, &fit.plant, &fit.x, |index, _, e| {
-            residuals[index].1.extend_from_slice(e);
+            residuals[index].values.extend_from_slice(e);
         })?;
         let noise = NoiseModel::of_residuals(&residuals, &closed, path, MAX_ORDER)?;
 
         // Each record has its own filter, from rest; those of one sampling interval share the colour.
         let mut meat = vec![0.0; q * q];
-        let colours = self
-            .steps()
-            .map(|step| Colour::new(&noise, &closed, step))
+        let colours = residuals
+            .iter()
+            .map(|residual| Colour::new(&noise, &closed, residual.step))
             .collect::<Result<Vec<_>, _>>()?;
         let mut filters: Vec<_> = colours.iter().map(|colour| colour.filter(q)).collect();
         let mut row = vec![0.0; q];

@@ -312,21 +312,3 @@ fn refusals() {
         assert!(matches!(new(&plant, settings), Err(Error::Setting { .. })));
     }
 }
-
-/// An update allocates nothing, from second order with a filtered PID too.
-#[test]
-fn no_allocation() {
-    let plant = PlantModel::new(&[210.0, 9000.0], &[5.0, 40.0]).unwrap();
-    let controller = Controller::pid(0.3, 0.004, 4.0, 10.0).unwrap();
-    let settings = RecursiveSettings::new(1.0, 0.005, 1000.0, 0.02);
-    let mut estimator = RecursiveFcloe::new(&plant, &controller, settings).unwrap();
-    let drive = support::drive(2000);
-    let counted = allocation_counter::measure(|| {
-        for (k, &drive) in drive.iter().enumerate() {
-            let y = if k % 3 == 0 { 0.5 * drive } else { -0.1 };
-            estimator.update(&LoopSample { drive, y }, 1.0);
-        }
-    });
-    assert_eq!(counted.count_total, 0);
-    assert!(allocation_counter::measure(|| drop(estimator.clone())).count_total > 0);
-}

@@ -285,10 +285,10 @@ fn bad_input() {
     let one = std::slice::from_ref(&record);
     assert!(matches!(
         fit(one, &filter),
-        Err(Error::MissingSignal { .. })
+        Err(Error::RegressionWithoutInput { .. })
     ));
     assert!(matches!(
         start::pipeline(one, &controller, orders, &settings),
-        Err(Error::MissingSignal { .. })
+        Err(Error::RegressionWithoutInput { .. })
     ));
 }

@@ -55,7 +55,7 @@ pub enum Form {
 /// Least squares, (24). lambda in \[1/time\]; needs u in the record.
 ///
 /// # Errors
-/// [`Error::MissingSignal`], [`Error::Setting`], [`Error::NotDetermined`], those of [`LoopRecord::validate`] and
+/// [`Error::RegressionWithoutInput`], [`Error::Setting`], [`Error::NotDetermined`], those of [`LoopRecord::validate`] and
 /// [`PlantModel::new`].
 pub fn least_squares(
     record: &LoopRecord,

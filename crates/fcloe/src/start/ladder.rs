@@ -97,7 +97,7 @@ pub fn lambda_ladder(
 /// Candidates for the batch fit, the best first, none twice; the recursive estimator takes the first.
 ///
 /// # Errors
-/// Those of [`LoopRecord::validate`]; [`Error::NoRecord`]; [`Error::MissingSignal`]; [`Error::Setting`];
+/// Those of [`LoopRecord::validate`]; [`Error::NoRecord`]; [`Error::RegressionWithoutInput`], [`Error::MissingReference`]; [`Error::Setting`];
 /// [`Error::NoStart`] where no plant that was tried has a stable loop.
 pub fn pipeline(
     records: &[LoopRecord],

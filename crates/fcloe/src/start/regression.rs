@@ -30,7 +30,7 @@ const RESTS: f64 = 1e-4;
 /// The controller says whether a sensor's filter is in the loop, through which u is passed then.
 ///
 /// # Errors
-/// [`Error::NoRecord`], [`Error::MissingSignal`], [`Error::Length`] for a filter of another degree,
+/// [`Error::NoRecord`], [`Error::RegressionWithoutInput`], [`Error::Length`] for a filter of another degree,
 /// [`Error::NotDetermined`], [`Error::Lti`]; those of [`LoopRecord::validate`] and [`PlantModel::new`].
 pub fn least_squares(
     records: &[LoopRecord],
@@ -100,7 +100,7 @@ pub struct Refinement {
 /// loop is stable, where the next one's is not, or where A^ is not Hurwitz and so is no filter.
 ///
 /// # Errors
-/// [`Error::UnstableLoop`] for the start; those of [`LoopRecord::validate`], [`Error::MissingSignal`],
+/// [`Error::UnstableLoop`] for the start; those of [`LoopRecord::validate`], [`Error::RegressionWithoutInput`],
 /// [`Error::NoRecord`].
 pub fn refine(
     records: &[LoopRecord],

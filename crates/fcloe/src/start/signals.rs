@@ -10,12 +10,12 @@ const DEPENDENT: f64 = 1e-13;
 
 /// u of a record.
 pub(super) fn input(record: &LoopRecord) -> Result<&[f64], Error> {
-    record.u.as_deref().ok_or_else(|| Error::MissingSignal {
-        record: record.name.clone(),
-        signal: "input u",
-        where_: "in a regression",
-        instead: "",
-    })
+    record
+        .u
+        .as_deref()
+        .ok_or_else(|| Error::RegressionWithoutInput {
+            record: record.name.clone(),
+        })
 }
 
 /// u as the plant of the loop sees it, through a sensor's filter where there is one, and y: deviations.

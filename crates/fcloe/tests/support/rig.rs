@@ -20,6 +20,10 @@ pub struct Rig {
     /// In decibels.
     pub snr: f64,
     pub in_loop: bool,
+    /// Raw levels instead of deviations, to be estimated.
+    pub unknown_levels: bool,
+    /// Of white noise, or the correlation of neighbours.
+    pub rho: f64,
 }
 
 impl Rig {
@@ -34,6 +38,8 @@ impl Rig {
             r: excitation::levels(2800, 400, &pattern).unwrap(),
             snr: 20.0,
             in_loop,
+            unknown_levels: false,
+            rho: 0.0,
         }
     }
 
@@ -46,6 +52,8 @@ impl Rig {
             r: excitation::prbs(1270, 10, -1.0, 1.0, 7).unwrap(),
             snr: 20.0,
             in_loop,
+            unknown_levels: false,
+            rho: 0.0,
         }
     }
 
@@ -61,6 +69,37 @@ impl Rig {
             r: excitation::prbs(1270, 10, -1.0, 1.0, 7).unwrap(),
             snr: 20.0,
             in_loop,
+            unknown_levels: false,
+            rho: 0.0,
+        }
+    }
+
+    /// A plant that passes its input on at once: so does the loop with the noise.
+    pub fn direct_term(in_loop: bool) -> Self {
+        Self {
+            name: "n = 1, m = 1, PI, pseudo-random",
+            plant: PlantModel::new(&[3.0], &[2.0, 0.7]).unwrap(),
+            controller: Controller::pi(0.5, 0.2).unwrap(),
+            step: 0.3,
+            ..Self::second_order(in_loop)
+        }
+    }
+
+    pub fn with_unknown_levels(self) -> Self {
+        Self {
+            name: "the same, levels estimated",
+            unknown_levels: true,
+            ..self
+        }
+    }
+
+    /// Without a controller, and coloured noise.
+    pub fn open_loop() -> Self {
+        Self {
+            name: "n = 2, m = 1, open loop, coloured noise",
+            controller: Controller::none(),
+            rho: 0.8,
+            ..Self::second_order(false)
         }
     }
 
@@ -78,14 +117,27 @@ impl Rig {
         };
         let clean = data(Noise::None);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let w = noise_at_snr(&clean.y, self.snr, &mut rng).unwrap();
-        let data = data(if self.in_loop {
+        let mut w = noise_at_snr(&clean.y, self.snr, &mut rng).unwrap();
+        for k in 1..w.len() {
+            w[k] = self.rho * w[k - 1] + (1.0 - self.rho * self.rho).sqrt() * w[k];
+        }
+        let mut data = data(if self.in_loop {
             Noise::InLoop(&w)
         } else {
             Noise::OnRecord(&w)
         });
-        let r = self.r.clone();
-        LoopRecord::closed_loop(self.step, r, Some(data.u), data.y, Offsets::Deviations)
+        let mut r = self.r.clone();
+        let mut offsets = Offsets::Deviations;
+        if self.unknown_levels {
+            for v in data.y.iter_mut().chain(&mut r) {
+                *v += 20.0;
+            }
+            offsets = Offsets::Estimated;
+        }
+        if self.controller.is_open_loop() {
+            return LoopRecord::open_loop(self.step, r, data.y, offsets);
+        }
+        LoopRecord::closed_loop(self.step, r, Some(data.u), data.y, offsets)
     }
 
     /// Estimates and their uncertainty, from a start that is off by a fifth.

@@ -314,7 +314,8 @@ impl RecursiveFcloe {
             .zip(&self.scale)
             .all(|(t, s)| t.abs() <= range * s);
         let (leading, scale) = (self.tried[self.orders.n - 1], self.scale[self.orders.n - 1]);
-        if !inside || leading.abs() < scale / range {
+        let same_sign = leading * self.theta[self.orders.n - 1] > 0.0;
+        if !inside || !same_sign || leading.abs() < scale / range {
             return false;
         }
         self.model.characteristic_at(&self.tried, &mut self.p);

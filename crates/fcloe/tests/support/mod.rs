@@ -115,37 +115,3 @@ pub fn integrate(
     }
     (ys, us)
 }
-
-/// y of `tau(t) y' + y = K u` under PI, r and the noise in the loop held over steps of 1, by Runge-Kutta with 20 steps
-/// each.
-pub fn drifting_first_order(
-    gain: f64,
-    tau: impl Fn(usize) -> f64,
-    (kp, ki): (f64, f64),
-    r: &[f64],
-    noise: Option<&[f64]>,
-) -> Vec<f64> {
-    const STEPS: usize = 20;
-    let h = 1.0 / STEPS as f64;
-    let (mut y, mut integral) = (0.0, 0.0);
-    let mut ys = Vec::with_capacity(r.len());
-    for (k, r) in r.iter().enumerate() {
-        let w = noise.map_or(0.0, |w| w[k]);
-        ys.push(y + w);
-        let tau = tau(k);
-        let slope = |y: f64, integral: f64| {
-            let e = r - y - w;
-            let u = kp * e + ki * integral;
-            ((gain * u - y) / tau, e)
-        };
-        for _ in 0..STEPS {
-            let a = slope(y, integral);
-            let b = slope(y + 0.5 * h * a.0, integral + 0.5 * h * a.1);
-            let c = slope(y + 0.5 * h * b.0, integral + 0.5 * h * b.1);
-            let d = slope(y + h * c.0, integral + h * c.1);
-            y += h / 6.0 * (a.0 + 2.0 * b.0 + 2.0 * c.0 + d.0);
-            integral += h / 6.0 * (a.1 + 2.0 * b.1 + 2.0 * c.1 + d.1);
-        }
-    }
-    ys
-}

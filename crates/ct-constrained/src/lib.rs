@@ -5,16 +5,19 @@
 //! | a balance, a ratio, a static gain: `f' theta = chi` | [`Row::equal`] in a [`ConstrainedRls`]; it also counts as excitation |
 //! | a sign or a bound that should be kept to softly | [`Row::at_most`], [`Row::at_least`] in a [`ConstrainedRls`] |
 //! | a sign or a bound that must be kept to | [`project_box`] or [`project`] after each update |
+//! | a box, hard or soft, around an estimator of another kind | [`Bounds`] |
 //! | a balance that varies in time | [`ConstrainedRls::set_row`] |
 //!
 //! The example `known_balance` (`cargo run --release -p ctid-examples --bin known_balance`) shows a tank with and without them.
 #![no_std]
 
+mod bounds;
 mod constrained;
 mod error;
 mod projection;
 mod row;
 
+pub use bounds::{Bounds, Keep};
 pub use constrained::ConstrainedRls;
 pub use error::Error;
 pub use projection::{project, project_box};

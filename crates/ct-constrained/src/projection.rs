@@ -19,7 +19,7 @@
 //! Reference: D. Goldfarb, A. Idnani, *A numerically stable dual method for solving strictly convex quadratic programs*,
 //! Mathematical Programming 27 (1983) 1-33.
 
-use ct_rls::{ContinuousRls, RecursiveEstimator};
+use ct_rls::{ContinuousRls, Integrator, RecursiveEstimator};
 use nalgebra::SVector;
 
 use crate::{Error, Relation, Row};
@@ -37,8 +37,8 @@ const STEPS: usize = 20;
 ///
 /// # Errors
 /// [`Error::NoCommonPoint`] where the rows contradict each other; nothing is changed then.
-pub fn project<const P: usize, const R: usize>(
-    rls: &mut ContinuousRls<P>,
+pub fn project<const P: usize, const R: usize, I: Integrator>(
+    rls: &mut ContinuousRls<P, I>,
     rows: &[Row<P>; R],
 ) -> Result<bool, Error> {
     let statement = |i: usize| {
@@ -56,21 +56,12 @@ pub fn project<const P: usize, const R: usize>(
 ///
 /// # Errors
 /// [`Error::Bounds`]; nothing is changed then.
-pub fn project_box<const P: usize>(
-    rls: &mut ContinuousRls<P>,
+pub fn project_box<const P: usize, I: Integrator>(
+    rls: &mut ContinuousRls<P, I>,
     lower: &SVector<f64, P>,
     upper: &SVector<f64, P>,
 ) -> Result<bool, Error> {
-    for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
-        let possible = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
-        if !possible {
-            return Err(Error::Bounds {
-                index,
-                lower,
-                upper,
-            });
-        }
-    }
+    check_box(lower, upper)?;
     let statement = |i: usize| {
         let mut f = SVector::zeros();
         let (entry, sign, bound) = if i < P {
@@ -81,7 +72,33 @@ pub fn project_box<const P: usize>(
         f[entry] = sign;
         (f, bound, false)
     };
-    nearest(rls, 2 * P, statement)
+    let moved = nearest(rls, 2 * P, statement)?;
+    // rounding may have left an entry a little outside
+    let inside = rls
+        .theta()
+        .zip_map(lower, f64::max)
+        .zip_map(upper, f64::min);
+    if inside != *rls.theta() {
+        rls.set_theta(inside)?;
+    }
+    Ok(moved)
+}
+
+pub(crate) fn check_box<const P: usize>(
+    lower: &SVector<f64, P>,
+    upper: &SVector<f64, P>,
+) -> Result<(), Error> {
+    for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
+        let possible = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
+        if !possible {
+            return Err(Error::Bounds {
+                index,
+                lower,
+                upper,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// An active row.
@@ -102,6 +119,7 @@ type Violated<const P: usize> = (usize, SVector<f64, P>, f64, bool);
 
 fn most_violated<const P: usize>(
     theta: &SVector<f64, P>,
+    start: &SVector<f64, P>,
     rows: usize,
     statement: impl Fn(usize) -> (SVector<f64, P>, f64, bool),
 ) -> Option<Violated<P>> {
@@ -110,7 +128,8 @@ fn most_violated<const P: usize>(
     for row in 0..rows {
         let (f, chi, equality) = statement(row);
         let excess = f.dot(theta) - chi;
-        let size = chi.abs() + f.abs().dot(&theta.abs());
+        // with a bound of 0 the estimate itself is no measure of its rounding; what it was made from is
+        let size = chi.abs() + f.abs().dot(&theta.abs().sup(&start.abs()));
         let violation = if equality { excess.abs() } else { excess };
         if violation > most * size {
             most = violation / size;
@@ -146,12 +165,13 @@ fn multiplier_rates<const P: usize>(active: &[Active<P>], n: &SVector<f64, P>) -
 }
 
 /// The dual method; `statement(i)` is `(f, chi, equality)` of `f' theta <= chi`.
-fn nearest<const P: usize>(
-    rls: &mut ContinuousRls<P>,
+fn nearest<const P: usize, I: Integrator>(
+    rls: &mut ContinuousRls<P, I>,
     rows: usize,
     statement: impl Fn(usize) -> (SVector<f64, P>, f64, bool),
 ) -> Result<bool, Error> {
-    let mut theta = *rls.theta();
+    let start = *rls.theta();
+    let mut theta = start;
     let none = Active {
         row: 0,
         f: SVector::zeros(),
@@ -162,15 +182,16 @@ fn nearest<const P: usize>(
     let (mut active, mut q) = ([none; P], 0);
     let mut last = (0, 0.0);
     for _ in 0..STEPS * (rows + P) {
-        let Some((row, f, mut excess, equality)) = most_violated(&theta, rows, &statement) else {
-            let moved = theta != *rls.theta();
+        let Some((row, f, mut excess, equality)) = most_violated(&theta, &start, rows, &statement)
+        else {
+            let moved = theta != start;
             if moved {
                 rls.set_theta(theta)?;
             }
             return Ok(moved);
         };
         last = (row, excess);
-        let (k, s) = rls.factor().times(&f);
+        let (k, s) = rls.times(&f);
         let mut lambda = 0.0;
         loop {
             let r = multiplier_rates(&active[..q], &f);

@@ -1,5 +1,6 @@
 //! One linear statement about the parameters, `f' theta = chi` or `f' theta <= chi`, and its weight.
 
+use ct_rls::{ContinuousRls, Integrator, RecursiveEstimator};
 use nalgebra::SVector;
 
 use crate::Error;
@@ -109,6 +110,13 @@ impl<const P: usize> Row<P> {
             Relation::Equal => r,
             Relation::AtMost => r.max(0.0),
             Relation::AtLeast => r.min(0.0),
+        }
+    }
+
+    /// Where the row is violated, pulls the estimates towards it for `dt` seconds with its weight, exactly, and leaves `P` as it is.
+    pub fn penalize<I: Integrator>(&self, rls: &mut ContinuousRls<P, I>, dt: f64) {
+        if self.violation(rls.theta()) != 0.0 {
+            rls.relax(&self.f, self.chi, self.weight * dt);
         }
     }
 }

@@ -11,8 +11,8 @@
 //! | Where is `Re G(jw)` smallest? | [`TransferFunction::least_real_part`] |
 //!
 //! Time is in any one unit throughout; frequencies are angular, in radians per that unit. The crate needs `alloc`, not
-//! `std`; nothing is allocated per sample. Its functions do not depend on the platform's mathematical library, so
-//! results are the same on all.
+//! `std` (`bash ci/no_std/run` links it without); nothing is allocated per sample. Its functions do not depend on the
+//! platform's mathematical library, so results are the same on all.
 //!
 //! # Example
 //! A first-order process `tau y' + y = K u` from samples of its input, held, and of its output: state variable filters

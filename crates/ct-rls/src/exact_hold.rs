@@ -29,7 +29,7 @@
 //! Reference: A. J. Udink ten Cate, *On optimal and suboptimal least squares identification in continuous time*, WP-85-54,
 //! IIASA, Laxenburg, 1985.
 
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 use crate::integrator::sealed::{Capped, Covariance, Refusal, Rule};
 use crate::settings::{Step, Weights};
@@ -84,6 +84,10 @@ impl<const P: usize> Covariance<P> for UdFactor<P> {
 
     fn to_matrix(&self) -> SMatrix<f64, P, P> {
         self.to_matrix()
+    }
+
+    fn times(&self, x: &SVector<f64, P>) -> (SVector<f64, P>, f64) {
+        self.times(x)
     }
 
     fn smallest_pivot(&self) -> Result<f64, (usize, f64)> {

@@ -14,9 +14,10 @@ impl Integrator for Rk4 {}
 pub(crate) mod sealed {
     use core::fmt::Debug;
 
-    use nalgebra::SMatrix;
+    use nalgebra::{SMatrix, SVector};
 
     use crate::Error;
+    use crate::blocks::Block;
     use crate::settings::{Step, Weights};
 
     /// What the cap on the trace needs.
@@ -31,9 +32,12 @@ pub(crate) mod sealed {
         fn to_matrix(&self) -> SMatrix<f64, P, P>;
         /// Smallest pivot, or the place and the value of the first one that is not above 0.
         fn smallest_pivot(&self) -> Result<f64, (usize, f64)>;
+        /// `(P x, x'P x)`
+        fn times(&self, x: &SVector<f64, P>) -> (SVector<f64, P>, f64);
     }
 
     /// Why a step was not made; the state is as before.
+    #[derive(Clone, Copy)]
     pub enum Refusal {
         /// The sample is of no use.
         NotFinite,
@@ -53,6 +57,15 @@ pub(crate) mod sealed {
             epsilon: f64,
             weights: &Weights,
             step: &Step,
+        ) -> Result<f64, Refusal>;
+    }
+
+    pub trait BlockRule: Rule {
+        /// One step of two blocks, given `eps` at its start; returns the sum of `phi'P phi` at its start.
+        fn blocks<const A: usize, const B: usize>(
+            first: Block<'_, A, Self::State<A>>,
+            second: Block<'_, B, Self::State<B>>,
+            epsilon: f64,
         ) -> Result<f64, Refusal>;
     }
 }
@@ -89,6 +102,12 @@ impl<const P: usize> sealed::Covariance<P> for Plain<P> {
 
     fn to_matrix(&self) -> nalgebra::SMatrix<f64, P, P> {
         nalgebra::SMatrix::from_fn(|i, j| self.0[i][j])
+    }
+
+    fn times(&self, x: &nalgebra::SVector<f64, P>) -> (nalgebra::SVector<f64, P>, f64) {
+        let [entries] = &x.data.0;
+        let k = nalgebra::SVector::from(Self::times(self, entries));
+        (k, k.dot(x))
     }
 
     fn smallest_pivot(&self) -> Result<f64, (usize, f64)> {

@@ -1,4 +1,5 @@
-//! Recursive least squares in continuous time with forgetting, which stays positive definite. No `std`, no allocation.
+//! Recursive least squares in continuous time with forgetting, which stays positive definite. No `std`, no allocation:
+//! `bash ci/no_std/run` links it without either.
 //!
 //! | question | answer |
 //! |---|---|
@@ -7,8 +8,10 @@
 //! | Which `eta`, `c`, `gamma`? | [`Weights`]: `least_squares(eta)`, `1/eta` 5 to 10 dominant time constants |
 //! | The signals are silent for hours | [`Guards`]: forgetting stops at a cap, or while the regressor is silent |
 //! | The parameters have jumped | [`ContinuousRls::reset_covariance`] |
+//! | A reading is missing | hand in the NaN: it is [refused](Innovation::accepted) and changes nothing |
 //! | Can I trust the estimates? | [`health`](RecursiveEstimator::health): excitation, definiteness, trace |
 //! | Parameters that are related, or bounded | the crate `ct-constrained` |
+//! | Two blocks of parameters, one output, no covariance between them | [`update_blocks`] |
 //! | How does Euler's rule compare? | [`ContinuousRls::with_integrator`] with [`Euler`] or [`Rk4`] |
 //!
 //! # Why not a plain covariance matrix
@@ -31,6 +34,7 @@
 //! It keeps `P` only while `gamma h phi'P phi < 1 + eta h`, which ties the step to `P(0)`. The exact step has no such limit.
 #![no_std]
 
+mod blocks;
 mod error;
 mod estimator;
 mod euler;
@@ -44,6 +48,7 @@ mod settings;
 #[cfg(feature = "alloc")]
 mod dynamic;
 
+pub use blocks::{BlockIntegrator, update_blocks};
 #[cfg(feature = "alloc")]
 pub use dynamic::{DynamicRls, DynamicSample};
 pub use error::Error;

@@ -57,10 +57,10 @@ impl<const P: usize> Sample<P> {
 /// ```
 #[derive(Clone, Debug)]
 pub struct ContinuousRls<const P: usize, I: Integrator = ExactHold> {
-    theta: SVector<f64, P>,
-    state: I::State<P>,
-    weights: Weights,
-    guard: Guard,
+    pub(crate) theta: SVector<f64, P>,
+    pub(crate) state: I::State<P>,
+    pub(crate) weights: Weights,
+    pub(crate) guard: Guard,
 }
 
 impl<const P: usize> ContinuousRls<P> {
@@ -118,24 +118,6 @@ impl<const P: usize> ContinuousRls<P> {
         )
         .map(|_| epsilon)
     }
-
-    /// Moves the estimates towards `f' theta = chi` along `P f`, and leaves `P` as it is: by the share
-    /// `1 - exp(-pull f'P f)`, which is the exact solution of `dtheta/dt = w P f (chi - f' theta)` with `pull = w h`;
-    /// `f64::INFINITY` moves all the way. At least 0.
-    ///
-    /// Returns `chi - f' theta` before; `None`, and nothing is done, where a number is out of range.
-    pub fn relax(&mut self, f: &SVector<f64, P>, chi: f64, pull: f64) -> Option<f64> {
-        let epsilon = chi - f.dot(&self.theta);
-        let (k, s) = self.state.times(f);
-        if !(pull >= 0.0 && epsilon.abs() <= MAX_EPSILON && f.norm_squared() <= MAX_PHI_SQUARED) {
-            return None;
-        }
-        if s > 0.0 {
-            let share = -libm::expm1(-pull * s);
-            self.theta += k * (epsilon * share / s);
-        }
-        Some(epsilon)
-    }
 }
 
 impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
@@ -157,6 +139,29 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
             weights,
             guard,
         })
+    }
+
+    /// Moves the estimates towards `f' theta = chi` along `P f`, and leaves `P` as it is: by the share
+    /// `1 - exp(-pull f'P f)`, which is the exact solution of `dtheta/dt = w P f (chi - f' theta)` with `pull = w h`;
+    /// `f64::INFINITY` moves all the way. At least 0.
+    ///
+    /// Returns `chi - f' theta` before; `None`, and nothing is done, where a number is out of range.
+    pub fn relax(&mut self, f: &SVector<f64, P>, chi: f64, pull: f64) -> Option<f64> {
+        let epsilon = chi - f.dot(&self.theta);
+        let (k, s) = self.state.times(f);
+        if !(pull >= 0.0 && epsilon.abs() <= MAX_EPSILON && f.norm_squared() <= MAX_PHI_SQUARED) {
+            return None;
+        }
+        if s > 0.0 {
+            let share = -libm::expm1(-pull * s);
+            self.theta += k * (epsilon * share / s);
+        }
+        Some(epsilon)
+    }
+
+    /// `(P x, x'P x)`.
+    pub fn times(&self, x: &SVector<f64, P>) -> (SVector<f64, P>, f64) {
+        self.state.times(x)
     }
 
     /// The same estimator with other guards against wind-up.
@@ -316,7 +321,7 @@ impl Guard {
         guards.check(trace)?;
         self.guards = guards;
         self.limit = guards.cap();
-        self.silent_below_squared = guards.silent_below * guards.silent_below;
+        self.silent_below_squared = guards.silent_below * guards.silent_below.abs();
         Ok(())
     }
 

@@ -106,8 +106,8 @@ pub struct Guards {
     /// A regressor that stays in a subspace for long makes the other directions reach the cap; while they are
     /// there, forgetting is nearly off in all directions.
     pub trace_limit: f64,
-    /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`, at least 0.
-    /// At 0, the start, only an exactly silent regressor counts.
+    /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`.
+    /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's.
     pub silent_below: f64,
 }
 
@@ -121,11 +121,11 @@ impl Guards {
                 range: "above 0, or f64::INFINITY for none",
             });
         }
-        if !(self.silent_below >= 0.0 && self.silent_below.is_finite()) {
+        if !self.silent_below.is_finite() {
             return Err(Error::Guard {
                 guard: "silent_below",
                 value: self.silent_below,
-                range: "at least 0 and finite, in the unit of phi",
+                range: "finite, in the unit of phi",
             });
         }
         let limit = self.cap();

@@ -1,0 +1,138 @@
+//! A box that estimates are kept to, step by step: by projection, which is hard, or by penalties, which are soft.
+
+use ct_rls::{ContinuousRls, Integrator, RecursiveEstimator};
+use nalgebra::SVector;
+
+use crate::projection::check_box;
+use crate::{Error, Relation, Row, project_box};
+
+/// How estimates are kept to their bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Keep {
+    /// Moved to the nearest point of the box, in the metric of what is known: [`project_box`].
+    Projection,
+    /// Each entry that is outside is set to its bound, and the others stay. Simple, as simulations in the literature have it; but the
+    /// Lyapunov function may grow, and correlated parameters are left where they do not belong.
+    Clamp,
+    /// Pulled back where outside: a row's penalty for each bound that is violated, relaxed exactly over the step.
+    Penalty {
+        /// As of a [`Row`]: well above the mean squared error of the output; 1e3 of it does, 1 of it is useless.
+        weight: f64,
+    },
+}
+
+/// The box `lower <= theta <= upper`, entry by entry, and how it is kept to. Infinite bounds are none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds<const P: usize> {
+    lower: SVector<f64, P>,
+    upper: SVector<f64, P>,
+    keep: Keep,
+}
+
+impl<const P: usize> Bounds<P> {
+    /// A box that is kept to by projection.
+    ///
+    /// # Errors
+    /// [`Error::Bounds`] where a lower bound is above its upper one, or either is NaN.
+    pub fn new(lower: [f64; P], upper: [f64; P]) -> Result<Self, Error> {
+        let (lower, upper) = (SVector::from(lower), SVector::from(upper));
+        check_box(&lower, &upper)?;
+        Ok(Self {
+            lower,
+            upper,
+            keep: Keep::Projection,
+        })
+    }
+
+    /// No bounds.
+    pub fn none() -> Self {
+        Self {
+            lower: SVector::from([f64::NEG_INFINITY; P]),
+            upper: SVector::from([f64::INFINITY; P]),
+            keep: Keep::Projection,
+        }
+    }
+
+    /// The same box, kept to in this way.
+    ///
+    /// # Errors
+    /// [`Error::Weight`] for a penalty's.
+    pub fn kept_by(self, keep: Keep) -> Result<Self, Error> {
+        match keep {
+            Keep::Penalty { weight } if !(weight >= 0.0 && weight.is_finite()) => {
+                Err(Error::Weight { weight })
+            }
+            _ => Ok(Self { keep, ..self }),
+        }
+    }
+
+    /// Lower bounds.
+    pub fn lower(&self) -> &SVector<f64, P> {
+        &self.lower
+    }
+
+    /// Upper bounds.
+    pub fn upper(&self) -> &SVector<f64, P> {
+        &self.upper
+    }
+
+    /// How the box is kept to.
+    pub fn keep(&self) -> Keep {
+        self.keep
+    }
+
+    /// Whether `theta` lies in the box.
+    pub fn contains(&self, theta: &SVector<f64, P>) -> bool {
+        let mut bounds = self.lower.iter().zip(&self.upper);
+        theta
+            .iter()
+            .all(|x| bounds.next().is_some_and(|(l, u)| (l..=u).contains(&x)))
+    }
+
+    /// Brings the estimates back after a step of `dt` seconds; returns whether they moved.
+    ///
+    /// # Errors
+    /// As of [`project_box`]; a box has a point, so none in fact.
+    #[inline]
+    pub fn enforce<I: Integrator>(
+        &self,
+        rls: &mut ContinuousRls<P, I>,
+        dt: f64,
+    ) -> Result<bool, Error> {
+        if self.contains(rls.theta()) {
+            return Ok(false);
+        }
+        match self.keep {
+            Keep::Projection => project_box(rls, &self.lower, &self.upper),
+            Keep::Clamp => {
+                let lifted = rls.theta().zip_map(&self.lower, f64::max);
+                rls.set_theta(lifted.zip_map(&self.upper, f64::min))?;
+                Ok(true)
+            }
+            Keep::Penalty { weight } => self.pull(rls, weight, dt),
+        }
+    }
+
+    fn pull<I: Integrator>(
+        &self,
+        rls: &mut ContinuousRls<P, I>,
+        weight: f64,
+        dt: f64,
+    ) -> Result<bool, Error> {
+        let bounds = [
+            (Relation::AtLeast, self.lower),
+            (Relation::AtMost, self.upper),
+        ];
+        for (relation, bound) in bounds {
+            for (entry, &chi) in bound.iter().enumerate() {
+                if chi.is_finite() {
+                    let mut f = [0.0; P];
+                    f[entry] = 1.0;
+                    Row::new(relation, f, chi, weight)?.penalize(rls, dt);
+                }
+            }
+        }
+        Ok(true)
+    }
+}

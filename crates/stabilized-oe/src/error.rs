@@ -1,0 +1,69 @@
+//! What can be wrong with a setting or a run: each message carries the numbers that disagree and the mend.
+
+/// Everything this crate can refuse, and why a run has stopped.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// From the estimator of one block.
+    #[error(transparent)]
+    Rls(#[from] ct_rls::Error),
+    /// From the bounds.
+    #[error(transparent)]
+    Constrained(#[from] ct_constrained::Error),
+    /// From a filter or the check of positive realness.
+    #[cfg(feature = "alloc")]
+    #[error(transparent)]
+    Lti(#[from] ct_lti::Error),
+    /// The model to start from is not stable.
+    #[error(
+        "A^ = 1 + a_1 s + .. + a_n s^n to start from is not Hurwitz, a_n = {highest}: the model runs in parallel and must be stable; start from real poles, a = (1 + s T)^n, if nothing is known"
+    )]
+    StartNotHurwitz {
+        /// The highest coefficient that was given.
+        highest: f64,
+    },
+    /// The estimates to start from lie outside their bounds.
+    #[error("{what}(0)[{index}] is {value}, outside its bounds {lower} to {upper}; start inside")]
+    StartOutside {
+        /// `theta` or `c`.
+        what: &'static str,
+        /// Which entry, from 0.
+        index: usize,
+        /// The value that was given.
+        value: f64,
+        /// Its lower bound.
+        lower: f64,
+        /// Its upper bound.
+        upper: f64,
+    },
+    /// A state of the model that is not finite.
+    #[error("the model's state {index} is {value}; give a finite one, 0 for rest")]
+    ModelState {
+        /// Which derivative of the output, from 0.
+        index: usize,
+        /// The value that was given.
+        value: f64,
+    },
+    /// The model's output left the range of numbers. The estimates from before are kept.
+    #[error(
+        "the model's output became {value} over a step of {dt} s; use ExactHold, shorten the step, or bound theta more closely"
+    )]
+    ModelDiverged {
+        /// What was reached.
+        value: f64,
+        /// The step, s.
+        dt: f64,
+    },
+    /// A box of plausible A0 in which a coefficient may be 0 or negative.
+    #[error(
+        "a_{index} of the plausible plants reaches from {lower} to {upper}, but must be above 0 throughout; no stable plant has another sign"
+    )]
+    Plausible {
+        /// Which coefficient, from 1.
+        index: usize,
+        /// Lower end.
+        lower: f64,
+        /// Upper end.
+        upper: f64,
+    },
+}

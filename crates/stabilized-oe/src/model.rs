@@ -1,0 +1,85 @@
+//! The model in parallel, [U] 4.1: `y_m = B^/A^ u`, with `theta^` as it was at the start of each step.
+//!
+//! States: `y_m, y_m', .., y_m^(n-1)`. The highest derivative is taken from the model's equation,
+//! ```text
+//! y_m^(n) = (B^ u - y_m - a_1 y_m' - .. - a_{n-1} y_m^(n-1))/a_n
+//! ```
+//! with `theta^` as it is, so that `phi_m' theta^ = y_m` holds exactly: a derivative from elsewhere would break (4.7).
+
+use crate::Integrator;
+use crate::integrator::sealed::ModelRule;
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Model<const N: usize, const P: usize> {
+    /// `y_m` to `y_m^(n-1)`
+    pub state: [f64; N],
+    held: Option<Held<P>>,
+}
+
+/// What the step that is under way began with.
+#[derive(Clone, Copy, Debug)]
+struct Held<const P: usize> {
+    theta: [f64; P],
+    inputs: [f64; P],
+    dt: f64,
+}
+
+impl<const N: usize, const P: usize> Model<N, P> {
+    pub fn new(state: [f64; N]) -> Self {
+        Self { state, held: None }
+    }
+
+    /// Length of the step under way, s; 0 before the first.
+    pub fn since(&self) -> f64 {
+        self.held.map_or(0.0, |held| held.dt)
+    }
+
+    /// Brings the states to the end of the step under way; `inputs` are those there, in the places of `b`.
+    #[inline]
+    pub fn advance<I: Integrator>(&mut self, inputs: &[f64; P], smooth: bool) {
+        let Some(held) = &self.held else { return };
+        let w0 = drive::<N, P>(&held.theta, &held.inputs);
+        let w1 = if smooth {
+            drive::<N, P>(&held.theta, inputs)
+        } else {
+            w0
+        };
+        let a = core::array::from_fn(|i| held.theta[i]);
+        <I as ModelRule>::advance(&mut self.state, &a, (w0, w1), held.dt);
+    }
+
+    /// Begins a step of `dt` seconds.
+    pub fn hold(&mut self, theta: [f64; P], inputs: [f64; P], dt: f64) {
+        self.held = Some(Held { theta, inputs, dt });
+    }
+
+    /// `y_m'` to `y_m^(n)`.
+    #[inline]
+    pub fn derivatives(&self, theta: &[f64; P], inputs: &[f64; P]) -> [f64; N] {
+        let drive = drive::<N, P>(theta, inputs);
+        slopes(&self.state, &theta[..N], drive)
+    }
+}
+
+/// `B^ u`
+#[inline]
+fn drive<const N: usize, const P: usize>(theta: &[f64; P], inputs: &[f64; P]) -> f64 {
+    theta[N..]
+        .iter()
+        .zip(&inputs[N..])
+        .map(|(b, u)| b * u)
+        .sum()
+}
+
+/// `y_m'` to `y_m^(n)`, given `drive = B^ u`.
+#[inline]
+pub(crate) fn slopes<const N: usize>(state: &[f64; N], a: &[f64], drive: f64) -> [f64; N] {
+    let mut slopes = [0.0; N];
+    let mut rest = drive - state[0];
+    for i in 1..N {
+        slopes[i - 1] = state[i];
+        rest -= a[i - 1] * state[i];
+    }
+    slopes[N - 1] = rest / a[N - 1];
+    slopes
+}

@@ -10,45 +10,57 @@ use fcloe::{
     Controller, Error, Filter, LoopSample, PlantModel, RecursiveFcloe, RecursiveSettings,
     TableOfStarts, Verdict, factors_to_five,
 };
-use online::{From, data, first_order, first_order_settings as settings, run, worst};
+use online::{From, SecondOrder, data, first_order, first_order_settings as settings, run, worst};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
+/// The first seed of records on which nothing was chosen.
+const FRESH: u64 = 10_000;
+
 /// 60 starts within a factor of 5, each with noise of its own: at least 58 end within 3 %. With the filter of the start
-/// half of them do.
+/// about half of them do.
 #[test]
 fn far_starts() {
-    let adaptive = online::first_order_from_afar(5.0, Filter::Adaptive);
-    let fixed = online::first_order_from_afar(5.0, Filter::Fixed);
+    let seeds = FRESH..FRESH + 60;
+    let adaptive = online::first_order_from_afar(5.0, Filter::Adaptive, seeds.clone());
+    let fixed = online::first_order_from_afar(5.0, Filter::Fixed, seeds);
     println!("adaptive {adaptive}, fixed {fixed} of 60");
     assert!(adaptive >= 58);
     assert!((20..50).contains(&fixed));
 }
 
-/// n = 2, m = 1 from regressions: at least 36 of 40 end within 10 % in all four parameters, and the recursion has made
-/// the estimates better.
+/// n = 2, m = 1 from regressions: at least 36 of 40 end within 10 % in all four parameters, also where not all of the
+/// starts are, and the mean error falls to less than two thirds.
 #[test]
 fn second_order_from_regressions() {
-    for from in [From::LeastSquares, From::Pipeline] {
-        let ends = online::second_order_runs(from, Filter::Adaptive);
-        println!("{from:?}: {ends:?}");
-        assert!(ends.good >= 36);
-        assert!(ends.off < ends.starts_off);
+    for (snr, beginning) in [(30.0, 2540), (20.0, 1270)] {
+        for from in [From::LeastSquares, From::Instruments] {
+            let experiment = SecondOrder { snr, beginning };
+            let ends = experiment.runs(from, Filter::Adaptive, FRESH..FRESH + 40);
+            println!("{experiment:?} {from:?}: {ends:?}");
+            assert!(ends.good >= 36);
+            assert!(snr > 20.0 || ends.good > ends.good_starts);
+            assert!(3.0 * ends.off < 2.0 * ends.starts_off);
+        }
     }
 }
 
-/// tau grows by 30 % along the record and is followed within 5 %, at each sample: the estimate lags by the memory's share
-/// of the drift, 2 %, and the noise moves it by 0.7 % rms.
+/// tau grows by 30 % along the record and is followed within 5 %, at each sample: over 25 400 samples on every record,
+/// over 12 700 on nearly every one. A memory that is too long is left behind.
 #[test]
 fn a_drift_is_followed() {
-    for seed in 0..5 {
-        let most = online::drift(12_700, 800.0, seed);
-        println!("off by at most {most:.4}");
-        assert!(most < 0.05);
+    let drift = |samples, memory, seed| {
+        let most = online::drift(samples, memory, seed);
+        println!("{samples}, memory {memory}: off by at most {most:.4}");
+        most
+    };
+    for seed in FRESH..FRESH + 8 {
+        assert!(drift(25_400, 1200.0, seed) < 0.05);
     }
-    // A memory that is too long is left behind.
-    assert!(online::drift(12_700, 4000.0, 0) > 0.05);
+    let good = (FRESH..FRESH + 12).filter(|&seed| drift(12_700, 800.0, seed) < 0.05);
+    assert!(good.count() >= 10);
+    assert!(drift(12_700, 4000.0, FRESH) > 0.05);
 }
 
 /// Starts from which the fixed filter ends in the wrong place and the adaptive one in the right one.

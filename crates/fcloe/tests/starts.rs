@@ -105,6 +105,43 @@ fn the_first_tables_statistics() {
     near(printed, (5.962, 79.40), (0.024, 1.57));
 }
 
+/// In open loop, noise on the record: least squares is biased, the standard instruments are not, those of the printed
+/// form are; the general forms with instruments are not either, and their least squares hardly.
+#[test]
+fn each_start_in_open_loop() {
+    const RUNS: u64 = 20;
+    let plant = PlantModel::first_order(6.0, 110.0).unwrap();
+    let none = Controller::none();
+    let u = excitation::prbs(2540, 20, -1.0, 1.0, 7).unwrap();
+    let mut sums = [(0.0, 0.0); 6];
+    for seed in 0..RUNS {
+        let record = record(&plant, &none, 1.0, u.clone(), Some(seed), 20.0);
+        let rule = Discretisation::Euler;
+        let ls = first_order::least_squares(&record, LAMBDA, rule).unwrap();
+        let with = |form| first_order::instruments(&record, LAMBDA, rule, &ls, form).unwrap();
+        let records = std::slice::from_ref(&record);
+        let filter = Polynomial::new([LAMBDA, 1.0]).unwrap();
+        let general = start::least_squares(records, &none, plant.orders(), &filter).unwrap();
+        let iv = start::instruments(records, &none, &filter, &general).unwrap();
+        let refined = start::refine(records, &none, &iv, 10).unwrap();
+        assert!(refined.rests);
+        let (standard, printed) = (with(Form::Standard), with(Form::AsPrinted));
+        let plants = [&ls, &standard, &printed, &general, &iv, &refined.plant];
+        for (sum, plant) in sums.iter_mut().zip(plants) {
+            let (gain, tau) = gain_and_tau(plant);
+            *sum = (sum.0 + gain / RUNS as f64, sum.1 + tau / RUNS as f64);
+        }
+    }
+    let [ls, standard, printed, general, iv, refined] = sums;
+    near(ls, (5.52, 100.9), (0.03, 1.0));
+    near(printed, (5.80, 106.2), (0.03, 1.0));
+    near(standard, (6.0, 110.4), (0.03, 1.0));
+    // Of lines between samples the noise leaves less after the filter.
+    near(general, (6.0, 110.0), (0.1, 2.0));
+    near(iv, (6.0, 110.0), (0.03, 1.0));
+    near(refined, (6.0, 110.0), (0.03, 1.0));
+}
+
 /// Instruments from r are not biased by noise that circulates, where those from the measured u are.
 #[test]
 fn instruments_from_the_reference() {

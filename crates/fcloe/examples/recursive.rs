@@ -8,6 +8,7 @@ mod online;
 
 use fcloe::Filter;
 use online::{From, SecondOrder};
+use rayon::prelude::*;
 
 fn main() {
     println!("n = 1, 2540 samples at 20 dB: ends within 3 %, of 60 starts within a factor");
@@ -55,7 +56,8 @@ fn main() {
         (25_400, 800.0),
         (25_400, 1200.0),
     ] {
-        let mut most: Vec<f64> = (0..200)
+        let mut most: Vec<f64> = (0..200_u64)
+            .into_par_iter()
             .map(|seed| online::drift(samples, memory, seed))
             .collect();
         most.sort_by(f64::total_cmp);

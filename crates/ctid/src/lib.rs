@@ -26,6 +26,7 @@ mod plot;
 pub mod progress;
 pub mod report;
 pub mod terminal;
+pub mod tables;
 pub mod tour;
 
 pub use commands::{Cli, run};

@@ -4,12 +4,13 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use missing_effect::{Diagnosis, Options};
+use missing_effect::Options;
 
 use crate::input::Files;
 use crate::look::Look;
-use crate::output::{self, Kind, Output};
+use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
+use crate::tables::{udink, udink_text};
 use crate::{Error, catalogue, edit, terminal, tour};
 
 /// Says which physical effect a model of measured data is missing.
@@ -35,6 +36,8 @@ enum Command {
     Remove(Remove),
     /// List the catalogue of effects, or say all about one
     Effects(Effects),
+    /// Compute the tables of a paper again, with many noises, and say which printed figures agree
+    Tables(Tables),
 }
 
 #[derive(Debug, Args)]
@@ -48,6 +51,13 @@ struct Compare {
     /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
+    #[command(flatten)]
+    results: Results,
+}
+
+/// Where results go besides the terminal.
+#[derive(Debug, Args)]
+struct Results {
     /// Write the result as JSON
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
@@ -98,6 +108,27 @@ struct Effects {
     effect: Option<String>,
 }
 
+#[derive(Debug, Args)]
+struct Tables {
+    /// The paper
+    #[arg(value_enum, default_value_t = Paper::Udink)]
+    paper: Paper,
+    /// Noises: each table is run once with each
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    runs: usize,
+    /// What the noises are drawn from
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    results: Results,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Paper {
+    /// A. J. Udink ten Cate, WP-85-54, IIASA, 1985: tables 1 to 4
+    Udink,
+}
+
 /// Does what the command line asks for; what a person reads goes to `out`.
 ///
 /// # Errors
@@ -125,6 +156,17 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Effects(Effects {
             effect: Some(effect),
         })) => say(out, &catalogue::describe(&effect, look)?),
+        Some(Command::Tables(arguments)) => arguments.run(out, look),
+    }
+}
+
+impl Results {
+    /// Where the results go, checked.
+    fn plan(&self, inputs: &[&Path]) -> Result<Vec<Output>, Error> {
+        let json = self.json.as_deref().map(|path| (Kind::Json, path));
+        let report = self.report.as_deref().map(|path| (Kind::Report, path));
+        let wanted: Vec<_> = json.into_iter().chain(report).collect();
+        output::plan(&wanted, inputs)
     }
 }
 
@@ -137,18 +179,10 @@ impl Compare {
         }
     }
 
-    /// Where the results go, checked.
-    fn outputs(&self) -> Result<Vec<Output>, Error> {
-        let json = self.json.as_deref().map(|path| (Kind::Json, path));
-        let report = self.report.as_deref().map(|path| (Kind::Report, path));
-        let wanted: Vec<_> = json.into_iter().chain(report).collect();
-        output::plan(&wanted, &self.files().all())
-    }
-
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
         let problem = files.read()?;
-        let outputs = self.outputs()?;
+        let outputs = self.results.plan(&files.all())?;
         let bar = Bar::new();
         bar.phase("fitting the model");
         let diagnosis = missing_effect::compare(&problem, &Options::default());
@@ -168,7 +202,7 @@ impl Diagnose {
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
         let problem = files.read()?;
-        let outputs = self.compare.outputs()?;
+        let outputs = self.compare.results.plan(&files.all())?;
         let mut options = Options::default();
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
@@ -188,9 +222,27 @@ impl Diagnose {
     }
 }
 
+impl Tables {
+    fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        let outputs = self.results.plan(&[])?;
+        match self.paper {
+            Paper::Udink => {
+                let bar = Bar::new();
+                let settings = udink::Settings::default();
+                let study = udink::study(&settings, self.runs, self.seed, &|progress| {
+                    bar.show(progress);
+                });
+                bar.clear();
+                let study = study?;
+                finish(&study, &udink_text::text(&study, look), &outputs, out, look)
+            }
+        }
+    }
+}
+
 /// Writes the files, then says what was found and what was written.
 fn finish(
-    diagnosis: &Diagnosis,
+    found: &impl Found,
     text: &str,
     outputs: &[Output],
     out: &mut dyn Write,
@@ -198,7 +250,7 @@ fn finish(
 ) -> Result<(), Error> {
     // The files first: whoever pipes the text into `head` still gets them.
     for output in outputs {
-        output.write(diagnosis)?;
+        output.write(found)?;
     }
     let mut text = text.to_string();
     if !outputs.is_empty() {

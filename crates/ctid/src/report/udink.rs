@@ -48,13 +48,14 @@ fn headline(study: &Study) -> String {
         .collect();
     format!(
         "<header>\n<p class=\"kicker\">ctid report · A. J. Udink ten Cate, WP-85-54, IIASA, 1985</p>\n\
-         <h1>Tables 1 to 4: statistically consistent</h1>\n\
+         <h1>Tables 1 to 4: {}</h1>\n\
          <div class=\"verdict\"><p>The paper prints one run of each table. Here are {} runs, each with another noise, \
          the same in every table. A cell is inside where the printed figure, give or take its rounding, lies in the \
          5 to 95 % range of the runs; of cells that agree, one in ten lies outside by chance.</p></div>\n\
          <ol class=\"trail apart\">\n{trail}</ol>\n\
          <details><summary>What the paper does not print, and is assumed</summary><ul>\n{assumptions}</ul></details>\n\
          {NOTICES}</header>\n",
+        study.verdict(),
         study.runs
     )
 }
@@ -63,7 +64,7 @@ fn responses() -> String {
     section(
         "responses",
         "Figure 1, drawn again",
-        "The responses of table 3: the first of the noises, with Euler's rule. Dashed: the true values, K = 1 and tau = 10 s.",
+        "The responses of table 3: the first of the noises, with Euler's rule. Dashed: the true values, K = 1 and tau = 10 s.",
         &figure("responses", "Output, estimates and criterion", ""),
     )
 }
@@ -107,7 +108,7 @@ fn cells_table(study: &Study, number: usize) -> String {
             format!(
                 "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td>{}{}</tr>\n",
                 euler.cell,
-                significant(euler.paper, 4),
+                format_args!("{:.*}", euler.decimals, euler.paper),
                 of_rule(euler),
                 of_rule(exact)
             )

@@ -18,6 +18,8 @@ pub struct Printed {
     pub value: f64,
     /// The rounding it may hide, either way.
     pub rounding: f64,
+    /// Decimals.
+    pub decimals: usize,
 }
 
 impl Printed {
@@ -27,6 +29,7 @@ impl Printed {
         Self {
             value,
             rounding: HALF_DIGIT[decimals],
+            decimals,
         }
     }
 
@@ -35,6 +38,7 @@ impl Printed {
         Self {
             value: self.value - other.value,
             rounding: self.rounding + other.rounding,
+            decimals: self.decimals.max(other.decimals),
         }
     }
 }
@@ -48,6 +52,9 @@ pub struct Cell {
     pub cell: &'static str,
     /// The figure that is printed, or a difference of such.
     pub paper: f64,
+    /// Decimals of it.
+    #[serde(skip)]
+    pub decimals: usize,
     /// Median of the runs; NaN (`null`) where none came to its end.
     pub median: f64,
     /// 5 % of the runs lie below.
@@ -78,6 +85,7 @@ impl Cell {
             table,
             cell,
             paper: paper.value,
+            decimals: paper.decimals,
             median,
             q05,
             q95,
@@ -113,6 +121,9 @@ pub struct Comparison {
     pub failed: usize,
 }
 
+/// Share of cells inside from which on tables are called consistent.
+const CONSISTENT: f64 = 0.85;
+
 /// A figure that lies outside.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outside {
@@ -125,6 +136,13 @@ pub struct Outside {
 }
 
 impl Comparison {
+    /// Whether so many lie inside as can be expected of figures of the same process: nine of ten, less
+    /// what chance takes.
+    #[must_use]
+    pub fn consistent(&self) -> bool {
+        self.inside as f64 >= CONSISTENT * self.of as f64
+    }
+
     pub(crate) fn new(
         tables: Vec<Cell>,
         failed: usize,

@@ -352,6 +352,20 @@ pub struct Study {
     pub figure: Figure,
 }
 
+impl Study {
+    /// What can be said of the paper's tables: never that they are identical.
+    #[must_use]
+    pub fn verdict(&self) -> &'static str {
+        if self.euler.consistent() && self.exact.consistent() {
+            "statistically consistent"
+        } else if self.euler.consistent() {
+            "statistically consistent with Euler's rule only"
+        } else {
+            "not consistent"
+        }
+    }
+}
+
 /// Table 1 with P(0) times a factor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LargerP {

@@ -40,7 +40,7 @@ fn cells(study: &Study, look: Look) -> String {
             first[0] = look.strong(format!("Table {last}"));
             rows.push(first.to_vec());
         }
-        let mut row = vec![format!("  {}", euler.cell), figure(euler.paper)];
+        let mut row = vec![format!("  {}", euler.cell), printed(euler)];
         row.extend(of_rule(euler, look));
         row.extend(of_rule(exact, look));
         rows.push(row);
@@ -76,13 +76,18 @@ fn of_rule(cell: &Cell, look: Look) -> [String; 3] {
     [figure(cell.median), range, mark]
 }
 
+/// As the paper prints it.
+fn printed(cell: &Cell) -> String {
+    format!("{:.*}", cell.decimals, cell.paper)
+}
+
 /// Three digits, and a fourth from 100 on.
 fn figure(value: f64) -> String {
     numbers::significant(value, if value.abs() >= 100.0 { 4 } else { 3 })
 }
 
 fn summary(study: &Study, look: Look) -> String {
-    let mut text = format!("{}\n", look.good("Statistically consistent with the paper"));
+    let mut text = format!("{}\n", look.strong(format!("Against the paper: {}", study.verdict())));
     for (name, comparison) in [("Euler's rule", &study.euler), ("the exact step", &study.exact)] {
         let Comparison {
             inside, of, failed, ..
@@ -141,14 +146,18 @@ fn gains(gains: &Gains, look: Look) -> String {
         let end = row.quiet_end.map_or("lost".to_owned(), |end| {
             end.map(|value| format!("{value:.3}")).join(", ")
         });
-        let range = [row.noisy_q05, row.noisy_q95].map(|q| numbers::significant(q, 2));
+        let [low, high] = [row.noisy_q05, row.noisy_q95].map(|q| numbers::significant(q, 2));
+        let range = match row.noisy_error.is_finite() {
+            true => format!("{low} .. {high}"),
+            false => "-".to_owned(),
+        };
         lines.push(vec![
             row.variant.gain.name().to_owned(),
             row.variant.rule.name().to_owned(),
             if row.variant.bounded { "on c" } else { "-" }.to_owned(),
             end,
             numbers::significant(row.noisy_error, 2),
-            range.join(" .. "),
+            range,
             row.noisy_failed.to_string(),
         ]);
     }

@@ -4,14 +4,16 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use ct_signals::{Columns, Hold, read_csv};
 use missing_effect::Options;
 
+use crate::identify::{self, Method, Order, Request};
 use crate::input::Files;
 use crate::look::Look;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
 use crate::tables::{udink, udink_text};
-use crate::{Error, catalogue, edit, terminal, tour};
+use crate::{Error, catalogue, edit, model_file, terminal, tour};
 
 /// Says which physical effect a model of measured data is missing.
 #[derive(Debug, Parser)]
@@ -36,6 +38,8 @@ enum Command {
     Remove(Remove),
     /// List the catalogue of effects, or say all about one
     Effects(Effects),
+    /// Identify a linear model in continuous time from a record
+    Identify(Identify),
     /// Compute the tables of a paper again, with many noises, and say which printed figures agree
     Tables(Tables),
 }
@@ -109,6 +113,44 @@ struct Effects {
 }
 
 #[derive(Debug, Args)]
+struct Identify {
+    /// Record (CSV)
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// How the parameters are found
+    #[arg(long, value_enum)]
+    method: Method,
+    /// Orders n of A and m of B in A y = B u + d
+    #[arg(long, value_name = "N,M", default_value = "1,0")]
+    order: Order,
+    /// Model file, of which the columns and the hold of the input are used
+    #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
+    model: Option<PathBuf>,
+    /// The columns' names, where their first letters do not tell
+    #[arg(long, value_name = "TIME,INPUT,OUTPUT", value_delimiter = ',', num_args = 3)]
+    columns: Option<Vec<String>>,
+    /// What the input does between samples
+    #[arg(long, value_enum, default_value_t = InputHold::Zero)]
+    hold: InputHold,
+    /// Memory of the recursion [s]; without it a fifth of the record, at least 10 time constants
+    #[arg(long, value_name = "S")]
+    memory: Option<f64>,
+    /// Bandwidth of the state variable filters [1/s]; without it 5 n over the time constant
+    #[arg(long, value_name = "L")]
+    bandwidth: Option<f64>,
+    #[command(flatten)]
+    results: Results,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum InputHold {
+    /// It stands until the next sample: a D/A converter
+    Zero,
+    /// It runs on a line to the next sample: a measured input
+    First,
+}
+
+#[derive(Debug, Args)]
 struct Tables {
     /// The paper
     #[arg(value_enum, default_value_t = Paper::Udink)]
@@ -156,6 +198,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Effects(Effects {
             effect: Some(effect),
         })) => say(out, &catalogue::describe(&effect, look)?),
+        Some(Command::Identify(arguments)) => arguments.run(out, look),
         Some(Command::Tables(arguments)) => arguments.run(out, look),
     }
 }
@@ -219,6 +262,53 @@ impl Diagnose {
             out,
             look,
         )
+    }
+}
+
+impl Identify {
+    /// Which columns, and the hold.
+    fn layout(&self) -> Result<(Columns, Hold), Error> {
+        if let Some(model) = &self.model {
+            let model = model_file::read(model)?;
+            return Ok((model.columns, model.hold));
+        }
+        let hold = match self.hold {
+            InputHold::Zero => Hold::Zero,
+            InputHold::First => Hold::First,
+        };
+        let columns = match self.columns.as_deref() {
+            Some([time, input, output]) => Columns {
+                time: Some(time.clone()),
+                input: Some(input.clone()),
+                output: Some(output.clone()),
+                reference: None,
+            },
+            _ => Columns::default(),
+        };
+        Ok((columns, hold))
+    }
+
+    fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        let (columns, hold) = self.layout()?;
+        let record = read_csv(&self.data, &columns, hold)?;
+        let inputs: Vec<&Path> = [Some(&self.data), self.model.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(PathBuf::as_path)
+            .collect();
+        let outputs = self.results.plan(&inputs)?;
+        let request = Request {
+            method: self.method,
+            order: self.order,
+            memory: self.memory,
+            bandwidth: self.bandwidth,
+        };
+        let bar = Bar::new();
+        bar.phase("identifying");
+        let found = identify::identify(&record, &request);
+        bar.clear();
+        let found = found?;
+        finish(&found, &identify::text::text(&found, look), &outputs, out, look)
     }
 }
 

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use missing_effect::Diagnosis;
 use serde::Serialize;
 
+use crate::identify::Identification;
 use crate::tables::udink::Study;
 use crate::{Error, atomic, report};
 
@@ -48,6 +49,12 @@ impl Found for Study {
 pub struct Output {
     kind: Kind,
     path: PathBuf,
+}
+
+impl Found for Identification {
+    fn page(&self) -> String {
+        report::identification(self)
+    }
 }
 
 /// Checks where results may go: not onto an input, not onto each other, not over a file that ctid

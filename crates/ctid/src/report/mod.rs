@@ -10,6 +10,7 @@
 mod data;
 mod decimate;
 mod figures;
+mod identification;
 mod page;
 #[cfg(test)]
 mod sample;
@@ -21,6 +22,7 @@ use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
 use self::page::{NOTICES, Page, figure, figure_with, section};
 use self::text::{escape, significant};
+pub use self::identification::html as identification;
 pub use self::udink::html as udink;
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.

@@ -1,0 +1,182 @@
+//! The page of `ctid identify`.
+
+use super::figures::{self, Colour, Curve, Figure, Panel};
+use super::page::{self, NOTICES, Page, figure, section};
+use super::tables::table;
+use super::text::{code, duration, escape, significant, unit, with_error};
+use crate::identify::Identification;
+use crate::identify::text::model;
+
+/// The page as a complete HTML file. The same result gives the same bytes.
+pub fn html(found: &Identification) -> String {
+    let body: String = [
+        headline(found),
+        "<main>".to_owned(),
+        fit(),
+        parameters(found),
+        "</main>".to_owned(),
+        "<footer><p>Written by ctid. The simulation error is that of a model that runs on the input alone; it is not a prediction \
+         error. Bands and standard errors are one standard deviation. This file holds all its data and loads nothing.</p></footer>"
+            .to_owned(),
+    ]
+    .concat();
+    let figures: Vec<Figure> = [Some(fit_figure(found)), trajectory_figure(found)]
+        .into_iter()
+        .flatten()
+        .collect();
+    page::html(&Page {
+        title: &format!("ctid: {}", escape(&found.record)),
+        body: &body,
+        data: &figures::json(&figures),
+        script: figures::SCRIPT,
+    })
+}
+
+fn headline(found: &Identification) -> String {
+    let output = unit(&found.shown.output.unit);
+    let warnings: String = found
+        .warnings
+        .iter()
+        .map(|warning| format!("<p class=\"notice\">{}</p>\n", escape(warning)))
+        .collect();
+    let facts: String = [
+        ("Model", escape(&model(found))),
+        ("Method", code(found.method.id())),
+        ("Memory", duration(found.settings.memory)),
+        (
+            "Filters",
+            format!("{} 1/s", significant(found.settings.bandwidth, 3)),
+        ),
+        ("Dynamics", dynamics(found)),
+    ]
+    .iter()
+    .map(|(name, text)| format!("<div><dt>{name}</dt><dd>{text}</dd></div>\n"))
+    .collect();
+    format!(
+        "<header>\n<p class=\"kicker\">ctid report · {}</p>\n<h1>Linear model of order {}</h1>\n\
+         <ol class=\"trail apart\">\n<li><span class=\"number\">{} <small>{output}</small></span>\
+         <span class=\"label\">simulation error, root mean square</span></li>\n\
+         <li><span class=\"number\">{} <small>%</small></span><span class=\"label\">fit</span></li></ol>\n\
+         <p class=\"caption\">The model runs on the input alone, from an initial state that is fitted. Fit: 100 % less the error over the \
+         output's standard deviation.</p>\n{warnings}<dl class=\"facts\">\n{facts}</dl>\n{NOTICES}</header>\n",
+        escape(&found.record),
+        found.order,
+        significant(found.simulation_rmse, 2),
+        significant(found.fit_percent, 3),
+    )
+}
+
+fn dynamics(found: &Identification) -> String {
+    let mut parts: Vec<String> = found
+        .time_constants
+        .iter()
+        .map(|t| format!("time constant {} s", significant(*t, 3)))
+        .collect();
+    parts.extend(found.oscillations.iter().map(|pair| {
+        format!(
+            "period {} s, damping {}",
+            significant(pair.period, 3),
+            significant(pair.damping, 2)
+        )
+    }));
+    parts.join("; ")
+}
+
+fn fit() -> String {
+    section(
+        "fit",
+        "Measured against simulated",
+        "Drag to zoom, double-click to see all again.",
+        &figure("fit", "Output, what is left of it, and input", ""),
+    )
+}
+
+fn parameters(found: &Identification) -> String {
+    let rows: String = found
+        .parameters
+        .iter()
+        .map(|parameter| {
+            format!(
+                "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td><td>{}</td></tr>\n",
+                code(&parameter.name),
+                with_error(parameter.value, parameter.std_error),
+                unit(&parameter.unit)
+            )
+        })
+        .collect();
+    let table = table(
+        "At the end of the record",
+        "<tr><th scope=\"col\">Parameter</th><th scope=\"col\" class=\"number\">Value ± standard error</th><th scope=\"col\">Unit</th></tr>",
+        &rows,
+        "Standard errors hold for noise of any colour, and for a model that is right; those of the recursion with its memory, \
+         not of the whole record.",
+    );
+    let over_time = match found.trajectory {
+        Some(_) => figure(
+            "trajectory",
+            "Over the record",
+            "Band: one standard error, once enough has been seen. Parameters that leave their band as the operating point moves say that \
+             the process is not linear, or not of this order.",
+        ),
+        None => String::new(),
+    };
+    section("parameters", "The parameters", "", &(table + &over_time))
+}
+
+fn fit_figure(found: &Identification) -> Figure {
+    let shown = &found.shown;
+    let residual: Vec<f64> = shown
+        .output
+        .values
+        .iter()
+        .zip(&shown.simulated)
+        .map(|(y, model)| y - model)
+        .collect();
+    let output = &shown.output;
+    let panels = vec![
+        Panel {
+            share: 2.0,
+            ..Panel::new("output", &output.unit)
+        },
+        Panel {
+            lines: vec![0.0],
+            ..Panel::new("residual", &output.unit)
+        },
+        Panel::new("input", &shown.input.unit),
+    ];
+    let measured = Colour::Named("measured");
+    let curves = vec![
+        Curve::line("measured", 0, measured, (&shown.time, &output.values)).named(),
+        Curve {
+            width: 2.4,
+            ..Curve::line("simulated", 0, Colour::Of(1), (&shown.time, &shown.simulated))
+        }
+        .named(),
+        Curve::line("residual", 1, Colour::Of(1), (&shown.time, &residual)),
+        Curve {
+            held: true,
+            ..Curve::line(
+                "input",
+                2,
+                Colour::Named("faint"),
+                (&shown.time, &shown.input.values),
+            )
+        },
+    ];
+    Figure::over_time("fit", 560, panels, curves)
+}
+
+fn trajectory_figure(found: &Identification) -> Option<Figure> {
+    let trajectory = found.trajectory.as_ref()?;
+    let mut panels = Vec::new();
+    let mut curves = Vec::new();
+    let series = trajectory.values.iter().zip(&trajectory.std_errors);
+    for (parameter, (values, errors)) in found.parameters.iter().zip(series) {
+        let data = (&trajectory.time[..], &values[..]);
+        let curve = Curve::line(&parameter.name, panels.len(), Colour::Of(1), data);
+        curves.push(curve.with_band(data, errors));
+        panels.push(Panel::new(&parameter.name, &parameter.unit));
+    }
+    let height = 90 + 135 * u32::try_from(panels.len()).unwrap_or(1);
+    Some(Figure::over_time("trajectory", height, panels, curves))
+}

@@ -127,19 +127,36 @@ struct Identify {
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
     /// The columns' names, where their first letters do not tell
-    #[arg(long, value_name = "TIME,INPUT,OUTPUT", value_delimiter = ',', num_args = 3)]
-    columns: Option<Vec<String>>,
+    #[arg(long, value_name = "TIME,INPUT,OUTPUT", value_parser = columns)]
+    columns: Option<Columns>,
     /// What the input does between samples
     #[arg(long, value_enum, default_value_t = InputHold::Zero)]
     hold: InputHold,
     /// Memory of the recursion [s]; without it a fifth of the record, at least 10 time constants
     #[arg(long, value_name = "S")]
     memory: Option<f64>,
-    /// Bandwidth of the state variable filters [1/s]; without it 5 n over the time constant
+    /// Bandwidth of the state variable filters [1/s]; without it 3 over the time constant
     #[arg(long, value_name = "L")]
     bandwidth: Option<f64>,
     #[command(flatten)]
     results: Results,
+}
+
+/// Three names, in the order of the help.
+fn columns(text: &str) -> Result<Columns, String> {
+    let names: Vec<&str> = text.split(',').map(str::trim).collect();
+    let [time, input, output] = names[..] else {
+        return Err(format!(
+            "three names are needed, those of time, input and output, and {} are given",
+            names.len()
+        ));
+    };
+    Ok(Columns {
+        time: Some(time.to_owned()),
+        input: Some(input.to_owned()),
+        output: Some(output.to_owned()),
+        reference: None,
+    })
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -276,16 +293,7 @@ impl Identify {
             InputHold::Zero => Hold::Zero,
             InputHold::First => Hold::First,
         };
-        let columns = match self.columns.as_deref() {
-            Some([time, input, output]) => Columns {
-                time: Some(time.clone()),
-                input: Some(input.clone()),
-                output: Some(output.clone()),
-                reference: None,
-            },
-            _ => Columns::default(),
-        };
-        Ok((columns, hold))
+        Ok((self.columns.clone().unwrap_or_default(), hold))
     }
 
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
@@ -308,7 +316,13 @@ impl Identify {
         let found = identify::identify(&record, &request);
         bar.clear();
         let found = found?;
-        finish(&found, &identify::text::text(&found, look), &outputs, out, look)
+        finish(
+            &found,
+            &identify::text::text(&found, look),
+            &outputs,
+            out,
+            look,
+        )
     }
 }
 

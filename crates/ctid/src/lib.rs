@@ -28,8 +28,8 @@ pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
-pub mod terminal;
 pub mod tables;
+pub mod terminal;
 pub mod tour;
 
 pub use commands::{Cli, run};

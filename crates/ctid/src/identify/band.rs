@@ -12,9 +12,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Trajectory;
 use super::recursion::{Path, Point};
 use super::scaled::Scaled;
-use super::Trajectory;
 
 /// Stretches that the parameters must be outnumbered by.
 const SPARE: f64 = 2.0;
@@ -34,7 +34,7 @@ pub(super) fn bands(path: &Path, scaled: &Scaled) -> Trajectory {
         if ends.last().is_some_and(|end| point.time - end.time >= 1.0) {
             ends.push(point);
         }
-        trajectory.time.push(scaled.seconds(point.time));
+        trajectory.time.push(scaled.seconds[point.sample]);
         let theta = &unscale * &point.theta + &shift;
         let covariance = covariance(&ends, point, scaled.eta);
         for i in 0..p {

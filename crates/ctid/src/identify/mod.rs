@@ -11,7 +11,11 @@
 //! parameters are about 1.
 //!
 //! The numbers that are not given are found from the best model of first order, over a grid of time constants: the start, the bandwidth of
-//! the filters (5 over its time constant) and the memory (a fifth of the record, at least 10 time constants).
+//! the filters (3 over its time constant) and the memory (a fifth of the record, at least 10 time constants).
+//!
+//! Measured on 3000 samples every second of a plant with time constants of 10 and 15 s, order 2,0, noise of a tenth of the output, white and
+//! coloured, 200 noises: stabilized-oe covers the truth with 1.96 standard errors in 89 to 97 % of them; ct-rls finds a_2 too small by 30 % with
+//! coloured noise, and by more with white. With nearly equal poles and zeros, order 2,1, the output error too is off by some standard errors.
 
 mod band;
 mod recursion;
@@ -48,6 +52,9 @@ impl Method {
 
 /// The largest n.
 pub const MAX_ORDER: usize = 4;
+
+/// A simulation error so many times that of the start is worse.
+const WORSE: f64 = 1.05;
 
 /// n and m, `m <= n`, n from 1 to [`MAX_ORDER`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -88,6 +95,15 @@ impl Order {
     pub fn parameters(self) -> usize {
         self.n + self.m + 2
     }
+
+    /// With one pole less.
+    fn lower(self) -> Self {
+        let n = self.n - 1;
+        Self {
+            n,
+            m: self.m.min(n),
+        }
+    }
 }
 
 /// What may be asked for.
@@ -112,6 +128,8 @@ pub struct Settings {
     pub bandwidth: f64,
     /// Time constant of the best model of first order, s: what the recursion starts from.
     pub first_order: f64,
+    /// Simulation error of that model, root mean square, in the output's unit.
+    pub first_order_rmse: f64,
 }
 
 /// What was found.
@@ -193,7 +211,7 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
     positive("--memory", "s", request.memory)?;
     positive("--bandwidth", "1/s", request.bandwidth)?;
 
-    let (scaled, mut warnings) = Scaled::new(record, order, request);
+    let (scaled, mut warnings) = Scaled::new(record, request);
     let path = match request.method {
         Method::CtRls => recursion::equation_error(&scaled, order),
         Method::StabilizedOe => recursion::output_error(&scaled, order),
@@ -210,15 +228,24 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
             name,
             unit,
             value: bands.values[i].last().copied().unwrap_or(f64::NAN),
-            std_error: bands.std_errors[i].last().copied().filter(|e| e.is_finite()),
+            std_error: bands.std_errors[i]
+                .last()
+                .copied()
+                .filter(|e| e.is_finite()),
         })
         .collect();
     warnings.extend(doubtful(&parameters, order));
     let (time_constants, oscillations) = poles(&parameters, order)?;
-    warnings.extend(too_fast(&time_constants, record));
+    warnings.extend(too_fast(&time_constants, record, order));
     warnings.extend(initial);
     let residual = record.output.values.iter().zip(&simulated);
     let rmse = rms(residual.map(|(y, model)| y - model));
+    warnings.extend(worse_than_first_order(
+        request.method,
+        rmse,
+        &scaled.settings(),
+        &record.output.unit,
+    ));
     Ok(Identification {
         schema: 1,
         method: request.method,
@@ -281,9 +308,7 @@ fn names(order: Order, record: &Record) -> Vec<(String, String)> {
         (y, u) if y == u => String::new(),
         (y, u) => format!("{y}/{u}"),
     };
-    let mut names: Vec<_> = (1..=order.n)
-        .map(|i| (format!("a{i}"), power(i)))
-        .collect();
+    let mut names: Vec<_> = (1..=order.n).map(|i| (format!("a{i}"), power(i))).collect();
     names.extend((0..=order.m).map(|j| {
         let unit = format!("{} {gain}", power(j)).trim().to_owned();
         (format!("b{j}"), unit)
@@ -292,24 +317,40 @@ fn names(order: Order, record: &Record) -> Vec<(String, String)> {
     names
 }
 
+/// The start was better than the end.
+fn worse_than_first_order(
+    method: Method,
+    rmse: f64,
+    settings: &Settings,
+    unit: &str,
+) -> Option<String> {
+    let first = settings.first_order_rmse;
+    if rmse <= WORSE * first {
+        return None;
+    }
+    let why = match method {
+        Method::CtRls => {
+            "noise biases least squares on the equation: compare with --method stabilized-oe"
+        }
+        Method::StabilizedOe => {
+            "the end of the record differs from the whole, or the order is too high: try a longer --memory, or a lower --order"
+        }
+    };
+    Some(format!(
+        "the best model of first order (time constant {:.4} s) simulates this record better, with {first:.3} {unit} root mean square; {why}",
+        settings.first_order
+    ))
+}
+
 /// A highest coefficient that may as well be 0 says that the order is too high.
 fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
-    let lower = |what: char| match what {
-        'a' => Order {
-            n: order.n - 1,
-            m: order.m.min(order.n - 1),
-        },
-        _ => Order {
-            m: order.m - 1,
-            ..order
-        },
-    };
     let mut highest = Vec::new();
     if order.n > 1 {
-        highest.push((order.n - 1, lower('a')));
+        highest.push((order.n - 1, order.lower()));
     }
     if order.m > 0 {
-        highest.push((order.n + order.m, lower('b')));
+        let m = order.m - 1;
+        highest.push((order.n + order.m, Order { m, ..order }));
     }
     let doubtful = |(index, lower): (usize, Order)| {
         let parameter = parameters.get(index)?;
@@ -325,11 +366,15 @@ fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
     highest.into_iter().filter_map(doubtful).collect()
 }
 
-fn too_fast(time_constants: &[f64], record: &Record) -> Option<String> {
+fn too_fast(time_constants: &[f64], record: &Record, order: Order) -> Option<String> {
     let step = record.sample_interval();
     let fastest = time_constants.last().filter(|fastest| **fastest < step)?;
+    let mend = match order.n {
+        1 => "sample faster".to_owned(),
+        _ => format!("try --order {}", order.lower()),
+    };
     Some(format!(
-        "the fastest time constant, {fastest:.2} s, is below the sampling interval of {step} s: it cannot be known from these samples"
+        "the fastest time constant, {fastest:.2} s, is below the sampling interval of {step} s: it cannot be known from these samples; {mend}"
     ))
 }
 

@@ -3,12 +3,10 @@
 use ct_constrained::Bounds;
 use ct_rls::{ContinuousRls, DynamicRls, RecursiveEstimator, Weights};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-use stabilized_oe::{
-    BlockDiagonal, Derivatives, FilterBounds, StabilizedOe, check_filter_bounds,
-};
+use stabilized_oe::{BlockDiagonal, Derivatives, FilterBounds, StabilizedOe, check_filter_bounds};
 
-use super::scaled::Scaled;
 use super::Order;
+use super::scaled::Scaled;
 use crate::Error;
 
 /// Points of the way that are kept.
@@ -25,6 +23,9 @@ const BOUNDS: [f64; 4] = [2.0, 1.5, 1.2, 1.05];
 /// Where the recursion was.
 #[derive(Debug, Clone)]
 pub(super) struct Point {
+    /// Which sample.
+    pub sample: usize,
+    /// Scaled.
     pub time: f64,
     pub theta: DVector<f64>,
     /// `P^-1`
@@ -54,12 +55,18 @@ impl Path {
         })
     }
 
-    fn keep(&mut self, time: f64, theta: &[f64], covariance: DMatrix<f64>) -> Result<(), Error> {
+    fn keep(
+        &mut self,
+        (sample, time): (usize, f64),
+        theta: &[f64],
+        covariance: DMatrix<f64>,
+    ) -> Result<(), Error> {
         let information = covariance
             .try_inverse()
             .filter(|information| information.iter().all(|x| x.is_finite()))
             .ok_or_else(|| untold(self.order))?;
         self.points.push(Point {
+            sample,
             time,
             theta: DVector::from_column_slice(theta),
             information,
@@ -128,7 +135,11 @@ pub(super) fn equation_error(scaled: &Scaled, order: Order) -> Result<Path, Erro
             rls.update_with(&phi, y[0], next, &weights);
         }
         if is_kept(k, count) {
-            path.keep(scaled.time[k], rls.theta().as_slice(), rls.covariance())?;
+            path.keep(
+                (k, scaled.time[k]),
+                rls.theta().as_slice(),
+                rls.covariance(),
+            )?;
         }
     }
     rls.health()?;
@@ -203,7 +214,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
         if is_kept(k, count) {
             let covariance = estimator.covariance();
             path.keep(
-                scaled.time[k],
+                (k, scaled.time[k]),
                 estimator.theta().as_slice(),
                 DMatrix::from_column_slice(P, P, covariance.as_slice()),
             )?;

@@ -10,8 +10,8 @@ use crate::Error;
 /// Time constants that are tried, between the sampling interval and the length of the record.
 const GRID: usize = 60;
 
-/// Bandwidth of the filters, over the inverse of the time constant of first order.
-const BANDWIDTH: f64 = 5.0;
+/// Bandwidth of the filters, over the inverse of the time constant of first order. Higher lets noise through, lower hides fast dynamics.
+const BANDWIDTH: f64 = 3.0;
 
 /// The least memory, in time constants.
 const LEAST_MEMORY: f64 = 10.0;
@@ -29,8 +29,8 @@ pub(super) struct Scaled {
     pub hold: Hold,
     /// Time constant of first order, s: the unit of time.
     unit: f64,
-    /// When the record begins, s.
-    begin: f64,
+    /// Time as it is in the record, s.
+    pub seconds: Vec<f64>,
     /// Means and standard deviations of input and output.
     input: (f64, f64),
     output: (f64, f64),
@@ -40,18 +40,23 @@ pub(super) struct Scaled {
     pub eta: f64,
     /// Gain and offset of the model of first order.
     pub first_order: [f64; 2],
+    /// Its simulation error, root mean square.
+    first_order_error: f64,
 }
 
 impl Scaled {
     /// The record must have rows, and signals that move. Also says what is doubtful.
-    pub fn new(record: &Record, order: Order, request: &Request) -> (Self, Vec<String>) {
+    pub fn new(record: &Record, request: &Request) -> (Self, Vec<String>) {
         let begin = record.time.first().copied().unwrap_or(0.0);
         let (duration, step) = (record.duration(), record.sample_interval());
         let hold = match record.hold {
             ct_signals::Hold::Zero => Hold::Zero,
             ct_signals::Hold::First => Hold::First,
         };
-        let (input, output) = (moments(&record.input.values), moments(&record.output.values));
+        let (input, output) = (
+            moments(&record.input.values),
+            moments(&record.output.values),
+        );
         let scale = |values: &[f64], (mean, deviation): (f64, f64)| -> Vec<f64> {
             values.iter().map(|v| (v - mean) / deviation).collect()
         };
@@ -59,7 +64,7 @@ impl Scaled {
             scale(&record.input.values, input),
             scale(&record.output.values, output),
         );
-        let (unit, first_order, at_edge) = first_order(record, &u, &y, hold);
+        let (unit, first_order, first_order_error, at_edge) = first_order(record, &u, &y, hold);
         let mut warnings = Vec::new();
         if at_edge {
             warnings.push(format!(
@@ -69,9 +74,7 @@ impl Scaled {
         }
         // The filters have to be seen by the samples.
         let fastest = 1.0 / step;
-        let bandwidth = request
-            .bandwidth
-            .unwrap_or((BANDWIDTH * order.n as f64 / unit).min(fastest));
+        let bandwidth = request.bandwidth.unwrap_or((BANDWIDTH / unit).min(fastest));
         if bandwidth > 2.0 * fastest {
             warnings.push(format!(
                 "the filters' bandwidth of {bandwidth} 1/s is beyond what samples every {step} s show; take --bandwidth {fastest:.3} at most"
@@ -91,12 +94,13 @@ impl Scaled {
             y,
             hold,
             unit,
-            begin,
+            seconds: record.time.clone(),
             input,
             output,
             bandwidth: bandwidth * unit,
             eta: unit / memory,
             first_order,
+            first_order_error,
         };
         (scaled, warnings)
     }
@@ -106,6 +110,7 @@ impl Scaled {
             memory: self.unit / self.eta,
             bandwidth: self.bandwidth / self.unit,
             first_order: self.unit,
+            first_order_rmse: self.output.1 * self.first_order_error,
         }
     }
 
@@ -127,11 +132,6 @@ impl Scaled {
             Ok(filter.starting(Start::Rest))
         };
         Ok([filter(self.hold)?, filter(Hold::First)?])
-    }
-
-    /// In seconds.
-    pub fn seconds(&self, time: f64) -> f64 {
-        self.begin + self.unit * time
     }
 
     /// An output in its unit.
@@ -169,8 +169,9 @@ fn moments(values: &[f64]) -> (f64, f64) {
     (mean, (squares / n).sqrt())
 }
 
-/// Time constant, gain and offset of the model of first order with the least simulation error; whether it lies at the edge of the grid.
-fn first_order(record: &Record, u: &[f64], y: &[f64], hold: Hold) -> (f64, [f64; 2], bool) {
+/// Time constant, gain and offset of the model of first order with the least simulation error, that error, and whether it lies at
+/// the edge of the grid.
+fn first_order(record: &Record, u: &[f64], y: &[f64], hold: Hold) -> (f64, [f64; 2], f64, bool) {
     let (shortest, longest) = (record.sample_interval(), record.duration());
     let ratio = (longest / shortest).max(1.0);
     let mut best = (f64::INFINITY, shortest, [1.0, 0.0], 0);
@@ -184,8 +185,9 @@ fn first_order(record: &Record, u: &[f64], y: &[f64], hold: Hold) -> (f64, [f64;
             best = (error, time_constant, line, k);
         }
     }
-    let (_, time_constant, line, k) = best;
-    (time_constant, line, k == 0 || k + 1 == GRID)
+    let (error, time_constant, line, k) = best;
+    let error = (error / y.len().max(1) as f64).sqrt();
+    (time_constant, line, error, k == 0 || k + 1 == GRID)
 }
 
 /// `1/(1 + s T) u`, from rest.

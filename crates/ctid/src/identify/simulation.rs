@@ -30,7 +30,13 @@ pub(super) fn simulate(
     // each of size 1, so that none is lost beside another
     let sizes: Vec<f64> = free
         .iter()
-        .map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE))
+        .map(|f| {
+            f.iter()
+                .map(|x| x * x)
+                .sum::<f64>()
+                .sqrt()
+                .max(f64::MIN_POSITIVE)
+        })
         .collect();
     let columns = DMatrix::from_fn(count, order.n, |k, state| free[state][k] / sizes[state]);
     let left = DVector::from_fn(count, |k, _| scaled.y[k] - rest - forced[k]);

@@ -97,13 +97,7 @@ fn parameters(found: &Identification, look: Look) -> String {
             range.unwrap_or_default(),
         ]);
     }
-    let sides = [
-        Side::Left,
-        Side::Right,
-        Side::Right,
-        Side::Left,
-        Side::Left,
-    ];
+    let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
     let mut text = format!("{}\n", look.heading("Parameters at the end of the record"));
     for line in table(&sides, &rows) {
         text += &format!("  {line}\n");

@@ -140,7 +140,10 @@ impl Curve {
     pub(super) fn with_band(mut self, (time, values): (&[f64], &[f64]), half: &[f64]) -> Self {
         let at = kept(time, values);
         let edge = |sign: f64| -> Vec<f64> {
-            let edges = values.iter().zip(half).map(|(value, half)| value + sign * half);
+            let edges = values
+                .iter()
+                .zip(half)
+                .map(|(value, half)| value + sign * half);
             picked(&edges.collect::<Vec<_>>(), &at, 6)
         };
         self.lower = edge(-1.0);

@@ -149,7 +149,12 @@ fn fit_figure(found: &Identification) -> Figure {
         Curve::line("measured", 0, measured, (&shown.time, &output.values)).named(),
         Curve {
             width: 2.4,
-            ..Curve::line("simulated", 0, Colour::Of(1), (&shown.time, &shown.simulated))
+            ..Curve::line(
+                "simulated",
+                0,
+                Colour::Of(1),
+                (&shown.time, &shown.simulated),
+            )
         }
         .named(),
         Curve::line("residual", 1, Colour::Of(1), (&shown.time, &residual)),

@@ -20,9 +20,9 @@ mod udink;
 
 use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
+pub use self::identification::html as identification;
 use self::page::{NOTICES, Page, figure, figure_with, section};
 use self::text::{escape, significant};
-pub use self::identification::html as identification;
 pub use self::udink::html as udink;
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.

@@ -193,7 +193,11 @@ fn larger_p(rows: &[LargerP]) -> String {
 }
 
 fn gains(gains: &Gains) -> String {
-    let rows: String = gains.rows.iter().map(|row| gain_row(row, gains.noises)).collect();
+    let rows: String = gains
+        .rows
+        .iter()
+        .map(|row| gain_row(row, gains.noises))
+        .collect();
     let content = [
         figure(
             "counterexample",
@@ -251,7 +255,10 @@ fn gain_row(row: &Row, noises: usize) -> String {
 fn all_figures(study: &Study) -> Vec<Figure> {
     let mut all = vec![responses_figure(study)];
     all.extend(numbers(study).into_iter().map(|n| cells_figure(study, n)));
-    all.extend([counterexample_figure(&study.gains), gains_figure(&study.gains)]);
+    all.extend([
+        counterexample_figure(&study.gains),
+        gains_figure(&study.gains),
+    ]);
     all
 }
 

@@ -19,9 +19,7 @@ use nalgebra::{SMatrix, SVector};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 use serde::Serialize;
-use stabilized_oe::{
-    BlockDiagonal, Integrator, IoSample, LateDifference, StabilizedOe, UNGUARDED,
-};
+use stabilized_oe::{BlockDiagonal, Integrator, IoSample, LateDifference, StabilizedOe, UNGUARDED};
 
 use super::gains::{self, Gains};
 use super::paper_udink::{CELLS, TABLES, Table};
@@ -40,9 +38,7 @@ const AVERAGED_EVERY: f64 = 5.0;
 const AVERAGED: usize = 20;
 
 /// Factors of P(0) in the table of what larger ones do.
-const FACTORS: [f64; 11] = [
-    1.0, 10.0, 15.0, 20.0, 30.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e8,
-];
+const FACTORS: [f64; 11] = [1.0, 10.0, 15.0, 20.0, 30.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e8];
 
 /// Runs for each factor, at most.
 const FACTOR_RUNS: usize = 50;

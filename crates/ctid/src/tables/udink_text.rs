@@ -21,7 +21,10 @@ pub fn text(study: &Study, look: Look) -> String {
     text += &look.paragraph("  ", &lead);
     text += &cells(study, look);
     text += &summary(study, look);
-    text += &format!("{}\n", look.heading("Assumed, as the paper does not print it"));
+    text += &format!(
+        "{}\n",
+        look.heading("Assumed, as the paper does not print it")
+    );
     for sentence in &study.assumptions {
         text += &look.paragraph("  - ", sentence);
     }
@@ -30,7 +33,16 @@ pub fn text(study: &Study, look: Look) -> String {
 }
 
 fn cells(study: &Study, look: Look) -> String {
-    let heading = ["", "paper", "Euler", "5 to 95 %", "", "exact", "5 to 95 %", ""];
+    let heading = [
+        "",
+        "paper",
+        "Euler",
+        "5 to 95 %",
+        "",
+        "exact",
+        "5 to 95 %",
+        "",
+    ];
     let mut rows = Vec::new();
     let mut last = 0;
     for (euler, exact) in study.euler.tables.iter().zip(&study.exact.tables) {
@@ -87,8 +99,14 @@ fn figure(value: f64) -> String {
 }
 
 fn summary(study: &Study, look: Look) -> String {
-    let mut text = format!("{}\n", look.strong(format!("Against the paper: {}", study.verdict())));
-    for (name, comparison) in [("Euler's rule", &study.euler), ("the exact step", &study.exact)] {
+    let mut text = format!(
+        "{}\n",
+        look.strong(format!("Against the paper: {}", study.verdict()))
+    );
+    for (name, comparison) in [
+        ("Euler's rule", &study.euler),
+        ("the exact step", &study.exact),
+    ] {
         let Comparison {
             inside, of, failed, ..
         } = comparison;
@@ -96,7 +114,10 @@ fn summary(study: &Study, look: Look) -> String {
             0 => "no run was lost".to_owned(),
             lost => format!("{lost} runs were lost"),
         };
-        text += &look.paragraph("  ", &format!("{name}: {inside} of {of} cells inside; {lost}"));
+        text += &look.paragraph(
+            "  ",
+            &format!("{name}: {inside} of {of} cells inside; {lost}"),
+        );
         for cell in &comparison.outside {
             let line = format!("table {}, {}: {}", cell.table, cell.cell, cell.why);
             text += &look.paragraph("    - ", &line);
@@ -107,7 +128,13 @@ fn summary(study: &Study, look: Look) -> String {
 }
 
 fn larger_p(rows: &[LargerP], look: Look) -> String {
-    let heading = ["P(0)", "Euler lost", "exact lost", "Euler E1000", "exact E1000"];
+    let heading = [
+        "P(0)",
+        "Euler lost",
+        "exact lost",
+        "Euler E1000",
+        "exact E1000",
+    ];
     let mut lines = vec![heading.map(|name| look.faint(name)).to_vec()];
     for row in rows {
         let lost = |count: usize| {
@@ -170,7 +197,10 @@ fn gains(gains: &Gains, look: Look) -> String {
         Side::Right,
         Side::Right,
     ];
-    let mut text = format!("{}\n", look.heading("Three gains on one experiment of second order"));
+    let mut text = format!(
+        "{}\n",
+        look.heading("Three gains on one experiment of second order")
+    );
     for line in table(&sides, &lines) {
         text += &format!("  {line}\n");
     }

@@ -1,4 +1,5 @@
-//! Time per recursive least squares update at 2, 5 and 10 parameters: factored, next to nalgebra's operators and dsmc, in one run.
+//! Time per recursive least squares update at 2, 5 and 10 parameters: factored, next to nalgebra's operators and dsmc, and
+//! padasip where `python3` has it (or the program that the variable PYTHON names), in one run.
 //!
 //! After criterion's figures come ratios: the shortest of many short runs, taken in turns, so that a busy machine disturbs
 //! both sides alike.
@@ -7,6 +8,7 @@
 mod rls_cases;
 
 use std::hint::black_box;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput, criterion_group};
@@ -43,6 +45,22 @@ fn shortest(runs: &mut [(Duration, &mut dyn FnMut() -> f64)], rounds: usize) {
     }
 }
 
+/// Nanoseconds per update of padasip, or why there is no figure.
+fn padasip(p: usize) -> Result<f64, String> {
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
+    let output = Command::new(&python)
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/padasip_rls.py"))
+        .arg(p.to_string())
+        .output()
+        .map_err(|e| format!("{python} does not start: {e}"))?;
+    let said = String::from_utf8_lossy(&output.stdout);
+    said.trim().parse().map_err(|_| {
+        let errors = String::from_utf8_lossy(&output.stderr);
+        let last = errors.lines().last().unwrap_or("it says nothing");
+        format!("{last} (`pip install padasip` in the environment of {python})")
+    })
+}
+
 fn ratios<const P: usize>(target: f64) {
     let samples = samples::<P>();
     let mut factored = || Factored::<P>::new().run(&samples);
@@ -58,11 +76,18 @@ fn ratios<const P: usize>(target: f64) {
     shortest(&mut runs, 2000);
     let [ours, dynamic, operators, dsmc] =
         runs.map(|(best, _)| best.as_nanos() as f64 / SAMPLES as f64);
+    let padasip = padasip(P);
+    let python = padasip
+        .as_ref()
+        .map_or("- | -".into(), |ns| format!("{ns:.0} | {:.4}", ours / ns));
     println!(
-        "| {P} | {ours:.1} | {dynamic:.1} | {operators:.1} | {dsmc:.1} | {:.2} (at most {target}) | {:.2} |",
+        "| {P} | {ours:.1} | {dynamic:.1} | {operators:.1} | {dsmc:.1} | {:.2} (at most {target}) | {:.2} | {python} |",
         ours / operators,
         ours / dsmc
     );
+    if let Err(reason) = padasip {
+        println!("padasip skipped: {reason}");
+    }
 }
 
 criterion_group!(benches, all);
@@ -72,9 +97,9 @@ fn main() {
     Criterion::default().configure_from_args().final_summary();
     println!("ns per update, shortest run:");
     println!(
-        "| p | ct-rls | run-time size | nalgebra operators | dsmc | ct-rls/operators | ct-rls/dsmc |"
+        "| p | ct-rls | run-time size | nalgebra operators | dsmc | ct-rls/operators | ct-rls/dsmc | padasip | ct-rls/padasip |"
     );
-    println!("|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     ratios::<2>(0.85);
     ratios::<5>(0.65);
     ratios::<10>(0.55);

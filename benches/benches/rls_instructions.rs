@@ -1,76 +1,78 @@
-//! Instructions per recursive least squares update, counted by valgrind: the same on any machine of the same kind, however busy.
+//! Instructions of 1000 recursive least squares updates, counted by valgrind: the same on any machine of the same kind,
+//! however busy.
 //!
-//! The program runs itself under callgrind with one and with three rounds; the difference is two rounds of updates and nothing else.
+//! Wants valgrind and `cargo install gungraun-runner --version 0.20.0`; says that it skips where the runner is missing.
 #![allow(missing_docs, clippy::expect_used)]
 
 mod rls_cases;
 
-use std::hint::black_box;
 use std::process::Command;
 
-use rls_cases::{Dsmc, Dynamic, Factored, Operators, SAMPLES, samples};
+/// One who updates, ready to run over the samples; made before the counting begins.
+type Run = Box<dyn FnMut() -> f64>;
 
-const WHO: [&str; 4] = ["ct-rls", "run-time size", "operators", "dsmc"];
+mod counted {
+    use std::hint::black_box;
 
-fn rounds<const P: usize>(who: &str, rounds: usize) {
-    let samples = samples::<P>();
-    let (mut ours, mut dynamic) = (Factored::<P>::new(), Dynamic::new(P));
-    let (mut operators, mut dsmc) = (Operators::<P>::new(), Dsmc::new(P));
-    for _ in 0..rounds {
-        black_box(match who {
-            "ct-rls" => ours.run(&samples),
-            "run-time size" => dynamic.run(&samples),
-            "operators" => operators.run(&samples),
-            _ => dsmc.run(&samples),
-        });
+    use gungraun::{library_benchmark, library_benchmark_group};
+
+    use super::Run;
+    use crate::rls_cases::{Dsmc, Dynamic, Factored, Operators, samples};
+
+    fn ct_rls<const P: usize>() -> Run {
+        let (samples, mut who) = (samples::<P>(), Factored::<P>::new());
+        Box::new(move || who.run(&samples))
     }
-}
 
-/// Instructions of a whole run, or why there is no figure.
-fn count(who: &str, p: usize, rounds: usize) -> Result<f64, String> {
-    let program = std::env::current_exe().map_err(|e| e.to_string())?;
-    let output = Command::new("valgrind")
-        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
-        .arg(program)
-        .args(["--rounds", who, &p.to_string(), &rounds.to_string()])
-        .output()
-        .map_err(|e| format!("valgrind does not start: {e}"))?;
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    text.lines()
-        .find_map(|line| line.split("Collected : ").nth(1)?.trim().parse().ok())
-        .ok_or_else(|| format!("valgrind says: {text}"))
+    fn run_time_size<const P: usize>() -> Run {
+        let (samples, mut who) = (samples::<P>(), Dynamic::new(P));
+        Box::new(move || who.run(&samples))
+    }
+
+    fn operators<const P: usize>() -> Run {
+        let (samples, mut who) = (samples::<P>(), Operators::<P>::new());
+        Box::new(move || who.run(&samples))
+    }
+
+    fn dsmc<const P: usize>() -> Run {
+        let (samples, mut who) = (samples::<P>(), Dsmc::new(P));
+        Box::new(move || who.run(&samples))
+    }
+
+    #[library_benchmark]
+    #[bench::ct_rls_2(ct_rls::<2>())]
+    #[bench::ct_rls_5(ct_rls::<5>())]
+    #[bench::ct_rls_10(ct_rls::<10>())]
+    #[bench::run_time_size_2(run_time_size::<2>())]
+    #[bench::run_time_size_5(run_time_size::<5>())]
+    #[bench::run_time_size_10(run_time_size::<10>())]
+    #[bench::operators_2(operators::<2>())]
+    #[bench::operators_5(operators::<5>())]
+    #[bench::operators_10(operators::<10>())]
+    #[bench::dsmc_2(dsmc::<2>())]
+    #[bench::dsmc_5(dsmc::<5>())]
+    #[bench::dsmc_10(dsmc::<10>())]
+    fn updates(mut run: Run) -> Run {
+        black_box(run());
+        // given back, so that it is not dropped while counting
+        run
+    }
+
+    library_benchmark_group!(name = rls; benchmarks = updates);
+    gungraun::main!(library_benchmark_groups = rls);
+
+    pub fn run() {
+        main();
+    }
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    if let [_, flag, who, p, n] = arguments.as_slice()
-        && flag == "--rounds"
-    {
-        let n = n.parse().expect("a number of rounds");
-        match p.as_str() {
-            "2" => rounds::<2>(who, n),
-            "5" => rounds::<5>(who, n),
-            _ => rounds::<10>(who, n),
-        }
+    let runner = std::env::var("GUNGRAUN_RUNNER").unwrap_or_else(|_| "gungraun-runner".into());
+    if Command::new(&runner).arg("--version").output().is_err() {
+        println!(
+            "skipped: {runner} does not start; `cargo install gungraun-runner --version 0.20.0`"
+        );
         return;
     }
-    println!("instructions per update:");
-    println!("| p | {} |", WHO.join(" | "));
-    println!("|---|---|---|---|---|");
-    for p in [2, 5, 10] {
-        let figures: Result<Vec<String>, String> = WHO
-            .iter()
-            .map(|who| {
-                let two_rounds = count(who, p, 3)? - count(who, p, 1)?;
-                Ok(format!("{:.1}", two_rounds / (2 * SAMPLES) as f64))
-            })
-            .collect();
-        match figures {
-            Ok(figures) => println!("| {p} | {} |", figures.join(" | ")),
-            Err(reason) => {
-                println!("skipped: {reason}");
-                return;
-            }
-        }
-    }
+    counted::run();
 }

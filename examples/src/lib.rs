@@ -1,3 +1,4 @@
 //! Small programs, and the records that the tour of `ctid` walks through.
 
+pub mod picture;
 pub mod tour_records;

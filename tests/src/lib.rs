@@ -1,6 +1,7 @@
 //! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
 
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
+use missing_effect::Problem;
 use plants::{
     Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, controller::Pi,
 };
@@ -38,6 +39,9 @@ pub struct Rig {
     pub samples: usize,
     /// Sampling interval \[s\].
     pub interval: f64,
+    /// What no model tells of: at a time \[s\], what the pump is given beside the command \[V\], and what the sensor
+    /// reads beside the level \[cm\].
+    pub outside: fn(f64) -> (f64, f64),
 }
 
 impl Rig {
@@ -55,6 +59,7 @@ impl Rig {
             drive: Drive::Open,
             samples: 1000,
             interval: 2.0,
+            outside: |_| (0.0, 0.0),
         }
     }
 
@@ -92,6 +97,20 @@ impl Rig {
             area,
             tank_height: Some(60.0),
             input_range: Some(10.0),
+        }
+    }
+
+    /// The plant without what is hidden, beside one record.
+    pub fn problem(&self, record: Record) -> Problem {
+        Problem {
+            plant: self.plant,
+            known: self.known(),
+            effects: Vec::new(),
+            start: Default::default(),
+            fixed: Vec::new(),
+            controller: None,
+            records: vec![record],
+            test: Vec::new(),
         }
     }
 
@@ -145,12 +164,13 @@ impl Rig {
             Vec::with_capacity(self.samples),
         );
         for k in 0..self.samples {
-            let reading = simulator.read() + e[k];
+            let (unseen, misread) = (self.outside)(k as f64 * self.interval);
+            let reading = simulator.read() + misread + e[k];
             let command = match self.drive {
                 Drive::Open => wanted[k],
                 Drive::Closed => controller.command(wanted[k], reading, self.interval),
             };
-            simulator.advance(Command::held(command), self.interval);
+            simulator.advance(Command::held(command + unseen), self.interval);
             y.push(reading);
             u.push(command);
         }

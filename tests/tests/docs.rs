@@ -83,12 +83,32 @@ fn the_readme_shows_the_bundled_model_file() {
     );
 }
 
+/// Its example is the one of the crate's documentation, which is compiled and run.
+#[test]
+fn the_readme_shows_the_estimators_example() {
+    let readme = include_str!("../../README.md");
+    let code = readme
+        .split("```rust\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next())
+        .unwrap();
+    let documented: String = code
+        .lines()
+        .map(|line| format!("{}\n", format!("/// {line}").trim_end()))
+        .collect();
+    assert!(
+        include_str!("../../crates/ct-rls/src/rls.rs").contains(&documented),
+        "README.md shows another example than ContinuousRls"
+    );
+}
+
 #[test]
 fn links_lead_to_files() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     for page in [
         "README.md",
         "CONTRIBUTING.md",
+        "benches/README.md",
         "docs/adding-an-effect.md",
         "docs/design.md",
         "docs/gallery.md",

@@ -1,7 +1,7 @@
 //! Records with no missing effect: the tool must not name one.
 
 use ctid_tests::{Drive, Rig};
-use missing_effect::{Options, Problem, diagnose};
+use missing_effect::{Options, diagnose};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -29,16 +29,7 @@ fn at_most_one_of_sixty_adequate_models_is_blamed() {
             ..rig
         };
         let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1000 + run));
-        let problem = Problem {
-            plant: rig.plant,
-            known: rig.known(),
-            effects: Vec::new(),
-            start: Default::default(),
-            fixed: Vec::new(),
-            controller: None,
-            records: vec![record],
-            test: Vec::new(),
-        };
+        let problem = rig.problem(record);
         let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
         println!(
             "{run} {} {drive:?} colour {colour}: {:?} {:?} {:.2} s",

@@ -1,10 +1,10 @@
 //! The traps that make a tool of this kind lie.
 #![allow(clippy::unwrap_used)]
 
-use ct_signals::{ArModel, Record};
+use ct_signals::ArModel;
 use ctid_tests::{Drive, Rig};
 use greybox::{Setup, Stopping, fit_from, random_starts};
-use missing_effect::{Diagnosis, Options, Problem, Verdict, diagnose};
+use missing_effect::{Diagnosis, Options, Verdict, diagnose};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -13,22 +13,9 @@ const STOPPING: Stopping = Stopping {
     cost: 1e-10,
 };
 
-fn problem(rig: &Rig, record: Record) -> Problem {
-    Problem {
-        plant: rig.plant,
-        known: rig.known(),
-        effects: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        controller: None,
-        records: vec![record],
-        test: Vec::new(),
-    }
-}
-
 fn run(rig: &Rig, seed: u64) -> Diagnosis {
     let record = rig.run(&mut ChaCha8Rng::seed_from_u64(seed));
-    diagnose(&problem(rig, record), &Options::default(), &|_| {}).unwrap()
+    diagnose(&rig.problem(record), &Options::default(), &|_| {}).unwrap()
 }
 
 /// Two tanks whose model is exactly right: some starts end in a local minimum, where the residual holds structure and
@@ -60,7 +47,7 @@ fn a_local_minimum_of_a_right_model_is_not_blamed_on_an_effect() {
             .iter()
             .filter(|cost| (*cost / best).ln() * record.len() as f64 > 38.0)
             .count();
-        let found = diagnose(&problem(&rig, record), &Options::default(), &|_| {}).unwrap();
+        let found = diagnose(&rig.problem(record), &Options::default(), &|_| {}).unwrap();
         assert!(found.effects.is_empty(), "seed {seed}: {:?}", found.effects);
         assert_eq!(found.verdict, Verdict::Adequate);
         assert!(found.steps[0].starts >= 10 && found.steps[0].starts_agree >= 2);
@@ -148,7 +135,7 @@ fn a_slow_disturbance_is_not_taken_for_an_effect() {
             })
             .fold(f64::NEG_INFINITY, f64::max);
         blamed_as_white += usize::from(gain > 6.0);
-        let found = diagnose(&problem(&rig, record), &Options::default(), &|_| {}).unwrap();
+        let found = diagnose(&rig.problem(record), &Options::default(), &|_| {}).unwrap();
         assert!(found.effects.is_empty(), "seed {seed}: {:?}", found.effects);
         assert!(!found.noise.coefficients.is_empty());
     }

@@ -1,14 +1,19 @@
 //! Runs the estimators without std, without an allocator and without libc, and ends with 0 where they are right.
+//! With the feature `heap` also what needs an allocator, on one of the program's own.
 //!
 //! Linux on x86-64 or aarch64. `bash ci/no_std/run` builds and runs it.
 #![no_std]
 #![no_main]
+
+#[cfg(feature = "heap")]
+mod heap;
 
 use core::arch::asm;
 
 use ct_constrained::{ConstrainedRls, Row, project_box};
 use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};
 use nalgebra::{SMatrix, SVector};
+use stabilized_oe::{BlockDiagonal, IoSample, LateDifference, StabilizedOe};
 
 /// What ended the program, as its exit code.
 enum Failure {
@@ -17,6 +22,15 @@ enum Failure {
     Health = 3,
     Constraint = 4,
     Projection = 5,
+    #[cfg(feature = "heap")]
+    Filter = 6,
+    #[cfg(feature = "heap")]
+    Positivity = 7,
+    #[cfg(feature = "heap")]
+    RunTimeSize = 8,
+    #[cfg(feature = "heap")]
+    Allocates = 9,
+    OutputError = 10,
     Panic = 101,
 }
 
@@ -55,6 +69,42 @@ fn check() -> Result<(), Failure> {
     project_box(constrained.rls_mut(), &lower, &upper).map_err(|_| Failure::Projection)?;
     if (constrained.theta()[0] - 1.0).abs() > 1e-9 {
         return Err(Failure::Projection);
+    }
+    output_error()?;
+    #[cfg(feature = "heap")]
+    heap::check()?;
+    Ok(())
+}
+
+/// A lag of 10 s and a gain of 2, from 5 s and 1.
+fn output_error() -> Result<(), Failure> {
+    let weights = Weights::least_squares(0.01).map_err(|_| Failure::Settings)?;
+    let theta = ContinuousRls::with_integrator(
+        SVector::from([5.0, 1.0]),
+        SMatrix::from_diagonal(&SVector::from([10.0, 1.0])),
+        weights,
+    );
+    let filter = ContinuousRls::with_integrator(
+        SVector::from([10.0]),
+        SMatrix::identity(),
+        Weights::least_squares(0.0).map_err(|_| Failure::Settings)?,
+    );
+    let gain = BlockDiagonal::<1, 2>::new(
+        theta.map_err(|_| Failure::Settings)?,
+        filter.map_err(|_| Failure::Settings)?,
+    );
+    let mut estimator =
+        StabilizedOe::new(gain, LateDifference::<3>::new()).map_err(|_| Failure::Settings)?;
+    // 1 - e^(-dt/10)
+    let (dt, share, mut y) = (0.5, 0.048_770_575_499_285_99, 0.0);
+    for k in 0..4000 {
+        let u = if k % 120 < 60 { 1.0 } else { -1.0 };
+        estimator.update(&IoSample { u, y }, dt);
+        y += share * (2.0 * u - y);
+    }
+    let theta = estimator.theta();
+    if (theta[0] - 10.0).abs() > 0.1 || (theta[1] - 2.0).abs() > 0.02 {
+        return Err(Failure::OutputError);
     }
     Ok(())
 }

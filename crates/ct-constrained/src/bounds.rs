@@ -12,6 +12,9 @@ use crate::{Error, Relation, Row, project_box};
 pub enum Keep {
     /// Moved to the nearest point of the box, in the metric of what is known: [`project_box`].
     Projection,
+    /// Each entry that is outside is set to its bound, and the others stay. Simple, as simulations in the literature have it; but the
+    /// Lyapunov function may grow, and correlated parameters are left where they do not belong.
+    Clamp,
     /// Pulled back where outside: a row's penalty for each bound that is violated, relaxed exactly over the step.
     Penalty {
         /// As of a [`Row`]: well above the mean squared error of the output; 1e3 of it does, 1 of it is useless.
@@ -102,6 +105,11 @@ impl<const P: usize> Bounds<P> {
         }
         match self.keep {
             Keep::Projection => project_box(rls, &self.lower, &self.upper),
+            Keep::Clamp => {
+                let lifted = rls.theta().zip_map(&self.lower, f64::max);
+                rls.set_theta(lifted.zip_map(&self.upper, f64::min))?;
+                Ok(true)
+            }
             Keep::Penalty { weight } => self.pull(rls, weight, dt),
         }
     }

@@ -150,7 +150,7 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
         let length = match innovation.outcome {
             Outcome::Updated | Outcome::Capped => self.window.length(weights.eta(), dt),
             // nothing was forgotten; the rows hold all the same
-            Outcome::Silent | Outcome::NotFinite => dt,
+            Outcome::Silent => dt,
             _ => return innovation,
         };
         for row in &self.rows {
@@ -181,7 +181,8 @@ impl<const P: usize, const R: usize> RecursiveEstimator for ConstrainedRls<P, R>
     type Covariance = SMatrix<f64, P, P>;
     type Error = Error;
 
-    /// The data, then the rows. A sample that is not finite leaves the rows acting.
+    /// The data, then the rows. A sample that is refused changes nothing, by the rows neither; while the sensor is gone, a silent
+    /// one (`phi = 0`, `y = 0`) lets the rows act alone.
     fn update(&mut self, sample: &Sample<P>, dt: f64) -> Innovation {
         let weights = self.rls.weights();
         self.step(sample, dt, &weights)

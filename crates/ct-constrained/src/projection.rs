@@ -72,7 +72,16 @@ pub fn project_box<const P: usize, I: Integrator>(
         f[entry] = sign;
         (f, bound, false)
     };
-    nearest(rls, 2 * P, statement)
+    let moved = nearest(rls, 2 * P, statement)?;
+    // rounding may have left an entry a little outside
+    let inside = rls
+        .theta()
+        .zip_map(lower, f64::max)
+        .zip_map(upper, f64::min);
+    if inside != *rls.theta() {
+        rls.set_theta(inside)?;
+    }
+    Ok(moved)
 }
 
 pub(crate) fn check_box<const P: usize>(
@@ -110,6 +119,7 @@ type Violated<const P: usize> = (usize, SVector<f64, P>, f64, bool);
 
 fn most_violated<const P: usize>(
     theta: &SVector<f64, P>,
+    start: &SVector<f64, P>,
     rows: usize,
     statement: impl Fn(usize) -> (SVector<f64, P>, f64, bool),
 ) -> Option<Violated<P>> {
@@ -118,7 +128,8 @@ fn most_violated<const P: usize>(
     for row in 0..rows {
         let (f, chi, equality) = statement(row);
         let excess = f.dot(theta) - chi;
-        let size = chi.abs() + f.abs().dot(&theta.abs());
+        // with a bound of 0 the estimate itself is no measure of its rounding; what it was made from is
+        let size = chi.abs() + f.abs().dot(&theta.abs().sup(&start.abs()));
         let violation = if equality { excess.abs() } else { excess };
         if violation > most * size {
             most = violation / size;
@@ -159,7 +170,8 @@ fn nearest<const P: usize, I: Integrator>(
     rows: usize,
     statement: impl Fn(usize) -> (SVector<f64, P>, f64, bool),
 ) -> Result<bool, Error> {
-    let mut theta = *rls.theta();
+    let start = *rls.theta();
+    let mut theta = start;
     let none = Active {
         row: 0,
         f: SVector::zeros(),
@@ -170,8 +182,9 @@ fn nearest<const P: usize, I: Integrator>(
     let (mut active, mut q) = ([none; P], 0);
     let mut last = (0, 0.0);
     for _ in 0..STEPS * (rows + P) {
-        let Some((row, f, mut excess, equality)) = most_violated(&theta, rows, &statement) else {
-            let moved = theta != *rls.theta();
+        let Some((row, f, mut excess, equality)) = most_violated(&theta, &start, rows, &statement)
+        else {
+            let moved = theta != start;
             if moved {
                 rls.set_theta(theta)?;
             }

@@ -10,8 +10,8 @@
 //! | Is `Re G(jw) > d` at every frequency? | [`TransferFunction::exceeds`], decided exactly, without a grid |
 //!
 //! Time is in any one unit throughout; frequencies are angular, in radians per that unit. The crate needs `alloc`, not
-//! `std`; nothing is allocated per sample. Its functions do not depend on the platform's mathematical library, so
-//! results are the same on all.
+//! `std` (`bash ci/no_std/run` links it without); nothing is allocated per sample. Its functions do not depend on the
+//! platform's mathematical library, so results are the same on all.
 //!
 //! # Example
 //! A first-order process `tau y' + y = K u` from samples of its input, held, and of its output: state variable filters

@@ -1,5 +1,7 @@
 //! What can be wrong with a setting or a run: each message carries the numbers that disagree and the mend.
 
+use crate::Outcome;
+
 /// Everything this crate can refuse, and why a run has stopped.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -105,6 +107,12 @@ pub enum Error {
         found: usize,
         /// The number of parameters.
         expected: usize,
+    },
+    /// A sample that was not used; the estimates are as before it.
+    #[error("the sample was refused and changed nothing: {}", outcome.reason())]
+    Refused {
+        /// Why.
+        outcome: Outcome,
     },
     /// A step of Euler's rule too long for the gain: `P` would have lost its definiteness. The estimates from before that step are kept.
     #[error(

@@ -1,5 +1,7 @@
 //! What every recursive estimator offers.
 
+use crate::Error;
+
 /// A recursive estimator of `theta` in `y = theta' phi`, or of something that contains it.
 pub trait RecursiveEstimator {
     /// One sample of the signals.
@@ -43,6 +45,20 @@ pub struct Innovation {
 }
 
 impl Innovation {
+    /// The same where the sample was used; where it was refused, the refusal as an error, for `?`.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]; the estimates are as before the sample.
+    pub fn accepted(self) -> Result<Self, Error> {
+        if self.outcome.used() {
+            Ok(self)
+        } else {
+            Err(Error::Refused {
+                outcome: self.outcome,
+            })
+        }
+    }
+
     pub(crate) fn unused(epsilon: f64, outcome: Outcome) -> Self {
         Self {
             epsilon,
@@ -77,6 +93,20 @@ impl Outcome {
     /// Whether the estimates took the sample in.
     pub fn used(self) -> bool {
         matches!(self, Self::Updated | Self::Capped | Self::Silent)
+    }
+
+    pub(crate) fn reason(self) -> &'static str {
+        match self {
+            Self::Updated | Self::Capped | Self::Silent => "it was used",
+            Self::NotFinite => {
+                "a signal is NaN, infinite or beyond any sense (a regressor above 1e30, an output error above 1e100); leave it out"
+            }
+            Self::BadStep => {
+                "its step must be above 0 and at most 1e30 s, with eta dt at most 300; check the clock"
+            }
+            Self::BadSize => "its regressor needs one entry for each parameter",
+            Self::Stopped => "the run has stopped before; health() says why",
+        }
     }
 }
 

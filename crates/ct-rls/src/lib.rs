@@ -1,4 +1,5 @@
-//! Recursive least squares in continuous time with forgetting, which stays positive definite. No `std`, no allocation.
+//! Recursive least squares in continuous time with forgetting, which stays positive definite. No `std`, no allocation:
+//! `bash ci/no_std/run` links it without either.
 //!
 //! | question | answer |
 //! |---|---|
@@ -7,6 +8,7 @@
 //! | Which `eta`, `c`, `gamma`? | [`Weights`]: `least_squares(eta)`, `1/eta` 5 to 10 dominant time constants |
 //! | The signals are silent for hours | [`Guards`]: forgetting stops at a cap, or while the regressor is silent |
 //! | The parameters have jumped | [`ContinuousRls::reset_covariance`] |
+//! | A reading is missing | hand in the NaN: it is [refused](Innovation::accepted) and changes nothing |
 //! | Can I trust the estimates? | [`health`](RecursiveEstimator::health): excitation, definiteness, trace |
 //! | Parameters that are related, or bounded | the crate `ct-constrained` |
 //! | Two blocks of parameters, one output, no covariance between them | [`update_blocks`] |

@@ -41,18 +41,14 @@ fn the_same_numbers() {
         let b = dynamic.update(&sample, 0.5);
         assert_eq!(a.outcome, b.outcome);
     }
-    let off = fixed
-        .theta()
-        .iter()
-        .zip(dynamic.theta())
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max);
-    assert!(off < 1e-12, "{off:e}");
-    let (a, b) = (fixed.health().unwrap(), dynamic.health().unwrap());
-    assert!(
-        (a.trace - b.trace).abs() < 1e-12 * a.trace
-            && (a.excitation - b.excitation).abs() < 1e-12 * a.excitation
+    // the same to the bit
+    assert_eq!(fixed.theta().as_slice(), dynamic.theta().as_slice());
+    assert_eq!(
+        fixed.covariance().as_slice(),
+        dynamic.covariance().as_slice()
     );
+    let (a, b) = (fixed.health().unwrap(), dynamic.health().unwrap());
+    assert_eq!((a.trace, a.excitation), (b.trace, b.excitation));
     assert_eq!(
         (a.used, a.unused, a.silent, a.capped),
         (b.used, b.unused, b.silent, b.capped)

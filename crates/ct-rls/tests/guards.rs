@@ -87,11 +87,9 @@ fn useless_samples_change_nothing() {
     rls.update(&Sample::new([1.0, 2.0], 3.0), 0.1);
     let (theta, p) = (*rls.theta(), rls.covariance());
     let mut check = |phi: [f64; 2], y: f64, dt: f64, outcome: Outcome| {
-        assert_eq!(
-            rls.update(&Sample::new(phi, y), dt).outcome,
-            outcome,
-            "{phi:?} {y} {dt}"
-        );
+        let innovation = rls.update(&Sample::new(phi, y), dt);
+        assert_eq!(innovation.outcome, outcome, "{phi:?} {y} {dt}");
+        assert_eq!(innovation.accepted(), Err(Error::Refused { outcome }));
         assert_eq!((*rls.theta(), rls.covariance()), (theta, p));
     };
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e200] {
@@ -103,10 +101,13 @@ fn useless_samples_change_nothing() {
         check([1.0, 1.0], 1.0, dt, Outcome::BadStep);
     }
     assert_eq!(rls.health().unwrap().unused, 17);
+    let innovation = rls.update(&Sample::new([1.0, 1.0], 1.0), 0.1);
+    assert_eq!(innovation.accepted(), Ok(innovation));
+    let refused = rls.update(&Sample::new([1.0, f64::NAN], 1.0), 0.1);
+    let message = refused.accepted().unwrap_err().to_string();
     assert!(
-        rls.update(&Sample::new([1.0, 1.0], 1.0), 0.1)
-            .outcome
-            .used()
+        message.contains("NaN") && message.contains("changed nothing"),
+        "{message}"
     );
 }
 
@@ -133,6 +134,29 @@ fn a_reset_follows_a_jump() {
     assert!(learn(&mut kept, jumped, 20) > 1.0);
     rls.reset_covariance(&(SMatrix::identity() * 1e4)).unwrap();
     assert!(learn(&mut rls, jumped, 20) < 1e-3);
+}
+
+/// After a jump, and without a reset, old data count for less and less: `V` falls to `e^{-eta t}` of what the jump made it.
+#[test]
+fn forgetting_follows_a_jump() {
+    let mut rng = rng(12);
+    let (eta, dt) = (0.05, 0.5);
+    let mut rls = estimator(eta);
+    for jumped in [vector![1.0, 2.0], vector![-1.0, 5.0], vector![40.0, -0.1]] {
+        let start = rls.distance(&jumped);
+        let mut trace = 0.0;
+        for _ in 0..400 {
+            let phi: SVector<f64, 2> = normals(&mut rng);
+            let y = jumped.dot(&phi);
+            assert!(rls.update(&Sample { phi, y }, dt).outcome.used());
+            trace = rls.covariance().trace();
+        }
+        // ten memories: |delta|^2 <= trace(P) V
+        let off = (rls.theta() - jumped).norm_squared();
+        let bound = trace * start * (-eta * dt * 400.0).exp();
+        assert!(off <= bound * (1.0 + 1e-9), "{off:e} {bound:e}");
+        assert!(off < 1e-3, "{off:e}");
+    }
 }
 
 #[test]
@@ -202,10 +226,30 @@ fn bad_settings_are_refused_with_their_numbers() {
         guarded(1.9, 0.0),
         Err(Error::TraceAboveLimit { .. })
     ));
-    for (limit, silent) in [(0.0, 0.0), (f64::NAN, 0.0), (10.0, -1.0), (10.0, f64::NAN)] {
+    for (limit, silent) in [
+        (0.0, 0.0),
+        (f64::NAN, 0.0),
+        (10.0, f64::NEG_INFINITY),
+        (10.0, f64::NAN),
+    ] {
         assert!(matches!(guarded(limit, silent), Err(Error::Guard { .. })));
     }
     assert!(guarded(f64::INFINITY, 0.0).is_ok());
+}
+
+#[test]
+fn below_zero_even_an_exact_silence_is_forgotten_in() {
+    let silent = Sample::new([0.0, 0.0], 0.0);
+    for (silent_below, grows) in [(0.0, false), (-1.0, true)] {
+        let guards = Guards {
+            trace_limit: f64::INFINITY,
+            silent_below,
+        };
+        let mut rls = estimator(0.1).with_guards(guards).unwrap();
+        let before = rls.factor().trace();
+        rls.update(&silent, 1.0);
+        assert_eq!(rls.factor().trace() > before, grows);
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 mod support;
 
-use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};
+use ct_rls::{ContinuousRls, Guards, RecursiveEstimator, Sample, Weights};
 use nalgebra::{SMatrix, SVector, vector};
 use rand_chacha::ChaCha8Rng;
 use support::textbook::{Form, Textbook};
@@ -18,13 +18,14 @@ fn estimator<const P: usize>() -> ContinuousRls<P> {
     ContinuousRls::new(SVector::zeros(), SMatrix::identity() * 1e3, weights).unwrap()
 }
 
-/// Regressors of each phase: how far the second entry is from the first.
-fn regressor(rng: &mut ChaCha8Rng, collinear: f64) -> SVector<f64, 2> {
-    let phi: SVector<f64, 2> = normals(rng);
-    vector![
-        phi[0],
-        phi[0] * (1.0 - collinear.min(1.0)) + collinear * phi[1]
-    ]
+/// Regressors of each phase: how far the other entries are from the first.
+fn regressor<const P: usize>(rng: &mut ChaCha8Rng, collinear: f64) -> SVector<f64, P> {
+    let phi: SVector<f64, P> = normals(rng);
+    let apart = collinear.min(1.0);
+    SVector::from_fn(|i, _| match i {
+        0 => phi[0],
+        _ => phi[0] * (1.0 - apart) + collinear * phi[i],
+    })
 }
 
 #[test]
@@ -86,41 +87,43 @@ fn ten_million_updates() {
     assert!(died < 5_000, "{died}");
 }
 
-/// Regressors a distance of 1e-7 apart from the start, without noise: the information's condition number is 1e14.
+/// Nearly collinear from the start, without noise and without a cap on `P`: its condition number becomes that of the
+/// regressors, squared, 1e14 and 1e18.
 #[test]
 fn nearly_collinear_from_the_start() {
-    let theta = vector![2.0, -0.5];
-    let mut rls = estimator::<2>();
-    let mut rng = rng(2);
-    for _ in 0..100_000 {
-        let phi = regressor(&mut rng, 1e-7);
-        rls.update(
-            &Sample {
-                phi,
-                y: theta.dot(&phi),
-            },
-            DT,
-        );
+    fn check<const P: usize>(apart: f64, condition: f64) {
+        let mut rng = rng(2);
+        let theta: SVector<f64, P> = normals(&mut rng);
+        let guards = Guards {
+            trace_limit: f64::INFINITY,
+            silent_below: 0.0,
+        };
+        let mut rls = estimator::<P>().with_guards(guards).unwrap();
+        let mut learn = |rls: &mut ContinuousRls<P>, apart: f64, samples: u32| {
+            for _ in 0..samples {
+                let phi = regressor::<P>(&mut rng, apart);
+                let y = theta.dot(&phi);
+                assert!(rls.update(&Sample { phi, y }, DT).outcome.used());
+            }
+        };
+        learn(&mut rls, apart, 100_000);
+        let health = rls.health().unwrap();
+        assert!(health.smallest_pivot > 0.0 && health.trace.is_finite());
+        // the smallest eigenvalue of P is below its smallest pivot
+        let reached = health.trace / (P as f64 * health.smallest_pivot);
+        assert!(reached > condition, "{P} {apart:e}: {reached:e}");
+        // the sum is known, the differences hardly
+        assert!((rls.theta().sum() - theta.sum()).abs() < 1e-6);
+        learn(&mut rls, 1.0, 5_000);
+        let off = (rls.theta() - theta).norm();
+        assert!(off < 1e-9, "{P} {apart:e}: {off:e}");
+        assert!(rls.health().unwrap().smallest_pivot > 0.0);
     }
-    let health = rls.health().unwrap();
-    assert!(health.smallest_pivot > 0.0);
-    // the sum is known, the difference hardly
-    assert!((rls.theta().sum() - theta.sum()).abs() < 1e-6);
-    for _ in 0..2_000 {
-        let phi = normals(&mut rng);
-        rls.update(
-            &Sample {
-                phi,
-                y: theta.dot(&phi),
-            },
-            DT,
-        );
+    for (apart, condition) in [(1e-7, 1e13), (1e-9, 1e17)] {
+        check::<2>(apart, condition);
+        check::<4>(apart, condition);
+        check::<8>(apart, condition);
     }
-    assert!(
-        (rls.theta() - theta).norm() < 1e-9,
-        "{:e}",
-        (rls.theta() - theta).norm()
-    );
 }
 
 /// What a short test does not see: unit Gaussian regressors, no noise, nothing ill about the data.

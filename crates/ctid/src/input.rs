@@ -58,11 +58,22 @@ impl Files {
 
     /// An error of the computation, with the file that is to blame where that is known.
     pub(crate) fn blame(&self, error: missing_effect::Error) -> Error {
-        match error {
-            missing_effect::Error::UnstableLoop { .. } => {
-                Error::file(&self.model, error.to_string())
-            }
-            other => other.into(),
+        use missing_effect::Error::{Structure, UnstableLoop};
+        if matches!(error, UnstableLoop { .. } | Structure(_)) {
+            return Error::file(&self.model, error.to_string());
+        }
+        let what = error.to_string();
+        let named = |path: &PathBuf| {
+            path.file_name()
+                .is_some_and(|name| what.contains(&*name.to_string_lossy()))
+        };
+        if self.data.iter().chain(&self.test).any(named) {
+            return error.into();
+        }
+        let fitted: Vec<String> = self.data.iter().map(|p| p.display().to_string()).collect();
+        Error::File {
+            file: fitted.join(", "),
+            what,
         }
     }
 

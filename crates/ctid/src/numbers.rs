@@ -1,4 +1,4 @@
-//! Numbers for the terminal: as many digits as they deserve, aligned in columns.
+//! Numbers for people: as many digits as they deserve, aligned in columns for the terminal.
 
 /// A number with this many significant digits, `-` where there is none.
 pub(crate) fn significant(value: f64, digits: i32) -> String {
@@ -86,7 +86,7 @@ pub(crate) fn duration(seconds: f64) -> String {
 }
 
 /// The power of ten of the first digit.
-fn exponent(value: f64) -> i32 {
+pub(crate) fn exponent(value: f64) -> i32 {
     if value == 0.0 {
         return 0;
     }
@@ -98,7 +98,7 @@ fn exponent(value: f64) -> i32 {
 }
 
 /// Fixed decimals; negative `places` round to tens, hundreds, ...
-fn decimals(value: f64, places: i32) -> String {
+pub(crate) fn decimals(value: f64, places: i32) -> String {
     let text = match usize::try_from(places) {
         Ok(places) => format!("{value:.places$}"),
         Err(_) => {

@@ -460,6 +460,39 @@ fn a_controller_of_the_wrong_sign() {
 }
 
 #[test]
+fn a_gain_beyond_all_reason_is_told_in_few_digits() {
+    let place = place();
+    let tanks = Tanks::single();
+    place.write("loop.csv", tanks.csv());
+    let controller =
+        "type = \"PI\"\nu_min = 0.0\nu_max = 10.0\ngain = -1e12\nintegral_time = 1e-9\n";
+    place.write("loop.toml", tanks.model() + "\n[controller]\n" + controller);
+    both_refuse(
+        &place,
+        "loop.csv --model loop.toml",
+        &[
+            "loop.toml: ",
+            "unstable",
+            "grows more than a thousand times a sample",
+        ],
+    );
+}
+
+#[test]
+fn constants_with_which_nothing_can_be_simulated() {
+    let place = place();
+    place.write(
+        "small.toml",
+        bundled("tour.toml").replace("154.0", "1e-300"),
+    );
+    both_refuse(
+        &place,
+        "tour.csv --model small.toml",
+        &["tour.csv: none of ", "starts", "[known]"],
+    );
+}
+
+#[test]
 fn a_controller_that_integrates_too_fast() {
     unstable(&Tanks::cascaded(), "gain = 2\nintegral_time = 4\n");
 }

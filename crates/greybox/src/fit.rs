@@ -223,7 +223,11 @@ pub fn fit_from(
             starts: starts.len(),
         })?;
     let interior: Vec<usize> = (0..free.len())
-        .filter(|&j| !held(minimum.x[j], bounds[j], minimum.triangle.descent(j)))
+        .filter(|&j| {
+            // What no sample speaks of has no error: the state behind a lag that is zero.
+            minimum.triangle.column_norm(j) > 0.0
+                && !held(minimum.x[j], bounds[j], minimum.triangle.descent(j))
+        })
         .collect();
     let samples = setup.samples();
     let cost = minimum.triangle.cost();
@@ -335,10 +339,7 @@ pub fn fit_initial_levels(
         .map(|factor| {
             let mut start = x.clone();
             if setup.structure.plant.vessels() > 1 {
-                for level in start[parameters.len()..]
-                    .iter_mut()
-                    .step_by(setup.structure.plant.vessels())
-                {
+                for level in start[parameters.len()..].iter_mut().step_by(setup.states()) {
                     *level *= factor;
                 }
             }

@@ -36,6 +36,17 @@ pub(crate) struct Minimum {
     pub stop: Stop,
 }
 
+/// The nearest value between two bounds. Unlike `clamp` it takes bounds of any order; what is not a number stays so.
+pub(crate) fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
+    if x < lower {
+        lower
+    } else if x > upper {
+        upper
+    } else {
+        x
+    }
+}
+
 /// Whether the gradient holds a parameter at its bound.
 pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
     let room = 1e-12 * (upper - lower);
@@ -51,7 +62,7 @@ pub(crate) fn minimise(
 ) -> Minimum {
     let p = x.len();
     for (value, (lower, upper)) in x.iter_mut().zip(bounds) {
-        *value = value.clamp(*lower, *upper);
+        *value = within(*value, (*lower, *upper));
     }
     let Some(mut at) = evaluate(&x).filter(|at| at.cost().is_finite()) else {
         return Minimum {
@@ -100,7 +111,7 @@ pub(crate) fn minimise(
                 } else {
                     lower
                 };
-                (x + d).clamp(lower, upper.max(lower))
+                within(x + d, (lower, upper.max(lower)))
             })
             .collect();
         let moved: Vec<f64> = trial.iter().zip(&x).map(|(to, from)| to - from).collect();

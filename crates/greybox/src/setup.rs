@@ -9,8 +9,8 @@ use crate::{Error, Triangle};
 
 /// A structure, the records, and which parameters are free.
 ///
-/// The fitted vector holds the structure's parameters (free ones and fixed ones), then the initial level of every
-/// vessel for every record.
+/// The fitted vector holds the structure's parameters (free ones and fixed ones), then for every record the initial
+/// level of every vessel and what stood behind every lag ([`Structure::lags`]).
 #[derive(Debug, Clone)]
 pub struct Setup<'a> {
     /// The structure.
@@ -25,6 +25,8 @@ pub struct Setup<'a> {
     bounds: Vec<(f64, f64)>,
     /// Positions of the parameters that are fitted.
     free: Vec<usize>,
+    /// How many entries come before the initial states.
+    parameters: usize,
 }
 
 /// What a simulation shows.
@@ -142,16 +144,28 @@ impl<'a> Setup<'a> {
         } else {
             -1e3 * reach
         };
-        for (r, _) in records.iter().enumerate() {
+        let lags = structure.lags();
+        let parameters = names.len();
+        for (r, record) in records.iter().enumerate() {
+            let of = if records.len() > 1 {
+                format!(", record {}", r + 1)
+            } else {
+                String::new()
+            };
             for vessel in 0..plant.vessels() {
                 free.push(names.len());
-                let of = if records.len() > 1 {
-                    format!(", record {}", r + 1)
-                } else {
-                    String::new()
-                };
                 names.push(format!("{}(0){of}", plant.level_name(vessel)));
                 bounds.push((lowest, 1e3 * reach));
+            }
+            // Before the record anything may have happened, and a lag remembers it.
+            for &lag in &lags {
+                let (name, range) = structure.lag_before(lag, record.input.values[0]);
+                let name = name + &of;
+                if !fixed.contains_key(&name) {
+                    free.push(names.len());
+                }
+                names.push(name);
+                bounds.push(range);
             }
         }
         Ok(Self {
@@ -162,6 +176,7 @@ impl<'a> Setup<'a> {
             names,
             bounds,
             free,
+            parameters,
         })
     }
 
@@ -222,10 +237,38 @@ impl<'a> Setup<'a> {
         &self.free
     }
 
-    /// How many of the vector's entries are parameters, before the initial levels.
+    /// How many of the vector's entries are parameters, before the initial states.
     #[must_use]
     pub fn parameter_count(&self) -> usize {
-        self.names.len() - self.records.len() * self.structure.plant.vessels()
+        self.parameters
+    }
+
+    /// The unit of every entry in words.
+    #[must_use]
+    pub fn unit_labels(&self) -> Vec<String> {
+        let record = &self.records[0];
+        let (level, input) = (&record.output.unit, &record.input.unit);
+        let parameters = self.structure.parameters();
+        let mut units: Vec<String> = parameters
+            .iter()
+            .map(|info| self.structure.unit_label(info, level, input))
+            .collect();
+        for _ in self.records {
+            units.extend((0..self.structure.plant.vessels()).map(|_| level.clone()));
+            units.extend(self.structure.lags().iter().map(|lag| {
+                if lag.effect.place == plants::Place::Actuator {
+                    input.clone()
+                } else {
+                    level.clone()
+                }
+            }));
+        }
+        units
+    }
+
+    /// Entries of one record: its initial levels and what its lags begin with.
+    pub(crate) fn states(&self) -> usize {
+        (self.names.len() - self.parameters) / self.records.len()
     }
 
     /// Puts the fixed parameters' values in their places.
@@ -249,9 +292,9 @@ impl<'a> Setup<'a> {
         self.records.iter().map(Record::len).sum()
     }
 
-    /// Positions of the initial levels of record `r`.
-    fn levels_of(&self, r: usize) -> std::ops::Range<usize> {
-        let n = self.structure.plant.vessels();
+    /// Positions of the initial states of record `r`.
+    fn states_of(&self, r: usize) -> std::ops::Range<usize> {
+        let n = self.states();
         let from = self.parameter_count() + r * n;
         from..from + n
     }
@@ -290,7 +333,7 @@ impl<'a> Setup<'a> {
             let mut simulator = Simulator::new(
                 &self.structure,
                 &x[..self.parameter_count()],
-                &x[self.levels_of(r)],
+                &x[self.states_of(r)],
                 record.input.values[0],
             )?;
             let mut output = Vec::with_capacity(record.len());
@@ -368,13 +411,13 @@ impl<'a> Setup<'a> {
 
     /// Shows every row, and whether it is the first one of its record.
     fn each_row(&self, x: &[f64], each: impl FnMut(bool, &mut [f64])) -> Option<()> {
-        // Parameters and one record's initial levels; a few lane counts, so that short vectors stay cheap.
+        // Parameters and one record's initial states; a few lane counts, so that short vectors stay cheap.
         let parameters = self
             .free
             .iter()
             .filter(|&&i| i < self.parameter_count())
             .count();
-        match parameters + self.structure.plant.vessels() {
+        match parameters + self.states() {
             0..=4 => self.each_row_in_lanes::<4>(x, each),
             5..=6 => self.each_row_in_lanes::<6>(x, each),
             7..=8 => self.each_row_in_lanes::<8>(x, each),
@@ -392,7 +435,7 @@ impl<'a> Setup<'a> {
         let mut row = vec![0.0; columns];
         let count = self.parameter_count();
         for (r, record) in self.records.iter().enumerate() {
-            let own = self.levels_of(r);
+            let own = self.states_of(r);
             // Columns of this record: the free parameters and its own initial levels, in lanes of one simulator or,
             // where they are too many, of several that run side by side.
             let lanes: Vec<usize> = (0..self.free.len())
@@ -486,6 +529,9 @@ impl<'a> Setup<'a> {
 
     /// The scales that a simulation shows: levels of every vessel and the throughput.
     ///
+    /// A level that is not measured is what the model makes it, a wrong model several times too high or too low: its
+    /// range reaches down to an empty vessel.
+    ///
     /// # Errors
     /// As [`Setup::simulate`].
     pub fn scales_at(&self, x: &[f64]) -> Result<Scales, Error> {
@@ -495,7 +541,12 @@ impl<'a> Setup<'a> {
         for vessel in 0..plant.vessels() {
             let (low, high) = simulated.level[vessel];
             if low.is_finite() && high.is_finite() && high > low {
-                scales.level[vessel] = (low, high);
+                let measured = vessel + 1 == plant.vessels();
+                scales.level[vessel] = if measured {
+                    (low, high)
+                } else {
+                    (low.min(0.0), high.max(0.0))
+                };
                 scales.operating_level[vessel] = simulated.mean_level[vessel];
             }
         }

@@ -8,7 +8,7 @@
 use plants::{Outlet, Plant};
 use rand::RngExt;
 
-use crate::Setup;
+use crate::{Setup, levenberg_marquardt::within};
 
 /// One start for the plant's own parameters and the initial levels; effects start at their first start value.
 #[must_use]
@@ -89,7 +89,8 @@ fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
     x
 }
 
-/// Appends initial levels: the measured one from the first reading, the upper one at rest under the first command.
+/// Appends initial states: the measured level from the first reading, the upper one and lags at rest under the first
+/// command.
 pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
     for record in setup.records {
         let (u0, y0) = (record.input.values[0], record.output.values[0]);
@@ -99,6 +100,7 @@ pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
             _ => {}
         }
         x.push(y0);
+        x.extend(setup.structure.lags().iter().map(|_| 0.0));
     }
 }
 
@@ -125,7 +127,7 @@ pub fn starts_around(setup: &Setup, x: &[f64], n: usize, seed: u64) -> Vec<Vec<f
                     } else {
                         value + 0.1 * (upper - lower) * rng.random_range(-1.0..1.0)
                     };
-                    moved.clamp(lower, upper)
+                    within(moved, (lower, upper))
                 })
                 .collect()
         })

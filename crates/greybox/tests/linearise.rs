@@ -136,8 +136,10 @@ fn with_effects(rig: &Rig, setup: &Setup, records: usize) -> Vec<f64> {
             x.push(info.starts[0]);
         }
     }
+    let lags = setup.structure.lags();
     for _ in 0..records {
         x.extend(&rig.levels);
+        x.extend(lags.iter().map(|_| 0.6));
     }
     x
 }
@@ -172,6 +174,8 @@ fn more_columns_than_lanes() {
             "overflow.rim" => *value = 4.5,
             "sensor_saturation.limit" => *value = 13.0,
             "level_upper(0), record 1" | "level_upper(0), record 2" => *value = 4.0,
+            // A reading that begins below the sensor's limit.
+            "sensor_lag.before, record 1" | "sensor_lag.before, record 2" => *value = -6.0,
             _ => {}
         }
     }

@@ -23,24 +23,29 @@ pub(crate) fn beyond_chance(fall: f64, freedom: f64, lacking: &Node) -> bool {
 
 /// Takes out, one by one, what the noise explains as well.
 pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
-    while !node.added.is_empty() {
-        let lacking: Vec<Node<'a>> = (0..node.added.len())
-            .into_par_iter()
-            .map(|position| without(&node, position, noise))
-            .collect::<Result<_, _>>()?;
-        let least = lacking
-            .into_iter()
-            .map(|lacking| (lacking.fit.bic() - node.fit.bic(), lacking))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((loss, lacking)) = least else { break };
+    while let Some(lacking) = least_useful(&node, noise)? {
         let freedom = (node.fit.parameters - lacking.fit.parameters).max(1) as f64;
         let fall = lacking.fit.deviance - node.fit.deviance;
-        if loss > BIC_MARGIN && beyond_chance(fall, freedom, &lacking) {
+        if node.gain_over(&lacking) > BIC_MARGIN && beyond_chance(fall, freedom, &lacking) {
             break;
         }
         node = lacking;
     }
     Ok(node)
+}
+
+/// The node without the effect whose loss costs least; `None` where it has none.
+pub(crate) fn least_useful<'a>(
+    node: &Node<'a>,
+    noise: &ArModel,
+) -> Result<Option<Node<'a>>, Error> {
+    let lacking: Vec<Node<'a>> = (0..node.added.len())
+        .into_par_iter()
+        .map(|position| without(node, position, noise))
+        .collect::<Result<_, _>>()?;
+    Ok(lacking
+        .into_iter()
+        .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())))
 }
 
 /// How many ways the search had to find something where there is nothing: every start of every candidate is one.

@@ -8,9 +8,10 @@ use rayon::prelude::*;
 
 use crate::{
     Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step, Verdict,
-    confirm::{BIC_MARGIN, beyond_chance, confirm},
-    noise_floor::{NOISE_ORDER, colour, input_shows, slowness, wanders},
+    confirm::{BIC_MARGIN, beyond_chance, confirm, least_useful},
+    noise_floor::{NOISE_ORDER, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
+    remains::remains,
     scores::scores,
     search::{Breadth, Node, exchanges, grow, refine, singles},
     sentences, step,
@@ -22,6 +23,8 @@ const GROUP_MARGIN: f64 = 6.0;
 /// Sets grown side by side, and refits of a size.
 const BEAM: usize = 3;
 const REFITS: usize = 12;
+/// Sets are grown to so many effects where they pay.
+const RICHEST: usize = 6;
 
 /// Fits the believed model and says where it fails: a diagnosis of one step without a search of sets.
 ///
@@ -31,8 +34,8 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     let begun = Instant::now();
     let base = base(problem, options)?;
     let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
-    // The model lacks something where the input shows in its residual, or where some effect would lower the error by
-    // more than chance does: the one sees what is linear, the other what the catalogue knows.
+    // The model lacks something where its residual is not noise, or where some effect would lower the error by more than
+    // chance does: the one needs no catalogue, the other sees what is small.
     let in_noise = Node {
         fit: own.clone(),
         ..base.clone()
@@ -45,14 +48,16 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
                 beyond_chance(own.deviance - single.fit.deviance, freedom, &in_noise)
             }
         });
-    let lacking = tempted || input_shows(&base)?;
+    let left = remains(&base, &own)?;
+    let lacking = tempted || left.is_some();
     let verdict = if lacking {
         Verdict::Unexplained
     } else {
         Verdict::Adequate
     };
     let floor = floor(&own.noise, "the residual of the believed model");
-    let shown = if lacking {
+    // In the metric of a noise that wanders a simulation may drift off.
+    let shown = if lacking || wanders(&base, &own.noise) {
         base
     } else {
         Node {
@@ -60,15 +65,14 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
             ..base
         }
     };
-    // What the model lacks is in the residual too: what cannot be predicted from the residual's own past is not.
-    let noise = if lacking {
-        floor.innovation
+    let floor = if lacking {
+        floor.of_what_is_new()
     } else {
-        floor.level
+        floor
     };
-    let step = step::report(&shown, own.bic(), noise, &problem.test)?;
+    let step = step::report(&shown, own.bic(), floor.level, &problem.test)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
-    diagnosis.sentences = sentences::of_comparison(&diagnosis);
+    diagnosis.sentences = sentences::of_comparison(&diagnosis, left);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     Ok(diagnosis)
 }
@@ -89,7 +93,8 @@ pub fn diagnose(
     let breadth = Breadth {
         beam: BEAM,
         refits: REFITS,
-        most: options.max_effects,
+        // What may be added does not bound what is tried: only the richest model shows what is noise.
+        most: options.max_effects.max(RICHEST),
     };
     let pays = |before: &Node, after: &Node| after.gain_over(before) > BIC_MARGIN;
 
@@ -107,7 +112,8 @@ pub fn diagnose(
     let base_noise = refine(&base, &noise, &[])?;
     let richest_noise = refine(&richest, &noise, &[])?;
     let mut confirmed = confirm(richest_noise, &noise)?;
-    let by_simulation = wanders(&richest, &noise) && !confirmed.added.is_empty();
+    let wandering = wanders(&richest, &noise);
+    let by_simulation = wandering && !confirmed.added.is_empty();
     if noise.order() > 0 && !by_simulation {
         // The noise's colour is known now: the search is repeated in its metric.
         let sizes = grow(&base_noise, &noise, breadth, pays, &|done, total| {
@@ -129,23 +135,33 @@ pub fn diagnose(
     if !confirmed.added.is_empty() && own_base.bic() - own_last.bic() < BIC_MARGIN {
         confirmed = base_noise.clone();
     }
+    let needed = confirmed.added.len();
+    let stopped = needed > options.max_effects;
+    if stopped {
+        confirmed = shortened(confirmed, &sizes, options.max_effects, &noise)?;
+    }
 
     tell("telling apart", 1, 3);
     let mut trail = trail(&base, &confirmed, &white)?;
-    // The last model is shown in the noise's metric, where its parameters are best known; the models before it lack
-    // something, and a metric that takes what they lack for noise would let their simulation drift off.
-    if !by_simulation && let Some(last) = trail.last_mut() {
-        let confirmed = refine(&confirmed, &noise, std::slice::from_ref(&last.fit.x))?;
-        let own = coloured(&confirmed.setup, confirmed.fit, NOISE_ORDER, STOPPING)?;
-        *last = Node {
-            fit: own.continuing(&last.fit),
-            setup: confirmed.setup,
-            added: last.added.clone(),
+    let (mut left, mut own_of_last) = (None, None);
+    if let Some(last) = trail.last_mut() {
+        let in_noise = if by_simulation || stopped {
+            last.clone()
+        } else {
+            refine(&confirmed, &noise, std::slice::from_ref(&last.fit.x))?
         };
+        let own = coloured(&in_noise.setup, in_noise.fit, NOISE_ORDER, STOPPING)?;
+        left = remains(last, &own)?;
+        // The last model is shown in the noise's metric, where its parameters are best known; a model that lacks
+        // something is not: a metric that takes what it lacks for noise would let its simulation drift off.
+        if !wandering && !stopped && left.is_none() {
+            last.fit = own.clone().continuing(&last.fit);
+        }
+        own_of_last = Some(own);
     }
     let last = trail.last().cloned().unwrap_or_else(|| base.clone());
-    let (metric, per_sample) = if by_simulation {
-        (&white, slowness(&noise))
+    let (metric, per_sample) = if by_simulation || stopped {
+        (&white, slowness(&residual_colour(&last)?))
     } else {
         (&noise, 1.0)
     };
@@ -158,25 +174,31 @@ pub fn diagnose(
     };
     let scores = scores(believed, &singles(believed, metric), metric);
 
-    let floor = floor(
+    let mut floor = floor(
         &noise,
-        if last.added.len() == richest.added.len() {
+        if needed == richest.added.len() && !stopped {
             "the residual of the final model"
         } else {
             "the residual of the richest model that was tried"
         },
     );
+    if left.is_some() && !stopped {
+        floor = floor.of_what_is_new();
+    }
     let steps = trail
         .par_iter()
-        .map(|node| {
-            let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?;
-            step::report(node, own.bic(), floor.level, &problem.test)
+        .enumerate()
+        .map(|(k, node)| {
+            let bic = match &own_of_last {
+                Some(own) if k + 1 == trail.len() => own.bic(),
+                _ => coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.bic(),
+            };
+            step::report(node, bic, floor.level, &problem.test)
         })
         .collect::<Result<Vec<Step>, Error>>()?;
-    let last_remains = by_simulation || input_shows(&last)?;
-    let verdict = match (last.added.is_empty(), last_remains) {
-        (true, true) => Verdict::Unexplained,
-        (true, false) => Verdict::Adequate,
+    let verdict = match (last.added.is_empty(), left) {
+        (true, Some(_)) => Verdict::Unexplained,
+        (true, None) => Verdict::Adequate,
         (false, _) if groups.iter().any(|group| group.len() > 1) => Verdict::Undecided,
         (false, _) => Verdict::Effect,
     };
@@ -189,7 +211,12 @@ pub fn diagnose(
     diagnosis.groups = groups;
     diagnosis.ranked = ranked(&scores, verdict);
     diagnosis.scores = scores;
-    diagnosis.sentences = sentences::of_diagnosis(&diagnosis, last_remains);
+    diagnosis.sentences = sentences::of_diagnosis(&diagnosis, left);
+    if stopped {
+        diagnosis
+            .sentences
+            .push(sentences::of_a_stop(options.max_effects, needed));
+    }
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     tell("done", 3, 3);
     Ok(diagnosis)
@@ -208,6 +235,28 @@ fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
                 best
             }
         })
+}
+
+/// The best set of at most so many effects: of a set that is too large, or of those that were grown.
+fn shortened<'a>(
+    mut node: Node<'a>,
+    sizes: &[Vec<Node<'a>>],
+    most: usize,
+    noise: &ArModel,
+) -> Result<Node<'a>, Error> {
+    while node.added.len() > most {
+        let Some(lacking) = least_useful(&node, noise)? else {
+            break;
+        };
+        node = lacking;
+    }
+    if let Some(grown) = sizes.get(most).and_then(|nodes| nodes.first()) {
+        let grown = refine(grown, noise, &[])?;
+        if grown.fit.bic() < node.fit.bic() {
+            node = grown;
+        }
+    }
+    Ok(node)
 }
 
 /// For every added effect, itself and all that fit as well in its place.

@@ -141,6 +141,18 @@ pub struct NoiseFloor {
     pub source: String,
 }
 
+impl NoiseFloor {
+    /// The floor where the residual is not noise alone: what a model lacks is in the residual too, but hardly in what
+    /// cannot be predicted from the residual's own past.
+    pub(crate) fn of_what_is_new(self) -> Self {
+        Self {
+            level: self.innovation,
+            source: format!("what the past of {} does not predict", self.source),
+            ..self
+        }
+    }
+}
+
 /// A record as the report shows it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Shown {

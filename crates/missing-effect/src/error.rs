@@ -15,8 +15,8 @@ pub enum Error {
     Fit(#[from] greybox::Error),
     /// The controller and the fitted plant do not make a stable loop.
     #[error(
-        "controller: the loop of gain = {gain}, integral_time = {integral_time} s and the fitted plant is unstable (an oscillation or drift grows by {:.2} % a sample): check the sign and the unit of the gain, and that integral_time is in seconds",
-        100.0 * (radius - 1.0)
+        "controller: the loop of gain = {gain}, integral_time = {integral_time} s and the fitted plant is unstable (an oscillation or drift grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",
+        growth(*radius)
     )]
     UnstableLoop {
         /// Proportional gain \[input/output\].
@@ -26,4 +26,15 @@ pub enum Error {
         /// Largest magnitude of the sampled loop's eigenvalues.
         radius: f64,
     },
+}
+
+/// A growth from one sample to the next, in words that stay short.
+fn growth(radius: f64) -> String {
+    if radius < 2.0 {
+        format!("by {:.2} %", 100.0 * (radius - 1.0))
+    } else if radius < 1000.0 {
+        format!("{radius:.1} times")
+    } else {
+        "more than a thousand times".to_string()
+    }
 }

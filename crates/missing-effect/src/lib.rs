@@ -12,6 +12,7 @@ mod error;
 mod locate;
 mod noise_floor;
 mod problem;
+mod remains;
 mod scores;
 mod search;
 mod sentences;

@@ -1,37 +1,23 @@
 //! The noise floor: the colour of the residual of the richest model in play.
 
 use ct_signals::ArModel;
+use greybox::noise_of;
 
 use crate::{Error, search::Node};
 
 /// Largest order of the noise model.
 pub(crate) const NOISE_ORDER: usize = 6;
-/// Below this p-value a residual is not noise: the input still shows in it.
-const INPUT_SHOWS: f64 = 1e-4;
 
-/// The autoregressive model of a node's residual.
+/// The autoregressive model of a node's residual, without the bias that fitting leaves in it.
 pub(crate) fn colour(node: &Node) -> Result<ArModel, Error> {
+    Ok(noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
+}
+
+/// The autoregressive model of a node's residual as it is, without what the fit has taken from the noise.
+pub(crate) fn residual_colour(node: &Node) -> Result<ArModel, Error> {
     let residuals = node.setup.residuals(&node.fit.x)?;
     let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
     Ok(ArModel::fit(&segments, NOISE_ORDER)?)
-}
-
-/// p-value of the test that the input does not show in a node's residual; of several records the smallest, corrected
-/// for having taken it.
-pub(crate) fn input_p(node: &Node) -> Result<f64, Error> {
-    let residuals = node.setup.residuals(&node.fit.x)?;
-    let records = node.setup.records;
-    let mut least: f64 = 1.0;
-    for (record, residual) in records.iter().zip(&residuals) {
-        let lags = (record.len() / 10).clamp(2, 25);
-        let (_, p) = ct_signals::residual_tests::prewhitened_input_test(
-            &record.input.values,
-            residual,
-            lags,
-        )?;
-        least = least.min(p);
-    }
-    Ok((least * records.len() as f64).min(1.0))
 }
 
 /// The noise's spectrum at frequency zero over its mean: by how much slow parameters are less certain than under
@@ -52,9 +38,4 @@ const SAMPLES_PER_PARAMETER: f64 = 10.0;
 pub(crate) fn wanders(node: &Node, noise: &ArModel) -> bool {
     let independent = node.setup.samples() as f64 / slowness(noise);
     noise.order() > 0 && independent < SAMPLES_PER_PARAMETER * node.setup.free().len() as f64
-}
-
-/// Whether the input still shows in a node's residual.
-pub(crate) fn input_shows(node: &Node) -> Result<bool, Error> {
-    Ok(input_p(node)? < INPUT_SHOWS)
 }

@@ -6,7 +6,8 @@ use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
 use crate::{
     Error, Parameter, ResidualTests, Step,
     locate::{Series, locate},
-    noise_floor::{NOISE_ORDER, input_p},
+    noise_floor::NOISE_ORDER,
+    remains::input_p,
     search::Node,
 };
 
@@ -69,26 +70,17 @@ fn std_errors(node: &Node) -> Result<Vec<Option<f64>>, Error> {
 
 /// All entries of the vector with their standard errors.
 pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -> Vec<Parameter> {
-    let record = &setup.records[0];
-    let infos = setup.structure.parameters();
     setup
         .names()
         .iter()
         .zip(&fit.x)
         .zip(std_errors)
-        .enumerate()
-        .map(|(i, ((name, value), std_error))| Parameter {
+        .zip(setup.unit_labels())
+        .map(|(((name, value), std_error), unit)| Parameter {
             name: name.clone(),
             value: *value,
             std_error: *std_error,
-            unit: infos.get(i).map_or_else(
-                || record.output.unit.clone(),
-                |info| {
-                    setup
-                        .structure
-                        .unit_label(info, &record.output.unit, &record.input.unit)
-                },
-            ),
+            unit,
         })
         .collect()
 }

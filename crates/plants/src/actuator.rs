@@ -2,7 +2,11 @@
 
 use std::collections::VecDeque;
 
-use crate::{Law, Scalar, moments::exponential_moments, vessels::Inflow};
+use crate::{
+    Law, Scalar,
+    moments::{decayed, exponential_moments},
+    vessels::Inflow,
+};
 
 /// Corners of a ramp that lie closer together than this share of the interval are one.
 const SAME_CORNER: f64 = 1e-9;
@@ -106,6 +110,13 @@ impl<T: Scalar> Actuator<T> {
             });
         }
         actuator
+    }
+
+    /// The lag had not settled: `h` before the record its signal exceeded the one that it follows by this.
+    pub(crate) fn unsettle(&mut self, before: T, h: f64) {
+        if let Some(lag) = self.lag {
+            self.excess = decayed(before, lag, h);
+        }
     }
 
     fn effective(&mut self, u: T, t: f64) -> T {

@@ -27,7 +27,9 @@ pub enum Error {
         effect: &'static str,
     },
     /// The effect does not act on this plant.
-    #[error("effect `{effect}` does not act on plant `{plant}`: its outflow law is another")]
+    #[error(
+        "effect `{effect}` does not act on plant `{plant}`, whose outflow follows another law: `ctid effects {effect}` names the plants it acts on"
+    )]
     EffectDoesNotApply {
         /// The effect.
         effect: &'static str,

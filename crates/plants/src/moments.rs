@@ -36,6 +36,15 @@ pub(crate) fn exponential_moments<T: Scalar>(time_constant: T, h: T) -> (T, [T; 
     (decay, [m0, m1, m2])
 }
 
+/// What is left of an excess after `h`, smooth down to a time constant of zero, where nothing is.
+pub(crate) fn decayed<T: Scalar>(excess: T, time_constant: T, h: f64) -> T {
+    if 700.0 * time_constant.value() > h {
+        excess * (-(T::constant(h) / time_constant)).exp()
+    } else {
+        T::constant(0.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,10 @@
 //! The sensor: a lag behind the measured level, then static laws on the reading.
 
-use crate::{Law, Scalar, moments::exponential_moments, vessels::Stretch};
+use crate::{
+    Law, Scalar,
+    moments::{decayed, exponential_moments},
+    vessels::Stretch,
+};
 
 pub(crate) struct Sensor<T: Scalar> {
     laws: Vec<Box<dyn Law<T>>>,
@@ -10,13 +14,20 @@ pub(crate) struct Sensor<T: Scalar> {
 }
 
 impl<T: Scalar> Sensor<T> {
-    /// The sensor has settled when the record begins.
+    /// The sensor has settled when the record begins, unless [`Sensor::unsettle`] says otherwise.
     pub(crate) fn new(laws: Vec<Box<dyn Law<T>>>) -> Self {
         let lag = laws.iter().find_map(|law| law.sensor_lag());
         Self {
             laws,
             lag,
             excess: T::constant(0.0),
+        }
+    }
+
+    /// The lag had not settled: `h` before the record the reading behind it exceeded the level by this.
+    pub(crate) fn unsettle(&mut self, before: T, h: f64) {
+        if let Some(lag) = self.lag {
+            self.excess = decayed(before, lag, h);
         }
     }
 

@@ -48,24 +48,27 @@ pub struct Simulator<T: Scalar> {
 }
 
 impl<T: Scalar> Simulator<T> {
-    /// `theta` in the order of [`Structure::parameters`], `levels` the initial level of each vessel, `at_rest`
-    /// the command before the record began.
+    /// `theta` in the order of [`Structure::parameters`], `initial` the level of each vessel when the record begins
+    /// and, where the lags had not settled by then, an excess for each of [`Structure::lags`]; `at_rest` the command
+    /// before the record began.
     ///
     /// # Errors
-    /// Where the number of parameters or levels is not the structure's.
+    /// Where the number of parameters or initial values is not the structure's.
     pub fn new(
         structure: &Structure,
         theta: &[T],
-        levels: &[T],
+        initial: &[T],
         at_rest: f64,
     ) -> Result<Self, Error> {
         let plant = structure.plant;
         let n = plant.vessels();
-        if levels.len() != n {
+        let (levels, before) = initial.split_at(n.min(initial.len()));
+        let lags = structure.lags();
+        if levels.len() != n || !(before.is_empty() || before.len() == lags.len()) {
             return Err(Error::Count {
-                what: "initial levels",
-                given: levels.len(),
-                needed: n,
+                what: "initial levels, and an excess for each lag",
+                given: initial.len(),
+                needed: n + lags.len(),
             });
         }
         let own = plant.parameters(&structure.scales).len();
@@ -118,10 +121,19 @@ impl<T: Scalar> Simulator<T> {
             }
             at += count;
         }
+        let mut actuator = Actuator::new(actuator, at_rest, 0.0);
+        let mut sensor = Sensor::new(sensor);
+        let sample = structure.scales.sample_interval;
+        for (lag, &before) in lags.iter().zip(before) {
+            match lag.effect.place {
+                Place::Actuator => actuator.unsettle(before, sample),
+                _ => sensor.unsettle(before, sample),
+            }
+        }
         Ok(Self {
-            actuator: Actuator::new(actuator, at_rest, 0.0),
+            actuator,
             vessels: Vessels::new(parts, vessels, levels),
-            sensor: Sensor::new(sensor),
+            sensor,
             pump_gain,
             last: n - 1,
             time: 0.0,

@@ -226,6 +226,37 @@ impl Structure {
         all
     }
 
+    /// The effects that are on and lag, in chain order. Each has a state that a record may begin with: what stands
+    /// behind the lag may not have settled.
+    ///
+    /// Its initial value, `before`, says by how much what is behind the lag exceeded what it follows one (median)
+    /// sampling interval before the record begins, in units of the input at the actuator and of the level at the
+    /// sensor; zero is at rest. An interval before, and not at the beginning, so that it vanishes with the lag.
+    #[must_use]
+    pub fn lags(&self) -> Vec<Placed> {
+        let lags = |placed: &Placed| {
+            let parameters = self.effect_parameters(*placed);
+            let starts: Vec<f64> = parameters.iter().map(|info| info.starts[0]).collect();
+            effects::bind(placed.effect, &self.site(*placed), &starts)
+                .is_some_and(|law| law.actuator_lag().or(law.sensor_lag()).is_some())
+        };
+        self.effects.iter().copied().filter(lags).collect()
+    }
+
+    /// The name and bounds of the initial value of one of [`Structure::lags`], `at_rest` the first command: what is
+    /// behind the lag lay within the range of the record.
+    #[must_use]
+    pub fn lag_before(&self, lag: Placed, at_rest: f64) -> (String, (f64, f64)) {
+        let (low, high) = if lag.effect.place == Place::Actuator {
+            let (low, high) = self.scales.input;
+            (low.min(at_rest) - at_rest, high.max(at_rest) - at_rest)
+        } else {
+            let (low, high) = self.site(lag).measured_level();
+            (low - high, high - low)
+        };
+        (format!("{}.before", lag.effect.id), (low, high))
+    }
+
     /// Names of all parameters, an effect's as `effect.parameter`, in the order of [`Structure::parameters`].
     #[must_use]
     pub fn parameter_names(&self) -> Vec<String> {

@@ -774,7 +774,10 @@ fn crossing(mut low: (f64, f64), mut high: (f64, f64), f: impl Fn(f64) -> f64) -
     let mut last = f64::NAN;
     let mut side = 0;
     for _ in 0..60 {
-        let s = ((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1)).clamp(low.0, high.0);
+        // Not `clamp`, which panics where a bound is not a number.
+        let s = ((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1))
+            .max(low.0)
+            .min(high.0);
         if (s - last).abs() < 1e-9 || high.0 - low.0 < 1e-9 {
             return s;
         }

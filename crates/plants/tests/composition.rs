@@ -169,7 +169,7 @@ fn what_cannot_be_is_refused() {
     assert_eq!(
         count(&[1.0; 3], &[1.0]),
         Some(Error::Count {
-            what: "initial levels",
+            what: "initial levels, and an excess for each lag",
             given: 1,
             needed: 2
         })

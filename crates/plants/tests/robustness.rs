@@ -91,7 +91,7 @@ proptest! {
         seed in 0..100_000_u64,
         size in 0..6_usize,
         shares in proptest::collection::vec(prop_oneof![1 => Just(0.0), 1 => Just(1.0), 6 => 0.0..1.0_f64], 16),
-        levels in proptest::collection::vec(prop_oneof![Just(0.0), 0.0..40.0_f64], 2),
+        levels in proptest::collection::vec(prop_oneof![Just(0.0), 0.0..40.0_f64], 4),
         input in proptest::collection::vec(command(3.0), 40),
         substeps in 1..4_usize,
     ) {
@@ -102,7 +102,8 @@ proptest! {
         for ((value, info), share) in case.theta.iter_mut().zip(case.structure.parameters()).zip(&shares) {
             *value = between(info.lower, info.upper, *share);
         }
-        case.levels = levels[..plant.vessels()].to_vec();
+        let states = case.levels.len();
+        case.levels.copy_from_slice(&levels[..states]);
         run(&case, &input, substeps)?;
     }
 

@@ -22,6 +22,13 @@ pub trait Derivatives<const N: usize> {
     fn smooth_inputs(&self) -> bool;
 }
 
+/// Inputs beyond this are faults, as regressors are: a sample with one cannot be used.
+const LARGEST: f64 = 1e30;
+
+pub(crate) fn plausible(input: f64) -> bool {
+    input.abs() <= LARGEST
+}
+
 /// One sample of an input and an output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IoSample {
@@ -73,7 +80,7 @@ impl<const SPAN: usize> Derivatives<1> for LateDifference<SPAN> {
 
     #[inline]
     fn take(&mut self, sample: &IoSample, since: f64, inputs: &mut [f64]) -> Option<f64> {
-        if !sample.u.is_finite() {
+        if !plausible(sample.u) {
             return None;
         }
         if let Some((u, derivatives)) = inputs.split_first_mut() {
@@ -142,7 +149,7 @@ impl<const N: usize, const U: usize> Derivatives<N> for Known<N, U> {
 
     #[inline]
     fn take(&mut self, sample: &Self::Sample, _: f64, inputs: &mut [f64]) -> Option<f64> {
-        if sample.u.iter().any(|u| !u.is_finite()) {
+        if !sample.u.iter().all(|&u| plausible(u)) {
             return None;
         }
         for (i, input) in inputs.iter_mut().enumerate() {

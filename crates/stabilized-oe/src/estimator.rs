@@ -185,6 +185,11 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
         &self.gain
     }
 
+    /// The gain: to start `P` again, or to project onto rows of one's own. What is changed in `theta^` counts from the next sample on.
+    pub fn gain_mut(&mut self) -> &mut G {
+        &mut self.gain
+    }
+
     /// Bounds on `c^`.
     pub fn filter_bounds(&self) -> &Bounds<N> {
         &self.filter_bounds
@@ -307,6 +312,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Recursive
         if self.offset {
             inputs[P - 1] = 1.0;
         }
+        self.theta = self.gain.theta();
         let smooth = self.derivatives.smooth_inputs();
         self.model.advance::<G::Integrator>(&inputs, smooth);
         let [theta] = &self.theta.data.0;

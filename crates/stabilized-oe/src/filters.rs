@@ -6,13 +6,14 @@
 //!
 //! Assumption: the input is held between samples, the output runs on lines. Noise passes the filter: it no longer is white, and
 //! `c^` goes elsewhere; bounds on it matter all the same.
+//!
+//! Accuracy: of second order in the step for `m < n`. For `m = n` the highest derivative of `u_f` jumps with `u`, and the line that the
+//! model takes it for is of first order: 1 % for n = 1 and a step of a fortieth of the time constant.
 
 use ct_lti::{Hold, Start, StateVariableFilter};
 
+use crate::derivatives::plausible;
 use crate::{Derivatives, Error, IoSample};
-
-/// An output beyond this is a fault, and taken for a gap.
-const LARGEST: f64 = 1e100;
 
 /// State variable filters for a model of order `N`.
 #[derive(Clone, Debug)]
@@ -42,9 +43,12 @@ impl<const N: usize> Derivatives<N> for StateVariableFilters<N> {
     type Sample = IoSample;
 
     fn take(&mut self, sample: &IoSample, since: f64, inputs: &mut [f64]) -> Option<f64> {
+        if !plausible(sample.u) {
+            return None;
+        }
         self.u.update(sample.u, since).ok()?;
         // the filter of the output runs through gaps on the value before
-        let measured = sample.y.abs() <= LARGEST;
+        let measured = plausible(sample.y);
         let y = if measured { sample.y } else { self.last_y };
         let measured = self.y.update(y, since).is_ok() && measured;
         self.last_y = y;

@@ -164,7 +164,7 @@ impl<const N: usize, const P: usize, I: Integrator> Gain<N, P> for BlockDiagonal
     }
 }
 
-/// One `P` over `(phi_m, -e1)`, [U] 4.9 with the sign put right: `T = N + P` parameters.
+/// One `P` over `(phi_m, -e1)`, (4.9) of the paper with the sign put right: `T = N + P` parameters.
 ///
 /// The adaptive gain with a proof: `dV/dt = -eta V - (2 c - gamma) eps~^2` without noise. With noise the paper expects bias, as
 /// `eps~` and `e1` are correlated: prefer it where noise is low.

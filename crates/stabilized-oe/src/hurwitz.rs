@@ -49,3 +49,57 @@ fn routh<const N: usize>(a: &[f64]) -> bool {
     }
     true
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use ct_lti::Polynomial;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    fn agrees<const N: usize>(rng: &mut ChaCha8Rng) -> usize {
+        let mut stable = 0;
+        for _ in 0..2000 {
+            // around (1 + s T)^N, of any unit of time
+            let unit = 10f64.powf(rng.random_range(-4.0..4.0));
+            let mut a = [0.0; N];
+            let mut binomial = 1.0;
+            for (i, a) in a.iter_mut().enumerate() {
+                binomial *= unit * (N - i) as f64 / (i + 1) as f64;
+                *a = binomial * 10f64.powf(rng.random_range(-1.0..0.4));
+            }
+            let whole: alloc::vec::Vec<f64> = core::iter::once(1.0).chain(a).collect();
+            let exact = Polynomial::new(whole).unwrap().is_hurwitz();
+            assert_eq!(is_hurwitz::<N>(&a), exact, "{a:?}");
+            stable += usize::from(exact);
+        }
+        stable
+    }
+
+    #[test]
+    fn agrees_with_the_exact_decision() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        assert_eq!(agrees::<1>(&mut rng), 2000);
+        assert_eq!(agrees::<2>(&mut rng), 2000);
+        for stable in [
+            agrees::<3>(&mut rng),
+            agrees::<4>(&mut rng),
+            agrees::<5>(&mut rng),
+            agrees::<6>(&mut rng),
+        ] {
+            assert!((50..1950).contains(&stable), "{stable}");
+        }
+    }
+
+    #[test]
+    fn the_border_and_worse_are_refused() {
+        // s^2 + 1 times (s + 1)
+        assert!(!is_hurwitz::<3>(&[1.0, 1.0, 1.0]));
+        assert!(!is_hurwitz::<1>(&[0.0]));
+        assert!(!is_hurwitz::<2>(&[1.0, f64::NAN]));
+        assert!(!is_hurwitz::<2>(&[1.0, f64::INFINITY]));
+    }
+}

@@ -152,3 +152,69 @@ fn functions<const N: usize>(z: &Matrix<N>) -> (Matrix<N>, Matrix<N>) {
     }
     (phi1, phi2)
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
+
+    use super::sealed::ModelRule;
+    use super::*;
+
+    /// The largest difference from `ct_lti`'s simulation, relative to the output's range, over 50 steps.
+    fn differs<const N: usize>(times: [f64; N], dt: f64, hold: Hold) -> f64 {
+        let mut whole = Polynomial::one();
+        for time in times {
+            whole = &whole * &Polynomial::new([1.0, time]).unwrap();
+        }
+        let whole = whole.coefficients();
+        let a = core::array::from_fn(|i| whole[i + 1]);
+        let plant = TransferFunction::from_coefficients(&[1.0], whole).unwrap();
+        let mut plant = Simulator::new(StateSpace::controllable(&plant).unwrap(), hold);
+        let mut state = [0.0; N];
+        let input = |k: u32| libm::sin(0.7 * f64::from(k)) + if k % 14 < 7 { 1.0 } else { -1.0 };
+        plant.update(input(0), 0.0).unwrap();
+        let mut worst = 0.0_f64;
+        for k in 0..50 {
+            let (w0, w1) = (input(k), input(k + 1));
+            let w1 = if hold == Hold::Zero { w0 } else { w1 };
+            <ExactHold as ModelRule>::advance(&mut state, &a, (w0, w1), dt);
+            let y = plant.update(input(k + 1), dt).unwrap();
+            worst = worst.max((state[0] - y).abs());
+        }
+        worst
+    }
+
+    #[test]
+    fn the_model_is_simulated_exactly() {
+        for hold in [Hold::Zero, Hold::First] {
+            for dt in [1e-3, 0.1, 1.0, 30.0] {
+                for worst in [
+                    differs([10.0], dt, hold),
+                    differs([1.0, 1.0], dt, hold),
+                    differs([20.0, 1e-4], dt, hold),
+                    differs([3.0, 1.0, 0.2], dt, hold),
+                    differs([50.0, 2.0, 2.0, 0.5], dt, hold),
+                    differs([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], dt, hold),
+                ] {
+                    assert!(worst < 1e-11, "{worst:e} at {dt} s, {hold:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn eulers_rule_is_of_first_order() {
+        let error = |dt: f64| {
+            let (mut euler, mut exact) = ([0.0; 2], [0.0; 2]);
+            for _ in 0..(1.0 / dt) as u32 {
+                <Euler as ModelRule>::advance(&mut euler, &[1.0, 1.0], (1.0, 1.0), dt);
+                <ExactHold as ModelRule>::advance(&mut exact, &[1.0, 1.0], (1.0, 1.0), dt);
+            }
+            (euler[0] - exact[0]).abs()
+        };
+        let ratio = error(0.01) / error(0.005);
+        assert!((1.9..2.1).contains(&ratio), "{ratio}");
+    }
+}

@@ -3,10 +3,11 @@
 //!
 //! State variable filters give y' without differentiating, recursive least squares with forgetting the parameters
 //! (crates `ct-lti` and `ct-rls`). First on a simulated tank, where Torricelli's law says what there is to find:
-//! `tau = 2 S sqrt(H)/alpha`, `K = pump_gain tau/S`; then, where the data lie beside the checkout, on the measured
-//! Cascaded Tanks.
+//! `tau = 2 S sqrt(H)/alpha`, `K = pump_gain tau/S`. Then on a record from a file: the measured Cascaded Tanks where
+//! they lie beside the checkout, otherwise the bundled record of the tour, whose tank runs over now and then. A linear
+//! model whose gain and time constant leave what the law allows shows that an effect is missing.
 //!
-//! `cargo run --release -p ctid-examples --bin track_tank`
+//! `cargo run --release -p ctid-examples --bin track_tank` prints plots and tables and writes `track_tank.svg`.
 
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -15,6 +16,7 @@ use std::path::Path;
 use ct_lti::{Hold, Start, StateVariableFilter};
 use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};
 use ct_signals::{Columns, Record, Signal, excitation, noise, read_csv};
+use ctid_examples::picture::{self, Curve, Panel};
 use nalgebra::{SMatrix, SVector};
 use plants::{Command, Known, Plant, Scales, Simulator, Structure};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -33,6 +35,14 @@ struct Tracking {
     memory: f64,
     /// First guess of the time constant \[s\]; how little is known of it, too.
     tau: f64,
+}
+
+/// Time constant \[s\] and gain at a level, by Torricelli's law.
+type TankLaw = fn(f64) -> [f64; 2];
+
+fn torricelli(level: f64) -> [f64; 2] {
+    let tau = 2.0 * AREA * level.sqrt() / ALPHA;
+    [tau, PUMP_GAIN * tau / AREA]
 }
 
 /// What is believed at one sample.
@@ -126,88 +136,169 @@ fn track(record: &Record, tracking: &Tracking) -> Result<Vec<Estimate>, Box<dyn 
     Ok(estimates)
 }
 
-/// A plot over time, and the means in bands of the level beside what the law says, where it is known.
-fn show(record: &Record, estimates: &[Estimate], settle: f64, law: Option<fn(f64) -> [f64; 2]>) {
-    let unit = &record.output.unit;
-    let settled: Vec<&Estimate> = estimates.iter().filter(|e| e.time >= settle).collect();
-    let (Some(first), Some(last)) = (settled.first(), settled.last()) else {
-        println!("{}: shorter than the memory of the estimator", record.name);
-        return;
-    };
-    type Quantity = fn(&Estimate) -> f64;
-    let quantities: [(String, Quantity); 3] = [
-        (format!("level, filtered [{unit}]"), |e| e.level),
-        ("time constant [s]".into(), |e| e.tau),
-        (format!("gain [{unit}/V]"), |e| e.gain),
-    ];
-    println!("\n{}", record.name);
-    for (title, quantity) in &quantities {
-        let points: Vec<(f32, f32)> = settled
-            .iter()
-            .map(|e| (e.time as f32, quantity(e) as f32))
-            .collect();
-        println!("\n{title} over time [s]");
-        Chart::new(140, 36, first.time as f32, last.time as f32)
-            .lineplot(&Shape::Lines(&points))
-            .nice();
+/// A record, what was estimated on it, and the law of its tank where it is known.
+struct Run {
+    record: Record,
+    /// From two memories of the estimator on.
+    estimates: Vec<Estimate>,
+    law: Option<TankLaw>,
+}
+
+impl Run {
+    fn new(
+        record: Record,
+        tracking: &Tracking,
+        law: Option<TankLaw>,
+    ) -> Result<Self, Box<dyn Error>> {
+        let mut estimates = track(&record, tracking)?;
+        estimates.retain(|e| e.time >= 2.0 * tracking.memory);
+        if estimates.is_empty() {
+            return Err(format!("{}: shorter than two memories", record.name).into());
+        }
+        Ok(Self {
+            record,
+            estimates,
+            law,
+        })
     }
 
-    let levels = || settled.iter().map(|e| e.remembered);
-    let low = levels().fold(f64::INFINITY, f64::min);
-    let high = levels().fold(f64::NEG_INFINITY, f64::max);
-    println!("\nlevel, as remembered [{unit}]   tau [s]   gain [{unit}/V]   by the law: tau, gain");
-    for band in 0..5 {
-        let edge = |k: i32| low + (high - low) * f64::from(k) / 5.0;
-        let (from, to) = (edge(band), edge(band + 1));
-        let here: Vec<_> = settled
-            .iter()
-            .filter(|e| (from..=to).contains(&e.remembered))
-            .collect();
-        let mean = |of: Quantity| here.iter().map(|e| of(e)).sum::<f64>() / here.len() as f64;
-        if here.is_empty() {
-            continue;
+    /// Level, time constant and gain over time, beside what the law says at the remembered level.
+    fn panels(&self) -> Vec<Panel> {
+        let curve = |name, quantity: &dyn Fn(&Estimate) -> f64| Curve {
+            name,
+            points: self
+                .estimates
+                .iter()
+                .map(|e| (e.time, quantity(e)))
+                .collect(),
+        };
+        let with_law = |title: String, estimated: Curve, i: usize| {
+            let mut curves = vec![estimated];
+            if let Some(law) = self.law {
+                curves.push(curve("Torricelli's law", &|e| law(e.remembered)[i]));
+            }
+            Panel { title, curves }
+        };
+        let unit = &self.record.output.unit;
+        let level = Panel {
+            title: format!("level [{unit}]"),
+            curves: vec![
+                curve("filtered", &|e| e.level),
+                curve("as remembered", &|e| e.remembered),
+            ],
+        };
+        vec![
+            level,
+            with_law(
+                "time constant [s]".into(),
+                curve("estimated", &|e| e.tau),
+                0,
+            ),
+            with_law(
+                format!("gain [{unit}/V]"),
+                curve("estimated", &|e| e.gain),
+                1,
+            ),
+        ]
+    }
+
+    /// The first curve of each panel over time, and the means in bands of the level beside what the law says.
+    fn show(&self) {
+        println!("\n{}", self.record.name);
+        for Panel { title, curves } in self.panels() {
+            let points: Vec<(f32, f32)> = curves[0]
+                .points
+                .iter()
+                .map(|&(time, value)| (time as f32, value as f32))
+                .collect();
+            println!("\n{title} over time [s]");
+            Chart::new(140, 36, points[0].0, points[points.len() - 1].0)
+                .lineplot(&Shape::Lines(&points))
+                .nice();
         }
-        let by_law = law.map(|law| law(mean(|e| e.remembered)));
-        let by_law = by_law.map_or("-".into(), |[tau, gain]| format!("{tau:.1}, {gain:.2}"));
-        let (tau, gain) = (mean(|e| e.tau), mean(|e| e.gain));
-        println!("{from:10.1} to {to:4.1} {tau:17.1} {gain:13.2}      {by_law}");
+
+        let unit = &self.record.output.unit;
+        let levels = || self.estimates.iter().map(|e| e.remembered);
+        let low = levels().fold(f64::INFINITY, f64::min);
+        let high = levels().fold(f64::NEG_INFINITY, f64::max);
+        println!(
+            "\nlevel, as remembered [{unit}]   tau [s]   gain [{unit}/V]   by the law: tau, gain"
+        );
+        for band in 0..5 {
+            let edge = |k: i32| low + (high - low) * f64::from(k) / 5.0;
+            let (from, to) = (edge(band), edge(band + 1));
+            let here: Vec<&Estimate> = self
+                .estimates
+                .iter()
+                .filter(|e| (from..=to).contains(&e.remembered))
+                .collect();
+            if here.is_empty() {
+                continue;
+            }
+            let mean = |of: fn(&Estimate) -> f64| {
+                here.iter().map(|e| of(e)).sum::<f64>() / here.len() as f64
+            };
+            let by_law = self.law.map_or("-".into(), |law| {
+                let [tau, gain] = law(mean(|e| e.remembered));
+                format!("{tau:.1}, {gain:.2}")
+            });
+            let (tau, gain) = (mean(|e| e.tau), mean(|e| e.gain));
+            println!("{from:10.1} to {to:4.1} {tau:17.1} {gain:13.2}      {by_law}");
+        }
     }
 }
 
+/// The measured tanks where they lie beside the checkout, otherwise the tank of the tour.
+fn recorded() -> Result<Run, Box<dyn Error>> {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |file: &Path| read_csv(file, &Columns::default(), ct_signals::Hold::Zero);
+    let measured = here.join("../../shared/data/cascaded_tanks/estimation.csv");
+    if measured.exists() {
+        let mut record = read(&measured)?;
+        record.name = "measured: Cascaded Tanks, the lower of two as if it were one".into();
+        let tracking = Tracking {
+            lambda: 1.0 / 40.0,
+            memory: 600.0,
+            tau: 50.0,
+        };
+        return Run::new(record, &tracking, None);
+    }
+    println!(
+        "the measured tanks are not there ({}); the bundled record instead",
+        measured.display()
+    );
+    let mut record = read(&here.join("records/tour.csv"))?;
+    record.name = "bundled: a tank that runs over at 20 cm".into();
+    let tracking = Tracking {
+        lambda: 1.0 / 20.0,
+        memory: 200.0,
+        tau: 50.0,
+    };
+    Run::new(record, &tracking, Some(torricelli))
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
-    let record = simulated()?;
     let tracking = Tracking {
         lambda: 1.0 / 20.0,
         memory: 500.0,
         tau: 50.0,
     };
-    let estimates = track(&record, &tracking)?;
-    let law = |level: f64| {
-        let tau = 2.0 * AREA * level.sqrt() / ALPHA;
-        [tau, PUMP_GAIN * tau / AREA]
-    };
-    show(&record, &estimates, 2.0 * tracking.memory, Some(law));
-
-    let measured = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../shared/data/cascaded_tanks/estimation.csv");
-    if !measured.exists() {
-        println!(
-            "\nmeasured tanks: skipped, {} is not there",
-            measured.display()
-        );
-        return Ok(());
+    let runs = [
+        Run::new(simulated()?, &tracking, Some(torricelli))?,
+        recorded()?,
+    ];
+    for run in &runs {
+        run.show();
     }
-    let mut record = read_csv(&measured, &Columns::default(), ct_signals::Hold::Zero)?;
-    record.name = "measured: Cascaded Tanks, the lower of two, as if it were one".into();
-    let tracking = Tracking {
-        lambda: 1.0 / 40.0,
-        memory: 600.0,
-        tau: 50.0,
-    };
-    let estimates = track(&record, &tracking)?;
-    show(&record, &estimates, 2.0 * tracking.memory, None);
     println!(
-        "\nWhere the time constant leaves its place, even below 0, one tank with one law is not what is there."
+        "\nWhere gain and time constant fall as the level rises, or leave all sense (below 0), one tank with this law is not"
     );
+    println!("what is there: an effect is missing. `ctid diagnose` names it.");
+    let file = Path::new("track_tank.svg");
+    picture::write(
+        file,
+        &runs.map(|run| (run.record.name.clone(), run.panels())),
+    )?;
+    println!("wrote {}", file.display());
     Ok(())
 }

@@ -3,7 +3,8 @@
 use missing_effect::{Diagnosis, Parameter, Step};
 
 use super::data::step_label;
-use super::text::{code, duration, escape, significant, unit, with_error};
+use super::text::{code, escape, significant, unit, with_error};
+use crate::numbers::duration;
 
 /// What was looked at: plant, records, noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {

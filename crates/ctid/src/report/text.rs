@@ -1,4 +1,6 @@
-//! Words and numbers for people: escaping, sensible digits, units, p-values in words.
+//! Words and numbers as HTML shows them: escaping, the signs of print, units, p-values in words.
+
+use crate::numbers::{self, exponent};
 
 /// Escapes text for HTML, inside elements and inside quoted attributes.
 pub(super) fn escape(text: &str) -> String {
@@ -86,16 +88,6 @@ pub(super) fn with_error(value: f64, std_error: Option<f64>) -> String {
     }
 }
 
-/// A duration, from seconds to days.
-pub(super) fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s >= 2.0 * 86_400.0 => format!("{} days", significant(s / 86_400.0, 3)),
-        s if s >= 2.0 * 3_600.0 => format!("{} h", significant(s / 3_600.0, 3)),
-        s if s >= 600.0 => format!("{} min", significant(s / 60.0, 3)),
-        s => format!("{} s", significant(s, 3)),
-    }
-}
-
 /// What the Ljung-Box test says.
 pub(super) fn whiteness(p: f64) -> String {
     let finding = match p {
@@ -127,31 +119,9 @@ fn p_value(p: f64) -> String {
     }
 }
 
-/// The power of ten of the first digit.
-fn exponent(value: f64) -> i32 {
-    if value == 0.0 {
-        return 0;
-    }
-    // The printed form has rounded already: 9.9999 counts as 9, 0.1 as exactly 10^-1.
-    format!("{:e}", value.abs())
-        .split_once('e')
-        .and_then(|(_, e)| e.parse().ok())
-        .unwrap_or(0)
-}
-
-/// Fixed decimals; negative `places` round to tens, hundreds, ...
+/// Fixed decimals with the sign of print.
 fn decimals(value: f64, places: i32) -> String {
-    let text = if places >= 0 {
-        format!("{value:.*}", usize::try_from(places).unwrap_or(0))
-    } else {
-        let step = 10f64.powi(-places);
-        format!("{:.0}", (value / step).round() * step)
-    };
-    match text.strip_prefix('-') {
-        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
-        Some(digits) => format!("−{digits}"),
-        None => text,
-    }
+    numbers::decimals(value, places).replace('-', "−")
 }
 
 /// An exponent in raised digits.
@@ -230,12 +200,5 @@ mod tests {
         assert!(whiteness(0.0).contains("p < 0.001"));
         assert!(input_test(0.02).contains("doubtful"));
         assert!(input_test(f64::NAN).contains("not tested"));
-    }
-
-    #[test]
-    fn durations_have_fitting_units() {
-        assert_eq!(duration(90.0), "90.0 s");
-        assert_eq!(duration(3_600.0), "60.0 min");
-        assert_eq!(duration(36_000.0), "10.0 h");
     }
 }

@@ -109,14 +109,16 @@ impl Rig {
             .collect()
     }
 
-    /// The parameters of plant and effects, then the initial levels of `records` records.
+    /// The parameters of plant and effects, then for each of `records` records the initial levels and lags at rest.
     pub fn truth(&self, records: usize) -> Vec<f64> {
         let mut truth = self.theta.clone();
         for (_, _, parameters) in &self.effects {
             truth.extend(parameters);
         }
+        let lags = self.effects.iter().filter(|(id, ..)| id.ends_with("_lag"));
         for _ in 0..records {
             truth.extend(&self.levels);
+            truth.extend(lags.clone().map(|_| 0.0));
         }
         truth
     }

@@ -16,6 +16,7 @@ pub struct Case {
     pub structure: Structure,
     /// The plant's own parameters, then each effect's.
     pub theta: Vec<f64>,
+    /// Of each vessel, then what stood behind each lag.
     pub levels: Vec<f64>,
     pub at_rest: f64,
     /// Nominal sampling interval \[s\].
@@ -138,6 +139,10 @@ impl Case {
                 case.theta.push(value(self, placed, &info));
             }
         }
+        // Lags that have not settled when the record begins.
+        case.levels.truncate(case.structure.plant.vessels());
+        case.levels
+            .extend(case.structure.lags().iter().map(|_| 1.3));
         case
     }
 

@@ -245,11 +245,18 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
         pieces,
     };
     let mut x = [0.0; 4];
-    for (i, (to, &level)) in x.iter_mut().zip(&case.levels).enumerate() {
+    let (levels, before) = case.levels.split_at(e.n);
+    for (i, (to, &level)) in x.iter_mut().zip(levels).enumerate() {
         *to = level.min(e.rim[i]);
     }
     x[2] = e.command(e.at_rest);
     x[3] = x[e.n - 1];
+    // What stood behind a lag decays for a sample before the record begins.
+    let lags = [(2, e.pump_lag), (3, e.sensor_lag)];
+    let lags = lags.into_iter().filter_map(|(i, lag)| Some((i, lag?)));
+    for ((i, lag), before) in lags.zip(before) {
+        x[i] += before * (-case.structure.scales.sample_interval / lag).exp();
+    }
     let mut corners = signal.corners();
     corners.push(end);
     let mut readings = Vec::new();

@@ -1,0 +1,257 @@
+//! Whether what a model leaves is noise: what an autoregressive noise cannot be.
+//!
+//! An autoregressive model fits anything, a random walk included: that a residual *can* be whitened says nothing. Noise is
+//! what is independent of the command, has no place in time, no period, and forgets faster than the process does.
+//! Each of these is a test of the residual `w` whitened by the noise model of its own model's fit:
+//! - **the command**: the past of the command, of its square, and of the size of its moves, against `w` (Haugh's test; a
+//!   square and a move show what is even in the command or hangs on its direction). A whitened residual is independent of
+//!   the past of anything, a controller's output included.
+//! - **a period**: a line of the spectrum against the mean of its `2 nu` neighbours, which a noise of a smooth spectrum
+//!   exceeds `x` times with a probability of `(1 + x/nu)^-nu` (the F distribution of 2 and `2 nu` degrees of freedom). An
+//!   autoregressive model would take a line for a resonance, so this test does without it, but for a first-order one.
+//! - **an instant**: windows of 1, 2, 4, ... samples of `w`, whose sums over the root of their length are standard normal.
+//! - **slowness**: the integral of the noise's autocorrelation over positive lags is longer than the slowest time constant
+//!   of the process. Such a noise can stand for anything that the process lacks, so it is no answer.
+//!
+//! **References**: L. D. Haugh, J. American Statistical Association 71 (1976) 378-385; S. A. Billings, W. S. F. Voon,
+//! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244; D. J. Thomson, Spectrum
+//! estimation and harmonic analysis, Proc. IEEE 70 (1982) 1055-1096.
+
+use std::f64::consts::{PI, SQRT_2};
+
+use ct_signals::{ArModel, Record, residual_tests::prewhitened_input_test};
+use greybox::Fit;
+use realfft::RealFftPlanner;
+use statrs::function::erf::erfc;
+
+use crate::{Error, control_loop::slowest_time_constant, noise_floor::slowness, search::Node};
+
+/// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
+const NOT_NOISE: f64 = 1e-4;
+/// Longest window that is looked at, as a part of the record.
+const LONGEST_WINDOW: usize = 4;
+
+/// Neighbours of a line, from where its taper ends to where a smooth spectrum may have changed, and the fewest that do.
+const NEAREST: usize = 3;
+const FARTHEST: usize = 12;
+const FEWEST: f64 = 4.0;
+
+/// Cycles that a period has in the record at least.
+const CYCLES: usize = 3;
+
+/// What a residual shows that noise does not; the first that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Remains {
+    /// The command.
+    Input,
+    /// A period \[s\].
+    Period(f64),
+    /// Something from an instant on, for a while \[s\].
+    Instant(f64, f64),
+    /// A wander: its correlation time and the process's slowest time constant \[s\].
+    Slow(f64, f64),
+}
+
+/// What the residual of a model holds that is not noise; `own` is its fit with the colour of its own residual.
+pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Remains>, Error> {
+    if least_p(node, of_command)? < NOT_NOISE {
+        return Ok(Some(Remains::Input));
+    }
+    let residuals = node.setup.residuals(&own.x)?;
+    let records = node.setup.records;
+    let level = NOT_NOISE / records.len() as f64;
+    for (record, residual) in records.iter().zip(&residuals) {
+        if let Some(found) = period(record, residual, level)? {
+            return Ok(Some(found));
+        }
+        let white = standardised(&own.noise, residual);
+        if let Some(found) = instant(record, &white, level) {
+            return Ok(Some(found));
+        }
+    }
+    if own.noise.order() == 0 {
+        return Ok(None);
+    }
+    let interval = node.setup.structure.scales.sample_interval;
+    let (wander, process) = (
+        0.5 * interval * slowness(&own.noise),
+        slowest_time_constant(node)?,
+    );
+    Ok((wander > process).then_some(Remains::Slow(wander, process)))
+}
+
+/// p-value of the test that the command itself does not show in a node's residual; of several records the smallest,
+/// corrected for having taken it.
+pub(crate) fn input_p(node: &Node) -> Result<f64, Error> {
+    least_p(node, |u| vec![u.to_vec()])
+}
+
+/// The same for all signals that are made of a record's command.
+fn least_p(node: &Node, signals: impl Fn(&[f64]) -> Vec<Vec<f64>>) -> Result<f64, Error> {
+    let residuals = node.setup.residuals(&node.fit.x)?;
+    let (mut least, mut count) = (1.0_f64, 0.0);
+    for (record, residual) in node.setup.records.iter().zip(&residuals) {
+        let lags = (record.len() / 10).clamp(2, 25);
+        for signal in signals(&record.input.values) {
+            let (_, p) = prewhitened_input_test(&signal, residual, lags)?;
+            least = least.min(p);
+            count += 1.0;
+        }
+    }
+    Ok((least * count).min(1.0))
+}
+
+/// The command, its square about the mean, and the size of its moves.
+fn of_command(u: &[f64]) -> Vec<Vec<f64>> {
+    let mean = u.iter().sum::<f64>() / u.len() as f64;
+    let square = u.iter().map(|u| (u - mean).powi(2)).collect();
+    let mut moves = vec![0.0];
+    moves.extend(u.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
+    vec![u.to_vec(), square, moves]
+}
+
+/// The whitened residual, of unit variance.
+fn standardised(noise: &ArModel, residual: &[f64]) -> Vec<f64> {
+    let mut white = noise.whiten(residual);
+    let rms = (white.iter().map(|w| w * w).sum::<f64>() / white.len() as f64).sqrt();
+    for w in &mut white {
+        *w /= rms.max(f64::MIN_POSITIVE);
+    }
+    white
+}
+
+fn instant(record: &Record, white: &[f64], level: f64) -> Option<Remains> {
+    let n = white.len();
+    let lengths =
+        || std::iter::successors(Some(1), |l| Some(2 * l)).take_while(|l| LONGEST_WINDOW * l <= n);
+    let windows: usize = lengths().map(|length| n - length + 1).sum();
+    let mut running = vec![0.0];
+    running.extend(white.iter().scan(0.0, |sum, w| {
+        *sum += w;
+        Some(*sum)
+    }));
+    let (size, from, length) = lengths()
+        .flat_map(|length| (0..=n - length).map(move |from| (from, length)))
+        .map(|(from, length)| {
+            let sum: f64 = running[from + length] - running[from];
+            (sum.abs() / (length as f64).sqrt(), from, length)
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let chance = windows as f64 * erfc(size / SQRT_2);
+    (chance < level).then(|| {
+        let to = (from + length).min(n - 1);
+        Remains::Instant(record.time[from], record.time[to] - record.time[from])
+    })
+}
+
+fn period(record: &Record, residual: &[f64], level: f64) -> Result<Option<Remains>, Error> {
+    let n = residual.len();
+    // Flat enough for neighbours to be compared, by a filter that has no room for a line.
+    let mut flat = ArModel::fit(&[residual], 1)?.whiten(residual);
+    for (k, value) in flat.iter_mut().enumerate() {
+        *value *= (PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
+    }
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let mut spectrum = transform.make_output_vec();
+    if transform.process(&mut flat, &mut spectrum).is_err() {
+        return Ok(None);
+    }
+    // Without the mean, and without the line at half the sampling rate, which has one degree of freedom.
+    let lines: Vec<f64> = spectrum[1..n.div_ceil(2)]
+        .iter()
+        .map(|line| line.norm_sqr())
+        .collect();
+    // What comes back less often than that is no period but a wander.
+    let least = (CYCLES - 1..lines.len())
+        .filter_map(|at| {
+            let around: Vec<f64> = (at.saturating_sub(FARTHEST)
+                ..lines.len().min(at + FARTHEST + 1))
+                .filter(|j| j.abs_diff(at) >= NEAREST)
+                .map(|j| lines[j])
+                .collect();
+            // The taper ties neighbours to each other: of two lines one counts.
+            let count = 0.5 * around.len() as f64;
+            let mean = around.iter().sum::<f64>() / (2.0 * count);
+            (count >= FEWEST && mean > 0.0)
+                .then(|| (-count * (lines[at] / (mean * count)).ln_1p(), at + 1))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(least
+        .filter(|(chance, _)| lines.len() as f64 * chance.exp() < level)
+        .map(|(_, cycles)| Remains::Period(record.duration() / cycles as f64)))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::panic)]
+    use super::*;
+    use ct_signals::{Hold, Signal, noise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    const SAMPLES: usize = 800;
+
+    fn record() -> Record {
+        Record {
+            name: "r".to_string(),
+            time: (0..SAMPLES).map(|k| 2.0 * k as f64).collect(),
+            input: Signal::new("u", "V", vec![0.0; SAMPLES]),
+            output: Signal::new("y", "cm", vec![0.0; SAMPLES]),
+            reference: None,
+            hold: Hold::Zero,
+        }
+    }
+
+    #[test]
+    fn noise_of_any_colour_has_no_period_and_no_instant() {
+        let record = record();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        // At a level of one in a hundred, 600 series: chance exceeds 15 of them once in a thousand.
+        let (mut periods, mut instants) = (0, 0);
+        for run in 0..600 {
+            let colour = [0.0, 0.8, 0.95][run % 3];
+            let e = noise::ar1(SAMPLES, 0.1, colour, &mut rng);
+            let model = ArModel::from_coefficients(&[colour], 1.0).unwrap();
+            periods += usize::from(period(&record, &e, 0.01).unwrap().is_some());
+            instants += usize::from(instant(&record, &standardised(&model, &e), 0.01).is_some());
+        }
+        assert!(periods <= 15 && instants <= 15, "{periods}, {instants}");
+    }
+
+    #[test]
+    fn a_period_is_found_with_its_length_in_noise_of_its_own_size() {
+        let record = record();
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for wanted in [5.0, 21.3, 160.0, 400.0] {
+            let e: Vec<f64> = noise::white(SAMPLES, 0.1, &mut rng)
+                .into_iter()
+                .zip(&record.time)
+                .map(|(e, t)| e + 0.14 * (2.0 * PI * t / wanted).sin())
+                .collect();
+            let Some(Remains::Period(found)) = period(&record, &e, NOT_NOISE).unwrap() else {
+                panic!("no period of {wanted} s");
+            };
+            // To the width of a line.
+            assert!((1.0 / found - 1.0 / wanted).abs() < 1.0 / record.duration());
+        }
+    }
+
+    #[test]
+    fn an_instant_is_found_where_it_is() {
+        let record = record();
+        let mut white = noise::white(SAMPLES, 1.0, &mut ChaCha8Rng::seed_from_u64(3));
+        white[300] += 8.0;
+        assert_eq!(
+            instant(&record, &white, NOT_NOISE),
+            Some(Remains::Instant(600.0, 2.0))
+        );
+        white[300] -= 8.0;
+        for value in &mut white[500..520] {
+            *value += 2.0;
+        }
+        let Some(Remains::Instant(from, length)) = instant(&record, &white, NOT_NOISE) else {
+            panic!("nothing was found");
+        };
+        assert!((from - 1000.0).abs() < 20.0 && (length - 40.0).abs() < 30.0);
+    }
+}

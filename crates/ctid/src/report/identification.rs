@@ -3,9 +3,10 @@
 use super::figures::{self, Colour, Curve, Figure, Panel};
 use super::page::{self, NOTICES, Page, figure, section};
 use super::tables::table;
-use super::text::{code, duration, escape, significant, unit, with_error};
+use super::text::{code, escape, significant, unit, with_error};
 use crate::identify::Identification;
 use crate::identify::text::model;
+use crate::numbers::duration;
 
 /// The page as a complete HTML file. The same result gives the same bytes.
 pub fn html(found: &Identification) -> String {

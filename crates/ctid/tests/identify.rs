@@ -141,7 +141,7 @@ fn units_and_dynamics_are_those_of_the_record() {
         unreachable!()
     };
     assert!((slow - 15.0).abs() < 0.5 && (fast - 10.0).abs() < 0.5);
-    let trajectory = found.trajectory.unwrap();
+    let trajectory = found.trajectory;
     assert_eq!(trajectory.time.last(), Some(&3099.0));
     assert!(
         trajectory
@@ -239,7 +239,7 @@ fn drift_with_the_operating_point_leaves_the_band() {
         *y = 40.0 + 2.0 * (*y - 40.0);
     }
     let found = found(&record, Method::StabilizedOe, plant.order());
-    let trajectory = found.trajectory.unwrap();
+    let trajectory = found.trajectory;
     let at = |t: f64| trajectory.time.iter().position(|time| *time >= t).unwrap();
     let (before, after) = (at(2090.0), trajectory.time.len() - 1);
     let [(low, low_error), (high, high_error)] =
@@ -332,10 +332,25 @@ fn what_cannot_be_is_refused() {
     );
     let still: String = (0..200).map(|k| format!("{k},1.5,{}\n", k % 7)).collect();
     place.write("still.csv", format!("t,u,y\n{still}"));
-    bad(
-        "still.csv --method stabilized-oe",
-        &["still.csv", "\"u\" stands at 1.5", "record at least a step"],
-    );
+    bad("still.csv --method stabilized-oe", &["still.csv", "the input is 1.5 in all 200 rows"]);
     place.write("dead.csv", format!("t,y,u\n{still}"));
-    bad("dead.csv --method stabilized-oe", &["\"y\" stands at 1.5"]);
+    bad("dead.csv --method stabilized-oe", &["the output is 1.5 in all 200 rows"]);
+    place.write("nan.csv", format!("t,u,y\n{still}").replace("\n7,1.5,", "\n7,NaN,"));
+    bad("nan.csv --method stabilized-oe", &["nan.csv, row 9", "\"u\""]);
+}
+
+/// Records that no file brought along are looked at too.
+#[test]
+fn a_record_that_stands_still_is_refused() {
+    let mut record = FIRST.record(200, 1);
+    record.input.values.fill(1.5);
+    let request = Request {
+        method: Method::CtRls,
+        order: FIRST.order(),
+        memory: None,
+        bandwidth: None,
+    };
+    let error = identify(&record, &request).unwrap_err().to_string();
+    assert!(error.contains("\"u\" stands at 1.5"), "{error}");
+    assert!(error.contains("record at least a step"), "{error}");
 }

@@ -26,6 +26,7 @@ pub(super) fn bands(path: &Path, scaled: &Scaled) -> Trajectory {
     let (unscale, shift) = scaled.unscaling(order);
     let mut trajectory = Trajectory {
         time: Vec::new(),
+        samples: Vec::new(),
         values: vec![Vec::new(); p],
         std_errors: vec![Vec::new(); p],
     };
@@ -34,6 +35,7 @@ pub(super) fn bands(path: &Path, scaled: &Scaled) -> Trajectory {
         if ends.last().is_some_and(|end| point.time - end.time >= 1.0) {
             ends.push(point);
         }
+        trajectory.samples.push(point.sample);
         trajectory.time.push(scaled.seconds[point.sample]);
         let theta = &unscale * &point.theta + &shift;
         let covariance = covariance(&ends, point, scaled.eta);

@@ -18,6 +18,7 @@
 //! coloured noise, and by more with white. With nearly equal poles and zeros, order 2,1, the output error too is off by some standard errors.
 
 mod band;
+mod drift;
 mod recursion;
 mod scaled;
 mod simulation;
@@ -28,6 +29,7 @@ use missing_effect::Parameter;
 use serde::Serialize;
 
 use self::scaled::Scaled;
+pub use drift::{Drift, OverLevel};
 use crate::Error;
 
 /// How the parameters are found.
@@ -158,8 +160,10 @@ pub struct Identification {
     pub fit_percent: f64,
     /// What should be known before it is used.
     pub warnings: Vec<String>,
-    /// The parameters over the record; nothing where a method finds them at once.
-    pub trajectory: Option<Trajectory>,
+    /// The parameters over the record.
+    pub trajectory: Trajectory,
+    /// Gain and time constant over the level; nothing where the level stands, or the record is too short to tell.
+    pub drift: Option<Drift>,
     /// The record, to be drawn.
     #[serde(skip)]
     pub shown: Shown,
@@ -179,10 +183,23 @@ pub struct Oscillation {
 pub struct Trajectory {
     /// Time, s.
     pub time: Vec<f64>,
+    /// Which samples those are, from 0.
+    #[serde(skip)]
+    pub samples: Vec<usize>,
     /// One series for each parameter.
     pub values: Vec<Vec<f64>>,
     /// Standard errors; NaN (`null`) where too little has been seen.
     pub std_errors: Vec<Vec<f64>>,
+}
+
+impl Trajectory {
+    /// From when on the start is forgotten as far as it will be: half the record.
+    pub(crate) fn settled(&self) -> f64 {
+        match (self.time.first(), self.time.last()) {
+            (Some(first), Some(last)) => 0.5 * (first + last),
+            _ => f64::NAN,
+        }
+    }
 }
 
 /// The record and the final model's simulation.
@@ -258,7 +275,8 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         simulation_rmse: rmse,
         fit_percent: 100.0 * (1.0 - rmse / scaled.output_deviation()),
         warnings,
-        trajectory: Some(bands),
+        drift: drift::over_level(&bands, &scaled, order),
+        trajectory: bands,
         shown: Shown {
             time: record.time.clone(),
             input: record.input.clone(),

@@ -21,6 +21,7 @@ pub fn text(found: &Identification, look: Look) -> String {
     text += &parameters(found, look);
     text += &dynamics(found);
     text.push('\n');
+    text += &drift(found, look);
     text += &error(found, look);
     for warning in &found.warnings {
         text += &look.warning("note: ");
@@ -83,11 +84,10 @@ fn parameters(found: &Identification, look: Look) -> String {
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
     for (i, parameter) in found.parameters.iter().enumerate() {
         let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
-        let range = found.trajectory.as_ref().and_then(|trajectory| {
-            let values = settled(trajectory.values.get(i)?);
-            let (low, high) = plot::limits([values]);
+        let range = found.trajectory.values.get(i).map(|values| {
+            let (low, high) = plot::limits([settled(values)]);
             let digits = |value| numbers::significant(value, 4);
-            Some(format!("{} .. {}", digits(low), digits(high)))
+            format!("{} .. {}", digits(low), digits(high))
         });
         rows.push(vec![
             parameter.name.clone(),
@@ -132,6 +132,77 @@ fn dynamics(found: &Identification) -> String {
         )
     }));
     format!("  {}\n", parts.join(", "))
+}
+
+fn drift(found: &Identification, look: Look) -> String {
+    let Some(drift) = &found.drift else {
+        return String::new();
+    };
+    let (Some(low), Some(high)) = (drift.level.first(), drift.level.last()) else {
+        return String::new();
+    };
+    let unit = &found.shown.output.unit;
+    let heading = [
+        "",
+        &format!("near {} {unit}", numbers::significant(*low, 3)),
+        &format!("near {} {unit}", numbers::significant(*high, 3)),
+        "",
+        "apart by",
+    ];
+    let mut rows = vec![heading.map(|name| look.faint(name.trim_end())).to_vec()];
+    let time_constant = time_constant_name(found);
+    let gain_unit = found.parameters.get(found.order.n).map_or("", |b0| &b0.unit);
+    for (name, unit, over_level) in [
+        ("gain b0", gain_unit, &drift.gain),
+        (time_constant, "s", &drift.time_constant),
+    ] {
+        let Some(ends) = over_level.ends() else {
+            continue;
+        };
+        let [low, high] = ends.map(|(value, error)| {
+            let (value, error) = numbers::value_and_error(value, Some(error));
+            error.map_or(value.clone(), |error| format!("{value} ± {error}"))
+        });
+        let apart = format!(
+            "{} std. errors",
+            numbers::decimals(over_level.difference.abs(), 1)
+        );
+        let apart = if over_level.moves() {
+            look.warning(apart)
+        } else {
+            apart
+        };
+        rows.push(vec![name.to_owned(), low, high, unit.to_owned(), apart]);
+    }
+    let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
+    let mut text = format!("{}\n", look.heading("Drift with the level"));
+    for line in table(&sides, &rows) {
+        text += &format!("  {line}\n");
+    }
+    text += &look.paragraph("  ", drift_verdict(found));
+    text.push('\n');
+    text
+}
+
+/// What `a_1` is.
+pub(crate) fn time_constant_name(found: &Identification) -> &'static str {
+    match found.order.n {
+        1 => "time constant a1",
+        _ => "sum of the time constants a1",
+    }
+}
+
+/// What the drift says, nothing where none is known.
+pub(crate) fn drift_verdict(found: &Identification) -> &'static str {
+    match &found.drift {
+        None => "",
+        Some(drift) if drift.gain.moves() || drift.time_constant.moves() => {
+            "The estimates move with the level by more than chance: the process is not linear over this range, or not of this order."
+        }
+        Some(_) => {
+            "The estimates do not move with the level beyond their standard errors; a shorter --memory sees faster changes, less surely."
+        }
+    }
 }
 
 fn error(found: &Identification, look: Look) -> String {

@@ -65,12 +65,13 @@
         : { domain: where[k], type: panel.log ? "log" : "linear", range: panel.range || undefined, exponentformat: "power", nticks: panel.log ? undefined : 5 });
     });
     const drawn = layout(narrow.matches ? Math.round(0.85 * figure.height) : figure.height, more);
-    // Where one finger scrolls the page the tools stand above the plot.
-    if (touch && !figure.categories) {
+    // Where one finger scrolls the page, or room is short, the tools stand above the plot.
+    const tight = touch || narrow.matches;
+    if (tight && !figure.categories) {
       drawn.margin.t = 34;
       Object.assign(drawn.legend, { y: 0, yref: "container", yanchor: "bottom" });
     }
-    return [traces(figure), drawn, touch && !figure.categories ? Object.assign({}, config, { displayModeBar: true }) : config];
+    return [traces(figure), drawn, tight ? Object.assign({}, config, { displayModeBar: !figure.categories }) : config];
   }
 
   plots.start(() => figures.forEach((figure) => {

@@ -19,7 +19,7 @@ pub(super) struct Figure {
     /// In pixels.
     pub height: u32,
     pub x_title: &'static str,
-    pub x_unit: &'static str,
+    pub x_unit: String,
     pub x_range: Option<[f64; 2]>,
     /// A stretch of the abscissa that is shaded.
     pub x_band: Option<[f64; 2]>,
@@ -88,7 +88,7 @@ impl Figure {
             id: id.to_owned(),
             height,
             x_title: "time",
-            x_unit: "s",
+            x_unit: "s".to_owned(),
             x_range: None,
             x_band: None,
             categories: false,

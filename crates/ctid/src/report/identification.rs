@@ -4,8 +4,8 @@ use super::figures::{self, Colour, Curve, Figure, Panel};
 use super::page::{self, NOTICES, Page, figure, section};
 use super::tables::table;
 use super::text::{code, escape, significant, unit, with_error};
-use crate::identify::Identification;
-use crate::identify::text::model;
+use crate::identify::text::{drift_verdict, model, time_constant_name};
+use crate::identify::{Identification, OverLevel};
 use crate::numbers::duration;
 
 /// The page as a complete HTML file. The same result gives the same bytes.
@@ -21,9 +21,9 @@ pub fn html(found: &Identification) -> String {
             .to_owned(),
     ]
     .concat();
-    let figures: Vec<Figure> = [Some(fit_figure(found)), trajectory_figure(found)]
+    let figures: Vec<Figure> = [fit_figure(found), trajectory_figure(found)]
         .into_iter()
-        .flatten()
+        .chain(drift_figure(found))
         .collect();
     page::html(&Page {
         title: &format!("ctid: {}", escape(&found.record)),
@@ -112,16 +112,28 @@ fn parameters(found: &Identification) -> String {
         "Standard errors hold for noise of any colour, and for a model that is right; those of the recursion with its memory, \
          not of the whole record.",
     );
-    let over_time = match found.trajectory {
+    let over_time = figure(
+        "trajectory",
+        "Over the record",
+        "Band: one standard error, once enough has been seen.",
+    );
+    let over_level = match found.drift {
         Some(_) => figure(
-            "trajectory",
-            "Over the record",
-            "Band: one standard error, once enough has been seen. Parameters that leave their band as the operating point moves say that \
-             the process is not linear, or not of this order.",
+            "drift",
+            "Gain and time constant over the level",
+            &format!(
+                "Second half of the record, means over stretches of the level that the recursion remembers. Band: one standard error. {}",
+                drift_verdict(found)
+            ),
         ),
         None => String::new(),
     };
-    section("parameters", "The parameters", "", &(table + &over_time))
+    section(
+        "parameters",
+        "The parameters",
+        "",
+        &(table + &over_time + &over_level),
+    )
 }
 
 fn fit_figure(found: &Identification) -> Figure {
@@ -172,8 +184,8 @@ fn fit_figure(found: &Identification) -> Figure {
     Figure::over_time("fit", 560, panels, curves)
 }
 
-fn trajectory_figure(found: &Identification) -> Option<Figure> {
-    let trajectory = found.trajectory.as_ref()?;
+fn trajectory_figure(found: &Identification) -> Figure {
+    let trajectory = &found.trajectory;
     let mut panels = Vec::new();
     let mut curves = Vec::new();
     let series = trajectory.values.iter().zip(&trajectory.std_errors);
@@ -184,5 +196,24 @@ fn trajectory_figure(found: &Identification) -> Option<Figure> {
         panels.push(Panel::new(&parameter.name, &parameter.unit));
     }
     let height = 90 + 135 * u32::try_from(panels.len()).unwrap_or(1);
-    Some(Figure::over_time("trajectory", height, panels, curves))
+    Figure::over_time("trajectory", height, panels, curves)
+}
+
+fn drift_figure(found: &Identification) -> Option<Figure> {
+    let drift = found.drift.as_ref()?;
+    let gain_unit = found.parameters.get(found.order.n).map_or("", |b0| &b0.unit);
+    let curve = |panel, name, over_level: &OverLevel| {
+        let data = (&drift.level[..], &over_level.values[..]);
+        Curve::line(name, panel, Colour::Of(1), data).with_band(data, &over_level.std_errors)
+    };
+    let panels = vec![Panel::new("gain b0", gain_unit), Panel::new("a1", "s")];
+    let curves = vec![
+        curve(0, "gain b0", &drift.gain),
+        curve(1, time_constant_name(found), &drift.time_constant),
+    ];
+    Some(Figure {
+        x_title: "level that is remembered",
+        x_unit: found.shown.output.unit.clone(),
+        ..Figure::over_time("drift", 360, panels, curves)
+    })
 }

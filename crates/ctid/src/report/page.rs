@@ -9,7 +9,7 @@ const STYLE: &str = include_str!("report.css");
 /// Colours, axes and the unpacking of plotly.js: comes before the page's own script.
 const PLOTS: &str = include_str!("plots.js");
 /// plotly.js, gzipped, in base64.
-const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
+pub(super) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
 
 /// Stands where the plots need a script.
 pub(super) const NOTICES: &str = "<noscript><p class=\"notice\">The plots need a browser that runs scripts; \

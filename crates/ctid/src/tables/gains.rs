@@ -25,6 +25,8 @@ use crate::Error;
 
 /// `a_1, a_2, b_0` of the plant.
 pub const TRUTH: [f64; 3] = [1.0, 1.0, 1.0];
+/// What `c^` is to become: `a_1, a_2`.
+const FILTER_TRUTH: [f64; 2] = [1.0, 1.0];
 const START: [f64; 3] = [2.0, 2.0, 0.5];
 const FILTER_START: [f64; 2] = [1.0, 1.0];
 const ETA: f64 = 0.01;
@@ -174,6 +176,9 @@ pub struct Counterexample {
     /// `a_1, a_2, b_0`
     #[serde(skip)]
     pub theta: [Vec<f64>; 3],
+    /// `V = delta' P^-1 delta` over theta and c: the paper's proof needs it to fall.
+    #[serde(skip)]
+    pub lyapunov: Vec<f64>,
 }
 
 /// Runs all variants on the same data.
@@ -199,7 +204,7 @@ pub fn compare(seed: u64, progress: &(impl Fn(Progress) + Sync)) -> Result<Gains
         .into_par_iter()
         .map(|variant| {
             let mut end = None;
-            let came = run(variant, &quiet, QUIET, |_, theta| end = Some(*theta))?;
+            let came = run(variant, &quiet, QUIET, |_, theta, _| end = Some(*theta))?;
             tell();
             let errors: Vec<(Option<f64>, Curve)> = noisy
                 .par_iter()
@@ -250,12 +255,14 @@ pub fn counterexample() -> Result<Vec<Counterexample>, Error> {
                 end: [f64::NAN; 3],
                 time: Vec::new(),
                 theta: Default::default(),
+                lyapunov: Vec::new(),
             };
             let every = samples.len() / DRAWN;
-            run(variant, &samples, FINE, |k, theta| {
+            run(variant, &samples, FINE, |k, theta, distance| {
                 found.end = *theta;
                 if k % every == 0 {
                     found.time.push(k as f64 * FINE.dt);
+                    found.lyapunov.push(distance());
                     for (curve, value) in found.theta.iter_mut().zip(theta) {
                         curve.push(*value);
                     }
@@ -270,7 +277,7 @@ pub fn counterexample() -> Result<Vec<Counterexample>, Error> {
 fn noisy_error(variant: Variant, samples: &[Sample]) -> Result<(Option<f64>, Curve), Error> {
     let steps = samples.len();
     let (mut sum, mut count, mut curve) = (0.0, 0, Curve::default());
-    let came = run(variant, samples, NOISY, |k, theta| {
+    let came = run(variant, samples, NOISY, |k, theta, _| {
         let errors = theta.iter().zip(TRUTH).map(|(a, b)| (a - b).abs());
         let error = errors.fold(0.0, f64::max);
         if 4 * k >= 3 * steps {
@@ -285,12 +292,16 @@ fn noisy_error(variant: Variant, samples: &[Sample]) -> Result<(Option<f64>, Cur
     Ok((came.then_some(sum / f64::from(count)), curve))
 }
 
+/// Is shown every step: its number, theta^, and what computes `V`.
+trait Watch: FnMut(usize, &[f64; 3], &dyn Fn() -> f64) {}
+impl<F: FnMut(usize, &[f64; 3], &dyn Fn() -> f64)> Watch for F {}
+
 /// One run; whether it came to its end.
 fn run(
     variant: Variant,
     samples: &[Sample],
     grid: Grid,
-    watch: impl FnMut(usize, &[f64; 3]),
+    watch: impl Watch,
 ) -> Result<bool, Error> {
     match variant.rule {
         Rule::Euler => run_by::<Euler>(variant, samples, grid, watch),
@@ -302,17 +313,20 @@ fn run_by<I: Integrator>(
     variant: Variant,
     samples: &[Sample],
     grid: Grid,
-    watch: impl FnMut(usize, &[f64; 3]),
+    watch: impl Watch,
 ) -> Result<bool, Error> {
     let (theta, c) = (SVector::from(START), SVector::from(FILTER_START));
     let weights = Weights::least_squares(ETA)?;
     let unit = SMatrix::identity();
+    let apart = |gain: &BlockDiagonal<2, 3, I>| {
+        distance(gain.theta_block(), TRUTH) + distance(gain.filter_block(), FILTER_TRUTH)
+    };
     match variant.gain {
         Kind::BlockDiagonal => {
             let theta = ContinuousRls::with_integrator(theta, unit, weights)?;
             let c = ContinuousRls::with_integrator(c, SMatrix::identity(), weights)?;
             let gain: BlockDiagonal<2, 3, I> = BlockDiagonal::new(theta, c);
-            follow(gain, variant.bounded, samples, grid, watch)
+            follow(gain, variant.bounded, (samples, grid), apart, watch)
         }
         Kind::Full => {
             let [a1, a2, b0] = START;
@@ -320,22 +334,33 @@ fn run_by<I: Integrator>(
             let both = SVector::from([a1, a2, b0, c1, c2]);
             let rls = ContinuousRls::with_integrator(both, SMatrix::identity(), weights)?;
             let gain: Full<2, 3, 5, I> = Full::new(rls);
-            follow(gain, variant.bounded, samples, grid, watch)
+            let ([a1, a2, b0], [c1, c2]) = (TRUTH, FILTER_TRUTH);
+            let truth = [a1, a2, b0, c1, c2];
+            let together = |gain: &Full<2, 3, 5, I>| distance(gain.rls(), truth);
+            follow(gain, variant.bounded, (samples, grid), together, watch)
         }
         Kind::Constant => {
             let gain: BlockDiagonal<2, 3, I> =
                 BlockDiagonal::constant((theta, unit), (c, SMatrix::identity()), 1.0)?;
-            follow(gain, variant.bounded, samples, grid, watch)
+            follow(gain, variant.bounded, (samples, grid), apart, watch)
         }
     }
+}
+
+/// `delta' P^-1 delta`; NaN where Euler's rule has lost P.
+fn distance<const P: usize, I: Integrator>(rls: &ContinuousRls<P, I>, truth: [f64; P]) -> f64 {
+    let delta = rls.theta() - SVector::from(truth);
+    rls.covariance()
+        .cholesky()
+        .map_or(f64::NAN, |p| delta.dot(&p.solve(&delta)))
 }
 
 fn follow<G: Gain<2, 3>>(
     gain: G,
     bounded: bool,
-    samples: &[Sample],
-    grid: Grid,
-    mut watch: impl FnMut(usize, &[f64; 3]),
+    (samples, grid): (&[Sample], Grid),
+    distance: impl Fn(&G) -> f64,
+    mut watch: impl Watch,
 ) -> Result<bool, Error> {
     let mut estimator = StabilizedOe::new(gain, Known::<2, 1>::new(true))?;
     if bounded {
@@ -348,7 +373,7 @@ fn follow<G: Gain<2, 3>>(
             return Ok(false);
         }
         let [theta] = &estimator.theta().data.0;
-        watch(k, theta);
+        watch(k, theta, &|| distance(estimator.gain()));
     }
     Ok(estimator.health().is_ok())
 }

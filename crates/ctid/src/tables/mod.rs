@@ -11,6 +11,8 @@ pub mod udink_text;
 use serde::Serialize;
 use statrs::statistics::{Data, OrderStatistics};
 
+use crate::numbers;
+
 /// A figure as it is printed: value and decimals, so that its rounding is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Printed {
@@ -92,6 +94,19 @@ impl Cell {
             below,
             inside: paper.value + paper.rounding >= q05 && paper.value - paper.rounding <= q95,
         }
+    }
+}
+
+impl Cell {
+    /// The 5 to 95 % range, both ends with the decimals that give its width two digits.
+    pub(crate) fn range(&self, between: &str) -> String {
+        let width = self.q95 - self.q05;
+        if !width.is_finite() {
+            return "-".to_owned();
+        }
+        let places = (1 - numbers::exponent(width)).max(0);
+        let [low, high] = [self.q05, self.q95].map(|end| numbers::decimals(end, places));
+        format!("{low}{between}{high}")
     }
 }
 
@@ -178,7 +193,8 @@ mod tests {
         let middle = cell(50.0, 0);
         assert_eq!(middle.median, 50.0);
         assert!(middle.inside && (middle.below - 0.495).abs() < 0.001);
-        assert!((middle.q05 - 5.0).abs() < 0.5 && (middle.q95 - 95.0).abs() < 0.5);
+        // quantiles without bias in the median: 0.05 (101 + 1/3) + 1/3 = 5.4, counted from 1
+        assert!((middle.q05 - 4.4).abs() < 1e-9 && (middle.q95 - 95.6).abs() < 1e-9);
         let edge = middle.q95 + 0.3;
         assert!(cell(edge, 0).inside && !cell(edge, 1).inside);
         let edge = middle.q05 - 0.3;

@@ -379,6 +379,17 @@ pub struct LargerP {
     pub exact_criterion: f64,
 }
 
+impl LargerP {
+    /// The factor as a person writes it.
+    pub(crate) fn factor_name(&self) -> String {
+        if self.factor < 1e6 {
+            format!("{}", self.factor)
+        } else {
+            format!("{:e}", self.factor)
+        }
+    }
+}
+
 /// Responses over time, those of table 3.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figure {

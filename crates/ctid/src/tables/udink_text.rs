@@ -84,8 +84,7 @@ fn of_rule(cell: &Cell, look: Look) -> [String; 3] {
     } else {
         look.warning("*")
     };
-    let range = format!("{} .. {}", figure(cell.q05), figure(cell.q95));
-    [figure(cell.median), range, mark]
+    [figure(cell.median), cell.range(" .. "), mark]
 }
 
 /// As the paper prints it.
@@ -142,7 +141,7 @@ fn larger_p(rows: &[LargerP], look: Look) -> String {
             if count > 0 { look.warning(text) } else { text }
         };
         lines.push(vec![
-            format!("x {}", numbers::significant(row.factor, 2)),
+            format!("x {}", row.factor_name()),
             lost(row.euler_failed),
             lost(row.exact_failed),
             figure(row.euler_criterion),

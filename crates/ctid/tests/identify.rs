@@ -247,6 +247,83 @@ fn drift_with_the_operating_point_leaves_the_band() {
     assert!(low + 3.0 * low_error < high - 3.0 * high_error);
 }
 
+/// A tank by Torricelli's law, `20 y' = 8 u - 2 sqrt(y)`, or what it is near `y = 16`; the input wanders, with steps on it.
+fn wandering(linear: bool, seed: u64) -> Record {
+    let (rows, fine) = (12_000, 5);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let steps = excitation::steps(rows, 20..=80, -0.1, 0.1, &mut rng).unwrap();
+    let noise = noise::ar1(rows, 0.3, 0.7, &mut rng);
+    let (mut y, mut output, mut input) = (16.0_f64, Vec::new(), Vec::new());
+    for k in 0..rows {
+        let slow = (k as f64 / 8000.0 * std::f64::consts::TAU).sin();
+        let u = 1.0 + 0.4 * slow + steps[k];
+        output.push(y + noise[k]);
+        input.push(u);
+        for _ in 0..fine {
+            let outflow = if linear {
+                4.0 + y / 4.0
+            } else {
+                2.0 * y.sqrt()
+            };
+            y += STEP / fine as f64 * (8.0 * u - outflow) / 20.0;
+        }
+    }
+    Record {
+        name: "tank".into(),
+        time: (0..rows).map(|k| k as f64 * STEP).collect(),
+        input: Signal::new("u", "V", input),
+        output: Signal::new("y", "cm", output),
+        reference: None,
+        hold: Hold::Zero,
+    }
+}
+
+#[test]
+fn drift_with_the_level_is_told_of_a_tank_and_not_of_a_linear_process() {
+    let order = Order { n: 1, m: 0 };
+    let drift = |linear, seed| {
+        let request = Request {
+            method: Method::StabilizedOe,
+            order,
+            memory: Some(600.0),
+            bandwidth: None,
+        };
+        identify(&wandering(linear, seed), &request)
+            .unwrap()
+            .drift
+            .unwrap()
+    };
+    let tank = drift(false, 1);
+    assert!(tank.gain.difference > 3.0, "{tank:?}");
+    assert!(tank.gain.moves());
+    assert!(tank.level.is_sorted());
+    // By the law the gain goes with the root of the level, here by 1.9; the recursion's memory flattens that.
+    let [low, high] = [0, tank.level.len() - 1].map(|i| tank.gain.values[i]);
+    assert!((1.3..2.2).contains(&(high / low)), "{tank:?}");
+
+    let blamed = (0..20)
+        .into_par_iter()
+        .map(|seed| drift(true, seed))
+        .filter(|drift| drift.gain.moves() || drift.time_constant.moves())
+        .count();
+    assert!(blamed <= 1, "{blamed} of 20 linear processes are blamed");
+}
+
+#[test]
+fn a_memory_too_short_for_standard_errors_is_said() {
+    let request = Request {
+        method: Method::StabilizedOe,
+        order: SECOND.order(),
+        memory: Some(60.0),
+        bandwidth: None,
+    };
+    let found = identify(&SECOND.record(2000, 1), &request).unwrap();
+    assert!(found.parameters.iter().all(|p| p.std_error.is_none()));
+    assert!(found.drift.is_none());
+    let said = |warning: &String| warning.contains("standard errors are not known");
+    assert!(found.warnings.iter().any(said), "{:?}", found.warnings);
+}
+
 #[test]
 fn the_program_writes_what_it_prints() {
     let place = Place::new();
@@ -332,11 +409,23 @@ fn what_cannot_be_is_refused() {
     );
     let still: String = (0..200).map(|k| format!("{k},1.5,{}\n", k % 7)).collect();
     place.write("still.csv", format!("t,u,y\n{still}"));
-    bad("still.csv --method stabilized-oe", &["still.csv", "the input is 1.5 in all 200 rows"]);
+    bad(
+        "still.csv --method stabilized-oe",
+        &["still.csv", "the input is 1.5 in all 200 rows"],
+    );
     place.write("dead.csv", format!("t,y,u\n{still}"));
-    bad("dead.csv --method stabilized-oe", &["the output is 1.5 in all 200 rows"]);
-    place.write("nan.csv", format!("t,u,y\n{still}").replace("\n7,1.5,", "\n7,NaN,"));
-    bad("nan.csv --method stabilized-oe", &["nan.csv, row 9", "\"u\""]);
+    bad(
+        "dead.csv --method stabilized-oe",
+        &["the output is 1.5 in all 200 rows"],
+    );
+    place.write(
+        "nan.csv",
+        format!("t,u,y\n{still}").replace("\n7,1.5,", "\n7,NaN,"),
+    );
+    bad(
+        "nan.csv --method stabilized-oe",
+        &["nan.csv, row 9", "\"u\""],
+    );
 }
 
 /// Records that no file brought along are looked at too.

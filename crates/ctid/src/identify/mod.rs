@@ -29,8 +29,8 @@ use missing_effect::Parameter;
 use serde::Serialize;
 
 use self::scaled::Scaled;
-pub use drift::{Drift, OverLevel};
 use crate::Error;
+pub use drift::{Drift, OverLevel};
 
 /// How the parameters are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
@@ -253,6 +253,7 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         .collect();
     warnings.extend(doubtful(&parameters, order));
     let (time_constants, oscillations) = poles(&parameters, order)?;
+    warnings.extend(unsure(&parameters, &scaled.settings()));
     warnings.extend(too_fast(&time_constants, record, order));
     warnings.extend(initial);
     let residual = record.output.values.iter().zip(&simulated);
@@ -382,6 +383,19 @@ fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
         })
     };
     highest.into_iter().filter_map(doubtful).collect()
+}
+
+/// Standard errors need more stretches of a time constant within the memory than there are parameters.
+fn unsure(parameters: &[Parameter], settings: &Settings) -> Option<String> {
+    if parameters.iter().all(|p| p.std_error.is_some()) {
+        return None;
+    }
+    let enough = (parameters.len() + 2) as f64 * settings.first_order;
+    Some(format!(
+        "standard errors are not known: the memory of {:.4} s, or the record, is too short for {} parameters; they need {enough:.0} s or more",
+        settings.memory,
+        parameters.len()
+    ))
 }
 
 fn too_fast(time_constants: &[f64], record: &Record, order: Order) -> Option<String> {

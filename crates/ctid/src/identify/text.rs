@@ -151,7 +151,10 @@ fn drift(found: &Identification, look: Look) -> String {
     ];
     let mut rows = vec![heading.map(|name| look.faint(name.trim_end())).to_vec()];
     let time_constant = time_constant_name(found);
-    let gain_unit = found.parameters.get(found.order.n).map_or("", |b0| &b0.unit);
+    let gain_unit = found
+        .parameters
+        .get(found.order.n)
+        .map_or("", |b0| &b0.unit);
     for (name, unit, over_level) in [
         ("gain b0", gain_unit, &drift.gain),
         (time_constant, "s", &drift.time_constant),

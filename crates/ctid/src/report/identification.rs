@@ -201,7 +201,10 @@ fn trajectory_figure(found: &Identification) -> Figure {
 
 fn drift_figure(found: &Identification) -> Option<Figure> {
     let drift = found.drift.as_ref()?;
-    let gain_unit = found.parameters.get(found.order.n).map_or("", |b0| &b0.unit);
+    let gain_unit = found
+        .parameters
+        .get(found.order.n)
+        .map_or("", |b0| &b0.unit);
     let curve = |panel, name, over_level: &OverLevel| {
         let data = (&drift.level[..], &over_level.values[..]);
         Curve::line(name, panel, Colour::Of(1), data).with_band(data, &over_level.std_errors)

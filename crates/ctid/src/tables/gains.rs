@@ -297,12 +297,7 @@ trait Watch: FnMut(usize, &[f64; 3], &dyn Fn() -> f64) {}
 impl<F: FnMut(usize, &[f64; 3], &dyn Fn() -> f64)> Watch for F {}
 
 /// One run; whether it came to its end.
-fn run(
-    variant: Variant,
-    samples: &[Sample],
-    grid: Grid,
-    watch: impl Watch,
-) -> Result<bool, Error> {
+fn run(variant: Variant, samples: &[Sample], grid: Grid, watch: impl Watch) -> Result<bool, Error> {
     match variant.rule {
         Rule::Euler => run_by::<Euler>(variant, samples, grid, watch),
         Rule::Exact => run_by::<ExactHold>(variant, samples, grid, watch),

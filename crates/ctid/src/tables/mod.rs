@@ -98,13 +98,13 @@ impl Cell {
 }
 
 impl Cell {
-    /// The 5 to 95 % range, both ends with the decimals that give its width two digits.
+    /// The 5 to 95 % range, both ends with the decimals that its width deserves: of 20 to 200 last digits.
     pub(crate) fn range(&self, between: &str) -> String {
         let width = self.q95 - self.q05;
         if !width.is_finite() {
             return "-".to_owned();
         }
-        let places = (1 - numbers::exponent(width)).max(0);
+        let places = (1 - numbers::exponent(0.5 * width)).max(0);
         let [low, high] = [self.q05, self.q95].map(|end| numbers::decimals(end, places));
         format!("{low}{between}{high}")
     }

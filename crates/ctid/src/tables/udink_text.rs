@@ -33,16 +33,7 @@ pub fn text(study: &Study, look: Look) -> String {
 }
 
 fn cells(study: &Study, look: Look) -> String {
-    let heading = [
-        "",
-        "paper",
-        "Euler",
-        "5 to 95 %",
-        "",
-        "exact",
-        "5 to 95 %",
-        "",
-    ];
+    let heading = ["", "paper", "Euler", "5 to 95 % ", "exact", "5 to 95 % "];
     let mut rows = Vec::new();
     let mut last = 0;
     for (euler, exact) in study.euler.tables.iter().zip(&study.exact.tables) {
@@ -57,17 +48,9 @@ fn cells(study: &Study, look: Look) -> String {
         row.extend(of_rule(exact, look));
         rows.push(row);
     }
-    let sides = [
-        Side::Left,
-        Side::Right,
-        Side::Right,
-        Side::Right,
-        Side::Left,
-        Side::Right,
-        Side::Right,
-        Side::Left,
-    ];
+    let [left, right] = [Side::Left, Side::Right];
     let mut text = String::new();
+    let sides = [left, right, right, right, right, right];
     for line in table(&sides, &rows) {
         if line.contains("Table ") {
             text.push('\n');
@@ -78,13 +61,13 @@ fn cells(study: &Study, look: Look) -> String {
     text
 }
 
-fn of_rule(cell: &Cell, look: Look) -> [String; 3] {
+fn of_rule(cell: &Cell, look: Look) -> [String; 2] {
     let mark = if cell.inside {
-        String::new()
+        " ".to_owned()
     } else {
         look.warning("*")
     };
-    [figure(cell.median), cell.range(" .. "), mark]
+    [figure(cell.median), cell.range(" .. ") + &mark]
 }
 
 /// As the paper prints it.
@@ -162,7 +145,7 @@ fn gains(gains: &Gains, look: Look) -> String {
         "gain",
         "rule",
         "bounds",
-        "without noise: a1, a2, b0",
+        "end: a1, a2, b0",
         "error",
         "5 to 95 %",
         "lost",
@@ -204,7 +187,7 @@ fn gains(gains: &Gains, look: Look) -> String {
         text += &format!("  {line}\n");
     }
     let note = format!(
-        "The truth is 1, 1, 1. Without noise: the estimates at 2000 s. Error: with 1 % of noise, of the worst parameter, mean over the last \
+        "The truth is 1, 1, 1. End: the estimates without noise, at 2000 s. Error: with 1 % of noise, of the worst parameter, mean over the last \
          quarter of 1000 s; median of {} noises. The block-diagonal gain of the paper ends elsewhere without noise, which its theorem \
          excludes; with bounds on c it does not.",
         gains.noises

@@ -40,8 +40,19 @@ fn headline(found: &Identification) -> String {
         .iter()
         .map(|warning| format!("<p class=\"notice\">{}</p>\n", escape(warning)))
         .collect();
+    let with_unit = |index: usize| {
+        found.parameters.get(index).map_or(String::new(), |p| {
+            format!("{} {}", with_error(p.value, p.std_error), unit(&p.unit))
+        })
+    };
+    let time_constant = match found.order.n {
+        1 => "Time constant",
+        _ => "Sum of time constants",
+    };
     let facts: String = [
         ("Model", escape(&model(found))),
+        ("Gain", with_unit(found.order.n)),
+        (time_constant, with_unit(0)),
         ("Method", code(found.method.id())),
         ("Memory", duration(found.settings.memory)),
         (

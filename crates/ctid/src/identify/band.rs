@@ -67,7 +67,7 @@ fn covariance(ends: &[&Point], now: &Point, eta: f64) -> Option<DMatrix<f64>> {
     }
     // As many stretches of one weight would say as much.
     let count = weights * weights / squares;
-    if !(count > p as f64 + SPARE) {
+    if count.is_nan() || count <= p as f64 + SPARE {
         return None;
     }
     let covariance = now.information.clone().try_inverse()?;

@@ -106,7 +106,8 @@ pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order)
         .collect();
     let of = |pick: fn(f64, f64) -> f64, from| points.iter().map(|p| p.0).fold(from, pick);
     let (low, high) = (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY));
-    if !(high > low) {
+    // Without points: from infinity down to minus infinity.
+    if high <= low {
         return None;
     }
     let mut stretches = [Stretch::default(); STRETCHES];

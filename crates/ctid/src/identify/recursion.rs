@@ -83,7 +83,7 @@ fn untold(order: Order) -> Error {
 
 /// Whether the k-th of `count` samples is kept.
 fn is_kept(k: usize, count: usize) -> bool {
-    k + 1 == count || k % count.div_ceil(POINTS) == 0
+    k + 1 == count || k.is_multiple_of(count.div_ceil(POINTS))
 }
 
 /// The start: as many equal lags as n, which sum up to the time constant of first order, its gain and its offset.
@@ -97,10 +97,10 @@ fn start(scaled: &Scaled, order: Order) -> Vec<f64> {
 
 /// `a_1` to `a_n` of `(1 + s/n)^n`.
 fn lags(n: usize) -> Vec<f64> {
-    let mut a = vec![1.0];
-    for _ in 0..n {
-        a.push(0.0);
-        for i in (1..a.len()).rev() {
+    let mut a = vec![0.0; n + 1];
+    a[0] = 1.0;
+    for degree in 1..=n {
+        for i in (1..=degree).rev() {
             a[i] += a[i - 1] / n as f64;
         }
     }

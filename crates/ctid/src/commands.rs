@@ -12,7 +12,7 @@ use crate::input::Files;
 use crate::look::Look;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
-use crate::tables::{udink, udink_text};
+use crate::tables::{baysse, baysse_text, udink, udink_text};
 use crate::{Error, catalogue, edit, model_file, terminal, tour};
 
 /// Says which physical effect a model of measured data is missing.
@@ -172,12 +172,15 @@ struct Tables {
     /// The paper
     #[arg(value_enum, default_value_t = Paper::Udink)]
     paper: Paper,
-    /// Noises: each table is run once with each
-    #[arg(long, value_name = "N", default_value_t = 200)]
-    runs: usize,
+    /// Noises: each table is run once with each; without it as many as a paper's bands are for, 200 or 100
+    #[arg(long, value_name = "N")]
+    runs: Option<usize>,
     /// What the noises are drawn from
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
+    /// Write the record of baysse's emulated rig as CSV, for `diagnose` or `identify`
+    #[arg(long, value_name = "F.csv")]
+    record: Option<PathBuf>,
     #[command(flatten)]
     results: Results,
 }
@@ -186,6 +189,18 @@ struct Tables {
 enum Paper {
     /// A. J. Udink ten Cate, WP-85-54, IIASA, 1985: tables 1 to 4
     Udink,
+    /// A. Baysse, F. J. Carrillo, A. Habbadi, output error in closed loop: tables I and II
+    Baysse,
+}
+
+impl Paper {
+    /// The runs that its bands are for.
+    fn runs(self) -> usize {
+        match self {
+            Self::Udink => 200,
+            Self::Baysse => 100,
+        }
+    }
 }
 
 /// Does what the command line asks for; what a person reads goes to `out`.
@@ -223,10 +238,14 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
 impl Results {
     /// Where the results go, checked.
     fn plan(&self, inputs: &[&Path]) -> Result<Vec<Output>, Error> {
+        let wanted: Vec<_> = self.wanted().collect();
+        output::plan(&wanted, inputs)
+    }
+
+    fn wanted(&self) -> impl Iterator<Item = (Kind, &Path)> {
         let json = self.json.as_deref().map(|path| (Kind::Json, path));
         let report = self.report.as_deref().map(|path| (Kind::Report, path));
-        let wanted: Vec<_> = json.into_iter().chain(report).collect();
-        output::plan(&wanted, inputs)
+        json.into_iter().chain(report)
     }
 }
 
@@ -328,17 +347,36 @@ impl Identify {
 
 impl Tables {
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
-        let outputs = self.results.plan(&[])?;
+        if self.record.is_some() && !matches!(self.paper, Paper::Baysse) {
+            let what =
+                "--record is of the rig that `ctid tables baysse` emulates; no other paper has one";
+            return Err(Error::Usage(what.to_owned()));
+        }
+        let record = self.record.as_deref().map(|path| (Kind::Record, path));
+        let wanted: Vec<_> = self.results.wanted().chain(record).collect();
+        let outputs = output::plan(&wanted, &[])?;
+        let runs = self.runs.unwrap_or(self.paper.runs());
+        let bar = Bar::new();
+        let progress = |progress| bar.show(progress);
         match self.paper {
             Paper::Udink => {
-                let bar = Bar::new();
                 let settings = udink::Settings::default();
-                let study = udink::study(&settings, self.runs, self.seed, &|progress| {
-                    bar.show(progress);
-                });
+                let study = udink::study(&settings, runs, self.seed, &progress);
                 bar.clear();
                 let study = study?;
                 finish(&study, &udink_text::text(&study, look), &outputs, out, look)
+            }
+            Paper::Baysse => {
+                let study = baysse::study(runs, self.seed, &progress);
+                bar.clear();
+                let study = study?;
+                finish(
+                    &study,
+                    &baysse_text::text(&study, look),
+                    &outputs,
+                    out,
+                    look,
+                )
             }
         }
     }

@@ -8,7 +8,7 @@ use missing_effect::Diagnosis;
 use serde::Serialize;
 
 use crate::identify::Identification;
-use crate::tables::udink::Study;
+use crate::tables::{baysse, udink};
 use crate::{Error, atomic, report};
 
 /// How much of an existing page is looked at: the mark stands in its head.
@@ -24,12 +24,19 @@ pub enum Kind {
     Json,
     /// The result as a page.
     Report,
+    /// A record as CSV.
+    Record,
 }
 
 /// What a command finds, which is written as JSON with `schema` and one of [`KEYS`], or as a page.
 pub trait Found: Serialize {
     /// The page, complete.
     fn page(&self) -> String;
+
+    /// The record as CSV, where there is one.
+    fn record(&self) -> String {
+        String::new()
+    }
 }
 
 impl Found for Diagnosis {
@@ -38,9 +45,19 @@ impl Found for Diagnosis {
     }
 }
 
-impl Found for Study {
+impl Found for udink::Study {
     fn page(&self) -> String {
         report::udink(self)
+    }
+}
+
+impl Found for baysse::Study {
+    fn page(&self) -> String {
+        report::baysse(self)
+    }
+
+    fn record(&self) -> String {
+        baysse::csv(&self.second.record)
     }
 }
 
@@ -107,6 +124,7 @@ impl Output {
                 text + "\n"
             }
             Kind::Report => found.page(),
+            Kind::Record => found.record(),
         };
         atomic::write(&self.path, content.as_bytes())
     }
@@ -173,6 +191,8 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
         return false;
     };
     match kind {
+        // Nothing in a record says who wrote it.
+        Kind::Record => false,
         Kind::Report => {
             let mut head = Vec::new();
             let read = file.take(HEAD).read_to_end(&mut head);

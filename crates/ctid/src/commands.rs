@@ -7,9 +7,10 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use ct_signals::{Columns, Hold, read_csv};
 use missing_effect::Options;
 
-use crate::identify::{self, Method, Order, Request};
+use crate::identify::{self, LevelChoice, Method, Order, Request};
 use crate::input::Files;
 use crate::look::Look;
+use crate::model_file::ControllerSettings;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
 use crate::tables::{baysse, baysse_text, udink, udink_text};
@@ -123,7 +124,7 @@ struct Identify {
     /// Orders n of A and m of B in A y = B u + d
     #[arg(long, value_name = "N,M", default_value = "1,0")]
     order: Order,
-    /// Model file, of which the columns and the hold of the input are used
+    /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
     /// The columns' names, where their first letters do not tell
@@ -138,6 +139,12 @@ struct Identify {
     /// Bandwidth of the state variable filters [1/s]; without it 3 over the time constant
     #[arg(long, value_name = "L")]
     bandwidth: Option<f64>,
+    /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe
+    #[arg(long, value_enum, default_value_t = LevelChoice::Auto)]
+    levels: LevelChoice,
+    /// Bandwidth of a filter on the reading in front of the controller [1/s]; y is the filtered reading
+    #[arg(long, value_name = "ZETA")]
+    sensor_filter: Option<f64>,
     #[command(flatten)]
     results: Results,
 }
@@ -302,21 +309,57 @@ impl Diagnose {
 }
 
 impl Identify {
-    /// Which columns, and the hold.
-    fn layout(&self) -> Result<(Columns, Hold), Error> {
+    /// Which columns, the hold, and the controller with its limits.
+    fn layout(&self) -> Result<(Columns, Hold, Option<ControllerSettings>), Error> {
         if let Some(model) = &self.model {
             let model = model_file::read(model)?;
-            return Ok((model.columns, model.hold));
+            return Ok((model.columns, model.hold, model.controller));
         }
         let hold = match self.hold {
             InputHold::Zero => Hold::Zero,
             InputHold::First => Hold::First,
         };
-        Ok((self.columns.clone().unwrap_or_default(), hold))
+        Ok((self.columns.clone().unwrap_or_default(), hold, None))
+    }
+
+    /// What was asked, if it goes together.
+    fn request(&self, controller: Option<ControllerSettings>) -> Result<Request, Error> {
+        let method = self.method.id();
+        let wrong = |what: String| Err(Error::Usage(what));
+        let of_loop = self.method.is_of_loop();
+        if !of_loop && self.levels != LevelChoice::Auto {
+            return wrong(format!(
+                "--levels does not go with --method {method}, which estimates an offset; leave it out"
+            ));
+        }
+        if of_loop && self.method != Method::RecursiveFcloe && self.memory.is_some() {
+            return wrong(format!(
+                "--memory does not go with --method {method}, which weighs the whole record alike; leave it out"
+            ));
+        }
+        let mut request = Request {
+            memory: self.memory,
+            bandwidth: self.bandwidth,
+            levels: self.levels,
+            ..Request::new(self.method, self.order)
+        };
+        let controller = controller.filter(|_| of_loop);
+        if let Some(settings) = controller {
+            request.controller = Some(settings.linear()?);
+            request.limits = (settings.u_min, settings.u_max);
+        }
+        if let Some(zeta) = self.sensor_filter {
+            let Some(controller) = request.controller else {
+                return wrong("--sensor-filter is of a loop: give --model with a [controller], and a method that uses it".to_owned());
+            };
+            request.controller = Some(controller.with_sensor_filter(zeta)?);
+        }
+        Ok(request)
     }
 
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
-        let (columns, hold) = self.layout()?;
+        let (columns, hold, controller) = self.layout()?;
+        let request = self.request(controller)?;
         let record = read_csv(&self.data, &columns, hold)?;
         let inputs: Vec<&Path> = [Some(&self.data), self.model.as_ref()]
             .into_iter()
@@ -324,12 +367,6 @@ impl Identify {
             .map(PathBuf::as_path)
             .collect();
         let outputs = self.results.plan(&inputs)?;
-        let request = Request {
-            method: self.method,
-            order: self.order,
-            memory: self.memory,
-            bandwidth: self.bandwidth,
-        };
         let bar = Bar::new();
         bar.phase("identifying");
         let found = identify::identify(&record, &request);

@@ -68,6 +68,16 @@ pub struct ControllerSettings {
     pub u_max: f64,
 }
 
+impl ControllerSettings {
+    /// `gain (1 + 1/(integral_time p))`, without the limits.
+    ///
+    /// # Errors
+    /// None for settings that [`parse`] has returned.
+    pub fn linear(&self) -> Result<fcloe::Controller, fcloe::Error> {
+        fcloe::Controller::pi(self.gain, self.gain / self.integral_time)
+    }
+}
+
 impl ModelFile {
     /// The plant with its effects, over the ranges that the data visit.
     ///

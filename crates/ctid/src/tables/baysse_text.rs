@@ -83,19 +83,26 @@ fn cells(study: &Study, look: Look) -> String {
 /// As the paper prints it, small numbers in powers of ten.
 pub(crate) fn printed(cell: &Cell) -> String {
     match cell.paper {
-        Some(paper) if paper < 0.01 => format!("{paper:.2e}"),
+        Some(paper) if paper < SMALL => format!("{paper:.2e}"),
         Some(paper) => format!("{paper:.*}", cell.decimals),
         None => "-".to_owned(),
     }
 }
 
+/// Below this, powers of ten.
+const SMALL: f64 = 0.01;
+
 /// To the second digit of its deviation.
 pub(crate) fn figure_of(cell: &Cell) -> String {
-    if cell.mean.abs() < 0.01 {
-        return numbers::significant(cell.mean, 3);
+    if cell.mean.abs() < SMALL {
+        return format!("{:.2e}", cell.mean);
     }
-    numbers::value_and_error(cell.mean, Some(cell.sd)).0
+    let places = 1 - numbers::exponent(cell.sd);
+    numbers::decimals(cell.mean, places.min(MOST_DECIMALS))
 }
+
+/// Nobody reads more, however sure it is.
+const MOST_DECIMALS: i32 = 4;
 
 /// Its ends, `> 7.5` where it is open, nothing without one.
 pub(crate) fn band(cell: &Cell, between: &str) -> String {
@@ -103,10 +110,23 @@ pub(crate) fn band(cell: &Cell, between: &str) -> String {
         None => String::new(),
         Some([low, high]) if high.is_infinite() => format!("> {low}"),
         Some([low, high]) => {
-            let digits = if low.abs() < 0.01 { 2 } else { 4 };
-            let [low, high] = [low, high].map(|end| numbers::significant(end, digits));
-            format!("{low}{between}{high}")
+            let end = |end: f64| match end.abs() < SMALL {
+                true => format!("{end:.1e}"),
+                false => short(&numbers::significant(end, 5)),
+            };
+            format!("{}{between}{}", end(low), end(high))
         }
+    }
+}
+
+/// Without zeros at the end of its decimals.
+fn short(number: &str) -> String {
+    match number.contains('.') {
+        true => number
+            .trim_end_matches('0')
+            .trim_end_matches('.')
+            .to_owned(),
+        false => number.to_owned(),
     }
 }
 
@@ -132,15 +152,22 @@ pub(crate) fn notes(study: &Study) -> Vec<String> {
     };
     let counts = &study.first.iterations;
     let [gain, tau] = study.second.tangent;
-    let ended = study
-        .second
-        .ki_as_printed
-        .iter()
-        .filter(|run| run[0].is_finite());
+    let printed = |of: &str| {
+        let mut cells = study.tables.iter();
+        let cell = cells.find(|cell| cell.method == "Ki = 0.074" && cell.of == of);
+        cell.map_or(String::new(), figure_of)
+    };
+    let (printed_k, printed_tau) = (printed("K"), printed("tau"));
+    let difference = match study.first.diagonal_difference {
+        0.0 => "are the same to the last digit".to_owned(),
+        share => format!(
+            "differ by {} of themselves at most",
+            numbers::significant(share, 1)
+        ),
+    };
     vec![
         format!(
-            "With mu diag(J'') the estimates in theta and delta differ by {} of themselves at most, and need {} and {} iterations.",
-            numbers::significant(study.first.diagonal_difference, 1),
+            "With mu diag(J'') the estimates in theta and delta {difference}, and need {} and {} iterations.",
             mean(&counts.plain_diagonal),
             mean(&counts.normalised_diagonal),
         ),
@@ -154,9 +181,7 @@ pub(crate) fn notes(study: &Study) -> Vec<String> {
              instruments on raw levels find the secant, which a dead zone of the pump moves."
         ),
         format!(
-            "With Ki = 0.074 as printed, {} of {} fits come to their end.",
-            ended.count(),
-            study.runs
+            "With Ki = 0.074 as printed, in the rig and in the model, it finds K = {printed_k} and tau = {printed_tau} s: not what the paper prints."
         ),
     ]
 }

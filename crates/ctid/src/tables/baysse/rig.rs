@@ -117,7 +117,7 @@ pub(super) fn assumptions() -> Vec<String> {
             rig.samples()
         ),
         "Instruments get the raw levels, as the paper's can only have had; the output error gets r and y less the operating point, and knows the filter.".to_owned(),
-        "Variances are those a fit says of itself, mean over the runs; for instruments, from run to run.".to_owned(),
+        "Variances are those a fit says of itself, taking its residual for white, mean over the runs; for instruments, whose own are not known, from run to run.".to_owned(),
         "Gain, time constant, dead zone, noise and reference were chosen to match the table; what is not chosen is that instruments find the secant, and that the output error does not.".to_owned(),
     ]
 }
@@ -331,7 +331,8 @@ fn run(rig: &Rig, seed: u64, index: usize) -> Result<Run, Error> {
     let problem = Problem::new(&[centred], &rig.controller(true)?, start.orders())?;
     let estimate = |coordinates| -> Result<Estimate, Error> {
         let fit = problem.fit(&start, &settings(MU, Damping::Identity, coordinates))?;
-        let errors = problem.uncertainty(&fit, None)?.std_errors;
+        // Those of a white residual, as the paper's will have been.
+        let errors = problem.uncertainty(&fit, None)?.white_std_errors;
         let variance = match errors[..] {
             [tau, gain] => [gain * gain, tau * tau],
             _ => [f64::NAN; 2],

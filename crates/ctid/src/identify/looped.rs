@@ -15,8 +15,10 @@ use serde::Serialize;
 use super::{Identification, Method, Order, Request, Shown, Trajectory, names, poles, rms};
 use crate::Error;
 
-/// From so many rows of a drive that stands still on, they are taken for a loop at rest.
-const ROWS_AT_REST: usize = 5;
+/// A loop rests in the first rows if there are so many in which the drive stands still, and the output's means over their two halves
+/// are no further apart than this share of its range.
+const ROWS_AT_REST: usize = 6;
+const MOVES: f64 = 0.03;
 /// The part of the record that a recursion is started from.
 const BEGINNING: f64 = 0.3;
 /// Renewals of instruments with a filter that stays, and of both.
@@ -117,6 +119,7 @@ struct Found {
     std_errors: Vec<Option<f64>>,
     record: LoopRecord,
     levels: [f64; 2],
+    levels_from: LevelChoice,
     start: Start,
     batch: Option<Batch>,
     recursion: Option<(Trajectory, LoopHealth)>,
@@ -206,6 +209,7 @@ impl Task<'_> {
             }),
             plant: fit.plant,
             recursion: None,
+            levels_from: chosen(&record),
             record,
             levels,
             warnings,
@@ -266,6 +270,7 @@ impl Task<'_> {
         Ok(Found {
             std_errors: vec![None; plant.theta().len()],
             levels: levels_of(&record, self),
+            levels_from: chosen(&record),
             plant,
             start,
             batch: None,
@@ -301,35 +306,40 @@ impl Task<'_> {
         let rows = ((BEGINNING * record.len() as f64) as usize).max(1);
         let part =
             |signal: &Option<Vec<f64>>| signal.as_ref().map(|v| v[..rows.min(v.len())].to_vec());
-        let point = record.operating_point();
         let beginning = LoopRecord {
             r: part(&record.r),
             u: part(&record.u),
             y: record.y[..rows.min(record.len())].to_vec(),
-            offsets: Offsets::Known(point),
             ..record.clone()
         };
         let mut warnings = Vec::new();
-        let from_beginning = Problem::new(&[beginning.clone()], &self.controller, self.orders)
+        let begun = Problem::new(&[beginning.clone()], &self.controller, self.orders)
             .map_err(Error::from)
-            .and_then(|_| self.pipeline(&beginning));
-        let candidates = match from_beginning {
-            Ok(candidates) => candidates,
+            .and_then(|_| self.begun(beginning));
+        let begun = match begun {
+            Ok(begun) => begun,
             Err(_) => {
                 warnings.push(
                     "the first rows do not tell a start: it was taken from the whole record, so the recursion knows what it has not seen yet"
                         .to_owned(),
                 );
-                self.pipeline(&record)?
+                self.begun(record.clone())?
             }
         };
-        let candidate = candidates
-            .into_iter()
-            .next()
-            .ok_or(fcloe::Error::NoStart { tried: 0 })?;
-        let settings = self.recursive_settings(&record, &candidate.plant, point)?;
-        let mut estimator = RecursiveFcloe::new(&candidate.plant, &self.controller, settings)?;
-        let parameters = candidate.plant.theta().len();
+        let [drive_level, y_level] = begun.levels;
+        let point = OperatingPoint {
+            r: drive_level,
+            u: drive_level,
+            y: y_level,
+        };
+        let record = LoopRecord {
+            offsets: Offsets::Known(point),
+            ..record
+        };
+        let start = begun.plant;
+        let settings = self.recursive_settings(&record, &start, point)?;
+        let mut estimator = RecursiveFcloe::new(&start, &self.controller, settings)?;
+        let parameters = start.theta().len();
         let mut trajectory = Trajectory {
             time: Vec::with_capacity(record.len()),
             samples: Vec::with_capacity(record.len()),
@@ -351,17 +361,25 @@ impl Task<'_> {
         Ok(Found {
             plant: estimator.plant()?,
             std_errors: trajectory.std_errors.iter().map(last).collect(),
-            levels: levels_of(&record, self),
+            levels: begun.levels,
+            levels_from: begun.levels_from,
             start: Start {
-                stage: candidate.stage,
-                bandwidth: candidate.lambda,
-                theta: candidate.plant.theta().to_vec(),
+                theta: start.theta().to_vec(),
+                ..begun.start
             },
             batch: None,
             recursion: Some((trajectory, estimator.loop_health()?)),
             record,
             warnings,
         })
+    }
+
+    /// What a recursion starts from: the batch fit where it has to find the levels too, else the best regression.
+    fn begun(&self, record: LoopRecord) -> Result<Found, Error> {
+        if record.offsets == Offsets::Means && self.request.levels == LevelChoice::Auto {
+            return self.batch(record);
+        }
+        self.regression(record, true)
     }
 
     /// Those of `fcloe`, for the amplitude and the speed of this loop.
@@ -418,7 +436,7 @@ impl Task<'_> {
                     self.request.method.id()
                 )));
             }
-            _ if still >= ROWS_AT_REST && still < drive.len() => Offsets::FirstRows(still),
+            _ if rests(&zero.y, still) => Offsets::FirstRows(still),
             _ => Offsets::Means,
         })
     }
@@ -457,6 +475,12 @@ impl Task<'_> {
         let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
         let deviation = rms(output.iter().map(|y| y - mean));
         let mut warnings = found.warnings;
+        if self.request.levels == LevelChoice::Auto && found.levels_from == LevelChoice::Mean {
+            warnings.push(
+                "the record does not begin at rest: its means were taken for the levels, which biases the estimates; --method fcloe estimates the levels, --levels says them"
+                    .to_owned(),
+            );
+        }
         warnings.extend(limited(record, self.request.limits));
         warnings.extend(super::doubtful(&parameters, order));
         warnings.extend(super::too_fast(&time_constants, record, order));
@@ -482,12 +506,7 @@ impl Task<'_> {
             in_loop: Some(InLoop {
                 r: of(self.controller.r()),
                 s: of(self.controller.s()),
-                levels_from: match found.record.offsets {
-                    Offsets::Estimated => LevelChoice::Estimated,
-                    Offsets::FirstRows(_) => LevelChoice::Rest,
-                    Offsets::Means => LevelChoice::Mean,
-                    _ => LevelChoice::Zero,
-                },
+                levels_from: found.levels_from,
                 levels: found.levels,
                 mismatch,
                 start: found.start,
@@ -533,6 +552,16 @@ impl Task<'_> {
     }
 }
 
+/// Whether the output stands still too while the drive does.
+fn rests(y: &[f64], still: usize) -> bool {
+    let (first, second) = y[..still].split_at(still / 2);
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let (low, high) = crate::plot::limits([y]);
+    still >= ROWS_AT_REST
+        && still < y.len()
+        && (mean(second) - mean(first)).abs() <= MOVES * (high - low)
+}
+
 /// The levels of drive and output that are subtracted.
 fn levels_of(record: &LoopRecord, task: &Task) -> [f64; 2] {
     let point = record.operating_point();
@@ -540,6 +569,16 @@ fn levels_of(record: &LoopRecord, task: &Task) -> [f64; 2] {
         [point.u, point.y]
     } else {
         [point.r, point.y]
+    }
+}
+
+/// Where the levels of a record come from.
+fn chosen(record: &LoopRecord) -> LevelChoice {
+    match record.offsets {
+        Offsets::Estimated => LevelChoice::Estimated,
+        Offsets::FirstRows(_) => LevelChoice::Rest,
+        Offsets::Means => LevelChoice::Mean,
+        _ => LevelChoice::Zero,
     }
 }
 

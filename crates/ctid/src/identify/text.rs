@@ -381,6 +381,7 @@ pub(crate) fn condition(condition: &Condition) -> String {
     }
     let least = numbers::significant(condition.least, 3);
     let at = match condition.frequency {
+        0.0 => "at low frequencies".to_owned(),
         f64::INFINITY => "at high frequencies".to_owned(),
         frequency => format!("at {} rad/s", numbers::significant(frequency, 3)),
     };

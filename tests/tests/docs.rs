@@ -127,6 +127,7 @@ fn links_lead_to_files() {
         "CONTRIBUTING.md",
         "benches/README.md",
         "docs/adding-an-effect.md",
+        "docs/block-diagonal-gain.md",
         "docs/design.md",
         "docs/gallery.md",
         "docs/model-file.md",

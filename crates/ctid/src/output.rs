@@ -28,7 +28,7 @@ pub enum Kind {
     Record,
 }
 
-/// What a command finds, which is written as JSON with `schema` and one of [`KEYS`], or as a page.
+/// What a command finds, which is written as JSON with `schema` and one of the keys that ctid knows its own files by, or as a page.
 pub trait Found: Serialize {
     /// The page, complete.
     fn page(&self) -> String;

@@ -5,6 +5,9 @@
 mod common;
 
 use common::Place;
+use std::path::Path;
+
+use ctid::tables::udink::{Settings, study};
 use serde_json::Value;
 
 fn check(comparison: &Value) {
@@ -77,6 +80,7 @@ fn the_result_holds_every_cell_for_both_rules() {
 fn what_cannot_be_is_refused() {
     let place = Place::empty();
     place.write("notes.json", "{\"mine\": 1}");
+    place.refuses("tables --runs 0", &["--runs is 0", "20 or more"]);
     place.refuses("tables --runs 19", &["--runs is 19", "20 or more"]);
     place.refuses("tables --runs many", &["--runs", "many"]);
     place.refuses("tables --seed -1", &["-1"]);
@@ -84,4 +88,42 @@ fn what_cannot_be_is_refused() {
     place.refuses("tables --json notes.json", &["ctid did not write it"]);
     place.refuses("tables --report no/where.html", &["there is no folder"]);
     place.refuses("tables --json a --report a", &["cannot share"]);
+}
+
+#[test]
+fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
+    let study = study(&Settings::default(), 200, 1, &|_| {}).unwrap();
+    // One cell in ten lies outside by chance; what differs by the rule, not by chance, is named.
+    assert!(study.euler.inside >= 66, "{:?}", study.euler.outside);
+    assert!(study.exact.inside >= 62, "{:?}", study.exact.outside);
+    assert_eq!(study.euler.failed + study.exact.failed, 0);
+
+    // Where it lies beside the checkout: the range for the median of 200 noises of another program, cell by cell.
+    let bands =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reproduction/udink-accept.md");
+    let Ok(bands) = std::fs::read_to_string(&bands) else {
+        eprintln!("skipped: {} is not there", bands.display());
+        return;
+    };
+    let mut seen = 0;
+    for row in bands.lines() {
+        let columns: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let Some(table) = columns.first().and_then(|n| n.parse::<usize>().ok()) else {
+            continue;
+        };
+        for (comparison, column) in [(&study.euler, 3), (&study.exact, 5)] {
+            let (low, high) = columns[column].split_once("..").unwrap();
+            let [low, high] = [low, high].map(|end| end.trim().parse::<f64>().unwrap());
+            let mut cells = comparison.tables.iter();
+            let cell = cells.find(|cell| (cell.table, cell.cell) == (table, columns[1]));
+            let median = cell.unwrap().median;
+            assert!(
+                (low..=high).contains(&median),
+                "table {table}, {}: {median} instead of {low} to {high}",
+                columns[1]
+            );
+            seen += 1;
+        }
+    }
+    assert_eq!(seen, 144);
 }

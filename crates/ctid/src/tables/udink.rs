@@ -1,4 +1,5 @@
-//! Tables 1 to 4 of [U]: one tank of first order, its gain and time constant estimated by the stabilized output error, many noises.
+//! Tables 1 to 4 of A. J. Udink ten Cate, WP-85-54, IIASA, 1985: one tank of first order, its gain and time constant
+//! estimated by the stabilized output error, many noises.
 //!
 //! Data flow of one step k, at `t = k dt`, for Euler's rule; every right side at step k:
 //! ```text

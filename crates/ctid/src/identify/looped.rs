@@ -26,6 +26,8 @@ const INSTRUMENTS: usize = 3;
 const REFINEMENTS: usize = 10;
 /// Points of the picture of condition (14).
 const POINTS: usize = 240;
+/// A controller that misses more than this share of the command is said.
+const MISSED: f64 = 0.03;
 /// A command at its limits for more than this share of the rows is said.
 const LIMITED: f64 = 0.01;
 
@@ -72,9 +74,9 @@ pub struct InLoop {
 /// Where an estimate began.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
-    /// Which regression gave it.
-    pub stage: Stage,
-    /// Bandwidth of its filter, 1/s.
+    /// What gave it.
+    pub from: &'static str,
+    /// Bandwidth of the filter that it began with, 1/s.
     pub bandwidth: f64,
     /// a_1 to a_n, b_0 to b_m.
     pub theta: Vec<f64>,
@@ -196,7 +198,7 @@ impl Task<'_> {
         Ok(Found {
             std_errors: uncertainty.std_errors.iter().map(|e| Some(*e)).collect(),
             start: Start {
-                stage: candidate.stage,
+                from: name(candidate.stage),
                 bandwidth: candidate.lambda,
                 theta: candidate.plant.theta().to_vec(),
             },
@@ -258,7 +260,7 @@ impl Task<'_> {
             let error = rms(record.y.iter().zip(&simulated).map(|(y, model)| y - model));
             if error.is_finite() && best.as_ref().is_none_or(|(least, ..)| error < *least) {
                 let start = Start {
-                    stage,
+                    from: name(stage),
                     bandwidth: lambda,
                     theta: plant.theta().to_vec(),
                 };
@@ -377,7 +379,9 @@ impl Task<'_> {
     /// What a recursion starts from: the batch fit where it has to find the levels too, else the best regression.
     fn begun(&self, record: LoopRecord) -> Result<Found, Error> {
         if record.offsets == Offsets::Means && self.request.levels == LevelChoice::Auto {
-            return self.batch(record);
+            let mut found = self.batch(record)?;
+            found.start.from = "output error of the first rows";
+            return Ok(found);
         }
         self.regression(record, true)
     }
@@ -481,6 +485,7 @@ impl Task<'_> {
                     .to_owned(),
             );
         }
+        warnings.extend(mismatch.and_then(|mismatch| missed(&mismatch)));
         warnings.extend(limited(record, self.request.limits));
         warnings.extend(super::doubtful(&parameters, order));
         warnings.extend(super::too_fast(&time_constants, record, order));
@@ -572,6 +577,15 @@ fn levels_of(record: &LoopRecord, task: &Task) -> [f64; 2] {
     }
 }
 
+fn name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::LeastSquares => "least squares",
+        Stage::Instruments => "instruments",
+        Stage::Refined => "instruments, filter renewed",
+        Stage::Guess => "a guess",
+    }
+}
+
 /// Where the levels of a record come from.
 fn chosen(record: &LoopRecord) -> LevelChoice {
     match record.offsets {
@@ -591,6 +605,17 @@ fn stopped(stop: Stop) -> &'static str {
         Stop::Iterations => "the fit ran out of iterations: try a lower --order",
         _ => "the fit did not come to a minimum: try a lower --order",
     }
+}
+
+/// The controller is a little off.
+fn missed(mismatch: &Mismatch) -> Option<String> {
+    let share = mismatch.systematic / mismatch.size;
+    (share > MISSED).then(|| {
+        format!(
+            "the controller misses {:.0} % of what the measured command does with the reference: its errors go straight into the estimates; check gain and integral_time",
+            100.0 * share
+        )
+    })
 }
 
 /// The command stands at its limits, where the loop is not linear.

@@ -1,6 +1,5 @@
 //! What `ctid identify` prints.
 
-use fcloe::start::Stage;
 use fcloe::{Condition, NoisePath, Verdict};
 
 use super::{Identification, InLoop, LevelChoice, rms};
@@ -309,12 +308,7 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
         ));
     }
     let theta: Vec<String> = in_loop.start.theta.iter().map(|v| digits(*v)).collect();
-    let stage = match in_loop.start.stage {
-        Stage::LeastSquares => "least squares",
-        Stage::Instruments => "instruments",
-        Stage::Refined => "instruments, filter renewed",
-        Stage::Guess => "a guess",
-    };
+    let from = in_loop.start.from;
     let bandwidth = numbers::significant(in_loop.start.bandwidth, 3);
     let start = if found.trajectory.is_some() || in_loop.batch.is_some() {
         "start"
@@ -324,7 +318,7 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
     facts.push((
         start,
         format!(
-            "{stage} with filters of {bandwidth} 1/s: {}",
+            "{from} with filters of {bandwidth} 1/s: {}",
             theta.join(", ")
         ),
     ));

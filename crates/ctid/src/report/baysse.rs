@@ -98,7 +98,7 @@ fn cells(study: &Study, number: usize, title: &str) -> String {
         .map(row)
         .collect();
     let table = table(
-        title,
+        "Paper and runs",
         "<tr><th scope=\"col\">Method</th><th scope=\"col\">Of</th><th scope=\"col\" class=\"number\">Paper</th>\
          <th scope=\"col\" class=\"number\">Here</th><th scope=\"col\" class=\"number\">Std. dev.</th>\
          <th scope=\"col\" class=\"number\">Band</th><th scope=\"col\"></th></tr>",
@@ -194,6 +194,13 @@ fn cloud(name: &str, colour: usize, marker: &'static str, runs: &[[f64; 2]]) -> 
     .named()
 }
 
+fn truth() -> Curve {
+    Curve {
+        colour: Colour::Named("text"),
+        ..cloud("truth", 0, "cross", &[TRUTH])
+    }
+}
+
 fn cloud_figure(id: &str, curves: Vec<Curve>) -> Figure {
     Figure {
         x_title: "K",
@@ -216,7 +223,7 @@ fn clouds_figure(study: &Study) -> Figure {
         cloud("LS", 0, "diamond", &first.least_squares),
         cloud("IV", 3, "square", &first.instruments),
         cloud("F-CLOE", 1, "circle", &first.normalised),
-        cloud("truth", 2, "cross", &[TRUTH]),
+        truth(),
     ];
     cloud_figure("clouds", curves)
 }
@@ -224,7 +231,7 @@ fn clouds_figure(study: &Study) -> Figure {
 fn closer_figure(study: &Study) -> Figure {
     let curves = vec![
         cloud("F-CLOE", 1, "circle", &study.first.normalised),
-        cloud("truth", 2, "cross", &[TRUTH]),
+        truth(),
     ];
     cloud_figure("closer", curves)
 }
@@ -247,17 +254,17 @@ fn iterations_figure(study: &Study) -> Figure {
             "x",
         ),
     ];
-    let most = series
-        .iter()
-        .flat_map(|(_, counts, ..)| counts.iter())
-        .max();
-    let most = most.copied().unwrap_or_default();
     let curves = series.map(|(name, counts, colour, marker)| {
-        let number = |step: usize| counts.iter().filter(|count| **count == step).count() as f64;
+        let number = |step: usize| counts.iter().filter(|count| **count == step).count();
+        let most = counts.iter().copied().max().unwrap_or_default();
+        let (x, y) = (1..=most)
+            .map(|step| (step as f64, number(step) as f64))
+            .filter(|(_, number)| *number > 0.0)
+            .unzip();
         Curve {
             marker: Some(marker),
-            x: (1..=most).map(|step| step as f64).collect(),
-            y: Values::Numbers((1..=most).map(number).collect()),
+            x,
+            y: Values::Numbers(y),
             ..Curve::line(name, 0, colour, (&[], &[]))
         }
         .named()

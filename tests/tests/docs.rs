@@ -128,6 +128,7 @@ fn links_lead_to_files() {
         "benches/README.md",
         "docs/adding-an-effect.md",
         "docs/block-diagonal-gain.md",
+        "docs/closed-loop.md",
         "docs/design.md",
         "docs/gallery.md",
         "docs/model-file.md",

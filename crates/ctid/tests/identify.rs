@@ -136,7 +136,7 @@ fn units_and_dynamics_are_those_of_the_record() {
         unreachable!()
     };
     assert!((slow - 15.0).abs() < 0.5 && (fast - 10.0).abs() < 0.5);
-    let trajectory = found.trajectory;
+    let trajectory = found.trajectory.unwrap();
     assert_eq!(trajectory.time.last(), Some(&3099.0));
     assert!(
         trajectory
@@ -234,7 +234,7 @@ fn drift_with_the_operating_point_leaves_the_band() {
         *y = 40.0 + 2.0 * (*y - 40.0);
     }
     let found = found(&record, Method::StabilizedOe, plant.order());
-    let trajectory = found.trajectory;
+    let trajectory = found.trajectory.unwrap();
     let at = |t: f64| trajectory.time.iter().position(|time| *time >= t).unwrap();
     let (before, after) = (at(2090.0), trajectory.time.len() - 1);
     let [(low, low_error), (high, high_error)] =

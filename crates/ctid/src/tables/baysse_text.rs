@@ -110,9 +110,10 @@ pub(crate) fn band(cell: &Cell, between: &str) -> String {
         None => String::new(),
         Some([low, high]) if high.is_infinite() => format!("> {low}"),
         Some([low, high]) => {
+            let places = 1 - numbers::exponent(high - low);
             let end = |end: f64| match end.abs() < SMALL {
                 true => format!("{end:.1e}"),
-                false => short(&numbers::significant(end, 5)),
+                false => short(&numbers::decimals(end, places)),
             };
             format!("{}{between}{}", end(low), end(high))
         }

@@ -22,7 +22,7 @@ impl Task<'_> {
             offsets,
             ..centred.clone()
         };
-        let problem = Problem::new(&[record.clone()], &self.controller, self.orders)?;
+        let problem = Problem::new(std::slice::from_ref(&record), &self.controller, self.orders)?;
         let candidates = self.pipeline(&centred)?;
         let starts = candidates.len();
         let mut best: Option<(fcloe::Fit, start::Candidate)> = None;

@@ -124,7 +124,11 @@ impl Task<'_> {
     fn identify(&self) -> Result<Identification, Error> {
         // What is refused is the same for all methods.
         let centred = self.centred(self.offsets_at_rest()?)?;
-        let problem = Problem::new(&[centred.clone()], &self.controller, self.orders)?;
+        let problem = Problem::new(
+            std::slice::from_ref(&centred),
+            &self.controller,
+            self.orders,
+        )?;
         let mismatch = problem.mismatches().first().copied().flatten();
         let found = match self.request.method {
             Method::Ls => self.regression(centred, false)?,

@@ -26,9 +26,13 @@ impl Task<'_> {
             ..record.clone()
         };
         let mut warnings = Vec::new();
-        let begun = Problem::new(&[beginning.clone()], &self.controller, self.orders)
-            .map_err(Error::from)
-            .and_then(|_| self.begun(beginning));
+        let begun = Problem::new(
+            std::slice::from_ref(&beginning),
+            &self.controller,
+            self.orders,
+        )
+        .map_err(Error::from)
+        .and_then(|_| self.begun(beginning));
         let begun = match begun {
             Ok(begun) => begun,
             Err(_) => {

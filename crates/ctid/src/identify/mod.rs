@@ -1,13 +1,23 @@
 //! A linear model in continuous time from one record: `A(s) y = B(s) u + d`, `A = 1 + a_1 s + .. + a_n s^n`, `B = b_0 + .. + b_m s^m`.
 //!
-//! Both methods run over the record once, on signals from the same state variable filters, with the same forgetting:
+//! Two methods run over the record once, on signals from the same state variable filters, with the same forgetting:
 //!
 //! | method | error that is made small | use it where |
 //! |---|---|---|
 //! | [`Method::CtRls`] | equation error of the filtered signals | noise is low: it biases the estimates, by the share of noise the filters let through |
 //! | [`Method::StabilizedOe`] | output error of a model in parallel | noise is there: it is not in the regressor |
 //!
-//! The offset `d` is always estimated, as records are seldom taken from their point of rest. Inside, time and signals are scaled so that all
+//! Four have to do with a loop `u = R/S (r - y)`; without a controller they identify in open loop. Their signals are deviations from levels of
+//! rest, see [`LevelChoice`]; in a loop the model is that of the whole loop, driven by the reference:
+//!
+//! | method | what it does | use it where |
+//! |---|---|---|
+//! | [`Method::Fcloe`] | output error of the loop, over the whole record | always, to begin with: noise that circulates does not bias it, and it says its standard errors |
+//! | [`Method::RecursiveFcloe`] | the same, sample by sample | the plant drifts |
+//! | [`Method::Iv`] | instruments simulated in the loop | a check that needs no iteration |
+//! | [`Method::Ls`] | least squares | noise is low, or to see what noise does |
+//!
+//! Of the first two: the offset `d` is always estimated, as records are seldom taken from their point of rest. Inside, time and signals are scaled so that all
 //! parameters are about 1.
 //!
 //! The numbers that are not given are found from the best model of first order, over a grid of time constants: the start, the bandwidth of

@@ -264,3 +264,56 @@ pub fn csv(record: &Record) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_jackknife_of_a_mean_is_its_standard_error() {
+        let values = [3.0, 1.0, 4.0, 1.0, 5.0, 9.0, 2.0, 6.0];
+        let error = (variance(&values) / 8.0).sqrt();
+        assert!((jackknife(&values, mean) / error - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bands_grow_for_fewer_runs_only() {
+        let near = |found: [f64; 2], low: f64, high: f64| {
+            assert!((found[0] - low).abs() < 1e-12 && (found[1] - high).abs() < 1e-12);
+        };
+        near(band_for(400, [1.0, 3.0]), 1.0, 3.0);
+        near(band_for(25, [1.0, 3.0]), 0.0, 4.0);
+    }
+
+    /// The loop rests where it is said to, and what is written is what was recorded.
+    #[test]
+    fn the_rig_rests_and_its_record_can_be_read() {
+        let quiet = Rig {
+            noise: 0.0,
+            amplitude: 1e-9,
+            ..Rig::default()
+        };
+        let record = quiet.record(1, 0).unwrap();
+        let moved = |signal: &Signal| signal.range().1 - signal.range().0;
+        assert!(moved(&record.output) < 2e-3 && moved(&record.input) < 2e-3);
+
+        let record = Rig::default().record(1, 0).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rig.csv");
+        std::fs::write(&path, csv(&record)).unwrap();
+        let columns = ct_signals::Columns::default();
+        let read = ct_signals::read_csv(&path, &columns, record.hold).unwrap();
+        assert_eq!(
+            (&read.time, &read.output.unit),
+            (&record.time, &record.output.unit)
+        );
+        let pairs = |a: &Signal, b: &Signal| -> f64 {
+            let off = a.values.iter().zip(&b.values).map(|(a, b)| (a - b).abs());
+            off.fold(0.0, f64::max)
+        };
+        assert!(pairs(&read.output, &record.output) < 6e-5);
+        assert!(pairs(&read.input, &record.input) < 6e-5);
+        let [there, here] = [&read, &record].map(|r| r.reference.clone().unwrap());
+        assert!(pairs(&there, &here) < 6e-5);
+    }
+}

@@ -329,13 +329,14 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
             "before a minimum"
         };
         let noise = match batch.noise {
-            NoisePath::Loop => "the noise circulates in the loop",
-            NoisePath::Record => "the noise is on the record alone",
+            _ if open => "",
+            NoisePath::Loop => "; the noise circulates in the loop",
+            NoisePath::Record => "; the noise is on the record alone",
         };
         facts.push((
             "fit",
             format!(
-                "{} steps, ended {end}, the best of {} starts; {noise}",
+                "{} steps, ended {end}, the best of {} starts{noise}",
                 batch.iterations, batch.starts
             ),
         ));

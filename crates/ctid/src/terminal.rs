@@ -552,7 +552,7 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
             look.warning("Something is missing, and more than one effect fits these data")
         }
         Verdict::Unexplained => {
-            look.warning("Something is missing that the catalogue does not explain")
+            look.warning("What is left is not noise, and no effect of the catalogue explains it")
         }
     };
     let mut text = format!("{headline}\n");

@@ -12,7 +12,7 @@ pub enum Verdict {
     Effect,
     /// Something is missing, and at least one added effect has a stand-in that fits as well.
     Undecided,
-    /// Something is missing, and nothing in the catalogue explains it.
+    /// What the model leaves is not noise, and nothing in the catalogue explains it.
     Unexplained,
     /// Nothing is missing that these data would show.
     Adequate,

@@ -84,7 +84,10 @@ impl Expected {
         Self {
             square,
             spacing,
-            lines: transform(&folded).iter().map(|line| line.re.max(0.0)).collect(),
+            lines: transform(&folded)
+                .iter()
+                .map(|line| line.re.max(0.0))
+                .collect(),
         }
     }
 
@@ -215,7 +218,12 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
         lowest = lowest.min(step);
         // Both signs of a frequency count.
         let part = 2.0 / samples as f64;
-        for (k, (line, noise)) in transform(one.residual).iter().zip(&expected.lines).enumerate().skip(1) {
+        for (k, (line, noise)) in transform(one.residual)
+            .iter()
+            .zip(&expected.lines)
+            .enumerate()
+            .skip(1)
+        {
             let own = line.norm_sqr() / n as f64;
             lines.push(Line(k as f64 * step, part * own, part * noise));
         }
@@ -227,7 +235,10 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
     while (from - 0.5) * lowest < highest {
         let (above, below) = ((from - 0.5) * lowest, (2.0 * from - 0.5) * lowest);
         let (mut count, mut square, mut noise, mut spread) = (0, 0.0, 0.0, 0.0);
-        for line in lines.iter().filter(|line| line.0 >= above && line.0 < below) {
+        for line in lines
+            .iter()
+            .filter(|line| line.0 >= above && line.0 < below)
+        {
             count += 1;
             square += line.1;
             noise += line.2;
@@ -237,7 +248,7 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
         bands.push(Bin {
             record: None,
             from: from * lowest,
-            to: (2.0 * from * lowest).min(highest.max(from * lowest) + lowest),
+            to: (2.0 * from * lowest).min(highest + lowest),
             count,
             mean: 0.0,
             rms: square.sqrt(),
@@ -269,16 +280,21 @@ pub(crate) fn locate(located: &Located) -> Failures {
         .collect();
     let mut by_time = Vec::new();
     for (k, (one, expected)) in series.iter().zip(&expected).enumerate() {
-        by_time.extend(by(one.time, one.residual, expected).into_iter().map(|bin| Bin {
-            record: Some(k),
-            ..bin
-        }));
+        by_time.extend(
+            by(one.time, one.residual, expected)
+                .into_iter()
+                .map(|bin| Bin {
+                    record: Some(k),
+                    ..bin
+                }),
+        );
     }
     // Where samples of several records come together, those of the longest are tied the most.
     let Some(longest) = expected.iter().max_by_key(|expected| expected.lines.len()) else {
         return Failures::default();
     };
-    let of_all = |signal: fn(&Series) -> Vec<f64>| series.iter().flat_map(signal).collect::<Vec<f64>>();
+    let of_all =
+        |signal: fn(&Series) -> Vec<f64>| series.iter().flat_map(signal).collect::<Vec<f64>>();
     let residual = of_all(|one| one.residual.to_vec());
     let by_level = by(&of_all(|one| one.model.to_vec()), &residual, longest);
     let by_flow = by(&of_all(|one| one.input.to_vec()), &residual, longest);
@@ -323,7 +339,10 @@ fn sentences(located: &Located, residual: &[f64], failures: &Failures) -> Vec<St
         }
     };
     worst(&failures.by_time, &|bin| {
-        let record = bin.record.filter(|_| located.series.len() > 1).and_then(|k| located.series.get(k));
+        let record = bin
+            .record
+            .filter(|_| located.series.len() > 1)
+            .and_then(|k| located.series.get(k));
         let record = record.map_or(String::new(), |one| format!("in {}, ", one.name));
         format!("{record}from {:.0} to {:.0} s", bin.from, bin.to)
     });
@@ -346,7 +365,8 @@ fn sentences(located: &Located, residual: &[f64], failures: &Failures) -> Vec<St
     });
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut sentences: Vec<String> = found.into_iter().map(|(_, sentence)| sentence).collect();
-    let band = failures.by_frequency
+    let band = failures
+        .by_frequency
         .iter()
         .filter(|bin| bin.fails)
         .max_by(|a, b| a.rms.total_cmp(&b.rms));
@@ -452,7 +472,11 @@ mod tests {
             for run in 0..100 {
                 let residual = noise::ar1(1000, size, colour, &mut rng);
                 let failures = located(&process, &[(&time, &model, &residual)]);
-                assert_eq!(failing(&failures), 0, "colour {colour}, run {run}: {failures:?}");
+                assert_eq!(
+                    failing(&failures),
+                    0,
+                    "colour {colour}, run {run}: {failures:?}"
+                );
             }
         }
     }
@@ -463,17 +487,25 @@ mod tests {
         let (time, model) = rig(1000);
         let process = ArModel::from_coefficients(&[0.95], 0.2).unwrap();
         let swing = |period: f64| -> Vec<f64> {
-            noise::ar1(1000, process.stationary_std(), 0.95, &mut ChaCha8Rng::seed_from_u64(9))
-                .iter()
-                .zip(&time)
-                .map(|(e, t)| e + 0.4 * (TAU * t / period).sin())
-                .collect()
+            noise::ar1(
+                1000,
+                process.stationary_std(),
+                0.95,
+                &mut ChaCha8Rng::seed_from_u64(9),
+            )
+            .iter()
+            .zip(&time)
+            .map(|(e, t)| e + 0.4 * (TAU * t / period).sin())
+            .collect()
         };
         let quick = located(&process, &[(&time, &model, &swing(3.0))]);
         let said = quick.sentences.join("; ");
         assert!(said.contains("most at periods of 2 to 4 s"), "{said}");
         // Where the noise itself is large a swing of that size is nothing.
-        assert_eq!(failing(&located(&process, &[(&time, &model, &swing(300.0))])), 0);
+        assert_eq!(
+            failing(&located(&process, &[(&time, &model, &swing(300.0))])),
+            0
+        );
     }
 
     #[test]
@@ -490,7 +522,12 @@ mod tests {
             &[(&time, &model, &right), (&time, &model, &wrong)],
         );
         assert_eq!(failures.by_time.len(), 2 * BINS);
-        assert!(failures.by_time.iter().all(|bin| !bin.fails || bin.record == Some(1)));
+        assert!(
+            failures
+                .by_time
+                .iter()
+                .all(|bin| !bin.fails || bin.record == Some(1))
+        );
         let said = failures.sentences.join("; ");
         assert!(said.contains("in second, from 500 to 583 s"), "{said}");
     }

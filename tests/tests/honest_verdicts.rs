@@ -102,7 +102,7 @@ fn what_is_outside_the_catalogue_is_not_called_noise() {
         let compared = compare(&problem, &Options::default()).unwrap();
         let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
         for found in [compared, found] {
-            assert_eq!(found.verdict, Verdict::Unexplained, "{says}");
+            assert_eq!(found.verdict, Verdict::Unexplained, "{:?}", found.sentences);
             assert!(found.effects.is_empty(), "{says}: {:?}", found.effects);
             assert!(
                 found.sentences[0].contains(says),
@@ -119,15 +119,23 @@ fn what_is_outside_the_catalogue_is_not_called_noise() {
     }
 }
 
-/// Ten seeds of each: `cargo test -p ctid-tests --test honest_verdicts -- --ignored --nocapture`.
+/// Twenty seeds of each: `cargo test -p ctid-tests --test honest_verdicts -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes"]
 fn what_is_outside_the_catalogue_is_not_named_as_an_effect() {
     let mut named = Vec::new();
     for (kind, (says, outside)) in OUTSIDE.into_iter().enumerate() {
         let mut verdicts = std::collections::BTreeMap::new();
-        for seed in 11..=20 {
+        for seed in 11..=30 {
             let found = diagnosed(&disturbed(outside), seed, &Options::default());
+            for remark in found
+                .sentences
+                .iter()
+                .filter(|said| said.contains("not taken for the answer"))
+            {
+                let (rmse, floor) = (found.steps[0].rmse, found.noise_floor);
+                println!("{kind} seed {seed}: {rmse:.3} cm, floor {floor:.3} cm: {remark}");
+            }
             *verdicts.entry(format!("{:?}", found.verdict)).or_insert(0) += 1;
             if !found.effects.is_empty() {
                 println!("{kind} seed {seed}: {:?}", found.sentences);
@@ -164,7 +172,6 @@ fn an_effect_that_explains_a_small_part_is_a_remark() {
         let said = found.sentences.join(" ");
         assert_eq!(found.verdict, Verdict::Unexplained, "{said}");
         assert!(found.effects.is_empty() && found.steps.len() == 1);
-        assert!(said.contains("sudden, from 1000 to"), "{said}");
         if problem.records.len() > 1 {
             assert!(said.contains("(in disturbed.csv)"), "{said}");
             let windows = &found.steps[0].failures.by_time;
@@ -175,6 +182,31 @@ fn an_effect_that_explains_a_small_part_is_a_remark() {
                     .all(|bin| !bin.fails || bin.record == Some(1))
             );
         }
+    }
+}
+
+/// A large effect is named beside a small disturbance, and in a noise that wanders more slowly than the process.
+#[test]
+fn an_effect_that_explains_nearly_all_is_named() {
+    let hidden = vec![("pump_saturation", 0, vec![5.0])];
+    let beside_a_jump = Rig {
+        hidden: hidden.clone(),
+        ..disturbed(|t| (0.0, if t > 1000.0 { 0.3 } else { 0.0 }))
+    };
+    let in_a_wander = Rig {
+        hidden,
+        colour: 0.99,
+        noise: 0.3,
+        ..Rig::single_tank()
+    };
+    for rig in [beside_a_jump, in_a_wander] {
+        let found = diagnosed(&rig, 1, &Options::default());
+        let said = found.sentences.join(" ");
+        assert!(
+            found.effects.contains(&"pump_saturation".to_string()),
+            "{said}"
+        );
+        assert!(said.contains("Something remains"), "{said}");
     }
 }
 

@@ -59,6 +59,18 @@ pub(crate) struct Left {
     pub record: Option<usize>,
 }
 
+impl Left {
+    /// The size of the noise above which there is something to explain. A wander is a noise too, in whose metric effects
+    /// are confirmed as in any other; what else remains is in the noise model by mistake, but hardly in what it cannot
+    /// predict.
+    pub(crate) fn above(&self, noise: &ArModel) -> f64 {
+        match self.what {
+            Remains::Slow(..) => noise.stationary_std(),
+            _ => noise.sigma(),
+        }
+    }
+}
+
 /// What the residual of a model holds that is not noise; `own` is its fit with the colour of its own residual.
 pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
     let (p, record) = least_p(node, of_command)?;

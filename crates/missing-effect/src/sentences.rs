@@ -18,11 +18,11 @@ fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
 
-fn list(names: &[String]) -> String {
+fn list(names: &[String], last_word: &str) -> String {
     match names {
         [] => String::new(),
         [one] => one.clone(),
-        [most @ .., last] => format!("{} or {last}", most.join(", ")),
+        [most @ .., last] => format!("{} {last_word} {last}", most.join(", ")),
     }
 }
 
@@ -112,10 +112,14 @@ pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
 
 /// The best that the catalogue has where it is not the answer.
 pub(crate) fn of_a_part(last: &Node, unit: &str) -> String {
-    let names: Vec<&str> = last.added.iter().map(|placed| placed.effect.id).collect();
+    let names: Vec<String> = last
+        .added
+        .iter()
+        .map(|placed| placed.effect.id.to_string())
+        .collect();
     format!(
-        "The best that the catalogue has is {}, which leaves {:.3} {unit} rms: less than half of the mean square above the noise floor would be explained, so it is not taken for the answer.",
-        names.join(" with "),
+        "The best that the catalogue has is {}, which leaves {:.3} {unit} rms: too much would be left that is not noise, so it is not taken for the answer.",
+        list(&names, "and"),
         last.fit.rmse
     )
 }
@@ -234,7 +238,7 @@ pub(crate) fn of_diagnosis(
                 if group.len() > 1 {
                     said.push(format!(
                         "It is {}: this data cannot tell them apart; {effect}{place}{size} fits best.{doubt}",
-                        list(group)
+                        list(group, "or")
                     ));
                 } else {
                     said.push(format!("It is {effect}{place}{size}.{doubt}"));

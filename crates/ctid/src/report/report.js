@@ -7,7 +7,6 @@
   const touch = matchMedia("(pointer: coarse)").matches;
   const records = report.records || [];
   const steps = report.steps || [];
-  // The cloud of samples is that of the first fitted record.
   const located = Math.max(0, records.findIndex((record) => !record.held_out));
   let chosen = steps.length - 1;
   let residualRecord = located;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use ct_signals::{ROWS_PER_PARAMETER, Record, read_csv};
 use missing_effect::Problem;
 use plants::controller::Pi;
-use plants::{Plant, Scales};
+use plants::{Outlet, Plant, Scales};
 
 use crate::model_file::{self, ModelFile};
 use crate::output::same_file;
@@ -13,6 +13,9 @@ use crate::{Error, numbers};
 
 /// A level this many times the tank's height is in another unit.
 const BEYOND_THE_TANK: f64 = 1.5;
+
+/// Readings this far below zero, as a part of what the record spans, are no noise about an empty tank.
+const BELOW_THE_OUTLET: f64 = 0.1;
 
 /// The files of a problem.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,6 +125,7 @@ pub fn problem(
 ) -> Result<Problem, Error> {
     check_units(&records, &test)?;
     check_height(model_name, &model, records.iter().chain(&test))?;
+    check_levels(&model, records.iter().chain(&test))?;
     check_rows(&model, &records)?;
     // The operating point plays no part in the loop's stability, and is not known.
     let controller = model
@@ -194,6 +198,43 @@ fn check_height<'a>(
         }
     }
     Ok(())
+}
+
+/// Where the outflow is a square root of the level a reading far below zero has another zero than the outlet: no such
+/// level can be simulated. Noise about an empty tank may reach below it, and so may a sensor whose offset is in the model.
+fn check_levels<'a>(
+    model: &ModelFile,
+    mut records: impl Iterator<Item = &'a Record>,
+) -> Result<(), Error> {
+    let offset = model
+        .effects
+        .iter()
+        .any(|placed| placed.effect.id == "sensor_offset");
+    if model.plant.outlet() != Outlet::Torricelli || offset {
+        return Ok(());
+    }
+    let below = records.find_map(|record| {
+        let (low, high) = record.output_range();
+        (low < -BELOW_THE_OUTLET * (high - low)).then_some((record, low))
+    });
+    let Some((record, low)) = below else {
+        return Ok(());
+    };
+    let unit = match record.output.unit.as_str() {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    Err(Error::File {
+        file: record.name.clone(),
+        what: format!(
+            "column \"{}\" falls to {}{unit}, but {} lets out by the square root of the level, which is not below zero: \
+             add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, where the \
+             offset is to be fitted, run `ctid add sensor_offset`",
+            record.output.name,
+            numbers::significant(low, 3),
+            model.plant.id()
+        ),
+    })
 }
 
 /// Enough rows for the parameters; every record brings initial levels of its own.
@@ -284,6 +325,37 @@ mod tests {
             ),
             "{message}"
         );
+    }
+
+    #[test]
+    fn a_level_below_the_outlet_is_refused_where_its_root_is_taken() {
+        let lowered = |by: f64| {
+            let mut record = record("a.csv", 50, "cm");
+            record.output.values.iter_mut().for_each(|y| *y -= by);
+            record
+        };
+        assert_eq!(
+            refused(
+                "plant = \"single-tank\"",
+                vec![record("b.csv", 50, "cm")],
+                vec![lowered(30.0)]
+            ),
+            "a.csv: column \"y\" falls to -28.0 cm, but single-tank lets out by the square root of the level, which is not \
+             below zero: add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, \
+             where the offset is to be fitted, run `ctid add sensor_offset`"
+        );
+        let taken = |model: &str, by: f64| {
+            let model = model_file::parse("tank.toml", model).unwrap();
+            problem("tank.toml", model, vec![lowered(by)], vec![]).is_ok()
+        };
+        // The readings run from 2 to 14 cm.
+        assert!(!taken("plant = \"single-tank\"", 3.3));
+        assert!(taken("plant = \"single-tank\"", 3.1));
+        assert!(taken("plant = \"single-tank-linear\"", 30.0));
+        assert!(taken(
+            "plant = \"single-tank\"\neffects = [\"sensor_offset\"]",
+            4.0
+        ));
     }
 
     #[test]

@@ -23,7 +23,6 @@ pub mod input;
 pub mod look;
 pub mod model_file;
 mod names;
-mod numbers;
 pub mod output;
 mod plot;
 pub mod progress;
@@ -34,3 +33,4 @@ pub mod tour;
 
 pub use commands::{Cli, run};
 pub use error::{Error, one_line};
+use missing_effect::numbers;

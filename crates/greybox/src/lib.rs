@@ -14,7 +14,7 @@ mod triangle;
 pub use error::Error;
 pub use fit::{Fit, FitOptions, coloured, fit, fit_from, fit_initial_levels, noise_of};
 pub use levenberg_marquardt::{Stop, Stopping};
-pub use sandwich::{Robust, robust, sandwich_std_errors};
+pub use sandwich::{Robust, robust};
 pub use setup::{Rows, Setup, Simulated};
 pub use starts::{random_starts, starts_around};
 pub use triangle::Triangle;

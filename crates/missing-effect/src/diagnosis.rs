@@ -1,6 +1,7 @@
 //! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
 //! printed or plotted is derived from them.
 
+use ct_signals::ArModel;
 use serde::Serialize;
 
 /// What the search found.
@@ -11,7 +12,7 @@ pub enum Verdict {
     Effect,
     /// Something is missing, and at least one added effect has a stand-in that fits as well.
     Undecided,
-    /// Something is missing, and nothing in the catalogue explains it.
+    /// What the model leaves is not noise, and nothing in the catalogue explains it.
     Unexplained,
     /// Nothing is missing that these data would show.
     Adequate,
@@ -50,6 +51,9 @@ pub struct ResidualTests {
 /// The residual in one bin of something: a time window, a range of level, of flow, ...
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bin {
+    /// Position of the record that a window lies in, fitted ones first; `None` where all fitted records are counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub record: Option<usize>,
     /// Lower edge.
     pub from: f64,
     /// Upper edge.
@@ -60,14 +64,14 @@ pub struct Bin {
     pub mean: f64,
     /// Root mean square of the residual, in the output's unit.
     pub rms: f64,
-    /// It fails: its mean square is clearly above that of the whole record's noise.
+    /// It fails: its mean square is clearly above what the noise would show there.
     pub fails: bool,
 }
 
-/// Where a model fails, in the first record it was fitted to.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Where a model fails, in all records that it was fitted to.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Failures {
-    /// By time \[s\].
+    /// By time \[s\], record by record.
     pub by_time: Vec<Bin>,
     /// By the model's level, in the output's unit.
     pub by_level: Vec<Bin>,
@@ -142,6 +146,16 @@ pub struct NoiseFloor {
 }
 
 impl NoiseFloor {
+    /// The noise that a residual is judged against: that of the floor's level and, where that is the noise's own, of its
+    /// colour.
+    pub(crate) fn model(&self) -> Result<ArModel, ct_signals::Error> {
+        if self.level > self.innovation {
+            ArModel::from_coefficients(&self.coefficients, self.innovation)
+        } else {
+            Ok(ArModel::white(self.level))
+        }
+    }
+
     /// The floor where the residual is not noise alone: what a model lacks is in the residual too, but hardly in what
     /// cannot be predicted from the residual's own past.
     pub(crate) fn of_what_is_new(self) -> Self {

@@ -11,6 +11,7 @@ mod diagnosis;
 mod error;
 mod locate;
 mod noise_floor;
+pub mod numbers;
 mod problem;
 mod remains;
 mod scores;

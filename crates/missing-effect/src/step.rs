@@ -1,11 +1,11 @@
 //! From a fitted node to what is reported of it.
 
-use ct_signals::{Record, residual_tests};
+use ct_signals::{ArModel, Record, residual_tests};
 use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
 
 use crate::{
     Error, Parameter, ResidualTests, Step,
-    locate::{Series, locate},
+    locate::{Located, Series, locate},
     noise_floor::NOISE_ORDER,
     remains::input_p,
     search::Node,
@@ -85,8 +85,14 @@ pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -
         .collect()
 }
 
-/// The report of one node; `bic` is its criterion under the colour of its own residual, `floor` the noise's standard deviation.
-pub(crate) fn report(node: &Node, bic: f64, floor: f64, test: &[Record]) -> Result<Step, Error> {
+/// The report of one node; `bic` is its criterion under the colour of its own residual, `judge` the noise
+/// against which its residual is judged.
+pub(crate) fn report(
+    node: &Node,
+    bic: f64,
+    judge: &ArModel,
+    test: &[Record],
+) -> Result<Step, Error> {
     let Node { setup, fit, added } = node;
     let last = added.last();
     let simulated = setup.simulate(&fit.x)?.output;
@@ -104,12 +110,22 @@ pub(crate) fn report(node: &Node, bic: f64, floor: f64, test: &[Record]) -> Resu
         whiteness_p: residual_tests::ljung_box(residual, portmanteau, 0)?,
         input_p: input_p(node)?,
     };
-    let failures = locate(&Series {
-        time: &record.time,
-        input: &record.input.values,
-        model: &simulated[0],
-        residual,
-        floor,
+    let series: Vec<Series> = setup
+        .records
+        .iter()
+        .zip(&simulated)
+        .zip(&residuals)
+        .map(|((record, model), residual)| Series {
+            name: &record.name,
+            time: &record.time,
+            input: &record.input.values,
+            model,
+            residual,
+        })
+        .collect();
+    let failures = locate(&Located {
+        series: &series,
+        noise: judge,
         output_unit: &record.output.unit,
         input_unit: &record.input.unit,
     });

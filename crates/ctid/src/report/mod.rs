@@ -83,7 +83,9 @@ fn verdict(diagnosis: &Diagnosis) -> &'static str {
     match diagnosis.verdict {
         Verdict::Effect => "The missing effect is found",
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
-        Verdict::Unexplained => "Something is missing that the catalogue does not explain",
+        Verdict::Unexplained => {
+            "What is left is not noise, and no effect of the catalogue explains it"
+        }
         Verdict::Adequate => "The model is adequate",
     }
 }

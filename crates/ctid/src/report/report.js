@@ -5,7 +5,6 @@
   const { narrow, touch, theme, plain, pretty, named, axis, config } = plots;
   const records = report.records || [];
   const steps = report.steps || [];
-  // The bins of the failures belong to the first fitted record.
   const located = Math.max(0, records.findIndex((record) => !record.held_out));
   let chosen = steps.length - 1;
   let residualRecord = located;
@@ -35,10 +34,10 @@
   const seen = () => (sameAxes ? steps : [steps[chosen]]);
   const level = () => (report.noise_floor > 0 ? report.noise_floor : null);
 
-  // The windows in which the chosen step fails: the larger the error, the stronger.
-  function failingWindows() {
+  // The windows of a record in which the chosen step fails: the larger the error, the stronger.
+  function failingWindows(r) {
     const most = largest(seen().flatMap((s) => s.failures.by_time.map((b) => b.rms))) || 1;
-    return steps[chosen].failures.by_time.filter((b) => b.fails).map((b) => ({
+    return steps[chosen].failures.by_time.filter((b) => b.fails && b.record === r).map((b) => ({
       type: "rect", xref: "x", yref: "paper", x0: b.from, x1: b.to, y0: 0, y1: 1, layer: "below",
       fillcolor: theme().failing, opacity: 0.08 + 0.37 * ((b.rms || 0) / most), line: { width: 0 },
     }));
@@ -86,7 +85,7 @@
       line: { color: c.faint, width: 1.2, shape: "hv" }, hovertemplate: `%{y:.4~g} ${IN}`,
     });
     return { data, layout: layout(narrow.matches ? 400 : 460, {
-      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: r === located ? failingWindows() : [],
+      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: failingWindows(r),
       xaxis: axis("time [s]", { anchor: "y2", exponentformat: "none", hoverformat: ".6~g", showspikes: false }),
       yaxis: axis(named("output", OUT), { domain: [0.33, 1] }),
       yaxis2: axis(named("input", IN), { domain: [0, 0.24], nticks: 4 }),
@@ -102,7 +101,7 @@
       x: run.residual.t, y: run.residual.y, mode: "lines", line: { color: stepColour(chosen), width: 1.4 }, name: "residual",
       hovertemplate: `%{x:.6~g} s: %{y:.3~g} ${OUT}<extra></extra>`,
     }], layout: layout(narrow.matches ? 240 : 280, {
-      hovermode: "x", shapes: (residualRecord === located ? failingWindows() : []).concat(floor),
+      hovermode: "x", shapes: failingWindows(residualRecord).concat(floor),
       xaxis: axis("time [s]", { exponentformat: "none", hoverformat: ".6~g" }), yaxis: axis(named("residual", OUT), { range: [-most, most] }),
     }) };
   }

@@ -11,6 +11,7 @@ fn problem(rig: &Rig, seed: u64) -> Problem {
         plant: rig.plant,
         known: rig.known(),
         effects: Vec::new(),
+        terms: Vec::new(),
         start: Default::default(),
         fixed: Vec::new(),
         controller: None,

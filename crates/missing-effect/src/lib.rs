@@ -18,6 +18,7 @@ mod search;
 mod sentences;
 mod step;
 mod trail;
+mod unknown;
 
 pub use diagnose::{compare, diagnose};
 pub use diagnosis::{
@@ -25,3 +26,4 @@ pub use diagnosis::{
 };
 pub use error::Error;
 pub use problem::{Options, Problem, Progress};
+pub use unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window};

@@ -3,8 +3,7 @@
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
 use missing_effect::Problem;
 use plants::{
-    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term,
-    controller::Pi,
+    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term, controller::Pi,
 };
 use rand_chacha::ChaCha8Rng;
 

@@ -5,6 +5,7 @@
 //! | the command line | [`run`], [`Cli`] |
 //! | the model file | [`model_file`]; its effects are edited by [`edit`] |
 //! | records and model, read and checked | [`input`] |
+//! | a missing term as a file | [`term_file`] |
 //! | the tour | [`tour`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
@@ -25,6 +26,7 @@ pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
+pub mod term_file;
 pub mod terminal;
 pub mod tour;
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use missing_effect::Diagnosis;
 
-use crate::{Error, atomic, report};
+use crate::{Error, atomic, report, term_file};
 
 /// How much of an existing page is looked at: the mark stands in its head.
 const HEAD: u64 = 4096;
@@ -18,6 +18,8 @@ pub enum Kind {
     Json,
     /// The diagnosis as a page.
     Report,
+    /// The shape of what is missing, as CSV; nothing is written where nothing is.
+    Unknown,
 }
 
 /// A file that will be written.
@@ -65,11 +67,11 @@ impl Output {
         &self.path
     }
 
-    /// Writes it.
+    /// Writes it; says whether there was something to write.
     ///
     /// # Errors
     /// Where the disk does not take it; what stood there before is then still there.
-    pub fn write(&self, diagnosis: &Diagnosis) -> Result<(), Error> {
+    pub fn write(&self, diagnosis: &Diagnosis) -> Result<bool, Error> {
         let content = match self.kind {
             Kind::Json => {
                 let text = serde_json::to_string_pretty(diagnosis)
@@ -77,8 +79,13 @@ impl Output {
                 text + "\n"
             }
             Kind::Report => report::html(diagnosis),
+            Kind::Unknown => match &diagnosis.unknown {
+                Some(unknown) => term_file::text(unknown),
+                None => return Ok(false),
+            },
         };
-        atomic::write(&self.path, content.as_bytes())
+        atomic::write(&self.path, content.as_bytes())?;
+        Ok(true)
     }
 }
 
@@ -147,6 +154,11 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
             let mut head = Vec::new();
             let read = file.take(HEAD).read_to_end(&mut head);
             read.is_ok() && String::from_utf8_lossy(&head).contains(report::GENERATOR)
+        }
+        Kind::Unknown => {
+            let mut head = Vec::new();
+            let read = file.take(HEAD).read_to_end(&mut head);
+            read.is_ok() && head.starts_with(term_file::HEADER.as_bytes())
         }
         Kind::Json => {
             let mut text = String::new();

@@ -86,7 +86,9 @@ pub(crate) fn base<'a>(problem: &'a Problem, options: &Options) -> Result<Node<'
     let structure = problem
         .terms
         .iter()
-        .try_fold(without.structure, |structure, term| structure.with_term(term.clone()))?;
+        .try_fold(without.structure, |structure, term| {
+            structure.with_term(term.clone())
+        })?;
     let mut setup = Setup::new(structure, &problem.records, fixed)?;
     for record in &problem.records {
         record.require_rows(setup.free().len())?;

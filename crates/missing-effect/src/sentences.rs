@@ -225,11 +225,16 @@ fn of_unknown(unknown: &Unknown) -> String {
     let others: Vec<String> = unknown
         .places
         .iter()
-        .filter(|other| other.below_best < crate::unknown::SAME_PLACE && other.place != unknown.place)
+        .filter(|other| {
+            other.below_best < crate::unknown::SAME_PLACE && other.place != unknown.place
+        })
         .map(|other| place(&other.place))
         .collect();
     if !others.is_empty() && unknown.variable == "time" {
-        said += &format!(" (or {}: the likelihood does not tell)", others.join(" or "));
+        said += &format!(
+            " (or {}: the likelihood does not tell)",
+            others.join(" or ")
+        );
     }
     if unknown.variable == "time" {
         said += " and follows no variable of the plant, so that it is a function of time";
@@ -254,14 +259,20 @@ fn of_unknown(unknown: &Unknown) -> String {
             said += &format!(
                 ", which predicts {:.0} ± {:.0} % of it on data that were left out",
                 100.0 * share.share.min(1.0),
-                100.0 * share.std_error
+                (100.0 * share.std_error).max(1.0)
             );
         }
         let (low, high) = unknown
             .ordinates
             .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
-        said += &format!("; it ranges over {} {}", two_digits(high - low), unknown.unit);
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(*v), high.max(*v))
+            });
+        said += &format!(
+            "; it ranges over {} {}",
+            two_digits(high - low),
+            unknown.unit
+        );
     }
     match &unknown.primitive {
         Some(nearest) => {
@@ -275,7 +286,16 @@ fn of_unknown(unknown: &Unknown) -> String {
                 };
             }
             if !nearest.effects.is_empty() {
-                said += &format!(" ({} would leave one)", list(&nearest.effects.iter().map(|e| (*e).to_string()).collect::<Vec<_>>()));
+                said += &format!(
+                    " ({} would leave one)",
+                    list(
+                        &nearest
+                            .effects
+                            .iter()
+                            .map(|e| (*e).to_string())
+                            .collect::<Vec<_>>()
+                    )
+                );
             }
         }
         None => said += "; no simple shape comes near",

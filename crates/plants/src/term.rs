@@ -160,8 +160,13 @@ impl Term {
             })
         };
         let letter = |c: char| c.is_ascii_alphanumeric() || c == '_';
-        if !self.name.starts_with(|c: char| c.is_ascii_alphabetic()) || !self.name.chars().all(letter) {
-            return refuse("a name begins with a letter and holds letters, digits and underscores alone".into());
+        if !self.name.starts_with(|c: char| c.is_ascii_alphabetic())
+            || !self.name.chars().all(letter)
+        {
+            return refuse(
+                "a name begins with a letter and holds letters, digits and underscores alone"
+                    .into(),
+            );
         }
         if effects::EffectInfo::find(&self.name).is_some() || self.name == "none" {
             return refuse("the catalogue has an effect of that name: give another".into());
@@ -188,11 +193,19 @@ impl Term {
                 "{knots} knots and {ordinates} values: as many of both, from 1 to {MOST_KNOTS}"
             ));
         }
-        if let Some(value) = self.knots.iter().chain(&self.ordinates).find(|v| !v.is_finite()) {
+        if let Some(value) = self
+            .knots
+            .iter()
+            .chain(&self.ordinates)
+            .find(|v| !v.is_finite())
+        {
             return refuse(format!("{value} is not a finite number"));
         }
         if let Some(pair) = self.knots.windows(2).find(|pair| pair[0] >= pair[1]) {
-            return refuse(format!("knot {} follows {}: knots have to rise", pair[1], pair[0]));
+            return refuse(format!(
+                "knot {} follows {}: knots have to rise",
+                pair[1], pair[0]
+            ));
         }
         Ok(())
     }
@@ -204,7 +217,10 @@ static ORDINATES: std::sync::LazyLock<Vec<String>> =
 /// The polyline through the ordinates at a point, level beyond the outermost knots.
 fn polyline<T: Scalar>(knots: &[f64], ordinates: &[T], at: T) -> T {
     let above = knots.partition_point(|knot| *knot <= at.value());
-    match (above.checked_sub(1).map(|i| ordinates[i]), ordinates.get(above)) {
+    match (
+        above.checked_sub(1).map(|i| ordinates[i]),
+        ordinates.get(above),
+    ) {
         (Some(low), Some(high)) => {
             let from = knots[above - 1];
             low + (*high - low) * ((at - from) * (1.0 / (knots[above] - from)))

@@ -8,6 +8,8 @@
 mod primitive;
 mod shape;
 mod smooth;
+#[cfg(test)]
+mod smooth_tests;
 
 use plants::{Fitted, Place, Plant, Term, Variable};
 use rayon::prelude::*;
@@ -26,9 +28,10 @@ const BAND: f64 = 1.96;
 /// A path is shown where its log-likelihood exceeds that of none that moves by this.
 const MOVES: f64 = 5.0;
 /// Places whose log-likelihood lies within this of the best are not told apart by it.
-pub(crate) const SAME_PLACE: f64 = 5.0;
-/// A variable is named where it predicts clearly more than this share of the missing term on unseen data ...
-const NAMED: f64 = 0.5;
+pub(crate) const SAME_PLACE: f64 = 10.0;
+/// A variable is named where it predicts clearly more than this share of the missing term on unseen data: what depends on it
+/// alone is predicted nearly in full, and a record that holds few values of the command ties each of them to a time ...
+const NAMED: f64 = 0.8;
 /// ... by so many standard errors.
 const CLEARLY: f64 = 1.64;
 
@@ -80,6 +83,10 @@ pub struct Unknown {
     pub value: Vec<f64>,
     /// Its standard error.
     pub std_error: Vec<f64>,
+    /// The random walk's standard deviation after one second, in the term's unit.
+    pub intensity: f64,
+    /// Standard deviation of the measurement noise beside it, in the output's unit.
+    pub noise: f64,
     /// Where it is clearly not zero, the strongest first.
     pub windows: Vec<Window>,
     /// Root mean square of the residual that it leaves, in the output's unit.
@@ -112,9 +119,18 @@ fn place_name(plant: Plant, spot: Spot) -> String {
 /// The missing term beside a fitted node; `None` where nothing moves.
 pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     let plant = node.setup.structure.plant;
-    let mut spots = vec![Spot { place: Place::Actuator, vessel: 0 }];
-    spots.extend((0..plant.vessels()).map(|vessel| Spot { place: Place::Vessel, vessel }));
-    spots.push(Spot { place: Place::Sensor, vessel: 0 });
+    let mut spots = vec![Spot {
+        place: Place::Actuator,
+        vessel: 0,
+    }];
+    spots.extend((0..plant.vessels()).map(|vessel| Spot {
+        place: Place::Vessel,
+        vessel,
+    }));
+    spots.push(Spot {
+        place: Place::Sensor,
+        vessel: 0,
+    });
     let mut smoothed: Vec<Smoothed> = spots
         .into_par_iter()
         .map(|spot| smooth(node, spot))
@@ -122,13 +138,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .into_iter()
         .flatten()
         .collect();
-    // Pump and first vessel are the same balance: of equals the vessel comes first.
-    smoothed.sort_by(|a, b| {
-        let rank = |s: &Smoothed| u8::from(s.spot.place != Place::Vessel);
-        b.log_likelihood
-            .total_cmp(&a.log_likelihood)
-            .then(rank(a).cmp(&rank(b)))
-    });
+    smoothed.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
     let Some(most) = smoothed.first().map(|s| s.log_likelihood) else {
         return Ok(None);
     };
@@ -139,11 +149,16 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
             below_best: most - s.log_likelihood,
         })
         .collect();
-    smoothed.retain(|s| most - s.log_likelihood < SAME_PLACE);
-    smoothed.sort_by_key(|s| u8::from(s.spot.place != Place::Vessel));
-    if smoothed.iter().all(|s| s.gain < MOVES) {
+    if smoothed[0].gain < MOVES {
         return Ok(None);
     }
+    let possible: Vec<f64> = smoothed[0]
+        .paths
+        .iter()
+        .flat_map(|path| path.residual.iter().copied())
+        .collect();
+    // A function of the level does not move as a random walk does, so the likelihood of one is weak evidence of the place
+    // against a curve that predicts unseen data: every place is tried.
     let candidates: Vec<(&Smoothed, Variable)> = smoothed
         .iter()
         .flat_map(|s| Variable::at(s.spot.place).iter().map(move |v| (s, *v)))
@@ -151,7 +166,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .collect();
     let mut shapes: Vec<Shape> = candidates
         .into_par_iter()
-        .map(|(smoothed, variable)| shape(node, smoothed, variable))
+        .map(|(smoothed, variable)| shape(node, smoothed, variable, &possible))
         .collect::<Result<Vec<_>, Error>>()?
         .into_iter()
         .flatten()
@@ -170,10 +185,16 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .into_iter()
         .next()
         .filter(|s| s.share - CLEARLY * s.share_error > NAMED);
-    let Some(chosen) = smoothed
-        .iter()
-        .find(|s| named.as_ref().is_none_or(|shape| shape.spot == s.spot))
-    else {
+    // The pump and the first vessel are one balance, as far as the likelihood goes: then it is said to be the vessel's.
+    let equal = |s: &&Smoothed| most - s.log_likelihood < SAME_PLACE;
+    let Some(chosen) = (match &named {
+        Some(shape) => smoothed.iter().find(|s| s.spot == shape.spot),
+        None => smoothed
+            .iter()
+            .filter(equal)
+            .find(|s| s.spot.place == Place::Vessel)
+            .or(smoothed.first()),
+    }) else {
         return Ok(None);
     };
     Ok(Some(report(node, places, shares, chosen, named)))
@@ -192,7 +213,11 @@ fn report(
     let path = &chosen.paths[0];
     let begin = record.time[0];
     let errors = |covariance: &nalgebra::DMatrix<f64>| -> Vec<f64> {
-        covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
+        covariance
+            .diagonal()
+            .iter()
+            .map(|v| v.max(0.0).sqrt())
+            .collect()
     };
     let std_error = errors(&path.covariance);
     let spot = chosen.spot;
@@ -224,7 +249,12 @@ fn report(
         ordinates: shape.ordinates,
         fitted: Fitted::Scale,
     };
-    let squares: f64 = chosen.paths.iter().flat_map(|p| &p.residual).map(|e| e * e).sum();
+    let squares: f64 = chosen
+        .paths
+        .iter()
+        .flat_map(|p| &p.residual)
+        .map(|e| e * e)
+        .sum();
     Unknown {
         place: place_name(structure.plant, spot),
         unit: label(term.unit()),
@@ -233,11 +263,19 @@ fn report(
         windows: windows(begin, &path.time, &path.value, &std_error),
         value: path.value.clone(),
         std_error,
+        intensity: (chosen.variance / chosen.lambda).sqrt(),
+        noise: chosen.variance.sqrt(),
         rmse: (squares / node.setup.samples() as f64).sqrt(),
         shares,
         variable: shape.variable.name(),
         variable_unit: label(shape.variable.unit()),
-        primitive: nearest(spot.place, shape.variable, &term.knots, &term.ordinates, &shape.information),
+        primitive: nearest(
+            spot.place,
+            shape.variable,
+            &term.knots,
+            &term.ordinates,
+            &shape.information,
+        ),
         ordinate_errors: errors(&shape.covariance),
         knots: term.knots,
         ordinates: term.ordinates,
@@ -258,7 +296,11 @@ fn windows(begin: f64, time: &[f64], value: &[f64], error: &[f64]) -> Vec<Window
         if i > from + 1 {
             let sum: f64 = value[from..i].iter().sum();
             let mean = sum / (i - from) as f64;
-            let window = Window { from: begin + time[from], to: begin + time[i - 1], mean };
+            let window = Window {
+                from: begin + time[from],
+                to: begin + time[i - 1],
+                mean,
+            };
             windows.push((sum.abs(), window));
         }
         i = i.max(from + 1);

@@ -28,13 +28,41 @@ struct Family {
 }
 
 const FAMILIES: [Family; 8] = [
-    Family { name: "constant", located: false, columns: |_, _| [1.0, 0.0] },
-    Family { name: "line", located: false, columns: |v, _| [v, 1.0] },
-    Family { name: "square root", located: false, columns: |v, _| [v.max(0.0).sqrt(), 0.0] },
-    Family { name: "parabola", located: false, columns: |v, _| [v * v, v] },
-    Family { name: "threshold", located: true, columns: |v, c| [(v - c).max(0.0), 0.0] },
-    Family { name: "end of a range", located: true, columns: |v, c| [(c - v).max(0.0), 0.0] },
-    Family { name: "step", located: true, columns: |v, c| [f64::from(u8::from(v > c)), 0.0] },
+    Family {
+        name: "constant",
+        located: false,
+        columns: |_, _| [1.0, 0.0],
+    },
+    Family {
+        name: "line",
+        located: false,
+        columns: |v, _| [v, 1.0],
+    },
+    Family {
+        name: "square root",
+        located: false,
+        columns: |v, _| [v.max(0.0).sqrt(), 0.0],
+    },
+    Family {
+        name: "parabola",
+        located: false,
+        columns: |v, _| [v * v, v],
+    },
+    Family {
+        name: "threshold",
+        located: true,
+        columns: |v, c| [(v - c).max(0.0), 0.0],
+    },
+    Family {
+        name: "end of a range",
+        located: true,
+        columns: |v, c| [(c - v).max(0.0), 0.0],
+    },
+    Family {
+        name: "step",
+        located: true,
+        columns: |v, c| [f64::from(u8::from(v > c)), 0.0],
+    },
     Family {
         name: "swing",
         located: true,
@@ -73,7 +101,9 @@ pub(super) fn nearest(
         } else if family.name == "swing" {
             (4..80).map(|i| (high - low) * 2.0 / f64::from(i)).collect()
         } else {
-            (1..24).map(|i| low + (high - low) * f64::from(i) / 24.0).collect()
+            (1..24)
+                .map(|i| low + (high - low) * f64::from(i) / 24.0)
+                .collect()
         };
         for c in places {
             let mut columns = DMatrix::zeros(knots.len(), 2);

@@ -5,8 +5,10 @@
 //! counted on parts of the record that the curve has not seen: a function of the level holds there too, a function of
 //! time cannot. What no variable predicts is left a function of time.
 
+use std::ops::Range;
+
 use ct_signals::{ArModel, Hold, Record};
-use greybox::{Stopping, fit_from};
+use greybox::Setup;
 use nalgebra::{DMatrix, DVector};
 use plants::{Command, Fitted, Simulator, Term, Variable};
 
@@ -14,15 +16,19 @@ use super::smooth::{Smoothed, Spot, carrier};
 use crate::{Error, noise_floor::slowness, search::Node};
 
 /// Knots of a polyline.
-const KNOTS: usize = 9;
+const KNOTS: usize = 12;
 /// Parts of the data that are left out in turn, each without a gap.
-const PARTS: usize = 6;
+const PARTS: usize = 10;
 /// Directions of the ordinates that hold less of the information than this share are the plant's own.
 const DETERMINED: f64 = 1e-4;
-const STOPPING: Stopping = Stopping {
-    evaluations: 40,
-    cost: 1e-7,
-};
+/// Before the fit an ordinate is as large as its neighbour to within the smoothed term's root mean square, and zero to within
+/// so many times that ...
+const SIZES: f64 = 3.0;
+/// ... and a parameter of the plant is known to within this part of itself.
+const LOOSE: f64 = 0.5;
+/// Steps of the fit, and the fall of its cost that is too small for another.
+const ROUNDS: usize = 30;
+const ENOUGH: f64 = 1e-6;
 
 /// A polyline in one variable.
 #[derive(Debug, Clone)]
@@ -107,10 +113,12 @@ fn knots(sorted: &[f64]) -> Vec<f64> {
 }
 
 /// The polyline in a variable at the place of a smoothed forcing; `None` where the variable hardly moves or the fit fails.
+/// `possible`: what the most likely forcing leaves of the residual.
 pub(super) fn shape(
     node: &Node,
     smoothed: &Smoothed,
     variable: Variable,
+    possible: &[f64],
 ) -> Result<Option<Shape>, Error> {
     let sorted = visited(node, smoothed, variable)?;
     if sorted.is_empty() || sorted.iter().any(|v| !v.is_finite()) {
@@ -138,16 +146,23 @@ pub(super) fn shape(
         .with_structure(node.setup.structure.with_term(term)?)?;
     let mut start = node.fit.x.clone();
     start.splice(own..own, vec![0.0; k]);
-    let Ok(fit) = fit_from(&setup, &[start], &ArModel::white(1.0), STOPPING) else {
+    // An ordinate is as large as the smoothed term is, give or take.
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in smoothed.paths.iter().flat_map(|path| &path.value) {
+        sum += value * value;
+        count += 1.0;
+    }
+    let size = SIZES * f64::sqrt(sum / count);
+    let Some(fitted) = fit(&setup, start, own..own + k, size) else {
         return Ok(None);
     };
-    let Some(rows) = setup.rows(&fit.x) else {
-        return Ok(None);
-    };
-    let columns = rows.columns - 1;
-    let mut j = DMatrix::from_row_slice(rows.values.len() / rows.columns, rows.columns, &rows.values);
-    let residual = j.column(columns).into_owned();
-    j = j.remove_column(columns);
+    let Fit { x, j, residual, .. } = &fitted;
+    let columns = j.ncols();
+    let states = setup
+        .free()
+        .iter()
+        .filter(|&&i| i < setup.parameter_count())
+        .count();
     // The ordinates' columns, and those of everything else.
     let (mut at, mut others) = (Vec::new(), Vec::new());
     for (column, &position) in setup.free().iter().enumerate() {
@@ -157,9 +172,9 @@ pub(super) fn shape(
             others.push(column);
         }
     }
-    let values = DVector::from_iterator(k, (own..own + k).map(|i| fit.x[i]));
+    let values = DVector::from_iterator(k, (own..own + k).map(|i| x[i]));
     let (mine, theirs) = (j.select_columns(&at), j.select_columns(&others));
-    let freedom = (residual.len() - columns.min(residual.len() - 1)) as f64;
+    let freedom = residual.len().saturating_sub(columns).max(1) as f64;
     let series: Vec<f64> = residual.iter().copied().collect();
     let inflation = slowness(&ArModel::fit(&[&series], crate::noise_floor::NOISE_ORDER)?);
     let variance = inflation * residual.norm_squared() / freedom;
@@ -182,7 +197,7 @@ pub(super) fn shape(
         }
     }
     let ordinates = (projection * &values).iter().copied().collect();
-    let (share, share_error) = unseen(node, smoothed, &j, &residual, &at, &values)?;
+    let (share, share_error) = unseen(node, possible, &fitted, &x_free(&setup, x), states)?;
     Ok(Some(Shape {
         spot,
         variable,
@@ -204,60 +219,152 @@ fn regularised(mut normal: DMatrix<f64>) -> DMatrix<f64> {
     normal
 }
 
+/// The free entries of a vector.
+fn x_free(setup: &Setup, x: &[f64]) -> DVector<f64> {
+    DVector::from_iterator(setup.free().len(), setup.free().iter().map(|&i| x[i]))
+}
+
+/// A fit with its derivatives.
+struct Fit {
+    x: Vec<f64>,
+    j: DMatrix<f64>,
+    residual: DVector<f64>,
+    /// Mean and weights of what is known of the free entries before: an ordinate is near zero and nearer to its neighbours,
+    /// a parameter of the plant near the believed model's fit.
+    prior: (DVector<f64>, DMatrix<f64>),
+}
+
+/// Least squares with a prior, by Levenberg and Marquardt's steps. Without a prior the plant's parameters and the ordinates
+/// would run off together, since the ones imitate the others.
+fn fit(setup: &Setup, start: Vec<f64>, ordinates: Range<usize>, size: f64) -> Option<Fit> {
+    let mean = x_free(setup, &start);
+    let rows = |x: &[f64]| {
+        let rows = setup.rows(x)?;
+        let samples = rows.values.len() / rows.columns;
+        let j = DMatrix::from_row_slice(samples, rows.columns, &rows.values);
+        let residual = j.column(rows.columns - 1).into_owned();
+        Some((j.remove_column(rows.columns - 1), residual))
+    };
+    let mut x = start;
+    let (mut j, mut residual) = rows(&x)?;
+    let mut damping = 1e-2;
+    // What is known before, as a weight on the squares of the departures, in units of the residual's variance.
+    let known = {
+        let count = setup.parameter_count();
+        let mut known = DMatrix::zeros(mean.len(), mean.len());
+        let inverse = |spread: f64| if spread > 0.0 { spread.powi(-2) } else { 0.0 };
+        let mut neighbour = None;
+        for (column, &position) in setup.free().iter().enumerate() {
+            if ordinates.contains(&position) {
+                known[(column, column)] += inverse(SIZES * size);
+                if let Some(before) = neighbour.replace(column) {
+                    let weight = inverse(size);
+                    known[(column, column)] += weight;
+                    known[(before, before)] += weight;
+                    known[(column, before)] -= weight;
+                    known[(before, column)] -= weight;
+                }
+            } else if position < count {
+                known[(column, column)] += inverse(LOOSE * mean[column].abs());
+            }
+        }
+        known
+    };
+    let mut weights = known.clone();
+    for _ in 0..ROUNDS {
+        let variance = residual.norm_squared() / residual.len() as f64;
+        weights = &known * variance;
+        let free = x_free(setup, &x);
+        let cost = |residual: &DVector<f64>, free: &DVector<f64>| {
+            let away = free - &mean;
+            residual.norm_squared() + away.dot(&(&weights * &away))
+        };
+        let now = cost(&residual, &free);
+        let normal = j.tr_mul(&j) + &weights;
+        let right = j.tr_mul(&residual) - &weights * (&free - &mean);
+        let mut fallen = None;
+        while damping < 1e8 {
+            let mut damped = normal.clone();
+            for i in 0..damped.nrows() {
+                damped[(i, i)] *= 1.0 + damping;
+            }
+            let step = damped.cholesky()?.solve(&right);
+            let mut next = x.clone();
+            for (d, &position) in step.iter().zip(setup.free()) {
+                let (low, high) = setup.bounds()[position];
+                next[position] = (x[position] + d).clamp(low, high);
+            }
+            if let Some((next_j, next_residual)) = rows(&next) {
+                let after = cost(&next_residual, &x_free(setup, &next));
+                if after < now {
+                    (x, j, residual) = (next, next_j, next_residual);
+                    fallen = Some((now - after) / now);
+                    damping *= 0.1;
+                    break;
+                }
+            }
+            damping *= 10.0;
+        }
+        if fallen.is_none_or(|fall| fall < ENOUGH) {
+            break;
+        }
+    }
+    Some(Fit {
+        x,
+        j,
+        residual,
+        prior: (mean, weights),
+    })
+}
+
 /// The share of the missing term that is predicted on parts that are left out in turn, and its standard error.
 ///
-/// The model is linear about its fit; an ordinate that only the left-out part has visited is taken to be zero there.
+/// The model is linear about its fit. An ordinate that only the left-out part has visited is near its neighbours'; initial
+/// states stay. A part counts for nothing at worst: what no other part has visited is no evidence against a variable.
+/// `possible`: the residual with the most likely forcing; `states`: from which column on there are initial states.
 fn unseen(
     node: &Node,
-    smoothed: &Smoothed,
-    j: &DMatrix<f64>,
-    residual: &DVector<f64>,
-    at: &[usize],
-    values: &DVector<f64>,
+    possible: &[f64],
+    Fit {
+        j,
+        residual,
+        prior: (mean, weights),
+        ..
+    }: &Fit,
+    free: &DVector<f64>,
+    states: usize,
 ) -> Result<(f64, f64), Error> {
-    let mut target = residual.clone();
-    for (column, value) in at.iter().zip(values.iter()) {
-        target += j.column(*column) * *value;
-    }
     let before: Vec<f64> = node.setup.residuals(&node.fit.x)?.concat();
-    let with_path: Vec<f64> = smoothed
-        .paths
-        .iter()
-        .flat_map(|path| path.residual.iter().copied())
-        .collect();
+    let j = j.columns(0, states);
+    let weights = weights.view((0, 0), (states, states)).into_owned();
+    let target = residual + j * (free - mean).rows(0, states);
     let n = target.len();
-    let whole = j.tr_mul(j);
+    let whole = j.tr_mul(&j) + weights;
     let right = j.tr_mul(&target);
-    let (mut fallen, mut possible) = (Vec::new(), Vec::new());
+    let (mut fallen, mut most) = (Vec::new(), Vec::new());
     for part in 0..PARTS {
         let (from, to) = (n * part / PARTS, n * (part + 1) / PARTS);
         let (rows, wanted) = (j.rows(from, to - from), target.rows(from, to - from));
-        let mut normal = &whole - rows.tr_mul(&rows);
-        // What the other parts say nothing of stays: a parameter at its fit, an ordinate at zero.
-        for column in 0..whole.nrows() {
-            normal[(column, column)] += 1e-6 * whole[(column, column)] + f64::MIN_POSITIVE;
-        }
-        let Some(factor) = normal.cholesky() else {
+        let Some(factor) = regularised(&whole - rows.tr_mul(&rows)).cholesky() else {
             return Ok((0.0, f64::INFINITY));
         };
         let solved = factor.solve(&(&right - rows.tr_mul(&wanted)));
         let left = (wanted - rows * solved).norm_squared();
         let sum = |series: &[f64]| series[from..to].iter().map(|e| e * e).sum::<f64>();
-        fallen.push(sum(&before) - left);
-        possible.push(sum(&before) - sum(&with_path));
+        let room = (sum(&before) - sum(possible)).max(0.0);
+        fallen.push((sum(&before) - left).clamp(0.0, room));
+        most.push(room);
     }
-    let total: f64 = possible.iter().sum();
+    let total: f64 = most.iter().sum();
+    if total <= 0.0 {
+        return Ok((0.0, f64::INFINITY));
+    }
     let share = fallen.iter().sum::<f64>() / total;
     let scatter: f64 = fallen
         .iter()
-        .zip(&possible)
+        .zip(&most)
         .map(|(f, p)| (f - share * p).powi(2))
         .sum();
     let parts = PARTS as f64;
-    let error = (scatter * parts / (parts - 1.0)).sqrt() / total;
-    Ok(if total > 0.0 {
-        (share, error)
-    } else {
-        (0.0, f64::INFINITY)
-    })
+    Ok((share, (scatter * parts / (parts - 1.0)).sqrt() / total))
 }

@@ -56,6 +56,10 @@ pub(super) struct Path {
 pub(super) struct Smoothed {
     pub spot: Spot,
     pub paths: Vec<Path>,
+    /// `sigma^2/q` at the largest likelihood.
+    pub lambda: f64,
+    /// `sigma^2`.
+    pub variance: f64,
     /// Restricted log-likelihood at its largest.
     pub log_likelihood: f64,
     /// By how much it exceeds that of a forcing that does not change.
@@ -174,12 +178,18 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
                 residual,
             });
         }
-        if paths.iter().flat_map(|p| &p.residual).any(|e| !e.is_finite()) {
+        if paths
+            .iter()
+            .flat_map(|p| &p.residual)
+            .any(|e| !e.is_finite())
+        {
             break;
         }
         best = Some(Smoothed {
             spot,
             paths,
+            lambda,
+            variance: solution.variance,
             log_likelihood: -0.5 * solution.deviance,
             gain: 0.5 * (still - solution.deviance),
         });
@@ -230,7 +240,13 @@ fn at(blocks: &[Block], lambda: f64) -> Option<Solution> {
             normal[(i, i)] += 1e-13 * trace;
         }
         let factor = normal.cholesky()?;
-        determinant += 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        determinant += 2.0
+            * factor
+                .l_dirty()
+                .diagonal()
+                .iter()
+                .map(|d| d.ln())
+                .sum::<f64>();
         squares += block.squares - block.right.dot(&factor.solve(&block.right));
         freedom += (block.samples - (block.normal.nrows() - block.steps().len())) as f64;
         factors.push(factor);

@@ -71,7 +71,7 @@ pub(super) fn shares(unknown: &Unknown) -> String {
         .iter()
         .map(|share| {
             let error = if share.std_error.is_finite() {
-                format!(" ± {:.0}", 100.0 * share.std_error)
+                format!(" ± {:.0}", (100.0 * share.std_error).max(1.0))
             } else {
                 String::new()
             };

@@ -166,3 +166,72 @@ fn leaves(place: Place, variable: Variable, shape: &str) -> Vec<&'static str> {
         .filter(|id| EffectInfo::find(id).is_some())
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// The nearest shape to a function at 13 knots that are known to 0.05 each.
+    fn of(variable: Variable, range: (f64, f64), f: impl Fn(f64) -> f64) -> Option<Primitive> {
+        let knots: Vec<f64> = (0..13)
+            .map(|i| range.0 + (range.1 - range.0) * f64::from(i) / 12.0)
+            .collect();
+        let ordinates: Vec<f64> = knots.iter().map(|v| f(*v)).collect();
+        let information = DMatrix::identity(13, 13) * 400.0;
+        nearest(Place::Vessel, variable, &knots, &ordinates, &information)
+    }
+
+    #[test]
+    fn every_simple_shape_is_named_where_it_is() {
+        let level = |f: fn(f64) -> f64| of(Variable::Level, (4.0, 16.0), f).unwrap();
+        assert_eq!(level(|_| -2.0).name, "constant");
+        assert_eq!(level(|_| -2.0).effects, ["const_leak"]);
+        assert_eq!(level(|h| 1.0 - 0.4 * h).name, "line");
+        assert_eq!(level(|h| -0.7 * h.sqrt()).name, "square root");
+        assert_eq!(level(|h| 0.1 * h * h - h).name, "parabola");
+        let threshold = level(|h| -1.5 * (h - 10.0).max(0.0));
+        assert_eq!((threshold.name, threshold.at), ("threshold", Some(10.0)));
+        assert!(threshold.effects.contains(&"overflow"));
+        assert_eq!(level(|h| (8.0 - h).max(0.0)).name, "end of a range");
+        assert_eq!(level(|h| if h > 9.5 { 3.0 } else { 0.0 }).name, "step");
+        let swing = of(Variable::Time, (0.0, 1000.0), |t| {
+            (t / 400.0 * std::f64::consts::TAU).sin()
+        });
+        assert_eq!(
+            (swing.as_ref().unwrap().name, swing.unwrap().at),
+            ("swing", Some(400.0))
+        );
+        assert_eq!(of(Variable::Level, (4.0, 16.0), |h| (3.0 * h).sin()), None);
+    }
+
+    #[test]
+    fn what_the_plant_imitates_is_not_seen() {
+        // Any line is imitated: what is left of a parabola with a line on it is the parabola.
+        let knots: Vec<f64> = (0..13).map(f64::from).collect();
+        let lines = DMatrix::from_fn(13, 2, |i, j| if j == 0 { 1.0 } else { i as f64 });
+        let project = DMatrix::identity(13, 13)
+            - &lines * (lines.tr_mul(&lines)).try_inverse().unwrap() * lines.transpose();
+        let ordinates: Vec<f64> = knots.iter().map(|v| 0.05 * v * v + 3.0 * v - 7.0).collect();
+        let information = &project * 400.0;
+        let found = nearest(
+            Place::Actuator,
+            Variable::Input,
+            &knots,
+            &ordinates,
+            &information,
+        );
+        assert_eq!(found.unwrap().name, "parabola");
+        let line: Vec<f64> = knots.iter().map(|v| 3.0 * v - 7.0).collect();
+        assert!(
+            nearest(
+                Place::Actuator,
+                Variable::Input,
+                &knots,
+                &line,
+                &information
+            )
+            .is_none_or(|p| p.name == "constant")
+        );
+    }
+}

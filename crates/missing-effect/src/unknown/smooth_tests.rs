@@ -6,11 +6,14 @@ use std::ops::RangeInclusive;
 use ct_signals::{ArModel, Hold, Record, Signal, noise};
 use greybox::{Setup, Stopping, fit_from};
 use nalgebra::{Matrix3, Vector3};
-use plants::{Command, Known, Place, Plant, Simulator};
+use plants::{Command, Known, Place, Plant, Simulator, Term, Variable};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::smooth::{Spot, carrier, smooth};
+use super::{
+    shape::shape,
+    smooth::{Spot, carrier, smooth},
+};
 use crate::search::Node;
 
 /// Samples, so that ten lie between two instants of the path.
@@ -28,10 +31,16 @@ const VESSEL: Spot = Spot {
 
 /// A record of a linear tank with a forcing in its balance, in units of the level.
 fn record(forcing: &[f64], rng: &mut ChaCha8Rng) -> Record {
-    let time: Vec<f64> = (0..N).map(|k| H * k as f64).collect();
-    let u: Vec<f64> = (0..N)
+    let instants: Vec<f64> = (0..INSTANTS).map(|i| H * (STEP * i) as f64).collect();
+    let u = (0..N)
         .map(|k| if (k / 120) % 2 == 0 { 3.0 } else { 4.0 })
         .collect();
+    run(carrier(VESSEL, &instants, forcing), u, rng)
+}
+
+/// A record of a linear tank with a term, all of whose ordinates are as they stand.
+fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
+    let time: Vec<f64> = (0..N).map(|k| H * k as f64).collect();
     let e = noise::white(N, NOISE, rng);
     let mut record = Record {
         name: "r".to_string(),
@@ -45,12 +54,8 @@ fn record(forcing: &[f64], rng: &mut ChaCha8Rng) -> Record {
     record.output.values = (0..N).map(|k| 10.0 + (k % 7) as f64).collect();
     let records = [record.clone()];
     let setup = setup(&records);
-    let instants: Vec<f64> = (0..INSTANTS).map(|i| H * (STEP * i) as f64).collect();
-    let structure = setup
-        .structure
-        .with_term(carrier(VESSEL, &instants, forcing))
-        .unwrap();
-    let theta: Vec<f64> = THETA.iter().chain(forcing).copied().collect();
+    let structure = setup.structure.with_term(term.clone()).unwrap();
+    let theta: Vec<f64> = THETA.iter().chain(&term.ordinates).copied().collect();
     let mut simulator = Simulator::<f64>::new(&structure, &theta, &[14.0], u[0]).unwrap();
     for k in 0..N {
         record.output.values[k] = simulator.read() + e[k];
@@ -242,4 +247,49 @@ fn where_nothing_is_missing_nothing_moves() {
         still += usize::from(smoothed.gain < super::MOVES);
     }
     assert_eq!(still, 12);
+}
+
+#[test]
+fn the_band_of_a_shape_holds_the_truth_as_often_as_it_says() {
+    use rayon::prelude::*;
+    let levels: Vec<f64> = (0..120).map(|i| 0.25 * f64::from(i)).collect();
+    let wave = |h: f64| 0.6 * (0.7 * h).sin();
+    let values: Vec<f64> = levels.iter().map(|h| wave(*h)).collect();
+    let (inside, all, named) = (0..24_u64)
+        .into_par_iter()
+        .map(|seed| {
+            let mut rng = ChaCha8Rng::seed_from_u64(900 + seed);
+            let u = ct_signals::excitation::steps(N, 20..=60, 1.5, 4.5, &mut rng).unwrap();
+            let term = Term {
+                variable: Variable::Level,
+                ..carrier(VESSEL, &levels, &values)
+            };
+            let records = [run(term, u, &mut rng)];
+            let node = node(&records);
+            let smoothed = smooth(&node, VESSEL).unwrap().unwrap();
+            let path = &smoothed.paths[0].residual;
+            let shape = shape(&node, &smoothed, Variable::Level, path)
+                .unwrap()
+                .unwrap();
+            // The truth too without what the plant's own parameters imitate.
+            let truth = nalgebra::DVector::from_iterator(
+                shape.knots.len(),
+                shape.knots.iter().map(|h| wave(*h)),
+            );
+            let truth = &shape.covariance * (&shape.information * truth);
+            let inside = (0..truth.len())
+                .filter(|&i| {
+                    (truth[i] - shape.ordinates[i]).abs() < 1.96 * shape.covariance[(i, i)].sqrt()
+                })
+                .count();
+            (inside, truth.len(), usize::from(shape.share > 0.9))
+        })
+        .reduce(|| (0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2));
+    let share = inside as f64 / all as f64;
+    println!(
+        "shape: {:.1} % of {all}, named {named} of 24",
+        100.0 * share
+    );
+    assert!(share > 0.9, "{share}");
+    assert!(named >= 22, "{named}");
 }

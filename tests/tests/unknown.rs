@@ -170,6 +170,7 @@ fn a_function_of_time_is_not_sold_as_one_of_the_level() {
             let Some(unknown) = &found.unknown else {
                 continue;
             };
+            println!("{seed}: {:.2} of it is predicted", unknown.shares[0].share);
             assert_eq!(unknown.variable, "time", "{:?}", unknown.shares);
             assert!(!found.sentences.join(" ").contains("depends on"));
             assert_eq!(unknown.knots.len(), unknown.time.len());
@@ -204,4 +205,68 @@ fn no_unknown_is_drawn_where_nothing_is_missing() {
         ..Rig::single_tank()
     };
     assert_eq!(found(&rig, 3).unknown, None);
+}
+
+/// `cargo test -p ctid-tests --test unknown study -- --ignored --nocapture`: of records on which something remains, how many
+/// are called a function of what.
+#[test]
+#[ignore = "a study of some minutes"]
+fn study() {
+    let pulse: fn(f64) -> (f64, f64) = |t| {
+        (
+            if (600.0..1000.0).contains(&t) {
+                0.3
+            } else {
+                0.0
+            },
+            0.0,
+        )
+    };
+    let swing: fn(f64) -> (f64, f64) = |t| (0.2 * (0.025 * t).sin(), 0.0);
+    let input = Term {
+        variable: Variable::Input,
+        ..term(Place::Actuator, 0, Variable::Input, (0.0, 10.0), |u| {
+            0.15 * (4.0 * u).sin()
+        })
+    };
+    let rigs = [
+        ("a wave in the level", with_level(|h| 2.5 * (1.1 * h).sin())),
+        (
+            "a dip in the level",
+            with_level(|h| -4.0 * (-(h - 14.0_f64).powi(2)).exp()),
+        ),
+        (
+            "a wave in the command",
+            Rig {
+                terms: vec![input],
+                ..Rig::single_tank()
+            },
+        ),
+        (
+            "a pulse in time",
+            Rig {
+                outside: pulse,
+                ..Rig::single_tank()
+            },
+        ),
+        (
+            "a swing in time",
+            Rig {
+                outside: swing,
+                ..Rig::single_tank()
+            },
+        ),
+    ];
+    for (name, rig) in rigs {
+        let mut counts = std::collections::BTreeMap::<String, usize>::new();
+        for seed in 1..=16 {
+            let found = found(&rig, seed);
+            let called = match &found.unknown {
+                Some(unknown) => format!("{} ({})", unknown.variable, unknown.place),
+                None => format!("{:?} without remainder", found.verdict),
+            };
+            *counts.entry(called).or_default() += 1;
+        }
+        println!("{name}: {counts:?}");
+    }
 }

@@ -16,7 +16,7 @@ use super::smooth::{Smoothed, Spot, carrier};
 use crate::{Error, noise_floor::slowness, search::Node};
 
 /// Knots of a polyline.
-const KNOTS: usize = 12;
+const KNOTS: usize = 16;
 /// Parts of the data that are left out in turn, each without a gap.
 const PARTS: usize = 10;
 /// Directions of the ordinates that hold less of the information than this share are the plant's own.
@@ -345,10 +345,18 @@ fn unseen(
     for part in 0..PARTS {
         let (from, to) = (n * part / PARTS, n * (part + 1) / PARTS);
         let (rows, wanted) = (j.rows(from, to - from), target.rows(from, to - from));
-        let Some(factor) = regularised(&whole - rows.tr_mul(&rows)).cholesky() else {
+        // Nothing next to the part is used either: the process remembers, and a command that is held is one visit, however
+        // many samples it lasts.
+        let margin = (to - from) / 2;
+        let (first, last) = (from.saturating_sub(margin), (to + margin).min(n));
+        let (hidden, unknown) = (
+            j.rows(first, last - first),
+            target.rows(first, last - first),
+        );
+        let Some(factor) = regularised(&whole - hidden.tr_mul(&hidden)).cholesky() else {
             return Ok((0.0, f64::INFINITY));
         };
-        let solved = factor.solve(&(&right - rows.tr_mul(&wanted)));
+        let solved = factor.solve(&(&right - hidden.tr_mul(&unknown)));
         let left = (wanted - rows * solved).norm_squared();
         let sum = |series: &[f64]| series[from..to].iter().map(|e| e * e).sum::<f64>();
         let room = (sum(&before) - sum(possible)).max(0.0);

@@ -69,6 +69,9 @@ fn setup(records: &[Record]) -> Setup<'_> {
     Setup::from_records(plant, Known::default(), &[], records, Default::default()).unwrap()
 }
 
+/// A forcing at the instants.
+type Forcing = fn(&mut ChaCha8Rng) -> Vec<f64>;
+
 /// The plant at its true parameters.
 fn node(records: &[Record]) -> Node<'_> {
     let setup = setup(records);
@@ -120,7 +123,7 @@ fn kalman(residual: &[f64], q: f64, variance: f64, diffuse: f64) -> Vec<(f64, f6
             1.0,
         );
         let mut noise = Matrix3::zeros();
-        if (k + 1) % STEP == 0 {
+        if (k + 1).is_multiple_of(STEP) {
             f[(1, 1)] = 0.0;
             f[(1, 2)] = 1.0;
             noise[(2, 2)] = q * dt;
@@ -203,7 +206,7 @@ fn the_band_holds_the_truth_as_often_as_it_says() {
     use rayon::prelude::*;
     // A forcing that is a random walk, and two that are not: for what is smoother the band is wide, for a jump it is short of
     // it at the jump alone.
-    let forcings: [(&str, RangeInclusive<f64>, fn(&mut ChaCha8Rng) -> Vec<f64>); 3] = [
+    let forcings: [(&str, RangeInclusive<f64>, Forcing); 3] = [
         ("random walk", 0.92..=0.98, |rng| walk(0.002, rng)),
         ("swing", 0.92..=1.0, |_| {
             (0..INSTANTS).map(|i| (0.15 * i as f64).sin()).collect()

@@ -7,6 +7,8 @@
 //! | records and model, read and checked | [`input`] |
 //! | a missing term as a file | [`term_file`] |
 //! | the tour | [`tour`] |
+//! | linear models from a record | [`mod@identify`] |
+//! | a paper's tables, computed again | [`tables`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
 //!
@@ -17,6 +19,7 @@ pub mod catalogue;
 mod commands;
 pub mod edit;
 mod error;
+pub mod identify;
 pub mod input;
 pub mod look;
 pub mod model_file;
@@ -26,6 +29,7 @@ pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
+pub mod tables;
 pub mod term_file;
 pub mod terminal;
 pub mod tour;

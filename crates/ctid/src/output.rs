@@ -5,21 +5,52 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use missing_effect::Diagnosis;
+use serde::Serialize;
 
+use crate::identify::Identification;
+use crate::tables::udink::Study;
 use crate::{Error, atomic, report, term_file};
 
 /// How much of an existing page is looked at: the mark stands in its head.
 const HEAD: u64 = 4096;
 
+/// Keys that tell JSON of ctid's from others', beside `schema`: one for each kind of result.
+const KEYS: [&str; 3] = ["verdict", "paper", "method"];
+
 /// What is in a file that the program writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// The diagnosis as JSON.
+    /// The result as JSON.
     Json,
-    /// The diagnosis as a page.
+    /// The result as a page.
     Report,
     /// The shape of what is missing, as CSV; nothing is written where nothing is.
     Unknown,
+}
+
+/// What a command finds, which is written as JSON with `schema` and one of the keys that ctid knows its own files by, or as a page.
+pub trait Found: Serialize {
+    /// The page, complete.
+    fn page(&self) -> String;
+    /// The shape of what nothing explains as CSV, where there is one.
+    fn unknown(&self) -> Option<String> {
+        None
+    }
+}
+
+impl Found for Diagnosis {
+    fn page(&self) -> String {
+        report::html(self)
+    }
+    fn unknown(&self) -> Option<String> {
+        self.unknown.as_ref().map(term_file::text)
+    }
+}
+
+impl Found for Study {
+    fn page(&self) -> String {
+        report::udink(self)
+    }
 }
 
 /// A file that will be written.
@@ -27,6 +58,12 @@ pub enum Kind {
 pub struct Output {
     kind: Kind,
     path: PathBuf,
+}
+
+impl Found for Identification {
+    fn page(&self) -> String {
+        report::identification(self)
+    }
 }
 
 /// Checks where results may go: not onto an input, not onto each other, not over a file that ctid
@@ -71,16 +108,16 @@ impl Output {
     ///
     /// # Errors
     /// Where the disk does not take it; what stood there before is then still there.
-    pub fn write(&self, diagnosis: &Diagnosis) -> Result<bool, Error> {
+    pub fn write(&self, found: &impl Found) -> Result<bool, Error> {
         let content = match self.kind {
             Kind::Json => {
-                let text = serde_json::to_string_pretty(diagnosis)
+                let text = serde_json::to_string_pretty(found)
                     .map_err(|error| Error::file(&self.path, error.to_string()))?;
                 text + "\n"
             }
-            Kind::Report => report::html(diagnosis),
-            Kind::Unknown => match &diagnosis.unknown {
-                Some(unknown) => term_file::text(unknown),
+            Kind::Report => found.page(),
+            Kind::Unknown => match found.unknown() {
+                Some(text) => text,
                 None => return Ok(false),
             },
         };
@@ -144,7 +181,7 @@ fn standing(kind: Kind, path: &Path) -> Standing {
     }
 }
 
-/// ctid wrote it: a page with the mark, or JSON with the keys of a diagnosis.
+/// ctid wrote it: a page with the mark, or JSON with the keys of a result.
 fn is_ours(kind: Kind, path: &Path) -> bool {
     let Ok(mut file) = fs::File::open(path) else {
         return false;
@@ -166,7 +203,8 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
             let value = serde_json::from_str::<serde_json::Value>(&text);
             read.is_ok()
                 && value.is_ok_and(|value| {
-                    value.get("schema").is_some() && value.get("verdict").is_some()
+                    let has = |key: &&str| value.get(key).is_some();
+                    has(&"schema") && KEYS.iter().any(has)
                 })
         }
     }

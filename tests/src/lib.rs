@@ -3,7 +3,7 @@
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
 use missing_effect::Problem;
 use plants::{
-    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, controller::Pi,
+    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term, controller::Pi,
 };
 use rand_chacha::ChaCha8Rng;
 
@@ -23,6 +23,8 @@ pub struct Rig {
     pub plant: Plant,
     /// What is built into it, with its parameters, in chain order.
     pub hidden: Vec<(&'static str, usize, Vec<f64>)>,
+    /// What is built into it that no effect of the catalogue describes.
+    pub terms: Vec<Term>,
     /// The plant's own parameters.
     pub theta: Vec<f64>,
     /// Level at rest of each vessel under the middle command \[cm\].
@@ -51,6 +53,7 @@ impl Rig {
         Self {
             plant: Plant::SingleTank,
             hidden: Vec::new(),
+            terms: Vec::new(),
             theta: vec![10.0, 12.5],
             levels: vec![16.0],
             command: (3.5, 6.5),
@@ -106,6 +109,7 @@ impl Rig {
             plant: self.plant,
             known: self.known(),
             effects: Vec::new(),
+            terms: Vec::new(),
             start: Default::default(),
             fixed: Vec::new(),
             controller: None,
@@ -139,6 +143,12 @@ impl Rig {
                 })
                 .expect("an effect of this plant");
             theta.extend(parameters);
+        }
+        for term in &self.terms {
+            structure = structure
+                .with_term(term.clone())
+                .expect("a term of this plant");
+            theta.push(1.0);
         }
         let middle = 0.5 * (self.command.0 + self.command.1);
         let mut simulator =

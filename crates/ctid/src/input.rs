@@ -127,6 +127,7 @@ pub fn problem(
     check_height(model_name, &model, records.iter().chain(&test))?;
     check_levels(&model, records.iter().chain(&test))?;
     check_rows(&model, &records)?;
+    check_terms(model_name, &model, &records[0])?;
     // The operating point plays no part in the loop's stability, and is not known.
     let controller = model
         .controller
@@ -136,6 +137,7 @@ pub fn problem(
         plant: model.plant,
         known: model.known,
         effects: model.effects,
+        terms: model.terms.into_iter().map(|own| own.term).collect(),
         start: model.start,
         fixed: model.fixed,
         controller,
@@ -235,6 +237,30 @@ fn check_levels<'a>(
             model.plant.id()
         ),
     })
+}
+
+/// A term is written in the units of the record that it was found on.
+fn check_terms(model_name: &str, model: &ModelFile, record: &Record) -> Result<(), Error> {
+    let area_known =
+        model.plant.outlet() == plants::Outlet::Torricelli && model.known.area[0].is_some();
+    for own in &model.terms {
+        for (written, unit, what) in [
+            (&own.at_unit, own.term.variable.unit(), "at"),
+            (&own.unit, own.term.unit(), "value"),
+        ] {
+            let here = unit.label(&record.output.unit, &record.input.unit, area_known);
+            if !written.is_empty() && *written != here {
+                return Err(Error::File {
+                    file: model_name.to_string(),
+                    what: format!(
+                        "[term.{}] has {what} in {written}, but with {} it would be in {here}; convert its numbers and its unit",
+                        own.term.name, record.name
+                    ),
+                });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Enough rows for the parameters; every record brings initial levels of its own.

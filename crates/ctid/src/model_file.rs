@@ -28,11 +28,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ct_signals::{Columns, Hold};
-use plants::{EffectInfo, Known, Place, Placed, Plant, Scales, Structure, controller::Pi};
+use plants::{
+    EffectInfo, Fitted, Known, Place, Placed, Plant, Scales, Structure, Term, controller::Pi,
+};
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::{Error, names};
+use crate::{Error, names, term_file};
 
 /// What a model file says, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +43,8 @@ pub struct ModelFile {
     pub plant: Plant,
     /// The effects that have been added, in the file's order.
     pub effects: Vec<Placed>,
+    /// The terms of the user's own that have been added, in the file's order.
+    pub terms: Vec<OwnTerm>,
     /// Which column of the records is what.
     pub columns: Columns,
     /// Constants that are not fitted.
@@ -53,6 +57,17 @@ pub struct ModelFile {
     pub controller: Option<ControllerSettings>,
     /// What the input does between samples.
     pub hold: Hold,
+}
+
+/// A term of the user's own, and the units that it is written in; empty where the file does not say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnTerm {
+    /// The term.
+    pub term: Term,
+    /// Unit of its knots.
+    pub at_unit: String,
+    /// Unit of its values.
+    pub unit: String,
 }
 
 /// The settings of a PI controller; [`Pi::new`] has accepted them.
@@ -78,6 +93,12 @@ impl ModelFile {
         self.effects
             .iter()
             .try_fold(plant, |structure, &placed| structure.with(placed))
+            .and_then(|structure| {
+                let mut terms = self.terms.iter();
+                terms.try_fold(structure, |structure, own| {
+                    structure.with_term(own.term.clone())
+                })
+            })
     }
 }
 
@@ -126,6 +147,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
     let mut model = ModelFile {
         plant,
         effects: Vec::new(),
+        terms: Vec::new(),
         columns: raw.columns,
         known,
         start: BTreeMap::new(),
@@ -134,7 +156,21 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
         hold: raw.hold,
     };
     let settings = source.effect_tables(plant, &raw.effect)?;
+    let terms = source.terms(plant, &raw.term)?;
     for name in &raw.effects {
+        if let Some((term, fixed)) = terms.get(name.as_ref().as_str()) {
+            if model.terms.iter().any(|on| on.term.name == term.term.name) {
+                let what = format!("{} stands here twice; keep it once", name.as_ref());
+                return Err(source.at(name.span().start, what));
+            }
+            if *fixed {
+                let scale = format!("{}.scale", term.term.name);
+                model.start.insert(scale.clone(), 1.0);
+                model.fixed.push(scale);
+            }
+            model.terms.push(term.clone());
+            continue;
+        }
         let placed = source.placed(plant, &model.effects, name, &settings)?;
         model.effects.push(placed);
     }
@@ -176,7 +212,24 @@ struct Raw {
     #[serde(default)]
     effect: BTreeMap<Spanned<String>, Spanned<EffectTable>>,
     #[serde(default)]
+    term: BTreeMap<Spanned<String>, Spanned<RawTerm>>,
+    #[serde(default)]
     hold: Hold,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTerm {
+    place: Spanned<String>,
+    variable: Spanned<String>,
+    at: Vec<Number>,
+    value: Vec<Number>,
+    #[serde(default)]
+    at_unit: String,
+    #[serde(default)]
+    unit: String,
+    #[serde(default)]
+    fixed: bool,
 }
 
 #[derive(Deserialize, Default)]
@@ -448,6 +501,41 @@ impl Source<'_> {
             settings.insert(effect.id, setting);
         }
         Ok(settings)
+    }
+
+    /// The `[term.X]` tables, and whether each is kept as it stands; one that is not on is checked too.
+    fn terms(
+        &self,
+        plant: Plant,
+        tables: &BTreeMap<Spanned<String>, Spanned<RawTerm>>,
+    ) -> Result<BTreeMap<String, (OwnTerm, bool)>, Error> {
+        let mut terms = BTreeMap::new();
+        for (name, table) in tables {
+            let raw = table.as_ref();
+            let (place, vessel) = term_file::place_of(plant, raw.place.as_ref())
+                .map_err(|what| self.at(raw.place.span().start, what))?;
+            let variable = term_file::variable_of(raw.variable.as_ref())
+                .map_err(|what| self.at(raw.variable.span().start, what))?;
+            let numbers = |list: &[Number]| list.iter().map(|number| number.value()).collect();
+            let term = Term {
+                name: name.as_ref().clone(),
+                place,
+                vessel,
+                variable,
+                knots: numbers(&raw.at),
+                ordinates: numbers(&raw.value),
+                fitted: Fitted::Scale,
+            };
+            term.check(plant)
+                .map_err(|error| self.at(name.span().start, error.to_string()))?;
+            let own = OwnTerm {
+                term,
+                at_unit: raw.at_unit.clone(),
+                unit: raw.unit.clone(),
+            };
+            terms.insert(name.as_ref().clone(), (own, raw.fixed));
+        }
+        Ok(terms)
     }
 
     /// The table's names are parameters of the effect at its place, and what is fixed has a value.

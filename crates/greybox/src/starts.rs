@@ -77,14 +77,12 @@ fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
         Plant::CascadedTanksLinear => vec![slope, tau[0], tau[1], y - slope * u],
         Plant::FirstOrder => vec![if u.abs() > 1e-12 { y / u } else { slope }, tau[1]],
     };
-    for &placed in structure.effects() {
-        x.extend(
-            structure
-                .effect_parameters(placed)
-                .iter()
-                .map(|p| p.starts.first().copied().unwrap_or(p.lower)),
-        );
-    }
+    let added = structure.parameters().split_off(x.len());
+    x.extend(
+        added
+            .iter()
+            .map(|p| p.starts.first().copied().unwrap_or(p.lower)),
+    );
     extend_levels(setup, &mut x);
     x
 }

@@ -16,6 +16,7 @@ use crate::{
     search::{Breadth, Node, exchanges, grow, refine, singles},
     sentences, step,
     trail::trail,
+    unknown::unknown,
 };
 
 /// What stands in for another lies within this of its criterion.
@@ -241,6 +242,10 @@ pub fn diagnose(
         .iter()
         .map(|placed| last.at_the_edge(*placed))
         .collect();
+    if left.is_some() && !stopped {
+        tell("shaping the unknown", 2, 3);
+        diagnosis.unknown = unknown(&last)?;
+    }
     diagnosis.sentences = sentences::of_diagnosis(&diagnosis, left, &doubtful);
     diagnosis.sentences.extend(remark);
     diagnosis
@@ -367,12 +372,14 @@ fn assemble(problem: &Problem, verdict: Verdict, steps: Vec<Step>, noise: NoiseF
         noise_floor: noise.level,
         noise,
         scores: Vec::new(),
+        unknown: None,
         sentences: Vec::new(),
         plant: problem.plant.id().to_string(),
         known_effects: problem
             .effects
             .iter()
             .map(|placed| placed.effect.id.to_string())
+            .chain(problem.terms.iter().map(|term| term.name.clone()))
             .collect(),
         input_unit: problem.records[0].input.unit.clone(),
         output_unit: problem.records[0].output.unit.clone(),

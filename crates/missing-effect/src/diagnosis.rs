@@ -4,6 +4,8 @@
 use ct_signals::ArModel;
 use serde::Serialize;
 
+use crate::Unknown;
+
 /// What the search found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -203,11 +205,13 @@ pub struct Diagnosis {
     pub noise: NoiseFloor,
     /// The scores of the single effects at the first step, best first.
     pub scores: Vec<Score>,
+    /// What is missing where the catalogue does not explain it.
+    pub unknown: Option<Unknown>,
     /// The findings in words.
     pub sentences: Vec<String>,
     /// The plant, as the model file names it.
     pub plant: String,
-    /// The effects that the model file already had.
+    /// The effects and the terms that the model file already had.
     pub known_effects: Vec<String>,
     /// Unit of the input.
     pub input_unit: String,

@@ -19,6 +19,7 @@ mod search;
 mod sentences;
 mod step;
 mod trail;
+mod unknown;
 
 pub use diagnose::{compare, diagnose};
 pub use diagnosis::{
@@ -26,3 +27,4 @@ pub use diagnosis::{
 };
 pub use error::Error;
 pub use problem::{Options, Problem, Progress};
+pub use unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, fit_from, random_starts};
-use plants::{Known, Placed, Plant, controller::Pi};
+use plants::{Known, Placed, Plant, Term, controller::Pi};
 
 use crate::{Error, control_loop::check_stable, search::Node};
 
@@ -23,6 +23,8 @@ pub struct Problem {
     pub known: Known,
     /// The effects that are on already.
     pub effects: Vec<Placed>,
+    /// Terms of the user's own that are on already; a fit changes their scale.
+    pub terms: Vec<Term>,
     /// First guesses, by name: `alpha`, `overflow.rim`.
     pub start: BTreeMap<String, f64>,
     /// Names in `start` that are not fitted.
@@ -74,13 +76,20 @@ pub(crate) fn base<'a>(problem: &'a Problem, options: &Options) -> Result<Node<'
         .iter()
         .filter_map(|name| problem.start.get(name).map(|value| (name.clone(), *value)))
         .collect();
-    let mut setup = Setup::from_records(
+    let without = Setup::from_records(
         problem.plant,
         problem.known.clone(),
         &problem.effects,
         &problem.records,
-        fixed,
+        BTreeMap::new(),
     )?;
+    let structure = problem
+        .terms
+        .iter()
+        .try_fold(without.structure, |structure, term| {
+            structure.with_term(term.clone())
+        })?;
+    let mut setup = Setup::new(structure, &problem.records, fixed)?;
     for record in &problem.records {
         record.require_rows(setup.free().len())?;
     }

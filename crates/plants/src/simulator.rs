@@ -6,6 +6,7 @@ use crate::{
     effects,
     sensor::Sensor,
     structure::MAX_VESSELS,
+    term,
     vessels::{Stretch, Vessels},
 };
 
@@ -77,7 +78,12 @@ impl<T: Scalar> Simulator<T> {
             .iter()
             .map(|&placed| structure.effect_parameters(placed).len())
             .collect();
-        let needed = own + counts.iter().sum::<usize>();
+        let term_counts: Vec<usize> = structure
+            .terms()
+            .iter()
+            .map(|term| term.parameters(&structure.scales).len())
+            .collect();
+        let needed = own + counts.iter().chain(&term_counts).sum::<usize>();
         if theta.len() != needed {
             return Err(Error::Count {
                 what: "parameters",
@@ -118,6 +124,15 @@ impl<T: Scalar> Simulator<T> {
                     Place::Vessel => vessels.push((placed.vessel, law)),
                     Place::Sensor => sensor.push(law),
                 }
+            }
+            at += count;
+        }
+        for (term, count) in structure.terms().iter().zip(term_counts) {
+            let law = term::bind(term, &theta[at..at + count]);
+            match term.place {
+                Place::Actuator => actuator.push(law),
+                Place::Vessel => vessels.push((term.vessel, law)),
+                Place::Sensor => sensor.push(law),
             }
             at += count;
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ct_signals::{ROWS_PER_PARAMETER, Record, read_csv};
 use missing_effect::Problem;
-use plants::controller::Pi;
+use plants::controller::Controller;
 use plants::{Plant, Scales};
 
 use crate::model_file::{self, ModelFile};
@@ -123,10 +123,9 @@ pub fn problem(
     check_units(&records, &test)?;
     check_height(model_name, &model, records.iter().chain(&test))?;
     check_rows(&model, &records)?;
-    // The operating point plays no part in the loop's stability, and is not known.
     let controller = model
         .controller
-        .map(|c| Pi::new(c.gain, c.integral_time, (c.u_min, c.u_max), 0.0))
+        .map(|c| Controller::pi(c.gain, c.integral_time, (c.u_min, c.u_max)))
         .transpose()?;
     Ok(Problem {
         plant: model.plant,

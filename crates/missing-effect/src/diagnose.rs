@@ -7,7 +7,8 @@ use greybox::coloured;
 use rayon::prelude::*;
 
 use crate::{
-    Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step, Verdict,
+    ControlLoop, Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step,
+    Verdict,
     confirm::{BIC_MARGIN, beyond_chance, confirm, least_useful},
     noise_floor::{NOISE_ORDER, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
@@ -32,7 +33,7 @@ const RICHEST: usize = 6;
 /// Where the records, the plant or the fit do not allow it.
 pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
     let begun = Instant::now();
-    let base = base(problem, options)?;
+    let (base, control_loop) = base(problem, options)?;
     let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
     // The model lacks something where its residual is not noise, or where some effect would lower the error by more than
     // chance does: the one needs no catalogue, the other sees what is small.
@@ -70,9 +71,11 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     } else {
         floor
     };
-    let step = step::report(&shown, own.bic(), floor.level, &problem.test)?;
+    let widen = ControlLoop::widens(control_loop.as_ref());
+    let step = step::report(&shown, own.bic(), floor.level, &problem.test, widen)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
     diagnosis.sentences = sentences::of_comparison(&diagnosis, left);
+    diagnosis.speak_of_the_loop(control_loop);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     Ok(diagnosis)
 }
@@ -89,7 +92,7 @@ pub fn diagnose(
     let begun = Instant::now();
     let tell = |phase, done, total| progress(Progress { phase, done, total });
     tell("fitting the model", 0, 1);
-    let base = base(problem, options)?;
+    let (base, control_loop) = base(problem, options)?;
     let breadth = Breadth {
         beam: BEAM,
         refits: REFITS,
@@ -185,6 +188,7 @@ pub fn diagnose(
     if left.is_some() && !stopped {
         floor = floor.of_what_is_new();
     }
+    let widen = ControlLoop::widens(control_loop.as_ref());
     let steps = trail
         .par_iter()
         .enumerate()
@@ -193,7 +197,7 @@ pub fn diagnose(
                 Some(own) if k + 1 == trail.len() => own.bic(),
                 _ => coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.bic(),
             };
-            step::report(node, bic, floor.level, &problem.test)
+            step::report(node, bic, floor.level, &problem.test, widen)
         })
         .collect::<Result<Vec<Step>, Error>>()?;
     let verdict = match (last.added.is_empty(), left) {
@@ -217,6 +221,7 @@ pub fn diagnose(
             .sentences
             .push(sentences::of_a_stop(options.max_effects, needed));
     }
+    diagnosis.speak_of_the_loop(control_loop);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     tell("done", 3, 3);
     Ok(diagnosis)
@@ -323,6 +328,7 @@ fn assemble(problem: &Problem, verdict: Verdict, steps: Vec<Step>, noise: NoiseF
         noise_floor: noise.level,
         noise,
         scores: Vec::new(),
+        control_loop: None,
         sentences: Vec::new(),
         plant: problem.plant.id().to_string(),
         known_effects: problem

@@ -1,0 +1,156 @@
+//! Records from a closed loop: the loop simulated from its reference where its controller is known, and what is said where
+//! it cannot be.
+//!
+//! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that
+//! depends on the colour of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
+
+use ct_signals::residual_tests::prewhitened_input_test;
+use greybox::{Setup, coloured, fit_from, replay};
+use plants::controller::Controller;
+use statrs::function::erf::erfc;
+
+use crate::{
+    ControlLoop, Error, Options, Problem, control_loop::check_stable, noise_floor::NOISE_ORDER,
+    problem::STOPPING, search::Node,
+};
+
+/// Feedback is said to be there below this p-value.
+const FEEDBACK: f64 = 1e-4;
+/// A controller whose command differs from the measured one by more than this part of what that moves is another one.
+/// What it differs by less is known, and simulated with the loop.
+const OTHER_CONTROLLER: f64 = 0.05;
+/// Lags at which the residual is looked for in the command.
+const LAGS: usize = 10;
+
+/// Closes the loop around a fitted node where that is possible, and says what is known of the loop.
+pub(crate) fn enclose<'a>(
+    problem: &Problem,
+    options: &Options,
+    node: Node<'a>,
+) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
+    let Some(controller) = &problem.controller else {
+        return Ok(match feedback_p(&node)? {
+            p if p < FEEDBACK => {
+                let said = format!(
+                    "The command answers to the noise (p {}): there is feedback, and no [controller] in the model file. The model runs on the measured command, which holds the noise; where its colour is not the one that was found, estimates and scores are biased, and the standard errors are made wider for it. Give [controller] and the reference.",
+                    chance(p)
+                );
+                (node, Some(ControlLoop::measured(Some(p), None, said)))
+            }
+            _ => (node, None),
+        });
+    };
+    check_stable(&node, controller)?;
+    if !options.simulate_loop {
+        return Ok((
+            node,
+            Some(ControlLoop::measured(None, None, ON_REQUEST.to_string())),
+        ));
+    }
+    let (mismatch, part) = match disagreement(problem, controller) {
+        Ok(found) => found,
+        Err(Error::Fit(why)) => return Ok((node, Some(not_simulated(&why.to_string(), None)))),
+        Err(error) => return Err(error),
+    };
+    if part > OTHER_CONTROLLER {
+        let why = format!(
+            "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {} rms, {:.0} % of what it moves: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+            problem.records[0].input.unit,
+            100.0 * part
+        );
+        return Ok((node, Some(not_simulated(&why, Some(mismatch)))));
+    }
+    let (setup, x) = match node.setup.in_loop(controller, &node.fit.x) {
+        Ok(closed) => closed,
+        Err(
+            why @ (greybox::Error::NoReference { .. }
+            | greybox::Error::ConstantReference { .. }
+            | greybox::Error::CommandNotHeld { .. }),
+        ) => return Ok((node, Some(not_simulated(&why.to_string(), Some(mismatch))))),
+        Err(error) => return Err(error.into()),
+    };
+    let fit = fit_from(&setup, &[x], &node.fit.noise, STOPPING)?.continuing(&node.fit);
+    let enclosed = Node { setup, fit, ..node };
+    Ok((
+        enclosed,
+        Some(ControlLoop {
+            simulated: true,
+            feedback_p: None,
+            mismatch: Some(mismatch),
+            warnings: Vec::new(),
+        }),
+    ))
+}
+
+const ON_REQUEST: &str = "The model runs on the measured command, as was asked for, and not in its loop: the noise is in that command; where its colour is not the one that was found, estimates and scores are biased, and the standard errors are made wider for it.";
+
+fn not_simulated(why: &str, mismatch: Option<f64>) -> ControlLoop {
+    ControlLoop::measured(
+        None,
+        mismatch,
+        format!(
+            "The loop is not simulated: {why}. The model runs on the measured command, which holds the noise; where its colour is not the one that was found, estimates and scores are biased, and the standard errors are made wider for it."
+        ),
+    )
+}
+
+fn chance(p: f64) -> String {
+    if p < 1e-9 {
+        "< 1e-9".to_string()
+    } else {
+        format!("= {p:.0e}")
+    }
+}
+
+/// How far the measured commands are from the controller's own, and which part that is of what they move; the worst
+/// record's.
+fn disagreement(problem: &Problem, controller: &Controller) -> Result<(f64, f64), Error> {
+    let mut worst = (0.0, 0.0);
+    for record in &problem.records {
+        let replayed = replay(controller, record)?;
+        let part = replayed.rms / replayed.moves.max(f64::MIN_POSITIVE);
+        if part >= worst.1 {
+            worst = (replayed.rms, part);
+        }
+    }
+    Ok(worst)
+}
+
+/// p-value of the test that the past and present of the residual do not show in the command, which a controller makes of
+/// the reading; of several records the smallest, corrected for having taken it.
+pub(crate) fn feedback_p(node: &Node) -> Result<f64, Error> {
+    let residuals = node.setup.residuals(&node.fit.x)?;
+    let (mut least, mut count) = (1.0_f64, 0.0);
+    for (record, residual) in node.setup.records.iter().zip(&residuals) {
+        let lags = LAGS.min(record.len() / 4).max(1);
+        let (correlation, later) = prewhitened_input_test(residual, &record.input.values, lags)?;
+        // The present alone is where a proportional part shows, and the test of the lags leaves it out.
+        let now = erfc(correlation[0].abs() * (0.5 * record.len() as f64).sqrt());
+        least = least.min(later).min(now);
+        count += 2.0;
+    }
+    Ok((least * count).min(1.0))
+}
+
+/// Standard errors that allow for a bias from feedback: the fits in the metric of white noise and of the noise that was
+/// found are both right where no noise comes back, and differ by about the bias where it does.
+pub(crate) fn widened(
+    node: &Node,
+    std_errors: Vec<Option<f64>>,
+) -> Result<Vec<Option<f64>>, Error> {
+    let other = other_metric(&node.setup, node)?;
+    Ok(std_errors
+        .into_iter()
+        .zip(node.fit.x.iter().zip(&other))
+        .map(|(error, (own, other))| error.map(|error| error.hypot(own - other)))
+        .collect())
+}
+
+fn other_metric(setup: &Setup, node: &Node) -> Result<Vec<f64>, Error> {
+    Ok(if node.fit.noise.order() == 0 {
+        coloured(setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.x
+    } else {
+        let white = ct_signals::ArModel::white(1.0);
+        fit_from(setup, std::slice::from_ref(&node.fit.x), &white, STOPPING)?.x
+    })
+}

@@ -6,6 +6,7 @@ use ctid_tests::{Drive, Rig};
 use missing_effect::{Diagnosis, Options, Verdict, diagnose};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 type Hidden = Option<(&'static str, f64)>;
 
@@ -47,25 +48,10 @@ fn main() {
                 Some(("pump_deadzone", 0.3)),
                 Some(("pump_lag", 6.0)),
                 Some(("overflow", 19.3)),
-                Some(("area_varies", 0.15)),
             ],
         ),
-        (
-            Rig::cascaded_tanks(),
-            &[
-                None,
-                Some(("pump_deadzone", 0.5)),
-                Some(("sensor_lag", 10.0)),
-            ],
-        ),
-        (
-            Rig::linear_tank(),
-            &[
-                None,
-                Some(("transport_delay", 6.0)),
-                Some(("pump_saturation", 6.0)),
-            ],
-        ),
+        (Rig::cascaded_tanks(), &[None, Some(("sensor_lag", 10.0))]),
+        (Rig::linear_tank(), &[None, Some(("transport_delay", 6.0))]),
     ];
     println!(
         "{:<20} {:<16} {:<7} {:<9} named  truth in group  alone  size  seconds",
@@ -74,6 +60,10 @@ fn main() {
     for (rig, effects) in &rigs {
         for hidden in effects.iter() {
             for colour in [0.0, 0.9, 0.98] {
+                // The slowest noise is the trap for false claims.
+                if hidden.is_some() && colour > 0.95 {
+                    continue;
+                }
                 for simulate_loop in [false, true] {
                     let rig = Rig {
                         drive: Drive::Closed,
@@ -86,6 +76,7 @@ fn main() {
                         ..rig.clone()
                     };
                     let answers: Vec<Answer> = (0..runs)
+                        .into_par_iter()
                         .filter_map(|seed| {
                             let record = rig.run(&mut ChaCha8Rng::seed_from_u64(7000 + seed));
                             let mut problem = rig.problem(record);

@@ -48,12 +48,21 @@ struct Compare {
     /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
+    /// In a loop whose [controller] is known: simulate it from its reference, or run on the measured command
+    #[arg(long = "loop", value_enum, default_value_t = LoopWay::Simulated, value_name = "WAY")]
+    way: LoopWay,
     /// Write the result as JSON
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
     /// Write an interactive page that needs no network
     #[arg(long, value_name = "F.html")]
     report: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LoopWay {
+    Simulated,
+    Measured,
 }
 
 #[derive(Debug, Args)]
@@ -137,6 +146,13 @@ impl Compare {
         }
     }
 
+    fn options(&self) -> Options {
+        Options {
+            simulate_loop: self.way == LoopWay::Simulated,
+            ..Options::default()
+        }
+    }
+
     /// Where the results go, checked.
     fn outputs(&self) -> Result<Vec<Output>, Error> {
         let json = self.json.as_deref().map(|path| (Kind::Json, path));
@@ -151,7 +167,7 @@ impl Compare {
         let outputs = self.outputs()?;
         let bar = Bar::new();
         bar.phase("fitting the model");
-        let diagnosis = missing_effect::compare(&problem, &Options::default());
+        let diagnosis = missing_effect::compare(&problem, &self.options());
         bar.clear();
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
@@ -169,7 +185,7 @@ impl Diagnose {
         let files = self.compare.files();
         let problem = files.read()?;
         let outputs = self.compare.outputs()?;
-        let mut options = Options::default();
+        let mut options = self.compare.options();
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
         }

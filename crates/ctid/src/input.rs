@@ -7,12 +7,15 @@ use missing_effect::Problem;
 use plants::controller::Controller;
 use plants::{Plant, Scales};
 
-use crate::model_file::{self, ModelFile};
+use crate::model_file::{self, ControllerLaw, ControllerSettings, ModelFile};
 use crate::output::same_file;
 use crate::{Error, numbers};
 
 /// A level this many times the tank's height is in another unit.
 const BEYOND_THE_TANK: f64 = 1.5;
+
+/// Sampling intervals that differ by less than this part are one: times are read from text.
+const SAME_INTERVAL: f64 = 0.01;
 
 /// The files of a problem.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,7 +128,8 @@ pub fn problem(
     check_rows(&model, &records)?;
     let controller = model
         .controller
-        .map(|c| Controller::pi(c.gain, c.integral_time, (c.u_min, c.u_max)))
+        .as_ref()
+        .map(|settings| controller(model_name, settings, &records))
         .transpose()?;
     Ok(Problem {
         plant: model.plant,
@@ -136,6 +140,51 @@ pub fn problem(
         controller,
         records,
         test,
+    })
+}
+
+/// The controller as it ran in the records.
+fn controller(
+    model_name: &str,
+    settings: &ControllerSettings,
+    records: &[Record],
+) -> Result<Controller, Error> {
+    let interval = records.first().map_or(1.0, Record::sample_interval);
+    for record in records {
+        if let Some(reference) = &record.reference
+            && !reference.unit.is_empty()
+            && !record.output.unit.is_empty()
+            && reference.unit != record.output.unit
+        {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "the reference is in {}, the output in {}: a controller compares the two; convert one of them, or correct its header",
+                    reference.unit, record.output.unit
+                ),
+            });
+        }
+        if matches!(settings.law, ControllerLaw::Pi { .. }) {
+            continue;
+        }
+        let uneven = record
+            .time
+            .windows(2)
+            .find(|pair| (pair[1] - pair[0] - interval).abs() > SAME_INTERVAL * interval);
+        if let Some(pair) = uneven {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "a controller of type \"RS\" runs at one interval, {interval} s, but {} s follow t = {} s; resample the record, or delete [controller] from {model_name}",
+                    numbers::significant(pair[1] - pair[0], 4),
+                    pair[0]
+                ),
+            });
+        }
+    }
+    settings.controller(interval).map_err(|error| Error::File {
+        file: model_name.to_string(),
+        what: error.to_string(),
     })
 }
 

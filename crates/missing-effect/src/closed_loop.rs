@@ -70,6 +70,10 @@ pub(crate) fn enclose<'a>(
         Err(error) => return Err(error.into()),
     };
     let fit = fit_from(&setup, &[x], &node.fit.noise, STOPPING)?.continuing(&node.fit);
+    let said = format!(
+        "The loop is simulated from its reference: no noise that came back through the command is in the model. The measured command agrees with the controller's to {mismatch:.4} {} rms.",
+        problem.records[0].input.unit
+    );
     let enclosed = Node { setup, fit, ..node };
     Ok((
         enclosed,
@@ -77,7 +81,7 @@ pub(crate) fn enclose<'a>(
             simulated: true,
             feedback_p: None,
             mismatch: Some(mismatch),
-            warnings: Vec::new(),
+            said: vec![said],
         }),
     ))
 }

@@ -163,8 +163,8 @@ pub struct ControlLoop {
     /// Measured command less the one that the controller gives on the measured reading, root mean square, in the input's
     /// unit; `None` where that was not looked at.
     pub mismatch: Option<f64>,
-    /// What the user should know, in words.
-    pub warnings: Vec<String>,
+    /// What the user should know of it, in words.
+    pub said: Vec<String>,
 }
 
 impl ControlLoop {
@@ -174,7 +174,7 @@ impl ControlLoop {
             simulated: false,
             feedback_p,
             mismatch,
-            warnings: vec![said],
+            said: vec![said],
         }
     }
 
@@ -243,7 +243,7 @@ impl Diagnosis {
     /// Adds what is known of the loop, and what there is to say of it.
     pub(crate) fn speak_of_the_loop(&mut self, known: Option<ControlLoop>) {
         if let Some(known) = &known {
-            self.sentences.extend_from_slice(&known.warnings);
+            self.sentences.extend_from_slice(&known.said);
         }
         self.control_loop = known;
     }

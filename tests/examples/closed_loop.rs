@@ -1,6 +1,7 @@
 //! Diagnoses in closed loop, on the measured command and in the simulated loop: effects, groups, false claims, seconds.
 //!
-//! `cargo run --release -p ctid-tests --example closed_loop -- 10`
+//! `cargo run --release -p ctid-tests --example closed_loop -- 12`; the records of a cell, then the correlation of the
+//! coloured noise (0.9) and one plant (all).
 
 use ctid_tests::{Drive, Rig};
 use missing_effect::{Diagnosis, Options, Verdict, diagnose};
@@ -53,13 +54,21 @@ fn main() {
         (Rig::cascaded_tanks(), &[None, Some(("sensor_lag", 10.0))]),
         (Rig::linear_tank(), &[None, Some(("transport_delay", 6.0))]),
     ];
+    let slow: f64 = std::env::args()
+        .nth(2)
+        .and_then(|colour| colour.parse().ok())
+        .unwrap_or(0.9);
+    let only = std::env::args().nth(3);
     println!(
         "{:<20} {:<16} {:<7} {:<9} named  truth in group  alone  size  seconds",
         "plant", "hidden", "colour", "way"
     );
     for (rig, effects) in &rigs {
+        if only.as_ref().is_some_and(|plant| plant != rig.plant.id()) {
+            continue;
+        }
         for hidden in effects.iter() {
-            for colour in [0.0, 0.9, 0.98] {
+            for colour in [0.0, slow, 0.98] {
                 // The slowest noise is the trap for false claims.
                 if hidden.is_some() && colour > 0.95 {
                     continue;

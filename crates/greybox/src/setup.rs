@@ -8,7 +8,7 @@ use plants::{
 };
 
 use crate::{
-    Error, LinearPlant, Triangle,
+    Error, LinearPlant, Replay, Triangle,
     feedback::{Feedback, Inverse, step},
 };
 
@@ -265,10 +265,10 @@ impl<'a> Setup<'a> {
         self.rebuilt(self.structure.clone(), feedback)
     }
 
-    /// Whether the loop is simulated.
+    /// What the controller gives on the measured reading of each record; empty where the loop is not simulated.
     #[must_use]
-    pub fn is_in_loop(&self) -> bool {
-        self.feedback.is_some()
+    pub fn replays(&self) -> &[Replay] {
+        self.feedback.as_ref().map_or(&[], |f| &f.replays)
     }
 
     /// A setup from records alone: the scales are taken from them.

@@ -157,8 +157,8 @@ fn the_loop_agrees_with_a_fine_reference() {
     let run = setup.simulate_loop(&x).unwrap().unwrap();
     let (mut level, mut integral, mut most) = (14.0_f64, 0.0, 0.0_f64);
     let mut at_limit = 0;
-    for k in 0..rig.samples {
-        let e = r[k] - level;
+    for (k, r) in r.iter().enumerate() {
+        let e = r - level;
         let wanted: f64 = 5.0 + 0.6 * (e + integral / 60.0);
         let u = wanted.clamp(0.0, 10.0);
         at_limit += usize::from(u != wanted);

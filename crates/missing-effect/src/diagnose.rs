@@ -13,7 +13,7 @@ use crate::{
     noise_floor::{NOISE_ORDER, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
     remains::remains,
-    scores::scores,
+    scores::{price_of_colour, scores},
     search::{Breadth, Node, exchanges, grow, refine, singles},
     sentences, step,
     trail::trail,
@@ -175,7 +175,9 @@ pub fn diagnose(
     } else {
         (&noise, &base_noise)
     };
-    let scores = scores(believed, &singles(believed, metric), metric);
+    let single = singles(believed, metric);
+    let scores = scores(believed, &single, metric);
+    let price = price_of_colour(&base_noise, &single, &noise);
 
     let mut floor = floor(
         &noise,
@@ -221,6 +223,9 @@ pub fn diagnose(
             .sentences
             .push(sentences::of_a_stop(options.max_effects, needed));
     }
+    diagnosis
+        .sentences
+        .extend(price.and_then(sentences::of_the_colour));
     diagnosis.speak_of_the_loop(control_loop);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     tell("done", 3, 3);

@@ -107,6 +107,14 @@ pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
     )
 }
 
+/// What the colour of the noise costs, where it costs something.
+pub(crate) fn of_the_colour(price: f64) -> Option<String> {
+    (price >= 1.2).then(|| format!(
+        "The noise is coloured, and hides what white noise of the same size would show: an effect has to be about {} times larger to be seen. Smaller ones than the sizes under \"visible from\" may be there.",
+        two_digits(price)
+    ))
+}
+
 /// What there is to say, the verdict first.
 pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, remains: Option<Remains>) -> Vec<String> {
     let unit = &diagnosis.output_unit;

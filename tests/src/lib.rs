@@ -3,7 +3,8 @@
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
 use missing_effect::Problem;
 use plants::{
-    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term, controller::Pi,
+    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term,
+    controller::Controller,
 };
 use rand_chacha::ChaCha8Rng;
 
@@ -103,7 +104,17 @@ impl Rig {
         }
     }
 
-    /// The plant without what is hidden, beside one record.
+    /// The controller of [`Drive::Closed`].
+    ///
+    /// # Panics
+    /// Never: its settings are constants that can work.
+    #[must_use]
+    #[allow(clippy::expect_used)]
+    pub fn controller(&self) -> Controller {
+        Controller::pi(0.4, 120.0, (0.0, 10.0)).expect("a controller")
+    }
+
+    /// The plant without what is hidden, beside one record; the controller is not told.
     pub fn problem(&self, record: Record) -> Problem {
         Problem {
             plant: self.plant,
@@ -168,7 +179,7 @@ impl Rig {
         let wanted: Result<Vec<f64>, Error> =
             excitation::steps(self.samples, 20..=90, low, high, rng);
         let wanted = wanted.expect("an excitation");
-        let mut controller = Pi::new(0.4, 120.0, (0.0, 10.0), middle).expect("a controller");
+        let mut controller = self.controller().start(&[middle]);
         let (mut u, mut y) = (
             Vec::with_capacity(self.samples),
             Vec::with_capacity(self.samples),
@@ -191,7 +202,7 @@ impl Rig {
                 .collect(),
             input: Signal::new("u", "V", u),
             output: Signal::new("y", "cm", y),
-            reference: None,
+            reference: (self.drive == Drive::Closed).then(|| Signal::new("r", "cm", wanted)),
             hold: Hold::Zero,
         }
     }

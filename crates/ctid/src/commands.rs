@@ -55,6 +55,9 @@ struct Compare {
     /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
+    /// In a loop whose [controller] is known: simulate it from its reference, or run on the measured command
+    #[arg(long = "loop", value_enum, default_value_t = LoopWay::Simulated, value_name = "WAY")]
+    way: LoopWay,
     #[command(flatten)]
     results: Results,
 }
@@ -68,6 +71,12 @@ struct Results {
     /// Write an interactive page that needs no network
     #[arg(long, value_name = "F.html")]
     report: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LoopWay {
+    Simulated,
+    Measured,
 }
 
 #[derive(Debug, Args)]
@@ -253,13 +262,20 @@ impl Compare {
         }
     }
 
+    fn options(&self) -> Options {
+        Options {
+            simulate_loop: self.way == LoopWay::Simulated,
+            ..Options::default()
+        }
+    }
+
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
         let problem = files.read()?;
         let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
-        let diagnosis = missing_effect::compare(&problem, &Options::default());
+        let diagnosis = missing_effect::compare(&problem, &self.options());
         bar.clear();
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
@@ -278,7 +294,7 @@ impl Diagnose {
         let problem = files.read()?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
-        let mut options = Options::default();
+        let mut options = self.compare.options();
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
         }

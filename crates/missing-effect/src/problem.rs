@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, fit_from, random_starts};
-use plants::{Known, Placed, Plant, Term, controller::Pi};
+use plants::{Known, Placed, Plant, Term, controller::Controller};
 
-use crate::{Error, control_loop::check_stable, search::Node};
+use crate::{ControlLoop, Error, closed_loop::enclose, search::Node};
 
 /// What the fit of a believed model is taken to.
 pub(crate) const STOPPING: Stopping = Stopping {
@@ -32,7 +32,7 @@ pub struct Problem {
     /// The records that are fitted together.
     pub records: Vec<Record>,
     /// The controller of the loop, where there is one: it must make the fitted plant stable.
-    pub controller: Option<Pi>,
+    pub controller: Option<Controller>,
     /// Records that take no part in any fit or choice and are only scored.
     pub test: Vec<Record>,
 }
@@ -46,6 +46,9 @@ pub struct Options {
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
+    /// Where a controller is known and the records hold its reference: the loop is simulated; otherwise the model runs on
+    /// the measured command.
+    pub simulate_loop: bool,
 }
 
 impl Default for Options {
@@ -54,6 +57,7 @@ impl Default for Options {
             max_effects: 6,
             starts: 12,
             seed: 1,
+            simulate_loop: true,
         }
     }
 }
@@ -69,8 +73,12 @@ pub struct Progress {
     pub total: usize,
 }
 
-/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried.
-pub(crate) fn base<'a>(problem: &'a Problem, options: &Options) -> Result<Node<'a>, Error> {
+/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried. In a
+/// loop that is known it is then fitted there.
+pub(crate) fn base<'a>(
+    problem: &'a Problem,
+    options: &Options,
+) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
     let fixed: BTreeMap<String, f64> = problem
         .fixed
         .iter()
@@ -120,8 +128,5 @@ pub(crate) fn base<'a>(problem: &'a Problem, options: &Options) -> Result<Node<'
         fit,
         added: Vec::new(),
     };
-    if let Some(controller) = &problem.controller {
-        check_stable(&node, controller)?;
-    }
-    Ok(node)
+    enclose(problem, options, node)
 }

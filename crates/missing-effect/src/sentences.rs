@@ -136,6 +136,14 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     })
 }
 
+/// What the colour of the noise costs, where it costs something.
+pub(crate) fn of_the_colour(price: f64) -> Option<String> {
+    (price >= 1.2).then(|| format!(
+        "The noise is coloured, and hides what white noise of the same size would show: an effect has to be about {} times larger to be seen. Smaller ones than the sizes under \"visible from\" may be there.",
+        significant(price, 2)
+    ))
+}
+
 /// The sizes from which on the likeliest effects would have been seen.
 fn visible(diagnosis: &Diagnosis) -> String {
     let sizes: Vec<String> = diagnosis

@@ -137,7 +137,7 @@ impl<'a> Setup<'a> {
         let mut free: Vec<usize> = (0..names.len())
             .filter(|&i| !fixed.contains_key(&names[i]))
             .collect();
-        let reach = structure.scales.largest_level().max(1e-9);
+        let reach = structure.scales.largest_level().max(f64::MIN_POSITIVE);
         // An empty tank is a trap: the outflow's slope is infinite there, and a step that overshot to it would stay.
         let lowest = if plant.outlet() == plants::Outlet::Torricelli {
             1e-6 * reach

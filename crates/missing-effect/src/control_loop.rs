@@ -27,7 +27,8 @@ pub(crate) fn check_stable(node: &Node, controller: &Pi) -> Result<(), Error> {
         simulator.advance(Command::held(u), h);
         Ok(simulator.levels())
     };
-    let step = 1e-4 * structure.scales.input_range.max(1e-9);
+    let range = structure.scales.input_range;
+    let step = 1e-4 * if range > 0.0 { range } else { 1.0 };
     let (more, less) = (after(command + step)?, after(command - step)?);
 
     // Levels, then the integral of the control error.

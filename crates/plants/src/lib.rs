@@ -21,6 +21,7 @@
 
 mod actuator;
 pub mod controller;
+mod damped;
 pub mod effects;
 mod error;
 mod law;

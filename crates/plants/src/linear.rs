@@ -18,7 +18,7 @@ pub(crate) struct Propagators<T> {
 /// Steps that differ by less than this share are one step: times are read from text.
 const SAME_STEP: f64 = 1e-9;
 /// Exponentials that are kept.
-const KEPT: usize = 4;
+const KEPT: usize = 12;
 
 impl<T: Scalar> Propagators<T> {
     pub(crate) fn new(vessels: Vec<(T, T)>) -> Self {

@@ -3,7 +3,9 @@
 
 use std::ops::Mul;
 
-use crate::{Law, Outlet, Rim, Scalar, linear::Propagators, structure::MAX_VESSELS};
+use crate::{
+    Law, Outlet, Rim, Scalar, damped::Damped, linear::Propagators, structure::MAX_VESSELS,
+};
 
 /// Below this level Torricelli's root, whose slope is infinite at zero, gives way to a parabola \[level unit\].
 const NEARLY_EMPTY: f64 = 1e-4;
@@ -67,7 +69,7 @@ impl<T: Scalar> Inflow<T> {
     }
 }
 
-type Levels<T> = [T; MAX_VESSELS];
+pub(crate) type Levels<T> = [T; MAX_VESSELS];
 
 /// Who wants to see the smooth stretches of the measured level, if anybody.
 pub(crate) type Watch<'a, T> = Option<&'a mut dyn FnMut(&Stretch<T>)>;
@@ -80,6 +82,11 @@ const STEP_LIMIT_AT_RIM: f64 = 0.125;
 const MOST_PARTS: usize = 256;
 /// A step that is still too long for its vessels is cut into at most so many parts; beyond that it is taken implicitly.
 const UNITS: usize = 32;
+/// A long part may be as long as what has passed of its step, where no level will move by more than this share of
+/// itself: the fast part of the motion has died away by then.
+const SETTLING: f64 = 0.2;
+/// Where none will move by more than this share, one part is enough.
+const SETTLED: f64 = 1e-4;
 /// Contacts with a rim that are looked for within a step.
 const MOST_EVENTS: usize = 12;
 
@@ -112,14 +119,16 @@ pub(crate) struct Vessels<T: Scalar> {
     vessels: Vec<Vessel<T>>,
     laws: Vec<Box<dyn Law<T>>>,
     pub(crate) levels: Levels<T>,
-    /// For linear vessels without a rim.
+    /// For linear vessels.
     linear: Option<LinearFlow<T>>,
+    /// How fast every vessel forgets, where a part is long against that \[1/s\]: then it is taken exponentially.
+    damping: Option<[f64; MAX_VESSELS]>,
     /// Some vessel has a rim.
     rims: bool,
     /// All are Torricelli's, of areas without derivatives, and nothing acts in them.
     bare: bool,
-    /// Into how many parts a second of linear vessels is cut at least \[1/s\].
-    parts_per_second: f64,
+    /// One over the shortest time constant of linear vessels; zero for others \[1/s\].
+    fastest: f64,
 }
 
 /// A stretch of time over which the measured level moved smoothly.
@@ -178,16 +187,15 @@ impl<T: Scalar> Vessels<T> {
                 .iter()
                 .all(|v| v.outlet == Outlet::Torricelli && v.plain_inverse.is_some());
         let linear = vessels.iter().all(|v| v.outlet == Outlet::Linear);
-        let limit = if rims { STEP_LIMIT_AT_RIM } else { STEP_LIMIT };
-        let parts_per_second = if linear {
-            let rates = vessels.iter().map(|v| 1.0 / (v.area.value().abs() * limit));
+        let fastest = if linear {
+            let rates = vessels.iter().map(|v| 1.0 / v.area.value().abs());
             rates.fold(0.0, f64::max)
         } else {
             0.0
         };
         let propagators =
             || Propagators::new(vessels.iter().map(|v| (v.area, v.coefficient)).collect());
-        let linear = (linear && !rims).then(|| LinearFlow {
+        let linear = linear.then(|| LinearFlow {
             whole: propagators(),
             half: propagators(),
             disturbed: vessels.iter().any(|v| !v.laws.is_empty()),
@@ -203,7 +211,8 @@ impl<T: Scalar> Vessels<T> {
             linear,
             rims,
             bare,
-            parts_per_second,
+            damping: None,
+            fastest,
         };
         all.keep_within();
         all
@@ -322,7 +331,14 @@ impl<T: Scalar> Vessels<T> {
     #[inline]
     fn trial(&self, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
         let dt = h.value();
-        if !h.same_derivatives(T::constant(0.0)) {
+        if let Some(rates) = self.damping {
+            let still = |_: &Levels<T>, _: T| [T::constant(0.0); MAX_VESSELS];
+            if h.same_derivatives(T::constant(0.0)) {
+                self.damped_trial(rates, [&self.levels; 3], dt, dt, q, t, still)
+            } else {
+                self.damped_trial(rates, [&self.levels; 3], h, dt, q, t, still)
+            }
+        } else if !h.same_derivatives(T::constant(0.0)) {
             self.trial_by(h, dt, q, t)
         } else if !self.bare {
             self.trial_by(dt, dt, q, t)
@@ -398,6 +414,60 @@ impl<T: Scalar> Vessels<T> {
         self.weighted(&self.levels, h, [&k1, &k2, &k3, &k4])
     }
 
+    /// Beside a flow (its levels at the beginning, in the middle and at the end, and its rates), what is added to it,
+    /// each vessel's own forgetting taken exactly.
+    #[allow(clippy::too_many_arguments)]
+    fn damped_trial<H: Scalar>(
+        &self,
+        rates: [f64; MAX_VESSELS],
+        [begin, half, whole]: [&Levels<T>; 3],
+        h: H,
+        dt: f64,
+        q: Inflow<T>,
+        t: f64,
+        flow_rates: impl Fn(&Levels<T>, T) -> Levels<T>,
+    ) -> Levels<T>
+    where
+        T: Mul<H, Output = T>,
+    {
+        let n = self.vessels.len();
+        let damped: [Damped<H>; MAX_VESSELS] = std::array::from_fn(|i| Damped::new(rates[i], h));
+        // What drives the deviation from the flow, but for its forgetting.
+        let driving = |flow: &Levels<T>, deviation: &Levels<T>, q: T, t: f64| {
+            let mut at = *flow;
+            for i in 0..n {
+                at[i] = at[i] + deviation[i];
+            }
+            let mut drive = self.rates(&at, q, t);
+            let own = flow_rates(flow, q);
+            for i in 0..n {
+                drive[i] = drive[i] - own[i] + deviation[i] * rates[i];
+            }
+            drive
+        };
+        let zero = [T::constant(0.0); MAX_VESSELS];
+        let stage = |f: &dyn Fn(usize) -> T| {
+            let mut deviation = zero;
+            for (i, to) in deviation.iter_mut().enumerate().take(n) {
+                *to = f(i);
+            }
+            deviation
+        };
+        let middle = t + 0.5 * dt;
+        let k1 = driving(begin, &zero, q.start, t);
+        let d2 = stage(&|i| damped[i].half(k1[i]));
+        let k2 = driving(half, &d2, q.middle, middle);
+        let d3 = stage(&|i| damped[i].half(k2[i]));
+        let k3 = driving(half, &d3, q.middle, middle);
+        let d4 = stage(&|i| damped[i].from_half(d2[i], k3[i] * 2.0 - k1[i]));
+        let k4 = driving(whole, &d4, q.end, t + dt);
+        let mut next = *whole;
+        for i in 0..n {
+            next[i] = next[i] + damped[i].whole([k1[i], (k2[i] + k3[i]) * 0.5, k4[i]]);
+        }
+        next
+    }
+
     #[inline(always)]
     fn weighted<H: Copy + Mul<f64, Output = H>>(
         &self,
@@ -426,6 +496,12 @@ impl<T: Scalar> Vessels<T> {
         t: f64,
     ) -> Levels<T> {
         let dt = h.value();
+        if let Some(rates) = self.damping {
+            let flow = [&self.levels, &half, &whole];
+            return self.damped_trial(rates, flow, h, dt, q, t, |levels, q| {
+                self.linear_rates(levels, q)
+            });
+        }
         let added = |levels: &Levels<T>, flow: &Levels<T>, q: T, t: f64| {
             let mut rates = self.rates(levels, q, t);
             let linear = self.linear_rates(flow, q);
@@ -475,7 +551,13 @@ impl<T: Scalar> Vessels<T> {
                     }
                 }
                 Outlet::Linear if vessel.laws.is_empty() => {}
-                Outlet::Linear => most = most.max(0.5 * h * self.slope(i, t).abs()),
+                // The vessel's own forgetting is exact; here it is what the effects add to it.
+                Outlet::Linear => {
+                    let own = 1.0 / vessel.area.value().abs();
+                    let slope = self.slope(i, t).abs();
+                    let added = if h * own > STEP_LIMIT { slope - own } else { slope };
+                    most = most.max(0.5 * h * added);
+                }
             }
         }
         most
@@ -543,14 +625,46 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
+    /// How fast each vessel forgets its level \[1/s\].
+    fn forgetting(&self, t: f64) -> [f64; MAX_VESSELS] {
+        let mut rates = [0.0; MAX_VESSELS];
+        for (i, (rate, vessel)) in rates.iter_mut().zip(&self.vessels).enumerate() {
+            *rate = match vessel.outlet {
+                Outlet::Linear if vessel.laws.is_empty() => 1.0 / vessel.area.value(),
+                _ => self.slope(i, t),
+            }
+            .max(0.0);
+        }
+        rates
+    }
+
+    /// The largest share of its level by which a level will move within `h`, to first order.
+    fn travel(&self, rates: &[f64; MAX_VESSELS], h: f64, q: &Inflow<T>, t: f64) -> f64 {
+        let share = |q: T| {
+            let moves = self.rates(&self.levels, q, t);
+            (0..self.vessels.len())
+                .map(|i| {
+                    let time = if rates[i] * h > 1.0 { 1.0 / rates[i] } else { h };
+                    (moves[i].value() * time / self.levels[i].value()).abs()
+                })
+                .fold(0.0, f64::max)
+        };
+        share(q.start).max(share(q.end))
+    }
+
     /// Moves on by `h` from time `t`; `watch` sees every smooth stretch of the measured level in turn.
     pub(crate) fn step(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
-        let wanted = self.parts_per_second * h.value();
-        if wanted.is_nan() || wanted <= 1.0 {
+        let wanted = self.fastest * h.value();
+        if wanted > STEP_LIMIT {
+            self.fast_linear_step(wanted, h, q, t, watch);
+        } else if self.rims && wanted > STEP_LIMIT_AT_RIM {
+            self.equal_parts(wanted / STEP_LIMIT_AT_RIM, h, q, t, watch);
+        } else {
             self.part(h, q, t, watch);
-            return;
         }
-        // Nothing here depends on effects, so that one at its absent value sees the parts of the base model.
+    }
+
+    fn equal_parts(&mut self, wanted: f64, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
         let share = 1.0 / parts as f64;
         let each = h * share;
@@ -561,11 +675,67 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
+    /// A step of linear vessels that is longer than a time constant, in parts that double: what a jump of the input sets
+    /// off is over when they are long. Their lengths do not depend on effects, so that one at its absent value sees
+    /// the parts of the base model.
+    fn fast_linear_step(
+        &mut self,
+        wanted: f64,
+        h: T,
+        q: Inflow<T>,
+        t: f64,
+        watch: &mut Watch<T>,
+    ) {
+        let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
+        let share = 1.0 / parts as f64;
+        let (mut done, mut length) = (0, 1);
+        while done < parts {
+            let (from, to) = (done as f64 * share, (done + length) as f64 * share);
+            let part = h * (length as f64 * share);
+            let q = q.part(T::constant(from), T::constant(to));
+            let begin = t + h.value() * from;
+            let quiet = !self.rims || self.quiet_part(part, q, begin, watch);
+            if !self.rims {
+                self.damping = Some(self.forgetting(begin));
+                self.part(part, q, begin, watch);
+                self.damping = None;
+            } else if !quiet {
+                // Something happens at a rim: here Runge-Kutta alone, in short steps.
+                let wanted = self.fastest * part.value() / STEP_LIMIT_AT_RIM;
+                self.equal_parts(wanted, part, q, begin, watch);
+            }
+            done += length;
+            length = done;
+        }
+    }
+
+    /// A part of linear vessels with rims, in one piece: `false`, and nothing is done, where something happens at a rim.
+    fn quiet_part(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) -> bool {
+        if self.stiffness(h.value(), t) > STEP_LIMIT {
+            return false;
+        }
+        self.settle_modes(q.start, t, None);
+        self.damping = Some(self.forgetting(t));
+        // What stands at its rim drives the next vessel by a parabola: then the exponential step is exact.
+        let next = if self.vessels.iter().any(|vessel| vessel.spilling) {
+            self.trial(h, q, t)
+        } else {
+            self.flow(h, q, t)
+        };
+        let quiet = self.first_event(&next, h, q, t).is_none();
+        if quiet {
+            self.accept(next, h, q, t, watch);
+        }
+        self.damping = None;
+        quiet
+    }
+
     fn part(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if self.stiffness(h.value(), t) <= STEP_LIMIT {
             self.unit(h, q, t, watch);
             return;
         }
+        let given = self.damping;
         let mut done = 0;
         while done < UNITS {
             let left = UNITS - done;
@@ -581,13 +751,31 @@ impl<T: Scalar> Vessels<T> {
             while units > 1 && stiffness * units as f64 > STEP_LIMIT * UNITS as f64 {
                 units /= 2;
             }
-            if stiffness * units as f64 > STEP_LIMIT * UNITS as f64 {
-                let (length, q, begin) = span(done, UNITS);
-                self.relax(length, q, begin, watch);
-                return;
+            let short = stiffness * units as f64 <= STEP_LIMIT * UNITS as f64;
+            let (length, inflow, begin) = span(done, UNITS);
+            let rates = self.forgetting(begin);
+            let travel = self.travel(&rates, length.value(), &inflow, begin);
+            let calm = if travel <= SETTLED {
+                left
+            } else if travel <= SETTLING {
+                done.max(1).min(left)
+            } else {
+                0
+            };
+            if calm > units || (calm > 0 && !short) {
+                let (length, q, begin) = span(done, done + calm);
+                self.damping = Some(rates);
+                self.unit(length, q, begin, watch);
+                self.damping = given;
+                done += calm;
+                continue;
             }
             let (length, q, begin) = span(done, done + units);
-            self.unit(length, q, begin, watch);
+            if short {
+                self.unit(length, q, begin, watch);
+            } else {
+                self.relax(length, q, begin, watch);
+            }
             done += units;
         }
     }
@@ -598,20 +786,22 @@ impl<T: Scalar> Vessels<T> {
             self.step_with_rims(h, q, t, watch);
             return;
         }
-        let next = match &mut self.linear {
-            None => self.trial(h, q, t),
-            Some(flow) => {
-                let whole = flow.whole.advance(&self.levels, h, q);
-                if flow.disturbed {
-                    let first = q.part(T::constant(0.0), T::constant(0.5));
-                    let half = flow.half.advance(&self.levels, h * 0.5, first);
-                    self.linear_trial(whole, half, h, q, t)
-                } else {
-                    whole
-                }
-            }
-        };
+        let next = self.flow(h, q, t);
         self.accept(next, h, q, t, watch);
+    }
+
+    /// The levels after a step without events.
+    fn flow(&mut self, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
+        let Some(flow) = &mut self.linear else {
+            return self.trial(h, q, t);
+        };
+        let whole = flow.whole.advance(&self.levels, h, q);
+        if !flow.disturbed {
+            return whole;
+        }
+        let first = q.part(T::constant(0.0), T::constant(0.5));
+        let half = flow.half.advance(&self.levels, h * 0.5, first);
+        self.linear_trial(whole, half, h, q, t)
     }
 
     fn step_with_rims(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {

@@ -150,14 +150,16 @@ impl Plant {
         };
         // Torricelli: tau = 2 S sqrt(H)/alpha = 2 S Q/alpha^2. The measured vessel, the last one, is the shortest at its
         // largest level; that bounds the throughput Q, and Q the upper vessel, whose level is not known.
-        let last = scales.area[self.vessels() - 1];
+        let last = self.vessels() - 1;
+        let (low, high) = scales.level[last];
+        let content = scales.area[last] * positive(low.abs().max(high.abs()));
         let alpha = |name, meaning, area: f64| {
             info(
                 name,
                 ALPHA,
                 meaning,
                 flow(area).0 / level.sqrt(),
-                2.0 * (area * last * level).sqrt() / tau.0,
+                2.0 * (area * content).sqrt() / tau.0,
             )
         };
         let lag = |name, meaning| info(name, Unit::TIME, meaning, tau.0, tau.1);

@@ -25,6 +25,15 @@ pub(crate) fn square_root<T: Scalar>(level: T) -> T {
     }
 }
 
+/// The slope of [`square_root`].
+fn slope_of_root(level: f64) -> f64 {
+    if level >= NEARLY_EMPTY {
+        0.5 / level.sqrt()
+    } else {
+        (1.5 - level.max(0.0) / NEARLY_EMPTY) / NEARLY_EMPTY.sqrt()
+    }
+}
+
 /// The inflow to the first vessel over a step: at its beginning, middle and end; a parabola through the three.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Inflow<T> {
@@ -85,8 +94,9 @@ const UNITS: usize = 32;
 /// A long part may be as long as what has passed of its step, where no level will move by more than this share of
 /// itself: the fast part of the motion has died away by then.
 const SETTLING: f64 = 0.2;
-/// Where none will move by more than this share, one part is enough.
-const SETTLED: f64 = 1e-4;
+/// One part is enough where no fast vessel will move by more than this share of its level. What is over before the next
+/// reading leaves a trace only in the vessel that it flows into: the last one may move more.
+const SETTLED: [f64; 2] = [1e-4, 1e-2];
 /// Contacts with a rim that are looked for within a step.
 const MOST_EVENTS: usize = 12;
 
@@ -566,6 +576,10 @@ impl<T: Scalar> Vessels<T> {
     /// By how much a higher level slows its own rise, by a difference \[1/s\].
     fn slope(&self, i: usize, t: f64) -> f64 {
         let level = self.levels[i];
+        let vessel = &self.vessels[i];
+        if vessel.outlet == Outlet::Torricelli && vessel.laws.is_empty() {
+            return vessel.coefficient.value() * slope_of_root(level.value()) / vessel.area.value();
+        }
         let step = 1e-6 * (level.value().abs() + 1e-3);
         let (low, high) = (self.outflow(i, level, t), self.outflow(i, level + step, t));
         (high.value() - low.value()) / (step * self.area(i, level).value())
@@ -638,18 +652,31 @@ impl<T: Scalar> Vessels<T> {
         rates
     }
 
-    /// The largest share of its level by which a level will move within `h`, to first order.
-    fn travel(&self, rates: &[f64; MAX_VESSELS], h: f64, q: &Inflow<T>, t: f64) -> f64 {
-        let share = |q: T| {
+    /// How many of [`UNITS`] the next part may last although a vessel is faster than that, `done` of them over; zero
+    /// where a level moves too far for its forgetting to be one number.
+    fn calm(&self, rates: &[f64; MAX_VESSELS], h: f64, q: &Inflow<T>, t: f64, done: usize) -> usize {
+        let left = UNITS - done;
+        let mut longest = left;
+        let mut inflows = [Some(q.start), Some(q.end)];
+        if q.start.value() == q.end.value() {
+            inflows[1] = None;
+        }
+        for q in inflows.into_iter().flatten() {
             let moves = self.rates(&self.levels, q, t);
-            (0..self.vessels.len())
-                .map(|i| {
-                    let time = if rates[i] * h > 1.0 { 1.0 / rates[i] } else { h };
-                    (moves[i].value() * time / self.levels[i].value()).abs()
-                })
-                .fold(0.0, f64::max)
-        };
-        share(q.start).max(share(q.end))
+            for i in 0..self.vessels.len() {
+                let fast = rates[i] * h > STEP_LIMIT;
+                let time = if fast { 1.0 / rates[i] } else { h };
+                let share = (moves[i].value() * time / self.levels[i].value()).abs();
+                let settled = SETTLED[usize::from(i + 1 == self.vessels.len())];
+                if share.is_nan() || share > SETTLING {
+                    return 0;
+                }
+                if fast && share > settled {
+                    longest = longest.min(done.max(1));
+                }
+            }
+        }
+        longest
     }
 
     /// Moves on by `h` from time `t`; `watch` sees every smooth stretch of the measured level in turn.
@@ -754,14 +781,7 @@ impl<T: Scalar> Vessels<T> {
             let short = stiffness * units as f64 <= STEP_LIMIT * UNITS as f64;
             let (length, inflow, begin) = span(done, UNITS);
             let rates = self.forgetting(begin);
-            let travel = self.travel(&rates, length.value(), &inflow, begin);
-            let calm = if travel <= SETTLED {
-                left
-            } else if travel <= SETTLING {
-                done.max(1).min(left)
-            } else {
-                0
-            };
+            let calm = self.calm(&rates, length.value(), &inflow, begin, done);
             if calm > units || (calm > 0 && !short) {
                 let (length, q, begin) = span(done, done + calm);
                 self.damping = Some(rates);

@@ -26,11 +26,14 @@ pub(crate) fn square_root<T: Scalar>(level: T) -> T {
 }
 
 /// The slope of [`square_root`].
-fn slope_of_root(level: f64) -> f64 {
-    if level >= NEARLY_EMPTY {
-        0.5 / level.sqrt()
+fn slope_of_root<T: Scalar>(level: T) -> T {
+    let one = T::constant(1.0);
+    let h = level.value();
+    if h >= NEARLY_EMPTY {
+        one * 0.5 / level.sqrt()
     } else {
-        (1.5 - level.max(0.0) / NEARLY_EMPTY) / NEARLY_EMPTY.sqrt()
+        let x = level.max(T::constant(0.0)) * (1.0 / NEARLY_EMPTY);
+        (one * 1.5 - x) * (1.0 / NEARLY_EMPTY.sqrt())
     }
 }
 
@@ -124,6 +127,25 @@ struct LinearFlow<T> {
     disturbed: bool,
 }
 
+/// The exact flow over one step.
+struct Flow<T> {
+    half: Levels<T>,
+    whole: Levels<T>,
+    /// Where there are two vessels.
+    handed: Option<Handed<T>>,
+}
+
+/// What the second linear vessel gets from the first one.
+#[derive(Clone, Copy)]
+struct Handed<T> {
+    /// In half a step, by a deviation of the first one's level at its beginning.
+    deviation: T,
+    /// In half a step, by a constant drive of the first one.
+    drive: T,
+    /// In a whole step, by a drive of `a + b s + c s^2`.
+    whole: [T; 3],
+}
+
 /// The vessels in series.
 pub(crate) struct Vessels<T: Scalar> {
     vessels: Vec<Vessel<T>>,
@@ -132,7 +154,7 @@ pub(crate) struct Vessels<T: Scalar> {
     /// For linear vessels.
     linear: Option<LinearFlow<T>>,
     /// How fast every vessel forgets, where a part is long against that \[1/s\]: then it is taken exponentially.
-    damping: Option<[f64; MAX_VESSELS]>,
+    damping: Option<[T; MAX_VESSELS]>,
     /// Some vessel has a rim.
     rims: bool,
     /// All are Torricelli's, of areas without derivatives, and nothing acts in them.
@@ -244,10 +266,7 @@ impl<T: Scalar> Vessels<T> {
     #[inline(always)]
     fn outflow(&self, i: usize, level: T, t: f64) -> T {
         let vessel = &self.vessels[i];
-        let mut outflow = match vessel.outlet {
-            Outlet::Torricelli => vessel.coefficient * square_root(level),
-            Outlet::Linear => level - vessel.coefficient,
-        };
+        let mut outflow = self.own_outflow(i, level);
         for &law in &vessel.laws {
             outflow = self.laws[law].outflow(level, outflow, t);
         }
@@ -342,12 +361,7 @@ impl<T: Scalar> Vessels<T> {
     fn trial(&self, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
         let dt = h.value();
         if let Some(rates) = self.damping {
-            let still = |_: &Levels<T>, _: T| [T::constant(0.0); MAX_VESSELS];
-            if h.same_derivatives(T::constant(0.0)) {
-                self.damped_trial(rates, [&self.levels; 3], dt, dt, q, t, still)
-            } else {
-                self.damped_trial(rates, [&self.levels; 3], h, dt, q, t, still)
-            }
+            self.damped_trial(rates, None, h, q, t)
         } else if !h.same_derivatives(T::constant(0.0)) {
             self.trial_by(h, dt, q, t)
         } else if !self.bare {
@@ -424,56 +438,80 @@ impl<T: Scalar> Vessels<T> {
         self.weighted(&self.levels, h, [&k1, &k2, &k3, &k4])
     }
 
-    /// Beside a flow (its levels at the beginning, in the middle and at the end, and its rates), what is added to it,
-    /// each vessel's own forgetting taken exactly.
-    #[allow(clippy::too_many_arguments)]
-    fn damped_trial<H: Scalar>(
+    /// What is added to a flow, or to standing still, each vessel's own forgetting taken exactly.
+    fn damped_trial(
         &self,
-        rates: [f64; MAX_VESSELS],
-        [begin, half, whole]: [&Levels<T>; 3],
-        h: H,
-        dt: f64,
+        rates: [T; MAX_VESSELS],
+        flow: Option<&Flow<T>>,
+        h: T,
         q: Inflow<T>,
         t: f64,
-        flow_rates: impl Fn(&Levels<T>, T) -> Levels<T>,
-    ) -> Levels<T>
-    where
-        T: Mul<H, Output = T>,
-    {
+    ) -> Levels<T> {
         let n = self.vessels.len();
-        let damped: [Damped<H>; MAX_VESSELS] = std::array::from_fn(|i| Damped::new(rates[i], h));
-        // What drives the deviation from the flow, but for its forgetting.
-        let driving = |flow: &Levels<T>, deviation: &Levels<T>, q: T, t: f64| {
-            let mut at = *flow;
+        let zero = [T::constant(0.0); MAX_VESSELS];
+        let damped: [Damped<T>; MAX_VESSELS] = std::array::from_fn(|i| Damped::new(rates[i], h));
+        let [begin, half, whole] = match flow {
+            Some(flow) => [&self.levels, &flow.half, &flow.whole],
+            None => [&self.levels; 3],
+        };
+        // What drives the deviation from the flow, but for its forgetting and what a linear vessel hands on.
+        let driving = |at: &Levels<T>, deviation: &Levels<T>, q: T, t: f64| {
+            let mut levels = *at;
             for i in 0..n {
-                at[i] = at[i] + deviation[i];
+                levels[i] = levels[i] + deviation[i];
             }
-            let mut drive = self.rates(&at, q, t);
-            let own = flow_rates(flow, q);
+            let mut drive = self.rates(&levels, q, t);
             for i in 0..n {
-                drive[i] = drive[i] - own[i] + deviation[i] * rates[i];
+                drive[i] = drive[i] + deviation[i] * rates[i];
+            }
+            if flow.is_some() {
+                for (drive, own) in drive.iter_mut().zip(self.linear_rates(at, q)) {
+                    *drive = *drive - own;
+                }
+                for i in 1..n {
+                    drive[i] = drive[i] - deviation[i - 1] * self.vessels[i].inverse;
+                }
             }
             drive
         };
-        let zero = [T::constant(0.0); MAX_VESSELS];
-        let stage = |f: &dyn Fn(usize) -> T| {
-            let mut deviation = zero;
-            for (i, to) in deviation.iter_mut().enumerate().take(n) {
-                *to = f(i);
+        // What the first vessel's deviation, and its drive, bring to the second one in half a step and in a whole one.
+        let handed = flow.and_then(|flow| flow.handed);
+        let middle = t + 0.5 * h.value();
+        let from_zero = |k: &Levels<T>| {
+            let mut d = zero;
+            for i in 0..n {
+                d[i] = damped[i].half(k[i]);
             }
-            deviation
+            if let Some(handed) = &handed {
+                d[1] = d[1] + k[0] * handed.drive;
+            }
+            d
         };
-        let middle = t + 0.5 * dt;
         let k1 = driving(begin, &zero, q.start, t);
-        let d2 = stage(&|i| damped[i].half(k1[i]));
+        let d2 = from_zero(&k1);
         let k2 = driving(half, &d2, q.middle, middle);
-        let d3 = stage(&|i| damped[i].half(k2[i]));
-        let k3 = driving(half, &d3, q.middle, middle);
-        let d4 = stage(&|i| damped[i].from_half(d2[i], k3[i] * 2.0 - k1[i]));
-        let k4 = driving(whole, &d4, q.end, t + dt);
+        let k3 = driving(half, &from_zero(&k2), q.middle, middle);
+        let mut d4 = zero;
+        for i in 0..n {
+            d4[i] = damped[i].half_from(d2[i], k3[i] * 2.0 - k1[i]);
+        }
+        if let Some(handed) = &handed {
+            d4[1] = d4[1] + d2[0] * handed.deviation + (k3[0] * 2.0 - k1[0]) * handed.drive;
+        }
+        let k4 = driving(whole, &d4, q.end, t + h.value());
         let mut next = *whole;
         for i in 0..n {
             next[i] = next[i] + damped[i].whole([k1[i], (k2[i] + k3[i]) * 0.5, k4[i]]);
+        }
+        if let Some(handed) = &handed {
+            let drive = Inflow {
+                start: k1[0],
+                middle: (k2[0] + k3[0]) * 0.5,
+                end: k4[0],
+            };
+            for (c, weight) in drive.coefficients().into_iter().zip(handed.whole) {
+                next[1] = next[1] + c * weight;
+            }
         }
         next
     }
@@ -497,20 +535,11 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// One step of linear vessels: their exact flow, and beside it Runge-Kutta on what the effects add.
-    fn linear_trial(
-        &self,
-        whole: Levels<T>,
-        half: Levels<T>,
-        h: T,
-        q: Inflow<T>,
-        t: f64,
-    ) -> Levels<T> {
+    fn linear_trial(&self, flow: &Flow<T>, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
+        let (whole, half) = (flow.whole, flow.half);
         let dt = h.value();
         if let Some(rates) = self.damping {
-            let flow = [&self.levels, &half, &whole];
-            return self.damped_trial(rates, flow, h, dt, q, t, |levels, q| {
-                self.linear_rates(levels, q)
-            });
+            return self.damped_trial(rates, Some(flow), h, q, t);
         }
         let added = |levels: &Levels<T>, flow: &Levels<T>, q: T, t: f64| {
             let mut rates = self.rates(levels, q, t);
@@ -564,8 +593,12 @@ impl<T: Scalar> Vessels<T> {
                 // The vessel's own forgetting is exact; here it is what the effects add to it.
                 Outlet::Linear => {
                     let own = 1.0 / vessel.area.value().abs();
-                    let slope = self.slope(i, t).abs();
-                    let added = if h * own > STEP_LIMIT { slope - own } else { slope };
+                    let slope = self.slope(i, t).value().abs();
+                    let added = if h * own > STEP_LIMIT {
+                        slope - own
+                    } else {
+                        slope
+                    };
                     most = most.max(0.5 * h * added);
                 }
             }
@@ -573,16 +606,32 @@ impl<T: Scalar> Vessels<T> {
         most
     }
 
-    /// By how much a higher level slows its own rise, by a difference \[1/s\].
-    fn slope(&self, i: usize, t: f64) -> f64 {
+    /// What vessel `i` alone lets out at a level.
+    #[inline(always)]
+    fn own_outflow(&self, i: usize, level: T) -> T {
+        let vessel = &self.vessels[i];
+        match vessel.outlet {
+            Outlet::Torricelli => vessel.coefficient * square_root(level),
+            Outlet::Linear => level - vessel.coefficient,
+        }
+    }
+
+    /// By how much a higher level slows its own rise \[1/s\]: what the effects add to it by a difference, so that it
+    /// vanishes with them.
+    fn slope(&self, i: usize, t: f64) -> T {
         let level = self.levels[i];
         let vessel = &self.vessels[i];
-        if vessel.outlet == Outlet::Torricelli && vessel.laws.is_empty() {
-            return vessel.coefficient.value() * slope_of_root(level.value()) / vessel.area.value();
+        let own = match vessel.outlet {
+            Outlet::Torricelli => vessel.coefficient * slope_of_root(level),
+            Outlet::Linear => T::constant(1.0),
+        };
+        if vessel.laws.is_empty() {
+            return own * vessel.inverse;
         }
         let step = 1e-6 * (level.value().abs() + 1e-3);
-        let (low, high) = (self.outflow(i, level, t), self.outflow(i, level + step, t));
-        (high.value() - low.value()) / (step * self.area(i, level).value())
+        let added = |level: T| self.outflow(i, level, t) - self.own_outflow(i, level);
+        let slope = own + (added(level + step) - added(level)) * (1.0 / step);
+        slope * vessel.inverse * (vessel.area / self.area(i, level))
     }
 
     /// One step that cannot overshoot, whatever its length: implicit in each vessel's own level, of order one.
@@ -592,8 +641,8 @@ impl<T: Scalar> Vessels<T> {
         for (i, to) in next.iter_mut().enumerate().take(self.vessels.len()) {
             let level = self.levels[i];
             let (outflow, net) = self.balance(i, level, inflow, t);
-            let slope = self.slope(i, t).max(0.0);
-            let damped = 1.0 / (1.0 + h.value() * slope);
+            let slope = self.slope(i, t).max(T::constant(0.0));
+            let damped = T::constant(1.0) / (h * slope + 1.0);
             *to = level + self.rate(i, level, net) * h * damped;
             let low = match self.vessels[i].outlet {
                 Outlet::Torricelli => 0.0,
@@ -601,7 +650,7 @@ impl<T: Scalar> Vessels<T> {
             };
             *to = (*to).max(T::constant(low)).min(self.vessels[i].rim.level);
             // What left the vessel is what its balance says; the rest of the step it is near its new level.
-            inflow = if slope * h.value() > 1.0 {
+            inflow = if slope.value() * h.value() > 1.0 {
                 self.outflow(i, *to, t)
             } else {
                 outflow
@@ -640,21 +689,21 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// How fast each vessel forgets its level \[1/s\].
-    fn forgetting(&self, t: f64) -> [f64; MAX_VESSELS] {
-        let mut rates = [0.0; MAX_VESSELS];
-        for (i, (rate, vessel)) in rates.iter_mut().zip(&self.vessels).enumerate() {
-            *rate = match vessel.outlet {
-                Outlet::Linear if vessel.laws.is_empty() => 1.0 / vessel.area.value(),
-                _ => self.slope(i, t),
-            }
-            .max(0.0);
+    fn forgetting(&self, t: f64) -> [T; MAX_VESSELS] {
+        let mut rates = [T::constant(0.0); MAX_VESSELS];
+        for (i, rate) in rates.iter_mut().enumerate().take(self.vessels.len()) {
+            *rate = match self.linear {
+                // Where the vessels' own forgetting is exact it alone is meant.
+                Some(_) => self.vessels[i].inverse,
+                None => self.slope(i, t).max(T::constant(0.0)),
+            };
         }
         rates
     }
 
     /// How many of [`UNITS`] the next part may last although a vessel is faster than that, `done` of them over; zero
     /// where a level moves too far for its forgetting to be one number.
-    fn calm(&self, rates: &[f64; MAX_VESSELS], h: f64, q: &Inflow<T>, t: f64, done: usize) -> usize {
+    fn calm(&self, rates: &[T; MAX_VESSELS], h: f64, q: &Inflow<T>, t: f64, done: usize) -> usize {
         let left = UNITS - done;
         let mut longest = left;
         let mut inflows = [Some(q.start), Some(q.end)];
@@ -664,8 +713,8 @@ impl<T: Scalar> Vessels<T> {
         for q in inflows.into_iter().flatten() {
             let moves = self.rates(&self.levels, q, t);
             for i in 0..self.vessels.len() {
-                let fast = rates[i] * h > STEP_LIMIT;
-                let time = if fast { 1.0 / rates[i] } else { h };
+                let fast = rates[i].value() * h > STEP_LIMIT;
+                let time = if fast { 1.0 / rates[i].value() } else { h };
                 let share = (moves[i].value() * time / self.levels[i].value()).abs();
                 let settled = SETTLED[usize::from(i + 1 == self.vessels.len())];
                 if share.is_nan() || share > SETTLING {
@@ -705,14 +754,7 @@ impl<T: Scalar> Vessels<T> {
     /// A step of linear vessels that is longer than a time constant, in parts that double: what a jump of the input sets
     /// off is over when they are long. Their lengths do not depend on effects, so that one at its absent value sees
     /// the parts of the base model.
-    fn fast_linear_step(
-        &mut self,
-        wanted: f64,
-        h: T,
-        q: Inflow<T>,
-        t: f64,
-        watch: &mut Watch<T>,
-    ) {
+    fn fast_linear_step(&mut self, wanted: f64, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
         let share = 1.0 / parts as f64;
         let (mut done, mut length) = (0, 1);
@@ -781,7 +823,12 @@ impl<T: Scalar> Vessels<T> {
             let short = stiffness * units as f64 <= STEP_LIMIT * UNITS as f64;
             let (length, inflow, begin) = span(done, UNITS);
             let rates = self.forgetting(begin);
-            let calm = self.calm(&rates, length.value(), &inflow, begin, done);
+            let calm = if self.linear.is_some() {
+                // What makes such a part too long is the effects' doing, which its vessels' forgetting does not cover.
+                0
+            } else {
+                self.calm(&rates, length.value(), &inflow, begin, done)
+            };
             if calm > units || (calm > 0 && !short) {
                 let (length, q, begin) = span(done, done + calm);
                 self.damping = Some(rates);
@@ -821,7 +868,23 @@ impl<T: Scalar> Vessels<T> {
         }
         let first = q.part(T::constant(0.0), T::constant(0.5));
         let half = flow.half.advance(&self.levels, h * 0.5, first);
-        self.linear_trial(whole, half, h, q, t)
+        let handed = (self.vessels.len() == 2 && h.value() > 0.0).then(|| {
+            // A drive of the level is an inflow over the area.
+            let area = self.vessels[0].area;
+            let (deviation, [drive, ..]) = flow.half.second_from(h * 0.5);
+            let (_, whole) = flow.whole.second_from(h);
+            Handed {
+                deviation,
+                drive: drive * area,
+                whole: whole.map(|weight| weight * area),
+            }
+        });
+        let flow = Flow {
+            half,
+            whole,
+            handed,
+        };
+        self.linear_trial(&flow, h, q, t)
     }
 
     fn step_with_rims(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {

@@ -4,13 +4,16 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use missing_effect::{Diagnosis, Options};
+use ct_signals::{Columns, Hold, read_csv};
+use missing_effect::Options;
 
+use crate::identify::{self, Method, Order, Request};
 use crate::input::Files;
 use crate::look::Look;
-use crate::output::{self, Kind, Output};
+use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
-use crate::{Error, catalogue, edit, terminal, tour};
+use crate::tables::{udink, udink_text};
+use crate::{Error, catalogue, edit, model_file, terminal, tour};
 
 /// Says which physical effect a model of measured data is missing.
 #[derive(Debug, Parser)]
@@ -35,6 +38,10 @@ enum Command {
     Remove(Remove),
     /// List the catalogue of effects, or say all about one
     Effects(Effects),
+    /// Identify a linear model in continuous time from a record
+    Identify(Identify),
+    /// Compute the tables of a paper again, with many noises, and say which printed figures agree
+    Tables(Tables),
 }
 
 #[derive(Debug, Args)]
@@ -48,6 +55,13 @@ struct Compare {
     /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
+    #[command(flatten)]
+    results: Results,
+}
+
+/// Where results go besides the terminal.
+#[derive(Debug, Args)]
+struct Results {
     /// Write the result as JSON
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
@@ -98,6 +112,82 @@ struct Effects {
     effect: Option<String>,
 }
 
+#[derive(Debug, Args)]
+struct Identify {
+    /// Record (CSV)
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// How the parameters are found
+    #[arg(long, value_enum)]
+    method: Method,
+    /// Orders n of A and m of B in A y = B u + d
+    #[arg(long, value_name = "N,M", default_value = "1,0")]
+    order: Order,
+    /// Model file, of which the columns and the hold of the input are used
+    #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
+    model: Option<PathBuf>,
+    /// The columns' names, where their first letters do not tell
+    #[arg(long, value_name = "TIME,INPUT,OUTPUT", value_parser = columns)]
+    columns: Option<Columns>,
+    /// What the input does between samples
+    #[arg(long, value_enum, default_value_t = InputHold::Zero)]
+    hold: InputHold,
+    /// Memory of the recursion [s]; without it a fifth of the record, at least 10 time constants
+    #[arg(long, value_name = "S")]
+    memory: Option<f64>,
+    /// Bandwidth of the state variable filters [1/s]; without it 3 over the time constant
+    #[arg(long, value_name = "L")]
+    bandwidth: Option<f64>,
+    #[command(flatten)]
+    results: Results,
+}
+
+/// Three names, in the order of the help.
+fn columns(text: &str) -> Result<Columns, String> {
+    let names: Vec<&str> = text.split(',').map(str::trim).collect();
+    let [time, input, output] = names[..] else {
+        return Err(format!(
+            "three names are needed, those of time, input and output, and {} are given",
+            names.len()
+        ));
+    };
+    Ok(Columns {
+        time: Some(time.to_owned()),
+        input: Some(input.to_owned()),
+        output: Some(output.to_owned()),
+        reference: None,
+    })
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum InputHold {
+    /// It stands until the next sample: a D/A converter
+    Zero,
+    /// It runs on a line to the next sample: a measured input
+    First,
+}
+
+#[derive(Debug, Args)]
+struct Tables {
+    /// The paper
+    #[arg(value_enum, default_value_t = Paper::Udink)]
+    paper: Paper,
+    /// Noises: each table is run once with each
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    runs: usize,
+    /// What the noises are drawn from
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    results: Results,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Paper {
+    /// A. J. Udink ten Cate, WP-85-54, IIASA, 1985: tables 1 to 4
+    Udink,
+}
+
 /// Does what the command line asks for; what a person reads goes to `out`.
 ///
 /// # Errors
@@ -125,6 +215,18 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Effects(Effects {
             effect: Some(effect),
         })) => say(out, &catalogue::describe(&effect, look)?),
+        Some(Command::Identify(arguments)) => arguments.run(out, look),
+        Some(Command::Tables(arguments)) => arguments.run(out, look),
+    }
+}
+
+impl Results {
+    /// Where the results go, checked.
+    fn plan(&self, inputs: &[&Path]) -> Result<Vec<Output>, Error> {
+        let json = self.json.as_deref().map(|path| (Kind::Json, path));
+        let report = self.report.as_deref().map(|path| (Kind::Report, path));
+        let wanted: Vec<_> = json.into_iter().chain(report).collect();
+        output::plan(&wanted, inputs)
     }
 }
 
@@ -137,18 +239,10 @@ impl Compare {
         }
     }
 
-    /// Where the results go, checked.
-    fn outputs(&self) -> Result<Vec<Output>, Error> {
-        let json = self.json.as_deref().map(|path| (Kind::Json, path));
-        let report = self.report.as_deref().map(|path| (Kind::Report, path));
-        let wanted: Vec<_> = json.into_iter().chain(report).collect();
-        output::plan(&wanted, &self.files().all())
-    }
-
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
         let problem = files.read()?;
-        let outputs = self.outputs()?;
+        let outputs = self.results.plan(&files.all())?;
         let bar = Bar::new();
         bar.phase("fitting the model");
         let diagnosis = missing_effect::compare(&problem, &Options::default());
@@ -168,7 +262,7 @@ impl Diagnose {
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
         let problem = files.read()?;
-        let outputs = self.compare.outputs()?;
+        let outputs = self.compare.results.plan(&files.all())?;
         let mut options = Options::default();
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
@@ -188,9 +282,71 @@ impl Diagnose {
     }
 }
 
+impl Identify {
+    /// Which columns, and the hold.
+    fn layout(&self) -> Result<(Columns, Hold), Error> {
+        if let Some(model) = &self.model {
+            let model = model_file::read(model)?;
+            return Ok((model.columns, model.hold));
+        }
+        let hold = match self.hold {
+            InputHold::Zero => Hold::Zero,
+            InputHold::First => Hold::First,
+        };
+        Ok((self.columns.clone().unwrap_or_default(), hold))
+    }
+
+    fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        let (columns, hold) = self.layout()?;
+        let record = read_csv(&self.data, &columns, hold)?;
+        let inputs: Vec<&Path> = [Some(&self.data), self.model.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(PathBuf::as_path)
+            .collect();
+        let outputs = self.results.plan(&inputs)?;
+        let request = Request {
+            method: self.method,
+            order: self.order,
+            memory: self.memory,
+            bandwidth: self.bandwidth,
+        };
+        let bar = Bar::new();
+        bar.phase("identifying");
+        let found = identify::identify(&record, &request);
+        bar.clear();
+        let found = found?;
+        finish(
+            &found,
+            &identify::text::text(&found, look),
+            &outputs,
+            out,
+            look,
+        )
+    }
+}
+
+impl Tables {
+    fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        let outputs = self.results.plan(&[])?;
+        match self.paper {
+            Paper::Udink => {
+                let bar = Bar::new();
+                let settings = udink::Settings::default();
+                let study = udink::study(&settings, self.runs, self.seed, &|progress| {
+                    bar.show(progress);
+                });
+                bar.clear();
+                let study = study?;
+                finish(&study, &udink_text::text(&study, look), &outputs, out, look)
+            }
+        }
+    }
+}
+
 /// Writes the files, then says what was found and what was written.
 fn finish(
-    diagnosis: &Diagnosis,
+    found: &impl Found,
     text: &str,
     outputs: &[Output],
     out: &mut dyn Write,
@@ -198,7 +354,7 @@ fn finish(
 ) -> Result<(), Error> {
     // The files first: whoever pipes the text into `head` still gets them.
     for output in outputs {
-        output.write(diagnosis)?;
+        output.write(found)?;
     }
     let mut text = text.to_string();
     if !outputs.is_empty() {

@@ -6,6 +6,8 @@
 //! | the model file | [`model_file`]; its effects are edited by [`edit`] |
 //! | records and model, read and checked | [`input`] |
 //! | the tour | [`tour`] |
+//! | linear models from a record | [`mod@identify`] |
+//! | a paper's tables, computed again | [`tables`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
 //!
@@ -16,6 +18,7 @@ pub mod catalogue;
 mod commands;
 pub mod edit;
 mod error;
+pub mod identify;
 pub mod input;
 pub mod look;
 pub mod model_file;
@@ -25,6 +28,7 @@ pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
+pub mod tables;
 pub mod terminal;
 pub mod tour;
 

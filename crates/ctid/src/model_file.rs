@@ -274,6 +274,9 @@ impl Source<'_> {
             );
         } else if let Some((_, rest)) = what.split_once("unknown variant `") {
             what = format!("unknown word `{rest}");
+        } else if toml::from_str::<toml::Table>(self.text).is_err() {
+            // what is wrong is the writing, not what it says
+            what += "; write `key = value`, words in quotes, numbers without quotes and without a unit, each key once";
         }
         let Some(span) = error.span() else {
             return Error::File {

@@ -194,7 +194,11 @@ fn text_where_a_number_belongs() {
 #[test]
 fn a_syntax_error() {
     refuses("plant = \"single-tank\"\neffects = [", "tank.toml:2: ", "");
-    refuses("plant = single-tank", "tank.toml:1: ", "");
+    refuses(
+        "plant = single-tank",
+        "tank.toml:1: ",
+        "words in quotes, numbers without quotes and without a unit",
+    );
     refuses(
         "plant = \"single-tank\"\nplant = \"first-order\"",
         "tank.toml:2: ",

@@ -81,8 +81,13 @@ pub(super) fn json(diagnosis: &Diagnosis) -> String {
         groups: &diagnosis.groups,
         effects: &diagnosis.effects,
     };
+    script_safe(&report)
+}
+
+/// JSON without what could close a `<script>` element.
+pub(super) fn script_safe(data: &impl Serialize) -> String {
     // Writing plain structs to memory cannot fail; an empty object would draw an empty report.
-    serde_json::to_string(&report)
+    serde_json::to_string(data)
         .unwrap_or_else(|_| "{}".to_owned())
         .replace('<', "\\u003c")
 }
@@ -172,7 +177,7 @@ fn pick(values: &[f64], at: &[usize]) -> Vec<f64> {
 }
 
 /// Rounds to significant digits: nobody sees more, and the file is half as large.
-fn rounded(value: f64, digits: usize) -> f64 {
+pub(super) fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }
 

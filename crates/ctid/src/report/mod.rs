@@ -3,27 +3,32 @@
 //! The words and the tables are written here and stand without a script; the plots are drawn in the
 //! browser by `report.js` with plotly.js, which the build script has packed. The page loads nothing:
 //! its content security policy forbids every connection. The same diagnosis gives the same bytes.
+//!
+//! What every page shares is in `page.rs`, `plots.js` and `report.css`; pages whose plots are curves alone say in
+//! `figures.rs` what `figures.js` draws.
 
 mod data;
 mod decimate;
+mod figures;
+mod identification;
+mod page;
 #[cfg(test)]
 mod sample;
 mod tables;
 mod text;
+mod udink;
 
 use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
+pub use self::identification::html as identification;
+use self::page::{NOTICES, Page, figure, figure_with, section};
 use self::text::{escape, significant};
+pub use self::udink::html as udink;
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.
 pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
 
-const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
-                      img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'";
-const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
-/// plotly.js, gzipped, in base64.
-const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
 
 /// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and
 /// no scores; what is empty is left out.
@@ -43,18 +48,12 @@ pub fn html(diagnosis: &Diagnosis) -> String {
         footer(),
     ]
     .concat();
-    format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-         {GENERATOR}\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}\n\
-         <script type=\"application/json\" id=\"data\">{data}</script>\n\
-         <script type=\"text/plain\" id=\"plotly\">{PLOTLY}</script>\n\
-         <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
-    )
+    page::html(&Page {
+        title: &title,
+        body: &body,
+        data: &data,
+        script: SCRIPT,
+    })
 }
 
 /// The verdict, the fall of the error in large numbers, and what was looked at.
@@ -67,9 +66,7 @@ fn headline(diagnosis: &Diagnosis) -> String {
     format!(
         "<header>\n<p class=\"kicker\">ctid report · {plant}</p>\n<h1>{verdict}</h1>\n\
          <div class=\"verdict\">\n{sentences}</div>\n{trail}{facts}\
-         <noscript><p class=\"notice\">The plots need a browser that runs scripts; \
-         the findings and the tables do not.</p></noscript>\n\
-         <p class=\"notice\" id=\"no-plots\" hidden></p>\n</header>\n",
+         {NOTICES}</header>\n",
         plant = escape(&diagnosis.plant),
         verdict = verdict(diagnosis),
         trail = trail(diagnosis),
@@ -365,35 +362,6 @@ fn footer() -> String {
 
 fn label(step: &Step) -> String {
     escape(&data::step_label(step))
-}
-
-fn section(id: &str, title: &str, lead: &str, content: &str) -> String {
-    let lead = if lead.is_empty() {
-        String::new()
-    } else {
-        format!("<p class=\"lead\">{lead}</p>\n")
-    };
-    format!(
-        "<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{title}</h2>\n{lead}{content}</section>\n"
-    )
-}
-
-/// A place for a plot. `heading` is HTML, `caption` is text.
-fn figure(id: &str, heading: &str, caption: &str) -> String {
-    figure_with(id, heading, &escape(caption))
-}
-
-/// A place for a plot, heading and caption in HTML.
-fn figure_with(id: &str, heading: &str, caption: &str) -> String {
-    let caption = if caption.is_empty() {
-        String::new()
-    } else {
-        format!("<p class=\"caption\">{caption}</p>")
-    };
-    format!(
-        "<figure aria-labelledby=\"plot-{id}-name\">\n<figcaption><h3 id=\"plot-{id}-name\">{heading}</h3>\
-         {caption}</figcaption>\n<div class=\"plot\" id=\"plot-{id}\"></div>\n</figure>\n"
-    )
 }
 
 #[cfg(test)]

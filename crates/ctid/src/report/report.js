@@ -1,10 +1,8 @@
-// Draws the plots of the report: unpacks plotly.js, then draws every figure for the chosen step.
+// Draws the plots of a diagnosis: every figure for the chosen step.
 "use strict";
 (() => {
   const report = JSON.parse(document.getElementById("data").textContent);
-  const narrow = matchMedia("(max-width: 40rem)");
-  const dark = matchMedia("(prefers-color-scheme: dark)");
-  const touch = matchMedia("(pointer: coarse)").matches;
+  const { narrow, touch, theme, plain, pretty, named, axis, config } = plots;
   const records = report.records || [];
   const steps = report.steps || [];
   // The bins of the failures belong to the first fitted record.
@@ -12,58 +10,24 @@
   let chosen = steps.length - 1;
   let residualRecord = located;
   let sameAxes = true;
-  let printing = false;
 
-  // Okabe and Ito's colours, told apart by colour-blind readers; lightened on a dark ground.
-  const LIGHT = {
-    text: "#1b1f26", faint: "#59616e", grid: "#e3e6eb", zero: "#a9b0bb", measured: "#1b1f26",
-    failing: "#e69f00", passing: "#8794a6", ground: "#ffffff",
-    band: "rgba(0,99,163,0.12)", held: "#a8518a", best: "#0072b2", equal: "#56a3d4",
-    steps: ["#d55e00", "#0072b2", "#008a66", "#b5578f", "#8a6d00", "#4a6fa5"],
-  };
-  const DARK = {
-    text: "#e7eaef", faint: "#a3acb9", grid: "#2b313a", zero: "#5c6674", measured: "#dfe3e9",
-    failing: "#f0b428", passing: "#75839a", ground: "#14171c",
-    band: "rgba(108,188,242,0.16)", held: "#e39ac8", best: "#56b4e9", equal: "#2f7fb0",
-    steps: ["#ff8a3c", "#56b4e9", "#2fc79a", "#e39ac8", "#e0c341", "#9db4dd"],
-  };
   const DASHES = ["dash", "solid", "dot", "dashdot", "longdash", "longdashdot"];
-  const FONT = "system-ui, -apple-system, Segoe UI, Roboto, Arial, sans-serif";
-  const theme = () => (dark.matches && !printing ? DARK : LIGHT);
   const stepColour = (k) => theme().steps[k % theme().steps.length];
 
   // --- words -------------------------------------------------------------------------------
 
-  // plotly reads a little HTML in its texts; names from files are no HTML.
-  const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-  const pretty = (unit) => plain(unit || "").replace(/\^(-?[\d.]+)/g, "<sup>$1</sup>");
   const OUT = pretty(report.output_unit);
   const IN = pretty(report.input_unit);
-  const named = (name, unit) => (unit ? `${name} [${unit}]` : name);
   const sized = (value, unit) => `${value === null ? "–" : Number(value.toPrecision(2))} ${unit}`.trim();
 
   // --- parts of a figure -------------------------------------------------------------------
 
-  function axis(title, more) {
-    const c = theme();
-    return Object.assign({
-      title: { text: title, standoff: 8 }, gridcolor: c.grid, zerolinecolor: c.zero, linecolor: c.zero,
-      tickcolor: c.zero, automargin: true, nticks: narrow.matches ? 6 : undefined,
-    }, more);
-  }
-
-  function layout(height, more) {
-    const c = theme();
-    return Object.assign({
-      height, autosize: true, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { family: FONT, size: narrow.matches ? 11 : 12.5, color: c.text },
-      margin: { l: 52, r: 10, t: 10, b: 40 },
-      legend: { orientation: "h", x: 0, xanchor: "left", y: 1.01, yanchor: "bottom", bgcolor: "rgba(0,0,0,0)", uirevision: chosen },
-      hoverlabel: { bgcolor: c.ground, bordercolor: c.zero, font: { color: c.text, family: FONT } },
-      modebar: { bgcolor: "rgba(0,0,0,0)", color: c.faint, activecolor: c.best },
-      dragmode: touch ? false : "zoom", uirevision: "kept", showlegend: false, bargap: 0.12,
-    }, more);
-  }
+  // The curves that were switched on stay so while the step stays.
+  const layout = (height, more) => {
+    const made = plots.layout(height, more);
+    made.legend.uirevision = chosen;
+    return made;
+  };
 
   const present = (values) => values.filter((v) => v !== null && v !== undefined);
   const largest = (values) => present(values).reduce((most, v) => Math.max(most, Math.abs(v)), 0);
@@ -281,11 +245,6 @@
 
   // --- drawing -----------------------------------------------------------------------------
 
-  const config = {
-    displaylogo: false, responsive: true, displayModeBar: touch ? false : "hover",
-    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], toImageButtonOptions: { scale: 2 },
-  };
-
   // On a touch screen a finger scrolls the page; the plots worth a zoom show their tools above.
   const ZOOMED = /^(record-\d+|by-time|by-level|by-flow)$/;
   function withTools({ data, layout }) {
@@ -393,40 +352,9 @@
     }
     const axes = document.getElementById("same-axes");
     if (axes) axes.addEventListener("change", () => { sameAxes = axes.checked; choose(chosen); });
-    const redraw = () => { paint(); drawAll(); };
-    dark.addEventListener("change", redraw);
-    narrow.addEventListener("change", redraw);
-    // On paper: the light colours, and as wide as the sheet.
-    const paper = (on) => {
-      printing = on;
-      redraw();
-      document.querySelectorAll(".js-plotly-plot").forEach((box) => Plotly.relayout(box, on ? { width: 660, autosize: false } : { width: null, autosize: true }));
-    };
-    addEventListener("beforeprint", () => paper(true));
-    addEventListener("afterprint", () => paper(false));
-  }
-
-  async function unpack() {
-    const element = document.getElementById("plotly");
-    const bytes = Uint8Array.from(atob(element.textContent), (c) => c.charCodeAt(0));
-    element.remove();
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    const script = document.createElement("script");
-    script.textContent = await new Response(stream).text();
-    document.head.append(script);
   }
 
   paint();
   words();
-  unpack().then(() => {
-    drawAll();
-    link();
-    listen();
-    document.documentElement.dataset.drawn = "yes";
-  }).catch((error) => {
-    const notice = document.getElementById("no-plots");
-    notice.textContent = `The plots could not be drawn (${error.message}). The findings and the tables stand; a browser from 2023 or later draws the plots.`;
-    notice.hidden = false;
-    document.querySelectorAll("#steps, .choice, figure").forEach((part) => { part.hidden = true; });
-  });
+  plots.start(() => { paint(); drawAll(); }, () => { link(); listen(); });
 })();

@@ -231,7 +231,7 @@ fn percent(part: f64) -> String {
 }
 
 /// A table that scrolls inside its own box, also by the keyboard.
-fn table(name: &str, head: &str, rows: &str, caption: &str) -> String {
+pub(super) fn table(name: &str, head: &str, rows: &str, caption: &str) -> String {
     format!(
         "<h3>{name}</h3>\n<div class=\"scroll\" role=\"region\" aria-label=\"{name}\" tabindex=\"0\">\n\
          <table><thead>{head}</thead>\n<tbody>{rows}</tbody></table>\n</div>\n\

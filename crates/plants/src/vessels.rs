@@ -10,6 +10,9 @@ use crate::{
 /// Below this level Torricelli's root, whose slope is infinite at zero, gives way to a parabola \[level unit\].
 const NEARLY_EMPTY: f64 = 1e-4;
 
+/// What stands for an empty vessel where its slope is asked by outflow over content \[level unit\].
+const A_LITTLE: f64 = 1e-3 * NEARLY_EMPTY;
+
 /// `sqrt(level)`, zero for an empty vessel, with a finite slope at empty.
 #[inline(always)]
 pub(crate) fn square_root<T: Scalar>(level: T) -> T {
@@ -575,16 +578,18 @@ impl<T: Scalar> Vessels<T> {
             let level = self.levels[i];
             match vessel.outlet {
                 // The outflow bends downwards from zero, so its slope is less than outflow/level: half of it for a root.
+                // An empty vessel is taken as one with a little in it: its slope is the same, and it may be about to fill.
                 Outlet::Torricelli => {
+                    let height = level.value().max(A_LITTLE);
                     let (outflow, content) = if vessel.laws.is_empty() {
-                        let height = level.value();
                         let outflow = vessel.coefficient.value() * square_root(height);
                         (outflow, height * vessel.area.value())
                     } else {
+                        let level = T::constant(height);
                         let outflow = self.outflow(i, level, t).value();
-                        (outflow, level.value() * self.area(i, level).value())
+                        (outflow, height * self.area(i, level).value())
                     };
-                    // Without the division in the common case; an empty vessel has no content and no outflow.
+                    // Without the division in the common case.
                     if h * outflow > 2.0 * STEP_LIMIT * content {
                         most = most.max(0.5 * h * outflow / content);
                     }
@@ -715,7 +720,13 @@ impl<T: Scalar> Vessels<T> {
             for i in 0..self.vessels.len() {
                 let fast = rates[i].value() * h > STEP_LIMIT;
                 let time = if fast { 1.0 / rates[i].value() } else { h };
-                let share = (moves[i].value() * time / self.levels[i].value()).abs();
+                let way = (moves[i].value() * time).abs();
+                // What does not move is calm at any level, also at the bottom.
+                let share = if way == 0.0 {
+                    0.0
+                } else {
+                    way / self.levels[i].value().abs()
+                };
                 let settled = SETTLED[usize::from(i + 1 == self.vessels.len())];
                 if share.is_nan() || share > SETTLING {
                     return 0;

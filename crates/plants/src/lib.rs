@@ -24,6 +24,7 @@ pub mod controller;
 mod damped;
 pub mod effects;
 mod error;
+mod inflow;
 mod law;
 mod linear;
 mod moments;

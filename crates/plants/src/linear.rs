@@ -1,6 +1,6 @@
 //! Exact propagation of linear vessels under a polynomial inflow, by the matrix exponential.
 
-use crate::{Scalar, structure::MAX_VESSELS, vessels::Inflow};
+use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
 
 /// Vessels, and the inflow's three coefficients and the constant one beside them.
 const N: usize = MAX_VESSELS + 4;

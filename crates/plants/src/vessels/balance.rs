@@ -11,43 +11,43 @@ use super::{
 impl<T: Scalar> Vessels<T> {
     /// What vessel `i` alone lets out at a level.
     #[inline(always)]
-    fn own_outflow(&self, i: usize, level: T) -> T {
+    fn own_outflow(&self, i: usize, level: &T) -> T {
         let vessel = &self.vessels[i];
         match vessel.outlet {
-            Outlet::Torricelli => vessel.coefficient * square_root(level),
-            Outlet::Linear => level - vessel.coefficient,
+            Outlet::Torricelli => vessel.coefficient * square_root(*level),
+            Outlet::Linear => *level - vessel.coefficient,
         }
     }
 
     /// What flows out of vessel `i` to the next one at a level.
     #[inline(always)]
-    pub(super) fn outflow(&self, i: usize, level: T, t: f64) -> T {
+    pub(super) fn outflow(&self, i: usize, level: &T, t: f64) -> T {
         let vessel = &self.vessels[i];
         let mut outflow = self.own_outflow(i, level);
         for &law in &vessel.laws {
-            outflow = self.laws[law].outflow(level, outflow, t);
+            self.laws[law].outflow(level, &mut outflow, t);
         }
         outflow
     }
 
     /// What flows out of vessel `i` to the next one, and its net inflow, at a level.
     #[inline(always)]
-    pub(super) fn balance(&self, i: usize, level: T, inflow: T, t: f64) -> (T, T) {
+    pub(super) fn balance(&self, i: usize, level: &T, inflow: T, t: f64) -> (T, T) {
         let outflow = self.outflow(i, level, t);
         let mut net = inflow - outflow;
         for &law in &self.vessels[i].laws {
-            net = self.laws[law].net(level, net, t);
+            self.laws[law].net(level, &mut net, t);
         }
         (outflow, net)
     }
 
     /// Surface of vessel `i` at a level.
     #[inline]
-    fn area(&self, i: usize, level: T) -> T {
+    fn area(&self, i: usize, level: &T) -> T {
         let vessel = &self.vessels[i];
         let mut area = vessel.area;
         for &law in &vessel.laws {
-            area = self.laws[law].area(level, area);
+            self.laws[law].area(level, &mut area);
         }
         area
     }
@@ -55,7 +55,7 @@ impl<T: Scalar> Vessels<T> {
     /// The rate of vessel `i` at a level. The nominal area goes in as its inverse, and an area that is nominal as a
     /// factor of one, so that both ways give the same bits.
     #[inline(always)]
-    pub(super) fn rate(&self, i: usize, level: T, net: T) -> T {
+    pub(super) fn rate(&self, i: usize, level: &T, net: T) -> T {
         let vessel = &self.vessels[i];
         let rate = match vessel.plain_inverse {
             Some(inverse) => net * inverse,
@@ -74,7 +74,7 @@ impl<T: Scalar> Vessels<T> {
         let mut rates = [T::constant(0.0); MAX_VESSELS];
         let mut inflow = q;
         for (i, vessel) in self.vessels.iter().enumerate() {
-            let level = levels[i];
+            let level = &levels[i];
             let (outflow, net) = self.balance(i, level, inflow, t);
             inflow = outflow;
             if vessel.spilling {
@@ -104,13 +104,13 @@ impl<T: Scalar> Vessels<T> {
     pub(super) fn net(&self, i: usize, levels: &Levels<T>, q: T, t: f64) -> T {
         let mut inflow = q;
         for (k, vessel) in self.vessels.iter().enumerate().take(i) {
-            let (outflow, net) = self.balance(k, levels[k], inflow, t);
+            let (outflow, net) = self.balance(k, &levels[k], inflow, t);
             inflow = outflow;
             if vessel.spilling {
                 inflow = inflow + net * vessel.rim.fraction;
             }
         }
-        self.balance(i, levels[i], inflow, t).1
+        self.balance(i, &levels[i], inflow, t).1
     }
 
     /// By how much a higher level slows its own rise \[1/s\]: what the effects add to it by a difference, so that it
@@ -126,9 +126,9 @@ impl<T: Scalar> Vessels<T> {
             return own * vessel.inverse;
         }
         let step = 1e-6 * (level.value().abs() + 1e-3);
-        let added = |level: T| self.outflow(i, level, t) - self.own_outflow(i, level);
-        let slope = own + (added(level + step) - added(level)) * (1.0 / step);
-        slope * vessel.inverse * (vessel.area / self.area(i, level))
+        let added = |level: &T| self.outflow(i, level, t) - self.own_outflow(i, level);
+        let slope = own + (added(&(level + step)) - added(&level)) * (1.0 / step);
+        slope * vessel.inverse * (vessel.area / self.area(i, &level))
     }
 
     /// How fast each vessel forgets its level \[1/s\].
@@ -161,8 +161,8 @@ impl<T: Scalar> Vessels<T> {
                         (outflow, height * vessel.area.value())
                     } else {
                         let level = T::constant(height);
-                        let outflow = self.outflow(i, level, t).value();
-                        (outflow, height * self.area(i, level).value())
+                        let outflow = self.outflow(i, &level, t).value();
+                        (outflow, height * self.area(i, &level).value())
                     };
                     // Without the division in the common case.
                     if h * outflow > 2.0 * STEP_LIMIT * content {

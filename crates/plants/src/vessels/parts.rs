@@ -192,10 +192,10 @@ impl<T: Scalar> Vessels<T> {
         let mut inflow = q.end;
         for (i, to) in next.iter_mut().enumerate().take(self.vessels.len()) {
             let level = self.levels[i];
-            let (outflow, net) = self.balance(i, level, inflow, t);
+            let (outflow, net) = self.balance(i, &level, inflow, t);
             let slope = self.slope(i, t).max(T::constant(0.0));
             let damped = T::constant(1.0) / (h * slope + 1.0);
-            *to = level + self.rate(i, level, net) * h * damped;
+            *to = level + self.rate(i, &level, net) * h * damped;
             let low = match self.vessels[i].outlet {
                 Outlet::Torricelli => 0.0,
                 Outlet::Linear => f64::NEG_INFINITY,
@@ -203,7 +203,7 @@ impl<T: Scalar> Vessels<T> {
             *to = (*to).max(T::constant(low)).min(self.vessels[i].rim.level);
             // What left the vessel is what its balance says; the rest of the step it is near its new level.
             inflow = if slope.value() * h.value() > 1.0 {
-                self.outflow(i, *to, t)
+                self.outflow(i, to, t)
             } else {
                 outflow
             };

@@ -51,7 +51,7 @@ impl<T: Scalar> Vessels<T> {
     pub(super) fn settle_modes(&mut self, q: T, t: f64, released: Option<usize>) {
         let mut inflow = q;
         for i in 0..self.vessels.len() {
-            let (outflow, net) = self.balance(i, self.levels[i], inflow, t);
+            let (outflow, net) = self.balance(i, &self.levels[i], inflow, t);
             let vessel = &mut self.vessels[i];
             vessel.spilling = self.levels[i].value() >= vessel.rim.level.value()
                 && net.value() > 0.0
@@ -146,8 +146,11 @@ impl<T: Scalar> Vessels<T> {
     fn top(&self, i: usize, next: &Levels<T>, h: T, q: Inflow<T>, t: f64) -> Option<(f64, f64)> {
         let dt = h.value();
         let begin = self.rates(&self.levels, q.start, t)[i].value() * dt;
+        if begin <= 0.0 {
+            return None;
+        }
         let end = self.rates(next, q.end, t + dt)[i].value() * dt;
-        if begin <= 0.0 || end >= 0.0 {
+        if end >= 0.0 {
             return None;
         }
         let before = self.levels[i].value();

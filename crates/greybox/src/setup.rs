@@ -163,7 +163,7 @@ impl<'a> Setup<'a> {
         let mut free: Vec<usize> = (0..names.len())
             .filter(|&i| !fixed.contains_key(&names[i]))
             .collect();
-        let reach = structure.scales.largest_level().max(1e-9);
+        let reach = structure.scales.largest_level().max(f64::MIN_POSITIVE);
         // An empty tank is a trap: the outflow's slope is infinite there, and a step that overshot to it would stay.
         let lowest = if plant.outlet() == plants::Outlet::Torricelli {
             1e-6 * reach
@@ -592,8 +592,11 @@ impl<'a> Setup<'a> {
             0..=4 => self.each_row_in_lanes::<4>(x, each),
             5..=6 => self.each_row_in_lanes::<6>(x, each),
             7..=8 => self.each_row_in_lanes::<8>(x, each),
-            9..=12 => self.each_row_in_lanes::<12>(x, each),
-            _ => self.each_row_in_lanes::<16>(x, each),
+            9..=10 => self.each_row_in_lanes::<10>(x, each),
+            11..=12 => self.each_row_in_lanes::<12>(x, each),
+            // One lane more, and a compiler copies a dual by a call instead of in registers.
+            13..=15 => self.each_row_in_lanes::<15>(x, each),
+            _ => self.each_row_in_lanes::<8>(x, each),
         }
     }
 

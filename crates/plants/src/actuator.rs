@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use crate::{
     Law, Scalar,
+    inflow::Inflow,
     moments::{decayed, exponential_moments},
-    vessels::Inflow,
 };
 
 /// Corners of a ramp that lie closer together than this share of the interval are one.

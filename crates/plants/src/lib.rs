@@ -21,8 +21,10 @@
 
 mod actuator;
 pub mod controller;
+mod damped;
 pub mod effects;
 mod error;
+mod inflow;
 mod law;
 mod linear;
 mod moments;

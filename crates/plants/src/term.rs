@@ -266,8 +266,8 @@ impl<T: Scalar> Law<T> for TermLaw<T> {
     fn command(&mut self, u: T, t: f64) -> T {
         u + self.value(u, u, t)
     }
-    fn net(&self, level: T, net: T, t: f64) -> T {
-        net + self.value(net, level, t)
+    fn net(&self, level: &T, net: &mut T, t: f64) {
+        *net = *net + self.value(*net, *level, t);
     }
     fn reading(&mut self, y: T, t: f64) -> T {
         y + self.value(y, y, t)

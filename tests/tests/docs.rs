@@ -131,6 +131,7 @@ fn links_lead_to_files() {
         "docs/closed-loop.md",
         "docs/design.md",
         "docs/gallery.md",
+        "docs/hidden-dead-zone.md",
         "docs/model-file.md",
     ] {
         let page = root.join(page);

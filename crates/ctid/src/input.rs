@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use ct_signals::{ROWS_PER_PARAMETER, Record, read_csv};
 use missing_effect::Problem;
-use plants::controller::Pi;
+use plants::controller::Controller;
 use plants::{Outlet, Plant, Scales};
 
-use crate::model_file::{self, ModelFile};
+use crate::model_file::{self, ControllerLaw, ControllerSettings, ModelFile};
 use crate::output::same_file;
 use crate::{Error, numbers};
 
@@ -16,6 +16,9 @@ const BEYOND_THE_TANK: f64 = 1.5;
 
 /// Readings this far below zero, as a part of what the record spans, are no noise about an empty tank.
 const BELOW_THE_OUTLET: f64 = 0.1;
+
+/// Sampling intervals that differ by less than this part are one: times are read from text.
+const SAME_INTERVAL: f64 = 0.01;
 
 /// The files of a problem.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,20 +130,67 @@ pub fn problem(
     check_height(model_name, &model, records.iter().chain(&test))?;
     check_levels(&model, records.iter().chain(&test))?;
     check_rows(&model, &records)?;
-    // The operating point plays no part in the loop's stability, and is not known.
+    check_terms(model_name, &model, &records[0])?;
     let controller = model
         .controller
-        .map(|c| Pi::new(c.gain, c.integral_time, (c.u_min, c.u_max), 0.0))
+        .as_ref()
+        .map(|settings| controller(model_name, settings, &records))
         .transpose()?;
     Ok(Problem {
         plant: model.plant,
         known: model.known,
         effects: model.effects,
+        terms: model.terms.into_iter().map(|own| own.term).collect(),
         start: model.start,
         fixed: model.fixed,
         controller,
         records,
         test,
+    })
+}
+
+/// The controller as it ran in the records.
+fn controller(
+    model_name: &str,
+    settings: &ControllerSettings,
+    records: &[Record],
+) -> Result<Controller, Error> {
+    let interval = records.first().map_or(1.0, Record::sample_interval);
+    for record in records {
+        if let Some(reference) = &record.reference
+            && !reference.unit.is_empty()
+            && !record.output.unit.is_empty()
+            && reference.unit != record.output.unit
+        {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "the reference is in {}, the output in {}: a controller compares the two; convert one of them, or correct its header",
+                    reference.unit, record.output.unit
+                ),
+            });
+        }
+        if matches!(settings.law, ControllerLaw::Pi { .. }) {
+            continue;
+        }
+        let uneven = record
+            .time
+            .windows(2)
+            .find(|pair| (pair[1] - pair[0] - interval).abs() > SAME_INTERVAL * interval);
+        if let Some(pair) = uneven {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "a controller of type \"RS\" runs at one interval, {interval} s, but {} s follow t = {} s; resample the record, or delete [controller] from {model_name}",
+                    numbers::significant(pair[1] - pair[0], 4),
+                    pair[0]
+                ),
+            });
+        }
+    }
+    settings.controller(interval).map_err(|error| Error::File {
+        file: model_name.to_string(),
+        what: error.to_string(),
     })
 }
 
@@ -235,6 +285,30 @@ fn check_levels<'a>(
             model.plant.id()
         ),
     })
+}
+
+/// A term is written in the units of the record that it was found on.
+fn check_terms(model_name: &str, model: &ModelFile, record: &Record) -> Result<(), Error> {
+    let area_known =
+        model.plant.outlet() == plants::Outlet::Torricelli && model.known.area[0].is_some();
+    for own in &model.terms {
+        for (written, unit, what) in [
+            (&own.at_unit, own.term.variable.unit(), "at"),
+            (&own.unit, own.term.unit(), "value"),
+        ] {
+            let here = unit.label(&record.output.unit, &record.input.unit, area_known);
+            if !written.is_empty() && *written != here {
+                return Err(Error::File {
+                    file: model_name.to_string(),
+                    what: format!(
+                        "[term.{}] has {what} in {written}, but with {} it would be in {here}; convert its numbers and its unit",
+                        own.term.name, record.name
+                    ),
+                });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Enough rows for the parameters; every record brings initial levels of its own.

@@ -204,7 +204,7 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
     place.refuses("tables --record b.csv", &["--record", "tables baysse"]);
 }
 
-/// docs/closed-loop.md: what the second paper's table II hides.
+/// docs/hidden-dead-zone.md: what the second paper's table II hides.
 #[test]
 fn the_emulated_rig_misses_its_dead_zone() {
     let place = Place::empty();

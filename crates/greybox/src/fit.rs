@@ -287,7 +287,7 @@ pub fn coloured(setup: &Setup, fit: Fit, order: usize, stopping: Stopping) -> Re
     let (starts, agree) = (fit.starts, fit.agree);
     let mut fit = fit;
     for _ in 0..8 {
-        let residuals = setup.residuals(&fit.x)?;
+        let residuals = setup.disturbance(&fit.x)?;
         let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
         let noise = ArModel::fit(&segments, order)?;
         let same = noise.order() == fit.noise.order()

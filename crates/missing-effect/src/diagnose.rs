@@ -7,15 +7,17 @@ use greybox::coloured;
 use rayon::prelude::*;
 
 use crate::{
-    Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step, Verdict,
+    ControlLoop, Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step,
+    Verdict,
     confirm::{BIC_MARGIN, beyond_chance, confirm, least_useful},
     noise_floor::{NOISE_ORDER, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
     remains::remains,
-    scores::scores,
+    scores::{price_of_colour, scores},
     search::{Breadth, Node, exchanges, grow, refine, singles},
     sentences, step,
     trail::trail,
+    unknown::unknown,
 };
 
 /// What stands in for another lies within this of its criterion.
@@ -40,7 +42,7 @@ const FAIR_PART: f64 = 0.85;
 /// Where the records, the plant or the fit do not allow it.
 pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
     let begun = Instant::now();
-    let base = base(problem, options)?;
+    let (base, control_loop) = base(problem, options)?;
     let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
     // The model lacks something where its residual is not noise, or where some effect would lower the error by more than
     // chance does: the one needs no catalogue, the other sees what is small.
@@ -78,12 +80,14 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     } else {
         floor
     };
-    let step = step::report(&shown, own.bic(), &floor.model()?, &problem.test)?;
+    let widen = ControlLoop::widens(control_loop.as_ref());
+    let step = step::report(&shown, own.bic(), &floor.model()?, &problem.test, widen)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
     diagnosis.sentences = sentences::of_comparison(&diagnosis, left);
     diagnosis
         .sentences
         .extend(sentences::of_a_minimum(&diagnosis));
+    diagnosis.speak_of_the_loop(control_loop);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     Ok(diagnosis)
 }
@@ -100,7 +104,7 @@ pub fn diagnose(
     let begun = Instant::now();
     let tell = |phase, done, total| progress(Progress { phase, done, total });
     tell("fitting the model", 0, 1);
-    let base = base(problem, options)?;
+    let (base, control_loop) = base(problem, options)?;
     let breadth = Breadth {
         beam: BEAM,
         refits: REFITS,
@@ -206,9 +210,12 @@ pub fn diagnose(
     } else {
         (&noise, &base_noise)
     };
-    let scores = scores(believed, &singles(believed, metric), metric);
+    let single = singles(believed, metric);
+    let scores = scores(believed, &single, metric);
+    let price = price_of_colour(&base_noise, &single, &noise);
 
     let judge = floor.model()?;
+    let widen = ControlLoop::widens(control_loop.as_ref());
     let steps = trail
         .par_iter()
         .enumerate()
@@ -217,7 +224,7 @@ pub fn diagnose(
                 Some(own) if k + 1 == trail.len() => own.bic(),
                 _ => coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.bic(),
             };
-            step::report(node, bic, &judge, &problem.test)
+            step::report(node, bic, &judge, &problem.test, widen)
         })
         .collect::<Result<Vec<Step>, Error>>()?;
     let verdict = match (last.added.is_empty(), left) {
@@ -241,6 +248,10 @@ pub fn diagnose(
         .iter()
         .map(|placed| last.at_the_edge(*placed))
         .collect();
+    if left.is_some() && !stopped {
+        tell("shaping the unknown", 2, 3);
+        diagnosis.unknown = unknown(&last)?;
+    }
     diagnosis.sentences = sentences::of_diagnosis(&diagnosis, left, &doubtful);
     diagnosis.sentences.extend(remark);
     diagnosis
@@ -251,6 +262,10 @@ pub fn diagnose(
             .sentences
             .push(sentences::of_a_stop(options.max_effects, needed));
     }
+    diagnosis
+        .sentences
+        .extend(price.and_then(sentences::of_the_colour));
+    diagnosis.speak_of_the_loop(control_loop);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     tell("done", 3, 3);
     Ok(diagnosis)
@@ -367,12 +382,15 @@ fn assemble(problem: &Problem, verdict: Verdict, steps: Vec<Step>, noise: NoiseF
         noise_floor: noise.level,
         noise,
         scores: Vec::new(),
+        unknown: None,
+        control_loop: None,
         sentences: Vec::new(),
         plant: problem.plant.id().to_string(),
         known_effects: problem
             .effects
             .iter()
             .map(|placed| placed.effect.id.to_string())
+            .chain(problem.terms.iter().map(|term| term.name.clone()))
             .collect(),
         input_unit: problem.records[0].input.unit.clone(),
         output_unit: problem.records[0].output.unit.clone(),

@@ -4,6 +4,8 @@
 use ct_signals::ArModel;
 use serde::Serialize;
 
+use crate::Unknown;
+
 /// What the search found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -167,6 +169,37 @@ impl NoiseFloor {
     }
 }
 
+/// The loop that the records come from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ControlLoop {
+    /// The loop was simulated from its reference; otherwise the model ran on the measured command.
+    pub simulated: bool,
+    /// p-value of the test that the noise does not show in the command; `None` where a controller is known.
+    pub feedback_p: Option<f64>,
+    /// Measured command less the one that the controller gives on the measured reading, root mean square, in the input's
+    /// unit; `None` where that was not looked at.
+    pub mismatch: Option<f64>,
+    /// What the user should know of it, in words.
+    pub said: Vec<String>,
+}
+
+impl ControlLoop {
+    /// A loop whose model ran on the measured command, and what that means.
+    pub(crate) fn measured(feedback_p: Option<f64>, mismatch: Option<f64>, said: String) -> Self {
+        Self {
+            simulated: false,
+            feedback_p,
+            mismatch,
+            said: vec![said],
+        }
+    }
+
+    /// Standard errors have to allow for what feedback does.
+    pub(crate) fn widens(known: Option<&Self>) -> bool {
+        known.is_some_and(|known| !known.simulated)
+    }
+}
+
 /// A record as the report shows it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Shown {
@@ -203,11 +236,15 @@ pub struct Diagnosis {
     pub noise: NoiseFloor,
     /// The scores of the single effects at the first step, best first.
     pub scores: Vec<Score>,
+    /// What is missing where the catalogue does not explain it.
+    pub unknown: Option<Unknown>,
+    /// The loop that the records come from, where there is one.
+    pub control_loop: Option<ControlLoop>,
     /// The findings in words.
     pub sentences: Vec<String>,
     /// The plant, as the model file names it.
     pub plant: String,
-    /// The effects that the model file already had.
+    /// The effects and the terms that the model file already had.
     pub known_effects: Vec<String>,
     /// Unit of the input.
     pub input_unit: String,
@@ -218,4 +255,14 @@ pub struct Diagnosis {
     pub records: Vec<Shown>,
     /// How long it took \[s\].
     pub seconds: f64,
+}
+
+impl Diagnosis {
+    /// Adds what is known of the loop, and what there is to say of it.
+    pub(crate) fn speak_of_the_loop(&mut self, known: Option<ControlLoop>) {
+        if let Some(known) = &known {
+            self.sentences.extend_from_slice(&known.said);
+        }
+        self.control_loop = known;
+    }
 }

@@ -1,7 +1,7 @@
 //! The findings in words.
 
 use crate::{
-    Diagnosis, Parameter, Step, Verdict,
+    Diagnosis, Parameter, Step, Unknown, Verdict,
     numbers::{significant, value_and_error},
     remains::{Left, Remains},
     search::Node,
@@ -136,6 +136,14 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     })
 }
 
+/// What the colour of the noise costs, where it costs something.
+pub(crate) fn of_the_colour(price: f64) -> Option<String> {
+    (price >= 1.2).then(|| format!(
+        "The noise is coloured, and hides what white noise of the same size would show: an effect has to be about {} times larger to be seen. Smaller ones than the sizes under \"visible from\" may be there.",
+        significant(price, 2)
+    ))
+}
+
 /// The sizes from which on the likeliest effects would have been seen.
 fn visible(diagnosis: &Diagnosis) -> String {
     let sizes: Vec<String> = diagnosis
@@ -167,6 +175,7 @@ pub(crate) fn of_diagnosis(
         return Vec::new();
     };
     let mut said = Vec::new();
+    let shaped = diagnosis.unknown.as_ref().map(of_unknown);
     let held_out = |step: &Step| {
         step.rmse_test.map_or(String::new(), |e| {
             format!(", {e:.3} {unit} on held-out data")
@@ -262,5 +271,97 @@ pub(crate) fn of_diagnosis(
             }
         }
     }
+    said.extend(shaped);
     said
+}
+
+/// Where what is missing acts, on what it depends, and what it looks like.
+fn of_unknown(unknown: &Unknown) -> String {
+    let place = |name: &str| match name {
+        "actuator" => "at the actuator".to_string(),
+        "sensor" => "at the sensor".to_string(),
+        "vessel" => "in the vessel's balance".to_string(),
+        which => format!("in the balance of the {which} tank"),
+    };
+    let mut said = format!("What is missing acts {}", place(&unknown.place));
+    let others: Vec<String> = unknown
+        .places
+        .iter()
+        .filter(|other| {
+            other.below_best < crate::unknown::SAME_PLACE && other.place != unknown.place
+        })
+        .map(|other| place(&other.place))
+        .collect();
+    if !others.is_empty() && unknown.variable == "time" {
+        said += &format!(
+            " (or {}: the likelihood does not tell)",
+            others.join(" or ")
+        );
+    }
+    if unknown.variable == "time" {
+        said += " and follows no variable of the plant, so that it is a function of time";
+        if let Some(window) = unknown.windows.first() {
+            said += &format!(
+                ": most from {:.0} to {:.0} s, {} {} on average",
+                window.from,
+                window.to,
+                significant(window.mean, 2),
+                unknown.unit
+            );
+        }
+    } else {
+        let variable = match (unknown.variable, unknown.place.as_str()) {
+            ("input", _) => "the command",
+            ("rate", _) => "the net inflow",
+            (_, "sensor") => "the reading",
+            _ => "the level",
+        };
+        said += &format!(" and depends on {variable}");
+        if let Some(share) = unknown.shares.first() {
+            said += &format!(
+                ", which predicts {:.0} ± {:.0} % of it on data that were left out",
+                100.0 * share.share.min(1.0),
+                (100.0 * share.std_error).max(1.0)
+            );
+        }
+        let (low, high) = unknown
+            .ordinates
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(*v), high.max(*v))
+            });
+        said += &format!(
+            "; it ranges over {} {}",
+            significant(high - low, 2),
+            unknown.unit
+        );
+    }
+    match &unknown.primitive {
+        Some(nearest) => {
+            said += &format!("; the nearest simple shape is a {}", nearest.name);
+            if let Some(at) = nearest.at {
+                let (at, unit) = (significant(at, 2), &unknown.variable_unit);
+                said += &match nearest.name {
+                    "swing" => format!(" of a period of {at} {unit}"),
+                    "end of a range" => format!(" below {at} {unit}"),
+                    _ => format!(" at {at} {unit}"),
+                };
+            }
+            if !nearest.effects.is_empty() {
+                said += &format!(
+                    " ({} would leave one)",
+                    list(
+                        &nearest
+                            .effects
+                            .iter()
+                            .map(|e| (*e).to_string())
+                            .collect::<Vec<_>>(),
+                        "or"
+                    )
+                );
+            }
+        }
+        None => said += "; no simple shape comes near",
+    }
+    said + "."
 }

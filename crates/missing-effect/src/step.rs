@@ -5,6 +5,7 @@ use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
 
 use crate::{
     Error, Parameter, ResidualTests, Step,
+    closed_loop::widened,
     locate::{Located, Series, locate},
     noise_floor::NOISE_ORDER,
     remains::input_p,
@@ -86,12 +87,14 @@ pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -
 }
 
 /// The report of one node; `bic` is its criterion under the colour of its own residual, `judge` the noise
-/// against which its residual is judged.
+/// against which its residual is judged; `widen`: the standard errors allow
+/// for the bias of feedback.
 pub(crate) fn report(
     node: &Node,
     bic: f64,
     judge: &ArModel,
     test: &[Record],
+    widen: bool,
 ) -> Result<Step, Error> {
     let Node { setup, fit, added } = node;
     let last = added.last();
@@ -130,6 +133,10 @@ pub(crate) fn report(
         input_unit: &record.input.unit,
     });
     let held_out = hold_out(node, test)?;
+    let mut errors = std_errors(node)?;
+    if widen {
+        errors = widened(node, errors)?;
+    }
     let rmse_test = held_out.as_ref().map(|held_out| held_out.rmse);
     let mut series = simulated;
     series.extend(held_out.into_iter().flat_map(|held_out| held_out.outputs));
@@ -139,7 +146,7 @@ pub(crate) fn report(
         rmse: fit.rmse,
         rmse_test,
         bic,
-        parameters: parameters(setup, fit, &std_errors(node)?),
+        parameters: parameters(setup, fit, &errors),
         starts: fit.starts,
         starts_agree: fit.agree,
         tests,

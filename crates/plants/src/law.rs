@@ -35,18 +35,13 @@ pub trait Law<T: Scalar>: Send {
     fn actuator_lag(&self) -> Option<T> {
         None
     }
-    /// Vessel: outflow to the next vessel at a level, given what the law before it says \[flow\].
-    fn outflow(&self, _level: T, nominal: T, _t: f64) -> T {
-        nominal
-    }
-    /// Vessel: the net inflow with what this law takes out and what is lost \[flow\].
-    fn net(&self, _level: T, net: T, _t: f64) -> T {
-        net
-    }
-    /// Vessel: surface at a level \[area\].
-    fn area(&self, _level: T, nominal: T) -> T {
-        nominal
-    }
+    /// Vessel: changes the outflow to the next vessel at a level, as the law before it left it \[flow\]. In place, as
+    /// the next two: they are called several times a step, and a dual with many lanes is long.
+    fn outflow(&self, _level: &T, _outflow: &mut T, _t: f64) {}
+    /// Vessel: takes out of the net inflow what is lost \[flow\].
+    fn net(&self, _level: &T, _net: &mut T, _t: f64) {}
+    /// Vessel: changes the surface at a level \[area\].
+    fn area(&self, _level: &T, _area: &mut T) {}
     /// Vessel: its rim.
     fn rim(&self) -> Option<Rim<T>> {
         None

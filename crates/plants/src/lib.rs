@@ -21,8 +21,10 @@
 
 mod actuator;
 pub mod controller;
+mod damped;
 pub mod effects;
 mod error;
+mod inflow;
 mod law;
 mod linear;
 mod moments;
@@ -31,6 +33,7 @@ mod scalar;
 mod sensor;
 mod simulator;
 mod structure;
+mod term;
 mod unit;
 mod vessels;
 
@@ -41,4 +44,5 @@ pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scalar::{Dual, Scalar};
 pub use simulator::{Command, Simulator};
 pub use structure::{Known, MAX_VESSELS, Placed, Scales, Site, Structure};
+pub use term::{Fitted, MOST_KNOTS, Term, Variable};
 pub use unit::Unit;

@@ -1,6 +1,6 @@
 //! What the report's script draws, as JSON: the curves thinned for display, the rest as it stands.
 
-use missing_effect::{Diagnosis, Failures, ResidualTests, Score, Shown, Step};
+use missing_effect::{Diagnosis, Failures, ResidualTests, Score, Shown, Step, Unknown};
 use serde::Serialize;
 
 use super::decimate::min_max;
@@ -20,6 +20,8 @@ struct Report<'a> {
     /// The effects that were added and all that cannot be told apart from them.
     groups: &'a [Vec<String>],
     effects: &'a [String],
+    /// What nothing explains.
+    unknown: Option<&'a Unknown>,
 }
 
 #[derive(Serialize)]
@@ -80,6 +82,7 @@ pub(super) fn json(diagnosis: &Diagnosis) -> String {
         scores: &diagnosis.scores,
         groups: &diagnosis.groups,
         effects: &diagnosis.effects,
+        unknown: diagnosis.unknown.as_ref(),
     };
     script_safe(&report)
 }

@@ -229,7 +229,40 @@
     }) };
   }
 
+  // A curve with its band.
+  function banded(x, y, error, title, name) {
+    const c = theme();
+    const edge = (sign) => y.map((v, k) => v + sign * 1.96 * error[k]);
+    const unit = pretty(report.unknown.unit);
+    const line = { width: 0 };
+    return { data: [
+      { x, y: edge(-1), mode: "lines", line, hoverinfo: "skip" },
+      { x, y: edge(1), mode: "lines", line, fill: "tonexty", fillcolor: c.band, hoverinfo: "skip" },
+      { x, y, mode: x.length > 20 ? "lines" : "lines+markers", line: { color: c.best, width: 2.2 }, marker: { size: 6 },
+        customdata: error.map((e) => 1.96 * e), hovertemplate: `%{x:.5~g}: %{y:.3~g} ± %{customdata:.2~g} ${unit}<extra></extra>` },
+    ], layout: layout(narrow.matches ? 260 : 300, {
+      hovermode: "closest", xaxis: axis(title, { exponentformat: "none" }), yaxis: axis(named(name, unit), { zeroline: true }),
+    }) };
+  }
+
+  function unknownPath() {
+    const u = report.unknown;
+    const made = banded(u.time, u.value, u.std_error, "time [s]", "missing term");
+    made.layout.shapes = u.windows.map((w) => ({
+      type: "rect", xref: "x", yref: "paper", x0: w.from, x1: w.to, y0: 0, y1: 1, layer: "below", fillcolor: theme().failing, opacity: 0.12, line: { width: 0 },
+    }));
+    return made;
+  }
+
+  function unknownShape() {
+    const u = report.unknown;
+    const name = { rate: "net inflow", input: "command" }[u.variable] || u.variable;
+    return banded(u.knots, u.ordinates, u.ordinate_errors, named(name, pretty(u.variable_unit)), "missing term");
+  }
+
   const figures = {
+    "unknown-path": unknownPath,
+    "unknown-shape": unknownShape,
     "by-time": byTime,
     "by-level": () => binned("by_level", "level", named("simulated output", OUT)),
     "by-flow": () => binned("by_flow", "flow", named("input", IN)),
@@ -245,7 +278,7 @@
   // --- drawing -----------------------------------------------------------------------------
 
   // On a touch screen a finger scrolls the page; the plots worth a zoom show their tools above.
-  const ZOOMED = /^(record-\d+|by-time|by-level|by-flow)$/;
+  const ZOOMED = /^(record-\d+|by-time|by-level|by-flow|unknown-path)$/;
   function withTools({ data, layout }) {
     layout.margin.t = 34;
     Object.assign(layout.legend, { y: 0, yref: "container", yanchor: "bottom" });
@@ -289,8 +322,8 @@
   function choose(k) {
     chosen = Math.min(Math.max(k, 0), steps.length - 1);
     words();
-    // The ranking is that of the first step and stays.
-    Object.keys(figures).filter((id) => id !== "scores").forEach(draw);
+    // The ranking is that of the first step, the unknown that of the last: they stay.
+    Object.keys(figures).filter((id) => id !== "scores" && !id.startsWith("unknown")).forEach(draw);
   }
 
   // The residual and its record show the same stretch of time.

@@ -305,6 +305,8 @@ pub(super) fn two_tanks() -> Diagnosis {
             score("sensor_drift", -6.2, 0.58, volt(0.01)),
             score("coupled_tank", -6.4, 0.58, None),
         ],
+        unknown: None,
+        control_loop: None,
         sentences: vec![
             "The model lacks an overflow of the upper tank: its rim is at 7.50 ± 0.03 V.".into(),
             "It also lacks pump_deadzone or pump_nonlinearity; these data cannot tell them apart. \

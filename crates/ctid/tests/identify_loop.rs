@@ -379,3 +379,20 @@ fn a_command_at_its_limits_and_a_controller_a_little_off_are_said() {
     let text = place.succeeds("identify loop.csv --model off.toml --method fcloe");
     assert!(text.contains("the controller misses"), "{text}");
 }
+
+#[test]
+fn a_controller_by_its_polynomials_is_the_same_one() {
+    let place = place();
+    let law = |more: &str| {
+        let r = format!("r = [{}, {}]", PI.0, PI.0 / PI.1);
+        format!("plant = \"first-order\"\n[controller]\ntype = \"RS\"\n{r}\ns = [1.0, 0.0]\n{more}")
+    };
+    place.write("p.toml", law("variable = \"p\"\n"));
+    let of =
+        |model: &str| place.result(&format!("identify loop.csv --method fcloe --model {model}"));
+    let [pi, p] = ["loop.toml", "p.toml"].map(|model| of(model)["parameters"].clone());
+    assert_eq!(pi, p);
+    place.write("sampled.toml", law(""));
+    let words = "identify loop.csv --method fcloe --model sampled.toml";
+    place.refuses(words, &["in continuous time", "variable = \"p\""]);
+}

@@ -390,8 +390,9 @@ impl<'a> Setup<'a> {
         from..from + n
     }
 
-    /// The same without those of the controller.
-    fn plant_states_of(&self, r: usize) -> std::ops::Range<usize> {
+    /// Positions of the plant's initial states of record `r`, from 0, without those of the controller.
+    #[must_use]
+    pub fn plant_states_of(&self, r: usize) -> std::ops::Range<usize> {
         let own = self.states_of(r);
         let controller = self.feedback.as_ref().map_or(0, |f| f.controller.states());
         own.start..own.end - controller

@@ -107,7 +107,6 @@ struct Solution {
 pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error> {
     let setup = &node.setup;
     let count = setup.parameter_count();
-    let states = (setup.names().len() - count) / setup.records.len();
     let fixed: BTreeMap<String, f64> = setup.names()[..count]
         .iter()
         .cloned()
@@ -126,7 +125,8 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
         with.substeps = setup.substeps;
         let mut x = node.fit.x[..count].to_vec();
         x.extend(std::iter::repeat_n(0.0, m));
-        x.extend(&node.fit.x[count + r * states..count + (r + 1) * states]);
+        // The path is looked for on the measured command, which needs no controller.
+        x.extend(&node.fit.x[setup.plant_states_of(r)]);
         runs.push((with, x, time));
     }
     let mut best = None;

@@ -64,3 +64,18 @@ fn effects_that_are_absent_leave_fast_vessels_bit_for_bit() {
         }
     }
 }
+
+/// What a vessel holds reaches the next one, also where it is gone long before a step's shortest part is over.
+#[test]
+fn nothing_is_lost_where_a_vessel_empties_at_once() {
+    for ratio in [45.0, 200.0, 1000.0, 1e4] {
+        let mut case = fast(Plant::CascadedTanks, 0, ratio);
+        // A small part of the next vessel's content, a thousand times what stays of it.
+        case.levels[0] = 9.5;
+        case.theta[1] *= 30.0;
+        let input = input(DRIVES[0], 60, case.h, 960);
+        let error = difference(&case.run(&input, 1), &reference::run(&case, &input));
+        println!("{error:8.1e} h/tau {ratio}");
+        assert!(error < 1e-3, "{error:e} h/tau {ratio}");
+    }
+}

@@ -26,7 +26,9 @@ fn outflow<T: Scalar>(height: T, level: f64, nominal: f64) -> T {
         vessel: 0,
         scales: &scales,
     };
-    pipe_height::bind(&site, &[height]).outflow(T::constant(level), T::constant(nominal), 0.0)
+    let mut outflow = T::constant(nominal);
+    pipe_height::bind(&site, &[height]).outflow(&T::constant(level), &mut outflow, 0.0);
+    outflow
 }
 
 #[test]

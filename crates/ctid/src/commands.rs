@@ -55,6 +55,9 @@ struct Compare {
     /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
+    /// In a loop whose [controller] is known: simulate it from its reference, or run on the measured command
+    #[arg(long = "loop", value_enum, default_value_t = LoopWay::Simulated, value_name = "WAY")]
+    way: LoopWay,
     #[command(flatten)]
     results: Results,
 }
@@ -70,10 +73,19 @@ struct Results {
     report: Option<PathBuf>,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LoopWay {
+    Simulated,
+    Measured,
+}
+
 #[derive(Debug, Args)]
 struct Diagnose {
     #[command(flatten)]
     compare: Compare,
+    /// Write the shape of what nothing explains as CSV, for `ctid add NAME --from F`
+    #[arg(long, value_name = "F.csv")]
+    unknown: Option<PathBuf>,
     /// Add at most so many effects
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     max_effects: Option<u8>,
@@ -81,11 +93,14 @@ struct Diagnose {
 
 #[derive(Debug, Args)]
 struct Add {
-    /// The effect, as `ctid effects` lists it
+    /// The effect, as `ctid effects` lists it, or with --from a name of your own
     effect: String,
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
+    /// The shape of a term of your own, as `ctid diagnose --unknown` writes it
+    #[arg(long, value_name = "F.csv", conflicts_with = "place")]
+    from: Option<PathBuf>,
     /// The vessel it acts in, where the plant has two
     #[arg(long = "where", value_enum)]
     place: Option<Vessel>,
@@ -200,7 +215,14 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Add(Add {
             effect,
             model,
+            from: Some(shape),
+            ..
+        })) => say(out, &(edit::add_term(&model, &effect, &shape)? + "\n")),
+        Some(Command::Add(Add {
+            effect,
+            model,
             place,
+            from: None,
         })) => {
             let place = place.map(|vessel| match vessel {
                 Vessel::Upper => "upper",
@@ -222,10 +244,11 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
 
 impl Results {
     /// Where the results go, checked.
-    fn plan(&self, inputs: &[&Path]) -> Result<Vec<Output>, Error> {
+    fn plan(&self, inputs: &[&Path], unknown: Option<&Path>) -> Result<Vec<Output>, Error> {
         let json = self.json.as_deref().map(|path| (Kind::Json, path));
         let report = self.report.as_deref().map(|path| (Kind::Report, path));
-        let wanted: Vec<_> = json.into_iter().chain(report).collect();
+        let unknown = unknown.map(|path| (Kind::Unknown, path));
+        let wanted: Vec<_> = json.into_iter().chain(report).chain(unknown).collect();
         output::plan(&wanted, inputs)
     }
 }
@@ -239,13 +262,20 @@ impl Compare {
         }
     }
 
+    fn options(&self) -> Options {
+        Options {
+            simulate_loop: self.way == LoopWay::Simulated,
+            ..Options::default()
+        }
+    }
+
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
         let problem = files.read()?;
-        let outputs = self.results.plan(&files.all())?;
+        let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
-        let diagnosis = missing_effect::compare(&problem, &Options::default());
+        let diagnosis = missing_effect::compare(&problem, &self.options());
         bar.clear();
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
@@ -262,8 +292,9 @@ impl Diagnose {
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
         let problem = files.read()?;
-        let outputs = self.compare.results.plan(&files.all())?;
-        let mut options = Options::default();
+        let unknown = self.unknown.as_deref();
+        let outputs = self.compare.results.plan(&files.all(), unknown)?;
+        let mut options = self.compare.options();
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
         }
@@ -304,7 +335,7 @@ impl Identify {
             .flatten()
             .map(PathBuf::as_path)
             .collect();
-        let outputs = self.results.plan(&inputs)?;
+        let outputs = self.results.plan(&inputs, None)?;
         let request = Request {
             method: self.method,
             order: self.order,
@@ -328,7 +359,7 @@ impl Identify {
 
 impl Tables {
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
-        let outputs = self.results.plan(&[])?;
+        let outputs = self.results.plan(&[], None)?;
         match self.paper {
             Paper::Udink => {
                 let bar = Bar::new();
@@ -353,15 +384,21 @@ fn finish(
     look: Look,
 ) -> Result<(), Error> {
     // The files first: whoever pipes the text into `head` still gets them.
+    let mut written = Vec::with_capacity(outputs.len());
     for output in outputs {
-        output.write(found)?;
+        written.push(output.write(found)?);
     }
     let mut text = text.to_string();
     if !outputs.is_empty() {
         text.push('\n');
     }
-    for output in outputs {
-        text += &look.faint(format!("wrote {}", output.path().display()));
+    for (output, written) in outputs.iter().zip(written) {
+        let path = output.path().display();
+        text += &look.faint(if written {
+            format!("wrote {path}")
+        } else {
+            format!("{path} is not written: nothing is left unexplained that has a shape")
+        });
         text.push('\n');
     }
     say(out, &text)

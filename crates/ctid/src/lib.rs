@@ -5,6 +5,7 @@
 //! | the command line | [`run`], [`Cli`] |
 //! | the model file | [`model_file`]; its effects are edited by [`edit`] |
 //! | records and model, read and checked | [`input`] |
+//! | a missing term as a file | [`term_file`] |
 //! | the tour | [`tour`] |
 //! | linear models from a record | [`mod@identify`] |
 //! | a paper's tables, computed again | [`tables`] |
@@ -23,14 +24,15 @@ pub mod input;
 pub mod look;
 pub mod model_file;
 mod names;
-mod numbers;
 pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
 pub mod tables;
+pub mod term_file;
 pub mod terminal;
 pub mod tour;
 
 pub use commands::{Cli, run};
 pub use error::{Error, one_line};
+use missing_effect::numbers;

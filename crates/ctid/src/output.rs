@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::identify::Identification;
 use crate::tables::udink::Study;
-use crate::{Error, atomic, report};
+use crate::{Error, atomic, report, term_file};
 
 /// How much of an existing page is looked at: the mark stands in its head.
 const HEAD: u64 = 4096;
@@ -24,17 +24,26 @@ pub enum Kind {
     Json,
     /// The result as a page.
     Report,
+    /// The shape of what is missing, as CSV; nothing is written where nothing is.
+    Unknown,
 }
 
 /// What a command finds, which is written as JSON with `schema` and one of the keys that ctid knows its own files by, or as a page.
 pub trait Found: Serialize {
     /// The page, complete.
     fn page(&self) -> String;
+    /// The shape of what nothing explains as CSV, where there is one.
+    fn unknown(&self) -> Option<String> {
+        None
+    }
 }
 
 impl Found for Diagnosis {
     fn page(&self) -> String {
         report::html(self)
+    }
+    fn unknown(&self) -> Option<String> {
+        self.unknown.as_ref().map(term_file::text)
     }
 }
 
@@ -95,11 +104,11 @@ impl Output {
         &self.path
     }
 
-    /// Writes it.
+    /// Writes it; says whether there was something to write.
     ///
     /// # Errors
     /// Where the disk does not take it; what stood there before is then still there.
-    pub fn write(&self, found: &impl Found) -> Result<(), Error> {
+    pub fn write(&self, found: &impl Found) -> Result<bool, Error> {
         let content = match self.kind {
             Kind::Json => {
                 let text = serde_json::to_string_pretty(found)
@@ -107,8 +116,13 @@ impl Output {
                 text + "\n"
             }
             Kind::Report => found.page(),
+            Kind::Unknown => match found.unknown() {
+                Some(text) => text,
+                None => return Ok(false),
+            },
         };
-        atomic::write(&self.path, content.as_bytes())
+        atomic::write(&self.path, content.as_bytes())?;
+        Ok(true)
     }
 }
 
@@ -177,6 +191,11 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
             let mut head = Vec::new();
             let read = file.take(HEAD).read_to_end(&mut head);
             read.is_ok() && String::from_utf8_lossy(&head).contains(report::GENERATOR)
+        }
+        Kind::Unknown => {
+            let mut head = Vec::new();
+            let read = file.take(HEAD).read_to_end(&mut head);
+            read.is_ok() && head.starts_with(term_file::HEADER.as_bytes())
         }
         Kind::Json => {
             let mut text = String::new();

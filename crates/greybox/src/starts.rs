@@ -81,22 +81,20 @@ fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
         Plant::CascadedTanksLinear => vec![slope, tau[0], tau[1], y - slope * u],
         Plant::FirstOrder => vec![if driven { y / u } else { slope }, tau[1]],
     };
-    for &placed in structure.effects() {
-        x.extend(
-            structure
-                .effect_parameters(placed)
-                .iter()
-                .map(|p| p.starts.first().copied().unwrap_or(p.lower)),
-        );
-    }
+    let added = structure.parameters().split_off(x.len());
+    x.extend(
+        added
+            .iter()
+            .map(|p| p.starts.first().copied().unwrap_or(p.lower)),
+    );
     extend_levels(setup, &mut x);
     x
 }
 
 /// Appends initial states: the measured level from the first reading, the upper one and lags at rest under the first
-/// command.
+/// command, the controller's as they give the measured command.
 pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
-    for record in setup.records {
+    for (r, record) in setup.records.iter().enumerate() {
         let (u0, y0) = (record.input.values[0], record.output.values[0]);
         match setup.structure.plant {
             Plant::CascadedTanks => x.push((x[0] * u0 / x[1]).powi(2)),
@@ -105,6 +103,7 @@ pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
         }
         x.push(y0);
         x.extend(setup.structure.lags().iter().map(|_| 0.0));
+        x.extend(setup.controller_states(r));
     }
 }
 

@@ -27,24 +27,22 @@ impl Node<'_> {
 
     /// The size of every added effect lies inside its plausible range, neither absent nor at the far end.
     pub fn plausible(&self) -> bool {
-        self.added.iter().all(|placed| {
-            let Some(leading) = self
-                .setup
-                .structure
-                .effect_parameters(*placed)
-                .into_iter()
-                .next()
-            else {
-                return true;
-            };
-            let name = format!("{}.{}", placed.effect.id, leading.name);
-            let Some(at) = self.setup.names().iter().position(|known| *known == name) else {
-                return true;
-            };
-            let room = 1e-6 * (leading.upper - leading.lower);
-            let size = self.fit.x[at];
-            size > leading.lower + room && size < leading.upper - room
-        })
+        !self.added.iter().any(|placed| self.at_the_edge(*placed))
+    }
+
+    /// The size of an added effect is absent or at the far end of its plausible range.
+    pub fn at_the_edge(&self, placed: Placed) -> bool {
+        let parameters = self.setup.structure.effect_parameters(placed);
+        let Some(leading) = parameters.first() else {
+            return false;
+        };
+        let name = format!("{}.{}", placed.effect.id, leading.name);
+        let Some(at) = self.setup.names().iter().position(|known| *known == name) else {
+            return false;
+        };
+        let room = 1e-6 * (leading.upper - leading.lower);
+        let size = self.fit.x[at];
+        size <= leading.lower + room || size >= leading.upper - room
     }
 }
 
@@ -74,7 +72,7 @@ const ROUGH: Stopping = Stopping {
     cost: 1e-3,
 };
 /// What a fit is taken to once its structure has a name.
-const FINE: Stopping = Stopping {
+pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };

@@ -183,7 +183,7 @@ impl<T: Scalar> Actuator<T> {
     /// and the command on it is what arrives after static laws and dead time.
     pub(crate) fn pieces(
         &mut self,
-        from: f64,
+        from: T,
         to: Option<f64>,
         t: f64,
         h: f64,
@@ -193,7 +193,7 @@ impl<T: Scalar> Actuator<T> {
         let zero = T::constant(0.0);
         let commanded = match to {
             None => {
-                let signal = Signal::held(self.effective(T::constant(from), t));
+                let signal = Signal::held(self.effective(from, t));
                 if self.delay.is_none() {
                     each(self, length, signal);
                     return;
@@ -205,7 +205,7 @@ impl<T: Scalar> Actuator<T> {
                 });
                 None
             }
-            Some(to) => Some((from, to)),
+            Some(to) => Some((from.value(), to)),
         };
         if let Some(ramp) = commanded {
             self.find_corners(ramp.0, ramp.1, t, h);

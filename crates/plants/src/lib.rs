@@ -42,6 +42,7 @@ mod scalar;
 mod sensor;
 mod simulator;
 mod structure;
+mod term;
 mod unit;
 mod vessels;
 
@@ -52,4 +53,5 @@ pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scalar::{Dual, Scalar};
 pub use simulator::{Command, Simulator};
 pub use structure::{Known, MAX_VESSELS, Placed, Scales, Site, Structure};
+pub use term::{Fitted, MOST_KNOTS, Term, Variable};
 pub use unit::Unit;

@@ -40,6 +40,7 @@ pub fn html(diagnosis: &Diagnosis) -> String {
         step_buttons(diagnosis),
         "<main>".to_owned(),
         fit(diagnosis),
+        unknown(diagnosis),
         failures(diagnosis),
         residual_tests(diagnosis),
         ranking(diagnosis),
@@ -81,7 +82,9 @@ fn verdict(diagnosis: &Diagnosis) -> &'static str {
     match diagnosis.verdict {
         Verdict::Effect => "The missing effect is found",
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
-        Verdict::Unexplained => "Something is missing that the catalogue does not explain",
+        Verdict::Unexplained => {
+            "What is left is not noise, and no effect of the catalogue explains it"
+        }
         Verdict::Adequate => "The model is adequate",
     }
 }
@@ -230,6 +233,41 @@ fn failures(diagnosis: &Diagnosis) -> String {
             "<ul id=\"failure-sentences\">{sentences}</ul>\n{choices}{figures}<div class=\"pairs\">{pairs}</div>\n"
         ),
     )
+}
+
+/// What nothing explains, where it has a shape.
+fn unknown(diagnosis: &Diagnosis) -> String {
+    let Some(unknown) = &diagnosis.unknown else {
+        return String::new();
+    };
+    let mut figures = figure(
+        "unknown-path",
+        "The missing term against time",
+        "Smoothed, with its 95 % band, on the first fitted record; shaded where the band does not hold zero.",
+    );
+    if unknown.variable != "time" {
+        figures.push_str(&figure(
+            "unknown-shape",
+            &format!("Against the {}", variable(unknown.variable)),
+            "Fitted with all parameters of the plant, without what those imitate; with its 95 % band.",
+        ));
+    }
+    section(
+        "unknown",
+        "What nothing explains",
+        "The term that has to be added to the last model so that it meets the data. <code>ctid diagnose --unknown F.csv</code> writes \
+         its shape, <code>ctid add NAME --from F.csv</code> keeps it as a term of your own.",
+        &format!("{figures}{}", tables::shares(unknown)),
+    )
+}
+
+/// A variable of a missing term in words.
+fn variable(name: &str) -> &str {
+    match name {
+        "rate" => "net inflow",
+        "input" => "command",
+        other => other,
+    }
 }
 
 const BINNED: &str = "Above the samples with the mean of each bin, below the root mean square of each bin; \

@@ -5,7 +5,6 @@
   const { narrow, touch, theme, plain, pretty, named, axis, config } = plots;
   const records = report.records || [];
   const steps = report.steps || [];
-  // The bins of the failures belong to the first fitted record.
   const located = Math.max(0, records.findIndex((record) => !record.held_out));
   let chosen = steps.length - 1;
   let residualRecord = located;
@@ -35,10 +34,10 @@
   const seen = () => (sameAxes ? steps : [steps[chosen]]);
   const level = () => (report.noise_floor > 0 ? report.noise_floor : null);
 
-  // The windows in which the chosen step fails: the larger the error, the stronger.
-  function failingWindows() {
+  // The windows of a record in which the chosen step fails: the larger the error, the stronger.
+  function failingWindows(r) {
     const most = largest(seen().flatMap((s) => s.failures.by_time.map((b) => b.rms))) || 1;
-    return steps[chosen].failures.by_time.filter((b) => b.fails).map((b) => ({
+    return steps[chosen].failures.by_time.filter((b) => b.fails && b.record === r).map((b) => ({
       type: "rect", xref: "x", yref: "paper", x0: b.from, x1: b.to, y0: 0, y1: 1, layer: "below",
       fillcolor: theme().failing, opacity: 0.08 + 0.37 * ((b.rms || 0) / most), line: { width: 0 },
     }));
@@ -86,7 +85,7 @@
       line: { color: c.faint, width: 1.2, shape: "hv" }, hovertemplate: `%{y:.4~g} ${IN}`,
     });
     return { data, layout: layout(narrow.matches ? 400 : 460, {
-      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: r === located ? failingWindows() : [],
+      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: failingWindows(r),
       xaxis: axis("time [s]", { anchor: "y2", exponentformat: "none", hoverformat: ".6~g", showspikes: false }),
       yaxis: axis(named("output", OUT), { domain: [0.33, 1] }),
       yaxis2: axis(named("input", IN), { domain: [0, 0.24], nticks: 4 }),
@@ -102,7 +101,7 @@
       x: run.residual.t, y: run.residual.y, mode: "lines", line: { color: stepColour(chosen), width: 1.4 }, name: "residual",
       hovertemplate: `%{x:.6~g} s: %{y:.3~g} ${OUT}<extra></extra>`,
     }], layout: layout(narrow.matches ? 240 : 280, {
-      hovermode: "x", shapes: (residualRecord === located ? failingWindows() : []).concat(floor),
+      hovermode: "x", shapes: failingWindows(residualRecord).concat(floor),
       xaxis: axis("time [s]", { exponentformat: "none", hoverformat: ".6~g" }), yaxis: axis(named("residual", OUT), { range: [-most, most] }),
     }) };
   }
@@ -230,7 +229,40 @@
     }) };
   }
 
+  // A curve with its band.
+  function banded(x, y, error, title, name) {
+    const c = theme();
+    const edge = (sign) => y.map((v, k) => v + sign * 1.96 * error[k]);
+    const unit = pretty(report.unknown.unit);
+    const line = { width: 0 };
+    return { data: [
+      { x, y: edge(-1), mode: "lines", line, hoverinfo: "skip" },
+      { x, y: edge(1), mode: "lines", line, fill: "tonexty", fillcolor: c.band, hoverinfo: "skip" },
+      { x, y, mode: x.length > 20 ? "lines" : "lines+markers", line: { color: c.best, width: 2.2 }, marker: { size: 6 },
+        customdata: error.map((e) => 1.96 * e), hovertemplate: `%{x:.5~g}: %{y:.3~g} ± %{customdata:.2~g} ${unit}<extra></extra>` },
+    ], layout: layout(narrow.matches ? 260 : 300, {
+      hovermode: "closest", xaxis: axis(title, { exponentformat: "none" }), yaxis: axis(named(name, unit), { zeroline: true }),
+    }) };
+  }
+
+  function unknownPath() {
+    const u = report.unknown;
+    const made = banded(u.time, u.value, u.std_error, "time [s]", "missing term");
+    made.layout.shapes = u.windows.map((w) => ({
+      type: "rect", xref: "x", yref: "paper", x0: w.from, x1: w.to, y0: 0, y1: 1, layer: "below", fillcolor: theme().failing, opacity: 0.12, line: { width: 0 },
+    }));
+    return made;
+  }
+
+  function unknownShape() {
+    const u = report.unknown;
+    const name = { rate: "net inflow", input: "command" }[u.variable] || u.variable;
+    return banded(u.knots, u.ordinates, u.ordinate_errors, named(name, pretty(u.variable_unit)), "missing term");
+  }
+
   const figures = {
+    "unknown-path": unknownPath,
+    "unknown-shape": unknownShape,
     "by-time": byTime,
     "by-level": () => binned("by_level", "level", named("simulated output", OUT)),
     "by-flow": () => binned("by_flow", "flow", named("input", IN)),
@@ -246,7 +278,7 @@
   // --- drawing -----------------------------------------------------------------------------
 
   // On a touch screen a finger scrolls the page; the plots worth a zoom show their tools above.
-  const ZOOMED = /^(record-\d+|by-time|by-level|by-flow)$/;
+  const ZOOMED = /^(record-\d+|by-time|by-level|by-flow|unknown-path)$/;
   function withTools({ data, layout }) {
     layout.margin.t = 34;
     Object.assign(layout.legend, { y: 0, yref: "container", yanchor: "bottom" });
@@ -290,8 +322,8 @@
   function choose(k) {
     chosen = Math.min(Math.max(k, 0), steps.length - 1);
     words();
-    // The ranking is that of the first step and stays.
-    Object.keys(figures).filter((id) => id !== "scores").forEach(draw);
+    // The ranking is that of the first step, the unknown that of the last: they stay.
+    Object.keys(figures).filter((id) => id !== "scores" && !id.startsWith("unknown")).forEach(draw);
   }
 
   // The residual and its record show the same stretch of time.

@@ -130,8 +130,10 @@ fn links_lead_to_files() {
         "benches/README.md",
         "docs/adding-an-effect.md",
         "docs/block-diagonal-gain.md",
+        "docs/closed-loop.md",
         "docs/design.md",
         "docs/gallery.md",
+        "docs/hidden-dead-zone.md",
         "docs/model-file.md",
     ] {
         let page = root.join(page);

@@ -7,12 +7,13 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use ct_signals::{Columns, Hold, read_csv};
 use missing_effect::Options;
 
-use crate::identify::{self, Method, Order, Request};
+use crate::identify::{self, LevelChoice, Method, Order, Request};
 use crate::input::Files;
 use crate::look::Look;
+use crate::model_file::ControllerSettings;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
-use crate::tables::{udink, udink_text};
+use crate::tables::{baysse, baysse_text, udink, udink_text};
 use crate::{Error, catalogue, edit, model_file, terminal, tour};
 
 /// Says which physical effect a model of measured data is missing.
@@ -138,7 +139,7 @@ struct Identify {
     /// Orders n of A and m of B in A y = B u + d
     #[arg(long, value_name = "N,M", default_value = "1,0")]
     order: Order,
-    /// Model file, of which the columns and the hold of the input are used
+    /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
     /// The columns' names, where their first letters do not tell
@@ -153,6 +154,12 @@ struct Identify {
     /// Bandwidth of the state variable filters [1/s]; without it 3 over the time constant
     #[arg(long, value_name = "L")]
     bandwidth: Option<f64>,
+    /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe
+    #[arg(long, value_enum, default_value_t = LevelChoice::Auto)]
+    levels: LevelChoice,
+    /// Bandwidth of a filter on the reading in front of the controller [1/s]; y is the filtered reading
+    #[arg(long, value_name = "ZETA")]
+    sensor_filter: Option<f64>,
     #[command(flatten)]
     results: Results,
 }
@@ -187,12 +194,15 @@ struct Tables {
     /// The paper
     #[arg(value_enum, default_value_t = Paper::Udink)]
     paper: Paper,
-    /// Noises: each table is run once with each
-    #[arg(long, value_name = "N", default_value_t = 200)]
-    runs: usize,
+    /// Noises: each table is run once with each; without it as many as a paper's bands are for, 200 or 100
+    #[arg(long, value_name = "N")]
+    runs: Option<usize>,
     /// What the noises are drawn from
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
+    /// Write the record of baysse's emulated rig as CSV, for `diagnose` or `identify`
+    #[arg(long, value_name = "F.csv")]
+    record: Option<PathBuf>,
     #[command(flatten)]
     results: Results,
 }
@@ -201,6 +211,18 @@ struct Tables {
 enum Paper {
     /// A. J. Udink ten Cate, WP-85-54, IIASA, 1985: tables 1 to 4
     Udink,
+    /// A. Baysse, F. J. Carrillo, A. Habbadi, output error in closed loop: tables I and II
+    Baysse,
+}
+
+impl Paper {
+    /// The runs that its bands are for.
+    fn runs(self) -> usize {
+        match self {
+            Self::Udink => 200,
+            Self::Baysse => 100,
+        }
+    }
 }
 
 /// Does what the command line asks for; what a person reads goes to `out`.
@@ -245,11 +267,15 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
 impl Results {
     /// Where the results go, checked.
     fn plan(&self, inputs: &[&Path], unknown: Option<&Path>) -> Result<Vec<Output>, Error> {
+        let unknown = unknown.map(|path| (Kind::Unknown, path));
+        let wanted: Vec<_> = self.wanted().chain(unknown).collect();
+        output::plan(&wanted, inputs)
+    }
+
+    fn wanted(&self) -> impl Iterator<Item = (Kind, &Path)> {
         let json = self.json.as_deref().map(|path| (Kind::Json, path));
         let report = self.report.as_deref().map(|path| (Kind::Report, path));
-        let unknown = unknown.map(|path| (Kind::Unknown, path));
-        let wanted: Vec<_> = json.into_iter().chain(report).chain(unknown).collect();
-        output::plan(&wanted, inputs)
+        json.into_iter().chain(report)
     }
 }
 
@@ -314,21 +340,57 @@ impl Diagnose {
 }
 
 impl Identify {
-    /// Which columns, and the hold.
-    fn layout(&self) -> Result<(Columns, Hold), Error> {
+    /// Which columns, the hold, and the controller with its limits.
+    fn layout(&self) -> Result<(Columns, Hold, Option<ControllerSettings>), Error> {
         if let Some(model) = &self.model {
             let model = model_file::read(model)?;
-            return Ok((model.columns, model.hold));
+            return Ok((model.columns, model.hold, model.controller));
         }
         let hold = match self.hold {
             InputHold::Zero => Hold::Zero,
             InputHold::First => Hold::First,
         };
-        Ok((self.columns.clone().unwrap_or_default(), hold))
+        Ok((self.columns.clone().unwrap_or_default(), hold, None))
+    }
+
+    /// What was asked, if it goes together.
+    fn request(&self, controller: Option<ControllerSettings>) -> Result<Request, Error> {
+        let method = self.method.id();
+        let wrong = |what: String| Err(Error::Usage(what));
+        let of_loop = self.method.is_of_loop();
+        if !of_loop && self.levels != LevelChoice::Auto {
+            return wrong(format!(
+                "--levels does not go with --method {method}, which estimates an offset; leave it out"
+            ));
+        }
+        if of_loop && self.method != Method::RecursiveFcloe && self.memory.is_some() {
+            return wrong(format!(
+                "--memory does not go with --method {method}, which weighs the whole record alike; leave it out"
+            ));
+        }
+        let mut request = Request {
+            memory: self.memory,
+            bandwidth: self.bandwidth,
+            levels: self.levels,
+            ..Request::new(self.method, self.order)
+        };
+        let controller = controller.filter(|_| of_loop);
+        if let Some(settings) = controller {
+            request.controller = Some(settings.linear()?);
+            request.limits = (settings.u_min, settings.u_max);
+        }
+        if let Some(zeta) = self.sensor_filter {
+            let Some(controller) = request.controller else {
+                return wrong("--sensor-filter is of a loop: give --model with a [controller], and a method that uses it".to_owned());
+            };
+            request.controller = Some(controller.with_sensor_filter(zeta)?);
+        }
+        Ok(request)
     }
 
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
-        let (columns, hold) = self.layout()?;
+        let (columns, hold, controller) = self.layout()?;
+        let request = self.request(controller)?;
         let record = read_csv(&self.data, &columns, hold)?;
         let inputs: Vec<&Path> = [Some(&self.data), self.model.as_ref()]
             .into_iter()
@@ -336,12 +398,6 @@ impl Identify {
             .map(PathBuf::as_path)
             .collect();
         let outputs = self.results.plan(&inputs, None)?;
-        let request = Request {
-            method: self.method,
-            order: self.order,
-            memory: self.memory,
-            bandwidth: self.bandwidth,
-        };
         let bar = Bar::new();
         bar.phase("identifying");
         let found = identify::identify(&record, &request);
@@ -359,17 +415,36 @@ impl Identify {
 
 impl Tables {
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
-        let outputs = self.results.plan(&[], None)?;
+        if self.record.is_some() && !matches!(self.paper, Paper::Baysse) {
+            let what =
+                "--record is of the rig that `ctid tables baysse` emulates; no other paper has one";
+            return Err(Error::Usage(what.to_owned()));
+        }
+        let record = self.record.as_deref().map(|path| (Kind::Record, path));
+        let wanted: Vec<_> = self.results.wanted().chain(record).collect();
+        let outputs = output::plan(&wanted, &[])?;
+        let runs = self.runs.unwrap_or(self.paper.runs());
+        let bar = Bar::new();
+        let progress = |progress| bar.show(progress);
         match self.paper {
             Paper::Udink => {
-                let bar = Bar::new();
                 let settings = udink::Settings::default();
-                let study = udink::study(&settings, self.runs, self.seed, &|progress| {
-                    bar.show(progress);
-                });
+                let study = udink::study(&settings, runs, self.seed, &progress);
                 bar.clear();
                 let study = study?;
                 finish(&study, &udink_text::text(&study, look), &outputs, out, look)
+            }
+            Paper::Baysse => {
+                let study = baysse::study(runs, self.seed, &progress);
+                bar.clear();
+                let study = study?;
+                finish(
+                    &study,
+                    &baysse_text::text(&study, look),
+                    &outputs,
+                    out,
+                    look,
+                )
             }
         }
     }

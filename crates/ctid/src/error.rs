@@ -45,6 +45,9 @@ pub enum Error {
     /// A linear model.
     #[error(transparent)]
     Linear(#[from] ct_lti::Error),
+    /// A linear model in a loop.
+    #[error(transparent)]
+    Loop(#[from] fcloe::Error),
     /// Standard output is gone.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] std::io::Error),

@@ -109,6 +109,31 @@ pub struct ControllerSettings {
 }
 
 impl ControllerSettings {
+    /// The controller in continuous time, without its limits.
+    ///
+    /// # Errors
+    /// Where it is sampled, or is no controller.
+    pub fn linear(&self) -> Result<fcloe::Controller, Error> {
+        let polynomial = |highest_first: &[f64]| {
+            ct_lti::Polynomial::new(highest_first.iter().rev().copied().collect::<Vec<_>>())
+        };
+        Ok(match &self.law {
+            ControllerLaw::Pi {
+                gain,
+                integral_time,
+            } => fcloe::Controller::pi(*gain, *gain / *integral_time)?,
+            ControllerLaw::Continuous { r, s } => {
+                fcloe::Controller::new(polynomial(r)?, polynomial(s)?)?
+            }
+            ControllerLaw::Sampled { .. } => {
+                return Err(Error::Usage(
+                    "[controller] is given in powers of a delay, but this method needs it in continuous time; write variable = \"p\" and its polynomials in p"
+                        .to_owned(),
+                ));
+            }
+        })
+    }
+
     /// The controller, run every `interval` seconds.
     ///
     /// # Errors

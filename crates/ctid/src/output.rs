@@ -8,7 +8,7 @@ use missing_effect::Diagnosis;
 use serde::Serialize;
 
 use crate::identify::Identification;
-use crate::tables::udink::Study;
+use crate::tables::{baysse, udink};
 use crate::{Error, atomic, report, term_file};
 
 /// How much of an existing page is looked at: the mark stands in its head.
@@ -24,6 +24,8 @@ pub enum Kind {
     Json,
     /// The result as a page.
     Report,
+    /// A record as CSV.
+    Record,
     /// The shape of what is missing, as CSV; nothing is written where nothing is.
     Unknown,
 }
@@ -32,6 +34,12 @@ pub enum Kind {
 pub trait Found: Serialize {
     /// The page, complete.
     fn page(&self) -> String;
+
+    /// The record as CSV, where there is one.
+    fn record(&self) -> String {
+        String::new()
+    }
+
     /// The shape of what nothing explains as CSV, where there is one.
     fn unknown(&self) -> Option<String> {
         None
@@ -47,9 +55,19 @@ impl Found for Diagnosis {
     }
 }
 
-impl Found for Study {
+impl Found for udink::Study {
     fn page(&self) -> String {
         report::udink(self)
+    }
+}
+
+impl Found for baysse::Study {
+    fn page(&self) -> String {
+        report::baysse(self)
+    }
+
+    fn record(&self) -> String {
+        baysse::csv(&self.second.record)
     }
 }
 
@@ -116,6 +134,7 @@ impl Output {
                 text + "\n"
             }
             Kind::Report => found.page(),
+            Kind::Record => found.record(),
             Kind::Unknown => match found.unknown() {
                 Some(text) => text,
                 None => return Ok(false),
@@ -187,6 +206,8 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
         return false;
     };
     match kind {
+        // Nothing in a record says who wrote it.
+        Kind::Record => false,
         Kind::Report => {
             let mut head = Vec::new();
             let read = file.take(HEAD).read_to_end(&mut head);

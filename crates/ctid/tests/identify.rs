@@ -80,12 +80,7 @@ impl Plant {
 }
 
 fn found(record: &Record, method: Method, order: Order) -> Identification {
-    let request = Request {
-        method,
-        order,
-        memory: None,
-        bandwidth: None,
-    };
+    let request = Request::new(method, order);
     identify(record, &request).unwrap()
 }
 
@@ -141,7 +136,7 @@ fn units_and_dynamics_are_those_of_the_record() {
         unreachable!()
     };
     assert!((slow - 15.0).abs() < 0.5 && (fast - 10.0).abs() < 0.5);
-    let trajectory = found.trajectory;
+    let trajectory = found.trajectory.unwrap();
     assert_eq!(trajectory.time.last(), Some(&3099.0));
     assert!(
         trajectory
@@ -239,7 +234,7 @@ fn drift_with_the_operating_point_leaves_the_band() {
         *y = 40.0 + 2.0 * (*y - 40.0);
     }
     let found = found(&record, Method::StabilizedOe, plant.order());
-    let trajectory = found.trajectory;
+    let trajectory = found.trajectory.unwrap();
     let at = |t: f64| trajectory.time.iter().position(|time| *time >= t).unwrap();
     let (before, after) = (at(2090.0), trajectory.time.len() - 1);
     let [(low, low_error), (high, high_error)] =
@@ -283,10 +278,8 @@ fn drift_with_the_level_is_told_of_a_tank_and_not_of_a_linear_process() {
     let order = Order { n: 1, m: 0 };
     let drift = |linear, seed| {
         let request = Request {
-            method: Method::StabilizedOe,
-            order,
             memory: Some(600.0),
-            bandwidth: None,
+            ..Request::new(Method::StabilizedOe, order)
         };
         identify(&wandering(linear, seed), &request)
             .unwrap()
@@ -312,10 +305,8 @@ fn drift_with_the_level_is_told_of_a_tank_and_not_of_a_linear_process() {
 #[test]
 fn a_memory_too_short_for_standard_errors_is_said() {
     let request = Request {
-        method: Method::StabilizedOe,
-        order: SECOND.order(),
         memory: Some(60.0),
-        bandwidth: None,
+        ..Request::new(Method::StabilizedOe, SECOND.order())
     };
     let found = identify(&SECOND.record(2000, 1), &request).unwrap();
     assert!(found.parameters.iter().all(|p| p.std_error.is_none()));
@@ -433,12 +424,7 @@ fn what_cannot_be_is_refused() {
 fn a_record_that_stands_still_is_refused() {
     let mut record = FIRST.record(200, 1);
     record.input.values.fill(1.5);
-    let request = Request {
-        method: Method::CtRls,
-        order: FIRST.order(),
-        memory: None,
-        bandwidth: None,
-    };
+    let request = Request::new(Method::CtRls, FIRST.order());
     let error = identify(&record, &request).unwrap_err().to_string();
     assert!(error.contains("\"u\" stands at 1.5"), "{error}");
     assert!(error.contains("record at least a step"), "{error}");

@@ -127,3 +127,106 @@ fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
     }
     assert_eq!(seen, 144);
 }
+
+/// The bands are for 100 runs, and wider for fewer.
+#[test]
+fn the_second_paper_is_reproduced_cell_by_cell() {
+    let place = Place::empty();
+    let words = "tables baysse --runs 20 --seed 5 --json a.json --report a.html --record a.csv";
+    let text = place.succeeds(words);
+    for line in text.lines() {
+        assert!(line.chars().count() <= 80, "wider than 80: {line}");
+    }
+    for words in [
+        "Table I ",
+        "Table II",
+        "0.0074",
+        "1.895 V",
+        "32 of 32 cells",
+    ] {
+        assert!(text.contains(words), "no {words} in {text}");
+    }
+    let json = place.json("a.json");
+    assert_eq!(
+        (&json["paper"], &json["runs"]),
+        (&"baysse".into(), &20.into())
+    );
+    let cells = json["tables"].as_array().unwrap();
+    let mut banded = 0;
+    for cell in cells {
+        let number = |value: &Value| value.as_f64().unwrap();
+        assert!(
+            number(&cell["mean"]).is_finite() && number(&cell["sd"]) >= 0.0,
+            "{cell}"
+        );
+        let Some(band) = cell["band"].as_array() else {
+            assert!(cell["inside"].is_null(), "{cell}");
+            continue;
+        };
+        let above = number(&cell["mean"]) >= number(&band[0]);
+        let below = band[1].is_null() || number(&cell["mean"]) <= number(&band[1]);
+        assert_eq!(cell["inside"], above && below, "{cell}");
+        banded += 1;
+    }
+    assert_eq!(
+        (&json["inside"], &json["of"]),
+        (&banded.into(), &banded.into())
+    );
+    let printed: Vec<f64> = cells
+        .iter()
+        .filter_map(|cell| cell["paper"].as_f64())
+        .collect();
+    assert_eq!(printed.len(), 5 + 6 + 6 + 12);
+    assert_eq!((printed[0], printed[17]), (5.91416, 2.60));
+    assert!(json["first"]["diagonal_difference"].as_f64().unwrap() < 1e-9);
+    let counts = &json["first"]["iterations"];
+    assert_eq!(counts["plain_diagonal"], counts["normalised_diagonal"]);
+
+    let page = place.read("a.html");
+    for id in ["outputs", "clouds", "closer", "iterations"] {
+        assert!(page.contains(&format!("id=\"plot-{id}\"")), "no plot {id}");
+        assert!(
+            page.contains(&format!("\"id\":\"{id}\"")),
+            "nothing draws {id}"
+        );
+    }
+    assert!(!page.contains("http://") && !page.contains("https://"));
+
+    // The seed decides, not the threads.
+    let mut threads = place.command("tables baysse --runs 20 --seed 5 --json b.json");
+    threads.env("RAYON_NUM_THREADS", "3");
+    assert_eq!(common::outcome(threads).code, Some(0));
+    assert!(place.json("b.json") == json);
+
+    // A record that is there may be anybody's.
+    place.refuses(words, &["a.csv", "it is there already"]);
+    place.refuses("tables baysse --runs 9", &["--runs is 9", "10 or more"]);
+    place.refuses("tables --record b.csv", &["--record", "tables baysse"]);
+}
+
+/// docs/hidden-dead-zone.md: what the second paper's table II hides.
+#[test]
+fn the_emulated_rig_misses_its_dead_zone() {
+    let place = Place::empty();
+    place.succeeds("tables baysse --runs 10 --record rig.csv");
+    place.write("secant.toml", "plant = \"first-order\"\n");
+    place.write(
+        "tank.toml",
+        "plant = \"single-tank\"\n[known]\narea = 154.0\n",
+    );
+    for (model, before, after) in [("secant.toml", 0.5, 0.1), ("tank.toml", 0.2, 0.1)] {
+        let found = place.result(&format!("diagnose rig.csv --model {model} --max-effects 1"));
+        assert_eq!(
+            found["effects"],
+            serde_json::json!(["pump_deadzone"]),
+            "{model}"
+        );
+        let rmse = |step: usize| found["steps"][step]["rmse"].as_f64().unwrap();
+        assert!(
+            rmse(0) > before && rmse(1) < after,
+            "{model}: {} {}",
+            rmse(0),
+            rmse(1)
+        );
+    }
+}

@@ -67,7 +67,10 @@ pub fn controller_mismatch(
     let smooth = u.iter().zip(r).map(|(u, r)| u - direct * r);
     let mean = smooth.clone().sum::<f64>() / n;
     let smooth = response(&high, Hold::First, smooth.map(|u| u - mean), record.step)?;
-    let jumps = response(&high, record.r_hold, r.iter().copied(), record.step)?;
+    // About its mean too, as the smooth part: else raw levels count as a jump at the beginning.
+    let level = r.iter().sum::<f64>() / n;
+    let moves = r.iter().map(|r| r - level);
+    let jumps = response(&high, record.r_hold, moves, record.step)?;
     let u: Vec<f64> = smooth
         .iter()
         .zip(jumps)

@@ -69,6 +69,20 @@ fn a_fit_never_leaves_the_stable_loops() {
     }
 }
 
+/// Levels are no moves: they make a wrong controller no better.
+#[test]
+fn a_controller_that_does_not_match_raw_levels() {
+    let mut raw = record();
+    raw.r.iter_mut().flatten().for_each(|r| *r += 50.0);
+    raw.y.iter_mut().for_each(|y| *y += 50.0);
+    raw.u.iter_mut().flatten().for_each(|u| *u += 7.0);
+    let wrong = Controller::pi(0.3, 0.0021 / 0.2292 * 0.3).unwrap();
+    let of = |record: &LoopRecord| controller_mismatch(record, &wrong).unwrap().unwrap();
+    let (raw_size, size) = (of(&raw).size, of(&record()).size);
+    assert!((raw_size / size - 1.0).abs() < 0.02, "{raw_size} {size}");
+    assert!(refusal(raw, &wrong).contains("R/S"));
+}
+
 #[test]
 fn a_controller_that_does_not_match() {
     let wrong = |kp: f64, ki: f64| Controller::pi(kp, ki).unwrap();

@@ -1,13 +1,23 @@
 //! A linear model in continuous time from one record: `A(s) y = B(s) u + d`, `A = 1 + a_1 s + .. + a_n s^n`, `B = b_0 + .. + b_m s^m`.
 //!
-//! Both methods run over the record once, on signals from the same state variable filters, with the same forgetting:
+//! Two methods run over the record once, on signals from the same state variable filters, with the same forgetting:
 //!
 //! | method | error that is made small | use it where |
 //! |---|---|---|
 //! | [`Method::CtRls`] | equation error of the filtered signals | noise is low: it biases the estimates, by the share of noise the filters let through |
 //! | [`Method::StabilizedOe`] | output error of a model in parallel | noise is there: it is not in the regressor |
 //!
-//! The offset `d` is always estimated, as records are seldom taken from their point of rest. Inside, time and signals are scaled so that all
+//! Four have to do with a loop `u = R/S (r - y)`; without a controller they identify in open loop. Their signals are deviations from levels of
+//! rest, see [`LevelChoice`]; in a loop the model is that of the whole loop, driven by the reference:
+//!
+//! | method | what it does | use it where |
+//! |---|---|---|
+//! | [`Method::Fcloe`] | output error of the loop, over the whole record | always, to begin with: noise that circulates does not bias it, and it says its standard errors |
+//! | [`Method::RecursiveFcloe`] | the same, sample by sample | the plant drifts |
+//! | [`Method::Iv`] | instruments simulated in the loop | a check that needs no iteration |
+//! | [`Method::Ls`] | least squares | noise is low, or to see what noise does |
+//!
+//! Of the first two: the offset `d` is always estimated, as records are seldom taken from their point of rest. Inside, time and signals are scaled so that all
 //! parameters are about 1.
 //!
 //! The numbers that are not given are found from the best model of first order, over a grid of time constants: the start, the bandwidth of
@@ -19,6 +29,7 @@
 
 mod band;
 mod drift;
+mod looped;
 mod recursion;
 mod scaled;
 mod simulation;
@@ -31,6 +42,7 @@ use serde::Serialize;
 use self::scaled::Scaled;
 use crate::Error;
 pub use drift::{Drift, OverLevel};
+pub use looped::{Batch, Convergence, InLoop, LevelChoice, Start};
 
 /// How the parameters are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
@@ -40,6 +52,14 @@ pub enum Method {
     StabilizedOe,
     /// Recursive least squares on the filtered equation
     CtRls,
+    /// Least squares on filtered signals, of the whole record: biased by noise, a start for the others
+    Ls,
+    /// Instruments simulated in the loop, of the whole record
+    Iv,
+    /// Closed-loop output error of the whole record: the loop is simulated from the reference; without a controller output error
+    Fcloe,
+    /// The same, recursively
+    RecursiveFcloe,
 }
 
 impl Method {
@@ -48,7 +68,16 @@ impl Method {
         match self {
             Self::StabilizedOe => "stabilized-oe",
             Self::CtRls => "ct-rls",
+            Self::Ls => "ls",
+            Self::Iv => "iv",
+            Self::Fcloe => "fcloe",
+            Self::RecursiveFcloe => "recursive-fcloe",
         }
+    }
+
+    /// Whether it has to do with the loop.
+    pub fn is_of_loop(self) -> bool {
+        !matches!(self, Self::StabilizedOe | Self::CtRls)
     }
 }
 
@@ -109,7 +138,7 @@ impl Order {
 }
 
 /// What may be asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// The method.
     pub method: Method,
@@ -119,6 +148,27 @@ pub struct Request {
     pub memory: Option<f64>,
     /// Bandwidth of the state variable filters, 1/s; found where not given.
     pub bandwidth: Option<f64>,
+    /// The controller of the loop, time in s; for the methods that have to do with it. Without one they work in open loop.
+    pub controller: Option<fcloe::Controller>,
+    /// Where zero is; for the same methods.
+    pub levels: LevelChoice,
+    /// Smallest and largest command, in the input's unit; infinite where there is none.
+    pub limits: (f64, f64),
+}
+
+impl Request {
+    /// Everything else found, in open loop.
+    pub fn new(method: Method, order: Order) -> Self {
+        Self {
+            method,
+            order,
+            memory: None,
+            bandwidth: None,
+            controller: None,
+            levels: LevelChoice::Auto,
+            limits: (f64::NEG_INFINITY, f64::INFINITY),
+        }
+    }
 }
 
 /// What was used.
@@ -145,8 +195,9 @@ pub struct Identification {
     pub order: Order,
     /// Name of the record.
     pub record: String,
-    /// What was used.
-    pub settings: Settings,
+    /// What a recursion without a loop used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settings: Option<Settings>,
     /// a_1 to a_n, b_0 to b_m, offset, at the end of the record. The standard error is of the recursion with its memory.
     pub parameters: Vec<Parameter>,
     /// Time constants of the model's real poles, s, the slowest first.
@@ -160,8 +211,12 @@ pub struct Identification {
     pub fit_percent: f64,
     /// What should be known before it is used.
     pub warnings: Vec<String>,
-    /// The parameters over the record.
-    pub trajectory: Trajectory,
+    /// The parameters over the record; of a recursion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trajectory: Option<Trajectory>,
+    /// What a method that has to do with the loop says besides.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_loop: Option<InLoop>,
     /// Gain and time constant over the level; nothing where the level stands, or the record is too short to tell.
     pub drift: Option<Drift>,
     /// The record, to be drawn.
@@ -221,6 +276,9 @@ pub struct Shown {
 /// [`Error::Record`] for a record that is too short, [`Error::Usage`] where it cannot tell the parameters, [`Error::Estimator`] where the
 /// recursion has stopped.
 pub fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
+    if request.method.is_of_loop() {
+        return looped::identify(record, request);
+    }
     let order = request.order;
     record.require_rows(order.parameters() + order.n)?;
     moves(record, &record.input)?;
@@ -231,7 +289,7 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
     let (scaled, mut warnings) = Scaled::new(record, request);
     let path = match request.method {
         Method::CtRls => recursion::equation_error(&scaled, order),
-        Method::StabilizedOe => recursion::output_error(&scaled, order),
+        _ => recursion::output_error(&scaled, order),
     }?;
     warnings.extend(path.warnings.iter().cloned());
     let (simulated, initial) = simulation::simulate(&scaled, order, &path.last()?.theta)
@@ -269,7 +327,7 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         method: request.method,
         order,
         record: record.name.clone(),
-        settings: scaled.settings(),
+        settings: Some(scaled.settings()),
         parameters,
         time_constants,
         oscillations,
@@ -277,7 +335,8 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         fit_percent: 100.0 * (1.0 - rmse / scaled.output_deviation()),
         warnings,
         drift: drift::over_level(&bands, &scaled, order),
-        trajectory: bands,
+        trajectory: Some(bands),
+        in_loop: None,
         shown: Shown {
             time: record.time.clone(),
             input: record.input.clone(),
@@ -351,7 +410,7 @@ fn worse_than_first_order(
         Method::CtRls => {
             "noise biases least squares on the equation: compare with --method stabilized-oe"
         }
-        Method::StabilizedOe => {
+        _ => {
             "the end of the record differs from the whole, or the order is too high: try a longer --memory, or a lower --order"
         }
     };

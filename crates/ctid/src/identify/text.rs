@@ -1,6 +1,8 @@
 //! What `ctid identify` prints.
 
-use super::{Identification, rms};
+use fcloe::{Condition, NoisePath, Verdict};
+
+use super::{Identification, InLoop, LevelChoice, rms};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
@@ -21,6 +23,7 @@ pub fn text(found: &Identification, look: Look) -> String {
     text += &parameters(found, look);
     text += &dynamics(found);
     text.push('\n');
+    text += &in_loop(found, look);
     text += &drift(found, look);
     text += &error(found, look);
     for warning in &found.warnings {
@@ -40,11 +43,11 @@ pub(crate) fn model(found: &Identification) -> String {
         };
         (from..=to).map(term).collect::<Vec<_>>().join(" + ")
     };
-    format!(
-        "(1 + {}) y = ({}) u + offset",
-        sum('a', 1, found.order.n),
-        sum('b', 0, found.order.m)
-    )
+    let (a, b) = (sum('a', 1, found.order.n), sum('b', 0, found.order.m));
+    match &found.in_loop {
+        None => format!("(1 + {a}) y = ({b}) u + offset"),
+        Some(_) => format!("(1 + {a}) y = ({b}) u, y and u as deviations"),
+    }
 }
 
 fn overlay(found: &Identification, look: Look) -> String {
@@ -80,11 +83,16 @@ fn bracketed(unit: &str) -> String {
 }
 
 fn parameters(found: &Identification, look: Look) -> String {
-    let heading = ["parameter", "value", "std. error", "", "over the record"];
+    let (title, last) = match &found.trajectory {
+        Some(_) => ("Parameters at the end of the record", "over the record"),
+        None => ("Parameters", ""),
+    };
+    let heading = ["parameter", "value", "std. error", "", last];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
     for (i, parameter) in found.parameters.iter().enumerate() {
         let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
-        let range = found.trajectory.values.get(i).map(|values| {
+        let values = found.trajectory.as_ref().and_then(|t| t.values.get(i));
+        let range = values.map(|values| {
             let (low, high) = plot::limits([settled(values)]);
             let digits = |value| numbers::significant(value, 4);
             format!("{} .. {}", digits(low), digits(high))
@@ -98,16 +106,23 @@ fn parameters(found: &Identification, look: Look) -> String {
         ]);
     }
     let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
-    let mut text = format!("{}\n", look.heading("Parameters at the end of the record"));
+    let mut text = format!("{}\n", look.heading(title));
     for line in table(&sides, &rows) {
         text += &format!("  {line}\n");
     }
-    let note = format!(
-        "(memory {}, filters of {} 1/s, started from a time constant of {}; the last column is of the second half)",
-        numbers::duration(found.settings.memory),
-        numbers::significant(found.settings.bandwidth, 3),
-        numbers::duration(found.settings.first_order),
-    );
+    let note = match (&found.settings, &found.trajectory) {
+        (Some(settings), _) => format!(
+            "(memory {}, filters of {} 1/s, started from a time constant of {}; the last column is of the second half)",
+            numbers::duration(settings.memory),
+            numbers::significant(settings.bandwidth, 3),
+            numbers::duration(settings.first_order),
+        ),
+        (None, Some(_)) => {
+            "(the last column is of the second half; standard errors take the residual for white)"
+                .to_owned()
+        }
+        (None, None) => return text,
+    };
     text += &look.faint(look.paragraph("  ", &note).trim_end());
     text.push('\n');
     text
@@ -224,6 +239,146 @@ fn error(found: &Identification, look: Look) -> String {
     let title = "Simulation error of the final model";
     let mut text = format!("{}\n", look.heading(title));
     text += &look.paragraph("  ", &line);
-    let note = "(the model runs on the input alone, from a fitted initial state; it is not a prediction error)";
+    let note = match found.in_loop.as_ref().map(|looped| looped.r.is_empty()) {
+        None => {
+            "(the model runs on the input alone, from a fitted initial state; it is not a prediction error)"
+        }
+        Some(true) => {
+            "(the model runs on the input alone, from rest; it is not a prediction error)"
+        }
+        Some(false) => {
+            "(the model's loop runs on the reference alone, from rest; it is not a prediction error)"
+        }
+    };
     text + &look.faint(look.paragraph("  ", note).trim_end()) + "\n\n"
+}
+
+fn in_loop(found: &Identification, look: Look) -> String {
+    let Some(in_loop) = &found.in_loop else {
+        return String::new();
+    };
+    let mut text = format!("{}\n", look.heading("The loop, and the way there"));
+    for (name, sentence) in facts(found, in_loop) {
+        text += &look.paragraph("  - ", &format!("{name}: {sentence}"));
+    }
+    text.push('\n');
+    text
+}
+
+/// What is known of the loop and of the way to the estimates.
+pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static str, String)> {
+    let (y, u) = (&found.shown.output.unit, &found.shown.input.unit);
+    let digits = |value| numbers::significant(value, 4);
+    let open = in_loop.r.is_empty();
+    let polynomial = |coefficients: &[f64]| {
+        let term = |(power, c): (usize, &f64)| match power {
+            0 => digits(*c),
+            1 => format!("{} s", digits(*c)),
+            power => format!("{} s^{power}", digits(*c)),
+        };
+        let terms = coefficients.iter().enumerate().filter(|(_, c)| **c != 0.0);
+        terms.map(term).collect::<Vec<_>>().join(" + ")
+    };
+    let mut facts = vec![(
+        "controller",
+        match open {
+            true => "none, open loop".to_owned(),
+            false => format!("({})/({})", polynomial(&in_loop.r), polynomial(&in_loop.s)),
+        },
+    )];
+    let [drive, output] = in_loop.levels.map(digits);
+    let from = match in_loop.levels_from {
+        LevelChoice::Estimated => "estimated",
+        LevelChoice::Rest => "means of the first rows, before anything moves",
+        LevelChoice::Mean => "means of the record",
+        LevelChoice::Zero | LevelChoice::Auto => "as given",
+    };
+    let driven = if open {
+        format!("u = {drive} {u}")
+    } else {
+        format!("r = {drive} {y}")
+    };
+    facts.push(("at rest", format!("{driven}, y = {output} {y} ({from})")));
+    if let Some(mismatch) = &in_loop.mismatch {
+        let [systematic, size] =
+            [mismatch.systematic, mismatch.size].map(|v| numbers::significant(v, 2));
+        facts.push((
+            "measured command",
+            format!("the controller misses {systematic} of {size} {u} root mean square"),
+        ));
+    }
+    let theta: Vec<String> = in_loop.start.theta.iter().map(|v| digits(*v)).collect();
+    let from = in_loop.start.from;
+    let bandwidth = numbers::significant(in_loop.start.bandwidth, 3);
+    let start = if found.trajectory.is_some() || in_loop.batch.is_some() {
+        "start"
+    } else {
+        "regression"
+    };
+    facts.push((
+        start,
+        format!(
+            "{from} with filters of {bandwidth} 1/s: {}",
+            theta.join(", ")
+        ),
+    ));
+    if let Some(batch) = &in_loop.batch {
+        let end = if batch.stop.was_successful() {
+            "at a minimum"
+        } else {
+            "before a minimum"
+        };
+        let noise = match batch.noise {
+            _ if open => "",
+            NoisePath::Loop => "; the noise circulates in the loop",
+            NoisePath::Record => "; the noise is on the record alone",
+        };
+        facts.push((
+            "fit",
+            format!(
+                "{} steps, ended {end}, the best of {} starts{noise}",
+                batch.iterations, batch.starts
+            ),
+        ));
+    }
+    if let Some(health) = &in_loop.health {
+        facts.push((
+            "recursion",
+            format!(
+                "{} steps cut to the limit, {} shortened and {} refused to keep the loop stable; output error {} {y}",
+                health.limited,
+                health.shortened,
+                health.refused,
+                numbers::significant(health.residual_rms, 3)
+            ),
+        ));
+    }
+    if let Some(convergence) = &in_loop.convergence {
+        facts.push(("condition (14)", condition(&convergence.condition)));
+    }
+    facts
+}
+
+/// The verdict of condition (14), in words.
+pub(crate) fn condition(condition: &Condition) -> String {
+    let verdict = match condition.verdict {
+        Verdict::Holds => "it holds: a recursion that keeps the filter of this start converges",
+        Verdict::Positive => {
+            "it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
+        }
+        Verdict::Negative => {
+            "it fails, and the real part falls below 0: a recursion that keeps the filter of this start may go the wrong way; renew the filter"
+        }
+        Verdict::Unstable => "the loop of the estimates is not stable",
+    };
+    if condition.verdict == Verdict::Unstable {
+        return verdict.to_owned();
+    }
+    let least = numbers::significant(condition.least, 3);
+    let at = match condition.frequency {
+        0.0 => "at low frequencies".to_owned(),
+        f64::INFINITY => "at high frequencies".to_owned(),
+        frequency => format!("at {} rad/s", numbers::significant(frequency, 3)),
+    };
+    format!("Re P^/P is least {at}, {least}, and has to be above 1/2; {verdict}")
 }

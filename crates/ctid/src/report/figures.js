@@ -54,7 +54,7 @@
     }
     const more = {
       showlegend: figure.curves.some((curve) => curve.legend),
-      hovermode: figure.categories ? "closest" : "x unified", hoversubplots: "axis", shapes,
+      hovermode: figure.categories || figure.curves.every((curve) => curve.marker) ? "closest" : "x unified", hoversubplots: "axis", shapes,
       xaxis: axis(named(plain(figure.x_title), pretty(figure.x_unit)), {
         anchor: `y${suffix(last)}`, exponentformat: "none", hoverformat: ".6~g", range: figure.x_range || undefined, showspikes: false,
       }),

@@ -1,10 +1,10 @@
 //! The page of `ctid identify`.
 
-use super::figures::{self, Colour, Curve, Figure, Panel};
+use super::figures::{self, Colour, Curve, Figure, Panel, Values};
 use super::page::{self, NOTICES, Page, figure, section};
 use super::tables::table;
 use super::text::{code, escape, significant, unit, with_error};
-use crate::identify::text::{drift_verdict, model, time_constant_name};
+use crate::identify::text::{self, condition, drift_verdict, model, time_constant_name};
 use crate::identify::{Identification, OverLevel};
 use crate::numbers::duration;
 
@@ -15,15 +15,18 @@ pub fn html(found: &Identification) -> String {
         "<main>".to_owned(),
         fit(),
         parameters(found),
+        convergence(found),
         "</main>".to_owned(),
         "<footer><p>Written by ctid. The simulation error is that of a model that runs on the input alone; it is not a prediction \
          error. Bands and standard errors are one standard deviation. This file holds all its data and loads nothing.</p></footer>"
             .to_owned(),
     ]
     .concat();
-    let figures: Vec<Figure> = [fit_figure(found), trajectory_figure(found)]
+    let figures: Vec<Figure> = [fit_figure(found)]
         .into_iter()
+        .chain(trajectory_figure(found))
         .chain(drift_figure(found))
+        .chain(condition_figure(found))
         .collect();
     page::html(&Page {
         title: &format!("ctid: {}", escape(&found.record)),
@@ -49,33 +52,50 @@ fn headline(found: &Identification) -> String {
         1 => "Time constant",
         _ => "Sum of time constants",
     };
-    let facts: String = [
+    let mut facts = vec![
         ("Model", escape(&model(found))),
         ("Gain", with_unit(found.order.n)),
         (time_constant, with_unit(0)),
         ("Method", code(found.method.id())),
-        ("Memory", duration(found.settings.memory)),
-        (
-            "Filters",
-            format!("{} 1/s", significant(found.settings.bandwidth, 3)),
-        ),
         ("Dynamics", dynamics(found)),
-    ]
-    .iter()
-    .map(|(name, text)| format!("<div><dt>{name}</dt><dd>{text}</dd></div>\n"))
-    .collect();
+    ];
+    if let Some(settings) = &found.settings {
+        let filters = format!("{} 1/s", significant(settings.bandwidth, 3));
+        facts.push(("Memory", duration(settings.memory)));
+        facts.push(("Filters", filters));
+    }
+    if let Some(in_loop) = &found.in_loop {
+        let more = text::facts(found, in_loop).into_iter();
+        facts.extend(more.map(|(name, sentence)| (name, escape(&sentence))));
+    }
+    let facts: String = facts
+        .iter()
+        .map(|(name, text)| format!("<div><dt>{}</dt><dd>{text}</dd></div>\n", capital(name)))
+        .collect();
+    let runs_on = match found.in_loop.as_ref().map(|in_loop| in_loop.r.is_empty()) {
+        None => "The model runs on the input alone, from an initial state that is fitted.",
+        Some(true) => "The model runs on the input alone, from rest.",
+        Some(false) => "The model's loop runs on the reference alone, from rest.",
+    };
     format!(
         "<header>\n<p class=\"kicker\">ctid report · {}</p>\n<h1>Linear model of order {}</h1>\n\
          <ol class=\"trail apart\">\n<li><span class=\"number\">{} <small>{output}</small></span>\
          <span class=\"label\">simulation error, root mean square</span></li>\n\
          <li><span class=\"number\">{} <small>%</small></span><span class=\"label\">fit</span></li></ol>\n\
-         <p class=\"caption\">The model runs on the input alone, from an initial state that is fitted. Fit: 100 % less the error over the \
+         <p class=\"caption\">{runs_on} Fit: 100 % less the error over the \
          output's standard deviation.</p>\n{warnings}<dl class=\"facts\">\n{facts}</dl>\n{NOTICES}</header>\n",
         escape(&found.record),
         found.order,
         significant(found.simulation_rmse, 2),
         significant(found.fit_percent, 3),
     )
+}
+
+fn capital(name: &str) -> String {
+    let mut letters = name.chars();
+    letters.next().map_or(String::new(), |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 fn dynamics(found: &Identification) -> String {
@@ -116,18 +136,35 @@ fn parameters(found: &Identification) -> String {
             )
         })
         .collect();
+    let (title, caption) = match (&found.settings, &found.trajectory) {
+        (Some(_), _) => (
+            "At the end of the record",
+            "Standard errors hold for noise of any colour, and for a model that is right; those of the recursion with its memory, \
+             not of the whole record.",
+        ),
+        (None, Some(_)) => (
+            "At the end of the record",
+            "Standard errors are those of the recursion with its memory, and take the residual for white.",
+        ),
+        (None, None) => (
+            "Of the whole record",
+            "Standard errors hold for noise of any colour, in the loop or on the record, and for a model that is right.",
+        ),
+    };
     let table = table(
-        "At the end of the record",
+        title,
         "<tr><th scope=\"col\">Parameter</th><th scope=\"col\" class=\"number\">Value ± standard error</th><th scope=\"col\">Unit</th></tr>",
         &rows,
-        "Standard errors hold for noise of any colour, and for a model that is right; those of the recursion with its memory, \
-         not of the whole record.",
+        caption,
     );
-    let over_time = figure(
-        "trajectory",
-        "Over the record",
-        "Band: one standard error, once enough has been seen.",
-    );
+    let over_time = match found.trajectory {
+        Some(_) => figure(
+            "trajectory",
+            "Over the record",
+            "Band: one standard error, once enough has been seen.",
+        ),
+        None => String::new(),
+    };
     let over_level = match found.drift {
         Some(_) => figure(
             "drift",
@@ -195,8 +232,8 @@ fn fit_figure(found: &Identification) -> Figure {
     Figure::over_time("fit", 560, panels, curves)
 }
 
-fn trajectory_figure(found: &Identification) -> Figure {
-    let trajectory = &found.trajectory;
+fn trajectory_figure(found: &Identification) -> Option<Figure> {
+    let trajectory = found.trajectory.as_ref()?;
     let mut panels = Vec::new();
     let mut curves = Vec::new();
     let series = trajectory.values.iter().zip(&trajectory.std_errors);
@@ -207,7 +244,53 @@ fn trajectory_figure(found: &Identification) -> Figure {
         panels.push(Panel::new(&parameter.name, &parameter.unit));
     }
     let height = 90 + 135 * u32::try_from(panels.len()).unwrap_or(1);
-    Figure::over_time("trajectory", height, panels, curves)
+    Some(Figure::over_time("trajectory", height, panels, curves))
+}
+
+fn convergence(found: &Identification) -> String {
+    let of_loop = found.in_loop.as_ref();
+    let Some(convergence) = of_loop.and_then(|in_loop| in_loop.convergence.as_ref()) else {
+        return String::new();
+    };
+    section(
+        "convergence",
+        "Would a recursion converge from this start?",
+        &escape(&condition(&convergence.condition)),
+        &figure(
+            "condition",
+            "P^/P − 1/2 over all frequencies",
+            "P^ is the loop's polynomial with the start, P that with the estimates. Condition (14): the curve stays right of the shaded part.",
+        ),
+    )
+}
+
+fn condition_figure(found: &Identification) -> Option<Figure> {
+    let convergence = found.in_loop.as_ref()?.convergence.as_ref()?;
+    let locus = &convergence.locus;
+    let real: Vec<f64> = locus.iter().map(|point| point.1).collect();
+    let (low, high) = crate::plot::limits([&real[..]]);
+    let room = 0.1 * (high.max(0.0) - low.min(0.0));
+    let (low, high) = (low.min(0.0) - room, high.max(0.0) + room);
+    let curve = Curve {
+        x: real,
+        y: Values::Numbers(locus.iter().map(|point| point.2).collect()),
+        ..Curve::line("P^/P − 1/2", 0, Colour::Of(1), (&[], &[]))
+    };
+    Some(Figure {
+        x_title: "real part",
+        x_unit: String::new(),
+        x_range: Some([low, high]),
+        x_band: Some([low, 0.0]),
+        ..Figure::over_time(
+            "condition",
+            380,
+            vec![Panel {
+                lines: vec![0.0],
+                ..Panel::new("imaginary part", "")
+            }],
+            vec![curve],
+        )
+    })
 }
 
 fn drift_figure(found: &Identification) -> Option<Figure> {

@@ -7,6 +7,7 @@
 //! What every page shares is in `page.rs`, `plots.js` and `report.css`; pages whose plots are curves alone say in
 //! `figures.rs` what `figures.js` draws.
 
+mod baysse;
 mod data;
 mod decimate;
 mod figures;
@@ -20,6 +21,7 @@ mod udink;
 
 use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
+pub use self::baysse::html as baysse;
 pub use self::identification::html as identification;
 use self::page::{NOTICES, Page, figure, figure_with, section};
 use self::text::{escape, significant};

@@ -3,7 +3,10 @@
 //! A paper prints one run of one noise. It is consistent with a computation where its figures lie among those of many runs; that is all
 //! that can be said without its noise.
 
+pub mod baysse;
+pub mod baysse_text;
 pub mod gains;
+pub mod paper_baysse;
 pub mod paper_udink;
 pub mod udink;
 pub mod udink_text;
@@ -27,7 +30,7 @@ pub struct Printed {
 impl Printed {
     /// A figure with so many decimals.
     pub(crate) const fn new(value: f64, decimals: usize) -> Self {
-        const HALF_DIGIT: [f64; 6] = [0.5, 0.05, 0.005, 5e-4, 5e-5, 5e-6];
+        const HALF_DIGIT: [f64; 7] = [0.5, 0.05, 0.005, 5e-4, 5e-5, 5e-6, 5e-7];
         Self {
             value,
             rounding: HALF_DIGIT[decimals],

@@ -36,7 +36,8 @@ impl Command {
 ///
 /// Linear plants without effects in their vessels are propagated exactly (matrix exponential); others by
 /// Runge-Kutta of order four in [`Simulator::set_substeps`] equal parts of the sampling interval, cut where the
-/// input jumps behind a dead time and where a level meets its rim. Nothing is allocated per step,
+/// input jumps behind a dead time and where a level meets its rim. Parts that are longer than a vessel's time constant
+/// are exponential Runge-Kutta steps (see the [front page](crate#steps-that-are-longer-than-a-time-constant)). Nothing is allocated per step,
 /// but for the first step of a new length of a linear plant, and the queue behind a dead time while it fills.
 pub struct Simulator<T: Scalar> {
     actuator: Actuator<T>,

@@ -64,3 +64,19 @@ fn effects_that_are_absent_leave_fast_vessels_bit_for_bit() {
         }
     }
 }
+
+/// What a vessel holds reaches the next one, also where it is gone long before a step's shortest part is over.
+#[test]
+fn nothing_is_lost_where_a_vessel_empties_at_once() {
+    for ratio in [4.5, 45.0, 200.0] {
+        let mut case = fast(Plant::CascadedTanks, 0, ratio);
+        // What stays of it is a thousandth.
+        case.theta[1] *= 30.0;
+        let input = input(DRIVES[0], 60, case.h, 960);
+        // So fine that every part is short against the vessel's time constant.
+        let fine = case.run(&input, 512);
+        let error = difference(&case.run(&input, 1), &fine);
+        println!("{error:8.1e} h/tau {ratio}");
+        assert!(error < 1e-3, "{error:e} h/tau {ratio}");
+    }
+}

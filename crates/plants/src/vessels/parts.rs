@@ -157,12 +157,12 @@ impl<T: Scalar> Vessels<T> {
             for i in 0..self.vessels.len() {
                 let fast = rates[i].value() * h > STEP_LIMIT;
                 let time = if fast { 1.0 / rates[i].value() } else { h };
-                let way = (moves[i].value() * time).abs();
-                // What does not move is calm at any level, also at the bottom.
-                let share = if way == 0.0 {
+                let (level, moves) = (self.levels[i].value(), moves[i].value());
+                // What is empty and gets nothing stays so.
+                let share = if level <= 0.0 && moves <= 0.0 {
                     0.0
                 } else {
-                    way / self.levels[i].value().abs()
+                    (moves * time / level).abs()
                 };
                 let settled = SETTLED[usize::from(i + 1 == self.vessels.len())];
                 if share.is_nan() || share > SETTLING {
@@ -195,18 +195,26 @@ impl<T: Scalar> Vessels<T> {
             let (outflow, net) = self.balance(i, &level, inflow, t);
             let slope = self.slope(i, t).max(T::constant(0.0));
             let damped = T::constant(1.0) / (h * slope + 1.0);
-            *to = level + self.rate(i, &level, net) * h * damped;
+            let rise = self.rate(i, &level, net) * h * damped;
             let low = match self.vessels[i].outlet {
                 Outlet::Torricelli => 0.0,
                 Outlet::Linear => f64::NEG_INFINITY,
             };
-            *to = (*to).max(T::constant(low)).min(self.vessels[i].rim.level);
-            // What left the vessel is what its balance says; the rest of the step it is near its new level.
-            inflow = if slope.value() * h.value() > 1.0 {
-                self.outflow(i, to, t)
-            } else {
-                outflow
-            };
+            let rim = self.vessels[i].rim;
+            *to = (level + rise).max(T::constant(low)).min(rim.level);
+            // Nothing is lost: what is not kept has left, by the outlet or over the rim.
+            let kept = net * damped;
+            inflow = outflow + net - kept;
+            if to.value() != (level + rise).value() && rise.value() != 0.0 {
+                let beyond = kept * (T::constant(1.0) - (*to - level) / rise);
+                inflow = if rise.value() > 0.0 {
+                    inflow + beyond * rim.fraction
+                } else {
+                    inflow + beyond
+                };
+            }
+            // A leak takes no more than there is.
+            inflow = inflow.max(T::constant(low));
         }
         if let Some(watch) = watch {
             // The transient is over at once; what is left looks straight.

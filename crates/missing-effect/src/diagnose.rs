@@ -190,7 +190,7 @@ pub fn diagnose(
     if let (Some(last), false) = (trail.last(), stopped)
         && let Some(found) = left
         && !last.added.is_empty()
-        && explained(&base, last, found.above(&noise)) < FAIR_PART
+        && explained(&base, last, found.above(&noise))? < FAIR_PART
     {
         remark = Some(sentences::of_a_part(last, &problem.records[0].output.unit));
         left = remains(&base, &own_base)?;
@@ -287,9 +287,13 @@ fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
 }
 
 /// The part of what stands above the noise floor, in mean square, that a model explains of its base.
-fn explained(base: &Node, last: &Node, floor: f64) -> f64 {
-    let before = base.fit.rmse.powi(2);
-    (before - last.fit.rmse.powi(2)) / (before - floor * floor).max(f64::MIN_POSITIVE)
+fn explained(base: &Node, last: &Node, floor: f64) -> Result<f64, Error> {
+    let mean_square = |node: &Node| -> Result<f64, Error> {
+        let series = node.setup.disturbance(&node.fit.x)?.concat();
+        Ok(series.iter().map(|e| e * e).sum::<f64>() / series.len().max(1) as f64)
+    };
+    let (before, after) = (mean_square(base)?, mean_square(last)?);
+    Ok((before - after) / (before - floor * floor).max(f64::MIN_POSITIVE))
 }
 
 /// The best set of at most so many effects: of a set that is too large, or of those that were grown.

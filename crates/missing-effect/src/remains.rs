@@ -80,7 +80,7 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
             record,
         }));
     }
-    let residuals = node.setup.residuals(&own.x)?;
+    let residuals = node.setup.disturbance(&own.x)?;
     let records = node.setup.records;
     let level = NOT_NOISE / records.len() as f64;
     for (k, (record, residual)) in records.iter().zip(&residuals).enumerate() {
@@ -120,11 +120,18 @@ fn least_p(
     node: &Node,
     signals: impl Fn(&[f64]) -> Vec<Vec<f64>>,
 ) -> Result<(f64, Option<usize>), Error> {
-    let residuals = node.setup.residuals(&node.fit.x)?;
+    let residuals = node.setup.disturbance(&node.fit.x)?;
+    // In a loop the command holds the noise that came back; what moves it from outside is the reference.
+    let in_loop = !node.setup.replays().is_empty();
     let (mut least, mut at, mut count) = (1.0, None, 0.0);
     for (k, (record, residual)) in node.setup.records.iter().zip(&residuals).enumerate() {
         let lags = (record.len() / 10).clamp(2, 25);
-        for signal in signals(&record.input.values) {
+        let from_outside = record
+            .reference
+            .as_ref()
+            .filter(|_| in_loop)
+            .unwrap_or(&record.input);
+        for signal in signals(&from_outside.values) {
             let (_, p) = prewhitened_input_test(&signal, residual, lags)?;
             if p < least {
                 (least, at) = (p, Some(k));

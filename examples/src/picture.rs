@@ -21,7 +21,11 @@ pub struct Panel {
     pub curves: Vec<Curve>,
 }
 
-const COLOURS: [RGBColor; 2] = [RGBColor(0, 90, 160), RGBColor(200, 90, 0)];
+const COLOURS: [RGBColor; 3] = [
+    RGBColor(0, 90, 160),
+    RGBColor(200, 90, 0),
+    RGBColor(0, 138, 102),
+];
 /// Width and height of a panel, pixels.
 const SIZE: (u32, u32) = (640, 260);
 
@@ -59,7 +63,8 @@ fn draw(place: &Place<'_>, panel: &Panel) -> Result<(), Box<dyn Error>> {
     };
     let ((from, to), (low, high)) = (range(|p| p.0), range(|p| p.1));
     // Room above for the legend.
-    let (below, above) = (0.06 * (high - low), 0.34 * (high - low));
+    let rows = panel.curves.len() as f64;
+    let (below, above) = (0.06 * (high - low), 0.17 * rows * (high - low));
     let mut chart = ChartBuilder::on(place)
         .caption(&panel.title, ("sans-serif", 15))
         .margin(10)

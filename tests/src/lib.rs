@@ -3,7 +3,8 @@
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
 use missing_effect::Problem;
 use plants::{
-    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, controller::Pi,
+    Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term,
+    controller::Controller,
 };
 use rand_chacha::ChaCha8Rng;
 
@@ -23,6 +24,8 @@ pub struct Rig {
     pub plant: Plant,
     /// What is built into it, with its parameters, in chain order.
     pub hidden: Vec<(&'static str, usize, Vec<f64>)>,
+    /// What is built into it that no effect of the catalogue describes.
+    pub terms: Vec<Term>,
     /// The plant's own parameters.
     pub theta: Vec<f64>,
     /// Level at rest of each vessel under the middle command \[cm\].
@@ -51,6 +54,7 @@ impl Rig {
         Self {
             plant: Plant::SingleTank,
             hidden: Vec::new(),
+            terms: Vec::new(),
             theta: vec![10.0, 12.5],
             levels: vec![16.0],
             command: (3.5, 6.5),
@@ -100,12 +104,23 @@ impl Rig {
         }
     }
 
-    /// The plant without what is hidden, beside one record.
+    /// The controller of [`Drive::Closed`].
+    ///
+    /// # Panics
+    /// Never: its settings are constants that can work.
+    #[must_use]
+    #[allow(clippy::expect_used)]
+    pub fn controller(&self) -> Controller {
+        Controller::pi(0.4, 120.0, (0.0, 10.0)).expect("a controller")
+    }
+
+    /// The plant without what is hidden, beside one record; the controller is not told.
     pub fn problem(&self, record: Record) -> Problem {
         Problem {
             plant: self.plant,
             known: self.known(),
             effects: Vec::new(),
+            terms: Vec::new(),
             start: Default::default(),
             fixed: Vec::new(),
             controller: None,
@@ -140,6 +155,12 @@ impl Rig {
                 .expect("an effect of this plant");
             theta.extend(parameters);
         }
+        for term in &self.terms {
+            structure = structure
+                .with_term(term.clone())
+                .expect("a term of this plant");
+            theta.push(1.0);
+        }
         let middle = 0.5 * (self.command.0 + self.command.1);
         let mut simulator =
             Simulator::new(&structure, &theta, &self.levels, middle).expect("a simulation");
@@ -158,7 +179,7 @@ impl Rig {
         let wanted: Result<Vec<f64>, Error> =
             excitation::steps(self.samples, 20..=90, low, high, rng);
         let wanted = wanted.expect("an excitation");
-        let mut controller = Pi::new(0.4, 120.0, (0.0, 10.0), middle).expect("a controller");
+        let mut controller = self.controller().start(&[middle]);
         let (mut u, mut y) = (
             Vec::with_capacity(self.samples),
             Vec::with_capacity(self.samples),
@@ -181,7 +202,7 @@ impl Rig {
                 .collect(),
             input: Signal::new("u", "V", u),
             output: Signal::new("y", "cm", y),
-            reference: None,
+            reference: (self.drive == Drive::Closed).then(|| Signal::new("r", "cm", wanted)),
             hold: Hold::Zero,
         }
     }

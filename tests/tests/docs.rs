@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use plants::Plant;
+
 #[test]
 fn the_page_shows_the_file() {
     let file = include_str!("../../crates/plants/src/effects/pipe_height.rs");
@@ -33,6 +35,23 @@ fn the_readme_shows_the_bundled_model_file() {
     );
 }
 
+#[test]
+fn model_files_on_the_page_are_read() {
+    let page = include_str!("../../docs/model-file.md");
+    let blocks: Vec<&str> = page
+        .split("```toml\n")
+        .skip(1)
+        .filter_map(|rest| rest.split("```").next())
+        .collect();
+    assert_eq!(blocks.len(), 2);
+    for block in blocks {
+        ctid::model_file::parse("docs/model-file.md", block).unwrap();
+    }
+    for plant in Plant::ALL {
+        assert!(page.contains(&format!("| `{}` |", plant.id())), "{plant:?}");
+    }
+}
+
 /// Its example is the one of the crate's documentation, which is compiled and run.
 #[test]
 fn the_readme_shows_the_estimators_example() {
@@ -60,8 +79,12 @@ fn links_lead_to_files() {
         "CONTRIBUTING.md",
         "benches/README.md",
         "docs/adding-an-effect.md",
+        "docs/block-diagonal-gain.md",
+        "docs/closed-loop.md",
         "docs/design.md",
         "docs/gallery.md",
+        "docs/hidden-dead-zone.md",
+        "docs/model-file.md",
     ] {
         let page = root.join(page);
         let text = std::fs::read_to_string(&page).unwrap();

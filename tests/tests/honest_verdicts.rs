@@ -1,22 +1,14 @@
 //! What a verdict may claim: adequate is a model that leaves noise, and nothing else.
 #![allow(clippy::unwrap_used)]
 
+use ct_signals::noise;
 use ctid_tests::Rig;
 use missing_effect::{Diagnosis, Options, Problem, Verdict, compare, diagnose};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 fn problem(rig: &Rig, seed: u64) -> Problem {
-    Problem {
-        plant: rig.plant,
-        known: rig.known(),
-        effects: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        controller: None,
-        records: vec![rig.run(&mut ChaCha8Rng::seed_from_u64(seed))],
-        test: Vec::new(),
-    }
+    rig.problem(rig.run(&mut ChaCha8Rng::seed_from_u64(seed)))
 }
 
 fn diagnosed(rig: &Rig, seed: u64, options: &Options) -> Diagnosis {
@@ -48,40 +40,74 @@ fn a_comparison_shows_what_a_model_lacks() {
     }
 }
 
-/// What no effect of the catalogue describes: a fast swing of the sensor, a jump of it, and a flow that nobody
-/// recorded. Drifts, swings and steps of the catalogue together would imitate each of them.
+type Outside = fn(f64) -> (f64, f64);
+
+/// What no effect of the catalogue describes: a swing of the sensor, a jump of it that stays or passes, a slow course of
+/// it, and a flow that nobody recorded; and how a sentence names it.
+const OUTSIDE: [(&str, Outside); 7] = [
+    ("period of about 20 s", |t| (0.0, 0.1 * (0.314 * t).sin())),
+    ("wanders", |t| (0.0, 0.5 * (0.00209 * t).sin())),
+    ("sudden, from 1002", |t| {
+        (0.0, if t > 1000.0 { 3.0 } else { 0.0 })
+    }),
+    ("sudden, from 1002", |t| {
+        (0.0, if t > 1000.0 { 0.3 } else { 0.0 })
+    }),
+    ("sudden", |t| {
+        (
+            if (900.0..1100.0).contains(&t) {
+                0.5
+            } else {
+                0.0
+            },
+            0.0,
+        )
+    }),
+    ("sudden, from 1000", |t| {
+        (
+            0.0,
+            if (1000.0..1100.0).contains(&t) {
+                1.5
+            } else {
+                0.0
+            },
+        )
+    }),
+    ("sudden, from 600", |t| {
+        (
+            0.0,
+            if (600.0..700.0).contains(&t) {
+                -0.5
+            } else {
+                0.0
+            },
+        )
+    }),
+];
+
+/// What an effect that follows the clock describes: a sensor that slides; and a swing of its reading, for a flow that
+/// swings leaves the same.
+const BY_CLOCK: [(&str, Outside); 2] = [
+    ("periodic_disturbance", |t| (0.0, 0.5 * (0.0628 * t).sin())),
+    ("sensor_drift", |t| (0.0, t / 2000.0)),
+];
+
+fn disturbed(outside: Outside) -> Rig {
+    Rig {
+        outside,
+        ..Rig::single_tank()
+    }
+}
+
 #[test]
 fn what_is_outside_the_catalogue_is_not_called_noise() {
-    type Outside = fn(f64) -> (f64, f64);
-    let outside: [(&str, Outside); 4] = [
-        ("period of about 20 s", |t| (0.0, 0.1 * (0.314 * t).sin())),
-        ("sudden, from 1002", |t| {
-            (0.0, if t > 1000.0 { 3.0 } else { 0.0 })
-        }),
-        ("sudden, from 1002", |t| {
-            (0.0, if t > 1000.0 { 0.3 } else { 0.0 })
-        }),
-        ("sudden", |t| {
-            (
-                if (900.0..1100.0).contains(&t) {
-                    0.5
-                } else {
-                    0.0
-                },
-                0.0,
-            )
-        }),
-    ];
-    for (says, outside) in outside {
-        let rig = Rig {
-            outside,
-            ..Rig::single_tank()
-        };
+    for (says, outside) in OUTSIDE {
+        let rig = disturbed(outside);
         let problem = problem(&rig, 1);
         let compared = compare(&problem, &Options::default()).unwrap();
         let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
         for found in [compared, found] {
-            assert_eq!(found.verdict, Verdict::Unexplained, "{says}");
+            assert_eq!(found.verdict, Verdict::Unexplained, "{:?}", found.sentences);
             assert!(found.effects.is_empty(), "{says}: {:?}", found.effects);
             assert!(
                 found.sentences[0].contains(says),
@@ -98,35 +124,173 @@ fn what_is_outside_the_catalogue_is_not_called_noise() {
     }
 }
 
-/// Part of a slow swing of the sensor: effects of the catalogue still imitate it.
-#[test]
-#[ignore = "fails: a set of the catalogue is named"]
-fn a_slow_course_of_the_sensor_is_not_named() {
-    let rig = Rig {
-        outside: |t| (0.0, 0.5 * (0.00209 * t).sin()),
-        ..Rig::single_tank()
-    };
-    let found = diagnosed(&rig, 1, &Options::default());
-    assert_eq!(found.verdict, Verdict::Unexplained, "{:?}", found.effects);
-}
-
-/// A sensor that slides has a name. So has a slow swing of its reading: a flow that swings leaves the same.
 #[test]
 fn what_follows_the_clock_is_named_where_it_leaves_noise() {
-    type Outside = fn(f64) -> (f64, f64);
-    let named: [(&str, Outside); 2] = [
-        ("periodic_disturbance", |t| (0.0, 0.5 * (0.0628 * t).sin())),
-        ("sensor_drift", |t| (0.0, t / 2000.0)),
-    ];
-    for (effect, outside) in named {
-        let rig = Rig {
-            outside,
-            ..Rig::single_tank()
-        };
+    for (effect, outside) in BY_CLOCK {
+        let rig = disturbed(outside);
         let found = diagnosed(&rig, 1, &Options::default());
         assert_eq!(found.effects, [effect]);
         assert!((found.noise_floor - rig.noise).abs() < 0.1 * rig.noise);
     }
+}
+
+/// Twenty seeds of each: `cargo test -p ctid-tests --test honest_verdicts -- --ignored --nocapture`.
+#[test]
+#[ignore = "takes minutes"]
+fn what_is_outside_the_catalogue_is_not_named_as_an_effect() {
+    let mut named = Vec::new();
+    let described = BY_CLOCK
+        .into_iter()
+        .map(|(effect, o)| (effect, o, Some(effect)));
+    let outside = OUTSIDE.into_iter().map(|(says, o)| (says, o, None));
+    for (kind, (says, outside, effect)) in outside.chain(described).enumerate() {
+        let mut verdicts = std::collections::BTreeMap::new();
+        for seed in 11..=30 {
+            let found = diagnosed(&disturbed(outside), seed, &Options::default());
+            for remark in found
+                .sentences
+                .iter()
+                .filter(|said| said.contains("not taken for the answer"))
+            {
+                let (rmse, floor) = (found.steps[0].rmse, found.noise_floor);
+                println!("{kind} seed {seed}: {rmse:.3} cm, floor {floor:.3} cm: {remark}");
+            }
+            *verdicts.entry(format!("{:?}", found.verdict)).or_insert(0) += 1;
+            if found.effects.iter().any(|id| Some(id.as_str()) != effect) {
+                println!("{kind} seed {seed}: {:?}", found.sentences);
+                named.push((kind, seed, found.effects));
+            }
+        }
+        println!("{kind} ({says}): {verdicts:?}");
+    }
+    assert!(named.is_empty(), "{named:?}");
+}
+
+/// A sensor that reads too high for a while, in the only record and in the second of two: seeds at which the little
+/// that a hysteresis explains of it is beyond chance.
+#[test]
+fn an_effect_that_explains_a_small_part_is_a_remark() {
+    let jump: Outside = |t| {
+        (
+            0.0,
+            if (1000.0..1100.0).contains(&t) {
+                1.5
+            } else {
+                0.0
+            },
+        )
+    };
+    let rig = disturbed(jump);
+    let single = problem(&rig, 12);
+    let mut double = problem(&Rig::single_tank(), 11);
+    double.records[0].name = "quiet.csv".to_string();
+    double.records.extend(single.records.clone());
+    double.records[1].name = "disturbed.csv".to_string();
+    for problem in [single, double] {
+        let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
+        let said = found.sentences.join(" ");
+        assert_eq!(found.verdict, Verdict::Unexplained, "{said}");
+        assert!(found.effects.is_empty() && found.steps.len() == 1);
+        if problem.records.len() > 1 {
+            assert!(said.contains("(in disturbed.csv)"), "{said}");
+            let windows = &found.steps[0].failures.by_time;
+            assert!(windows.iter().any(|bin| bin.fails));
+            assert!(
+                windows
+                    .iter()
+                    .all(|bin| !bin.fails || bin.record == Some(1))
+            );
+        }
+    }
+}
+
+/// A large effect is named beside a small disturbance, and in a noise that wanders more slowly than the process.
+#[test]
+fn an_effect_that_explains_nearly_all_is_named() {
+    let hidden = vec![("pump_saturation", 0, vec![5.0])];
+    let beside_a_jump = Rig {
+        hidden: hidden.clone(),
+        ..disturbed(|t| (0.0, if t > 1000.0 { 0.3 } else { 0.0 }))
+    };
+    let in_a_wander = Rig {
+        hidden,
+        colour: 0.99,
+        noise: 0.3,
+        ..Rig::single_tank()
+    };
+    for rig in [beside_a_jump, in_a_wander] {
+        let found = diagnosed(&rig, 1, &Options::default());
+        let said = found.sentences.join(" ");
+        assert!(
+            found.effects.contains(&"pump_saturation".to_string()),
+            "{said}"
+        );
+        assert!(said.contains("Something remains"), "{said}");
+    }
+}
+
+/// The floor is the noise's own size, in whatever unit, and a stretch of more noise fails in a comparison as it does in a
+/// diagnosis.
+#[test]
+fn a_comparison_knows_the_noise_of_a_white_record() {
+    for unit in [1.0, 10.0] {
+        for seed in 1..=2 {
+            let rig = Rig::single_tank();
+            let mut problem = problem(&rig, seed);
+            for value in &mut problem.records[0].output.values {
+                *value *= unit;
+            }
+            problem.known.area[0] = None;
+            problem.known.tank_height = None;
+            let compared = compare(&problem, &Options::default()).unwrap();
+            let noise = unit * rig.noise;
+            assert_eq!(compared.verdict, Verdict::Adequate);
+            assert!(
+                (compared.noise_floor - noise).abs() < 0.1 * noise,
+                "unit {unit}: {}",
+                compared.noise_floor
+            );
+            // Three times the noise in one window of the twelve.
+            let more = noise::white(83, 3.0 * noise, &mut ChaCha8Rng::seed_from_u64(seed));
+            for (y, e) in problem.records[0].output.values[500..583]
+                .iter_mut()
+                .zip(more)
+            {
+                *y += e;
+            }
+            let compared = compare(&problem, &Options::default()).unwrap();
+            let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
+            for found in [&compared, &found] {
+                let failing: Vec<usize> = (0..12)
+                    .filter(|k| found.steps[0].failures.by_time[*k].fails)
+                    .collect();
+                assert_eq!(failing, [6], "{:?}", found.sentences);
+            }
+        }
+    }
+}
+
+/// An adequate model under coloured noise fails nowhere.
+#[test]
+fn coloured_noise_is_no_failure() {
+    let (mut records, mut said) = (0, Vec::new());
+    for colour in [0.8, 0.95] {
+        for seed in 1..=5 {
+            let rig = Rig {
+                colour,
+                noise: 0.1,
+                ..Rig::single_tank()
+            };
+            let found = compare(&problem(&rig, seed), &Options::default()).unwrap();
+            assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.sentences);
+            records += 1;
+            let sentences = &found.steps[0].failures.sentences;
+            if !sentences[0].starts_with("nowhere") {
+                said.push((colour, seed, sentences.clone()));
+            }
+        }
+    }
+    assert!(said.is_empty(), "{} of {records}: {said:?}", said.len());
 }
 
 /// A limit on the number of effects bounds what is added, and neither what is known of the noise nor what is said.

@@ -29,6 +29,7 @@ fn the_cascaded_tanks_give_up_their_effects() {
         plant: Plant::CascadedTanks,
         known: Known::default(),
         effects: Vec::new(),
+        terms: Vec::new(),
         start: Default::default(),
         fixed: Vec::new(),
         controller: None,

@@ -25,6 +25,18 @@ pub enum Error {
         /// The value that was given.
         value: f64,
     },
+    /// The row is beyond the range of the estimator.
+    #[error(
+        "{what} of the row is {value:e}, but must be at most {limit:e}; divide f and chi by the same number, or choose other units"
+    )]
+    TooLarge {
+        /// `the length of f` or `chi`.
+        what: &'static str,
+        /// Its size.
+        value: f64,
+        /// The largest that is taken.
+        limit: f64,
+    },
     /// The weight of a row is negative or not finite.
     #[error(
         "the weight of the row is {weight}, but must be at least 0 and finite; take 0 to switch the row off"

@@ -1,9 +1,12 @@
 //! One linear statement about the parameters, `f' theta = chi` or `f' theta <= chi`, and its weight.
 
-use ct_rls::{ContinuousRls, Integrator, RecursiveEstimator};
+use ct_rls::{ContinuousRls, Integrator, MAX_REGRESSOR, RecursiveEstimator};
 use nalgebra::SVector;
 
 use crate::Error;
+
+/// A tenth of what the estimator takes for an output error.
+const MAX_CHI: f64 = 1e99;
 
 /// What a row says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,12 +37,12 @@ pub struct Row<const P: usize> {
 impl<const P: usize> Row<P> {
     /// A row of any relation.
     ///
-    /// - `f`: coefficients, one for each parameter.
-    /// - `chi`: right-hand side, unit of `f' theta`.
+    /// - `f`: coefficients, one for each parameter; no longer than [`MAX_REGRESSOR`].
+    /// - `chi`: right-hand side, unit of `f' theta`; at most 1e99 in size, so that the row's error stays in the range of the estimator.
     /// - `weight`: 1/(s unit(chi)^2) where the data's weight `c` is per unit(y)^2; at least 0, 0 switches the row off.
     ///
     /// # Errors
-    /// [`Error::NotFinite`], [`Error::Weight`].
+    /// [`Error::NotFinite`], [`Error::TooLarge`], [`Error::Weight`].
     pub fn new(relation: Relation, f: [f64; P], chi: f64, weight: f64) -> Result<Self, Error> {
         let not_finite = |what, value| Err(Error::NotFinite { what, value });
         if let Some(&value) = f.iter().find(|x| !x.is_finite()) {
@@ -48,11 +51,21 @@ impl<const P: usize> Row<P> {
         if !chi.is_finite() {
             return not_finite("chi", chi);
         }
+        let f = SVector::from(f);
+        // A row beyond the estimator's range would be left out of every step.
+        for (what, value, limit) in [
+            ("the length of f", f.norm(), MAX_REGRESSOR),
+            ("chi", chi.abs(), MAX_CHI),
+        ] {
+            if value > limit {
+                return Err(Error::TooLarge { what, value, limit });
+            }
+        }
         if !(weight >= 0.0 && weight.is_finite()) {
             return Err(Error::Weight { weight });
         }
         Ok(Self {
-            f: SVector::from(f),
+            f,
             chi,
             weight,
             relation,

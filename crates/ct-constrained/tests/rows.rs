@@ -411,6 +411,32 @@ fn rows_act_while_the_sensor_is_gone() {
     );
 }
 
+/// Whatever [`Row`] accepts is enforced: no weight is so large that the row is left out.
+#[test]
+fn a_row_of_any_weight_is_enforced() {
+    for weight in [1e3, 1e40, 1e70, f64::MAX] {
+        let weights = Weights::least_squares(0.01).unwrap();
+        let rls = ContinuousRls::<2>::new(SVector::zeros(), SMatrix::identity(), weights).unwrap();
+        let rows = [
+            Row::equal([1.0, 1.0], 3.0, weight).unwrap(),
+            Row::at_most([1.0, 0.0], 0.5, weight).unwrap(),
+        ];
+        let mut constrained = ConstrainedRls::new(rls, rows).unwrap();
+        for k in 0..100 {
+            let u = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let sample = Sample::new([u, 1.0], u);
+            constrained.update(&sample, 10.0).accepted().unwrap();
+        }
+        let theta = constrained.theta();
+        assert!(
+            (theta[0] + theta[1] - 3.0).abs() < 0.1,
+            "{weight:e}: {theta}"
+        );
+        assert!(theta[0] < 0.55, "{weight:e}: {theta}");
+        assert!(constrained.health().unwrap().excitation > 0.0);
+    }
+}
+
 #[test]
 fn bad_settings_are_refused_with_their_numbers() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -422,6 +448,12 @@ fn bad_settings_are_refused_with_their_numbers() {
         Row::<2>::at_most([1.0, 0.0], f64::INFINITY, 1.0),
         Err(Error::NotFinite { .. })
     ));
+    for (f, chi) in [([1e31, 1e31], 1.0), ([1.0, 0.0], -1e101)] {
+        assert!(matches!(
+            Row::<2>::equal(f, chi, 1.0),
+            Err(Error::TooLarge { .. })
+        ));
+    }
     for weight in [-1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             Row::<2>::at_least([1.0, 0.0], 0.0, weight),

@@ -9,7 +9,7 @@
 //!
 //! Reference: E. J. Routh (1877), as in F. R. Gantmacher, The Theory of Matrices, volume 2, chapter XV.
 
-use alloc::vec::Vec;
+use alloc::vec;
 
 use crate::Polynomial;
 use crate::exact::Exact;
@@ -18,16 +18,7 @@ impl Polynomial {
     /// Whether every root has a real part below 0, decided exactly for the coefficients as they are. A constant other
     /// than 0 has no roots: true. 0, or coefficients that are not finite: false.
     pub fn is_hurwitz(&self) -> bool {
-        let c = self.coefficients();
-        if c.iter().any(|c| !c.is_finite()) {
-            return false;
-        }
-        // Necessary, and enough up to the second order.
-        let sign = self.leading();
-        if c.is_empty() || c.iter().any(|c| *c == 0.0 || (*c < 0.0) != (sign < 0.0)) {
-            return false;
-        }
-        c.len() <= 3 || routh(c).unwrap_or_else(|| Exact::new(c, 0).is_hurwitz())
+        is_hurwitz(self.coefficients())
     }
 
     /// Whether every root has a real part below `-rate` \[1/time\], so that what it describes decays faster than
@@ -37,29 +28,54 @@ impl Polynomial {
     }
 }
 
+/// [`Polynomial::is_hurwitz`] for ascending coefficients, the last of them not zero. Allocates nothing up to a degree of
+/// 31, unless the answer is so close that integers have to decide.
+pub fn is_hurwitz(c: &[f64]) -> bool {
+    if c.iter().any(|c| !c.is_finite()) {
+        return false;
+    }
+    // Necessary, and enough up to the second order.
+    let sign = c.last().copied().unwrap_or(0.0);
+    if c.is_empty() || c.iter().any(|c| *c == 0.0 || (*c < 0.0) != (sign < 0.0)) {
+        return false;
+    }
+    let routh = |c: &[f64]| {
+        let half = c.len().div_ceil(2);
+        if half <= ROW {
+            let (mut above, mut row) = ([Bounded::default(); ROW], [Bounded::default(); ROW]);
+            routh(c, &mut above[..half], &mut row[..c.len() - half])
+        } else {
+            let rows = || vec![Bounded::default(); half];
+            routh(c, &mut rows(), &mut rows()[..c.len() - half])
+        }
+    };
+    c.len() <= 3 || routh(c).unwrap_or_else(|| Exact::new(c, 0).is_hurwitz())
+}
+
+/// Entries of a row of Routh's table that need no allocation: up to a degree of 31.
+const ROW: usize = 16;
+
 /// A number and how far the exact one may be from it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Bounded {
     value: f64,
     error: f64,
 }
 
-/// Routh's table, or none where rounding could decide. All coefficients have one sign.
-fn routh(c: &[f64]) -> Option<bool> {
+/// Routh's table, or none where rounding could decide. All coefficients have one sign; the rows have the lengths of the
+/// table's first two.
+fn routh<'a>(c: &[f64], mut above: &'a mut [Bounded], mut row: &'a mut [Bounded]) -> Option<bool> {
     // Products neither overflow nor lose digits below the smallest normal number.
     if c.iter().any(|c| !(1e-60..1e60).contains(&c.abs())) {
         return None;
     }
-    let row = |first: usize| -> Vec<Bounded> {
-        let every = c.iter().rev().skip(first).step_by(2);
-        every
-            .map(|c| Bounded {
-                value: c.abs(),
-                error: 0.0,
-            })
-            .collect()
-    };
-    let (mut above, mut row) = (row(0), row(1));
+    for (i, c) in c.iter().rev().enumerate() {
+        let row = if i % 2 == 0 { &mut *above } else { &mut *row };
+        row[i / 2] = Bounded {
+            value: c.abs(),
+            error: 0.0,
+        };
+    }
     while !row.is_empty() {
         let (top, head) = (above[0], row[0]);
         if head.value.abs() <= 2.0 * head.error {
@@ -89,8 +105,8 @@ fn routh(c: &[f64]) -> Option<bool> {
                 error: 1.001 * error,
             };
         }
-        above.pop();
-        core::mem::swap(&mut above, &mut row);
+        let shorter = above.len() - 1;
+        (above, row) = (row, &mut above[..shorter]);
     }
     Some(true)
 }
@@ -176,7 +192,8 @@ mod tests {
             });
             let c: Vec<f64> = digits.collect();
             let exact = Exact::new(&c, 0).is_hurwitz();
-            if let Some(answer) = routh(&c) {
+            let rows = || vec![Bounded::default(); c.len().div_ceil(2)];
+            if let Some(answer) = routh(&c, &mut rows(), &mut rows()[..c.len() / 2]) {
                 decided += 1;
                 assert_eq!(answer, exact, "{c:?}");
             }

@@ -8,6 +8,7 @@
 //! | What does the output do between and at the samples? | [`Simulator`], [`StateSpace::sampled`], [`TransferFunction::step_response`] |
 //! | I need derivatives of what I measured | [`StateVariableFilter`] |
 //! | Is `Re G(jw) > d` at every frequency? | [`TransferFunction::exceeds`], decided exactly, without a grid |
+//! | Where is `Re G(jw)` smallest? | [`TransferFunction::least_real_part`] |
 //!
 //! Time is in any one unit throughout; frequencies are angular, in radians per that unit. The crate needs `alloc`, not
 //! `std` (`bash ci/no_std/run` links it without); nothing is allocated per sample. Its functions do not depend on the
@@ -59,6 +60,7 @@ mod error;
 mod exact;
 mod hold;
 mod hurwitz;
+mod least_real_part;
 mod matrix;
 mod phi;
 mod polynomial;
@@ -71,6 +73,7 @@ mod transfer_function;
 
 pub use error::Error;
 pub use hold::{Hold, Start};
+pub use hurwitz::is_hurwitz;
 pub use num_complex::Complex64;
 pub use polynomial::Polynomial;
 pub use positive_real::Positivity;

@@ -112,7 +112,7 @@ impl TransferFunction {
 }
 
 /// The power of 2 nearest to the roots' geometric mean.
-fn scale(p: &Polynomial) -> i64 {
+pub(crate) fn scale(p: &Polynomial) -> i64 {
     let size = |c: f64| i64::from(libm::frexp(c).1);
     match p.degree() {
         Some(n) if n > 0 => (size(p.coefficient(0)) - size(p.leading())).div_euclid(n as i64),

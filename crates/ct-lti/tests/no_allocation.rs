@@ -21,6 +21,11 @@ fn per_sample() {
     });
     assert!(sum.is_finite());
     assert_eq!(counted.count_total, 0);
+    let counted = allocation_counter::measure(|| {
+        assert!(ct_lti::is_hurwitz(&[1.0, 5.0, 9.0, 7.0, 2.0, 0.1]));
+        assert!(!ct_lti::is_hurwitz(&[1.0, 5.0, 9.0, 7.0, 20.0, 10.0]));
+    });
+    assert_eq!(counted.count_total, 0);
     // The counter counts.
     assert!(allocation_counter::measure(|| drop(simulator.clone())).count_total > 0);
 }

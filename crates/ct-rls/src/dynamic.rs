@@ -91,6 +91,24 @@ impl DynamicRls {
         Ok(())
     }
 
+    /// Replaces the estimates and keeps `P`; allocates nothing.
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::Theta`]; nothing is changed then.
+    pub fn set_theta(&mut self, theta: &[f64]) -> Result<(), Error> {
+        let (found, expected) = (theta.len(), self.theta.len());
+        if found != expected {
+            return Err(Error::Size {
+                what: "theta",
+                found,
+                expected,
+            });
+        }
+        check_theta(theta)?;
+        self.theta.as_mut_slice().copy_from_slice(theta);
+        Ok(())
+    }
+
     /// [`update`](RecursiveEstimator::update) from a slice, with weights for this step alone; allocates nothing.
     pub fn update_with(&mut self, phi: &[f64], y: f64, dt: f64, weights: &Weights) -> Innovation {
         if phi.len() != self.theta.len() {

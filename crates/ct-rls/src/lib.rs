@@ -59,4 +59,4 @@ pub use factor::UdFactor;
 pub use integrator::Integrator;
 pub use rk4::Rk4;
 pub use rls::{ContinuousRls, Sample};
-pub use settings::{Guards, Weights};
+pub use settings::{Guards, MAX_REGRESSOR, Weights};

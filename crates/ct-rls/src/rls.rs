@@ -91,17 +91,16 @@ impl<const P: usize> ContinuousRls<P> {
     }
 
     /// Takes in the statement `f' theta = chi` at once, with the weight `information` (1/unit(chi)^2, at least 0):
-    /// `P^-1` grows by `information f f'`. Not counted, not guarded.
+    /// `P^-1` grows by `information f f'`. Above 1e60 it counts as 1e60, which is exact. Not counted, not guarded.
     ///
     /// Returns `chi - f' theta` before; `None`, and nothing is done, where a number is out of range or the run has stopped.
     pub fn absorb(&mut self, f: &SVector<f64, P>, chi: f64, information: f64) -> Option<f64> {
         // with c = gamma, the product of weight and length is all that counts
         let weights = Weights::new(1.0, 1.0, 0.0).ok()?;
-        if !(0.0..=MAX_PHI_SQUARED).contains(&information)
-            || !(0.0..=MAX_PHI_SQUARED).contains(&f.norm_squared())
-        {
+        if !(information >= 0.0 && f.norm_squared() <= MAX_PHI_SQUARED) {
             return None;
         }
+        let information = information.min(MAX_PHI_SQUARED);
         let epsilon = chi - f.dot(&self.theta);
         let (mut scratch, mut k) = ([0.0; P], [0.0; P]);
         factor::exact_step(

@@ -153,8 +153,9 @@ pub struct Step {
     pub length: f64,
 }
 
-/// Signals and steps beyond these are taken for faults: within them no number of updates leaves the floating-point range.
-pub(crate) const MAX_PHI_SQUARED: f64 = 1e60;
+/// A longer regressor is taken for a fault: within this and the other limits no number of updates leaves the floating-point range.
+pub const MAX_REGRESSOR: f64 = 1e30;
+pub(crate) const MAX_PHI_SQUARED: f64 = MAX_REGRESSOR * MAX_REGRESSOR;
 /// As above, for the output error.
 pub(crate) const MAX_EPSILON: f64 = 1e100;
 /// As above, for the step, s.

@@ -85,3 +85,27 @@ fn sizes_that_do_not_fit() {
     ));
     assert!(rls.reset_covariance(&DMatrix::identity(3, 3)).is_ok());
 }
+
+#[test]
+fn estimates_can_be_replaced() {
+    let weights = Weights::least_squares(0.1).unwrap();
+    let mut rls = DynamicRls::new(DVector::zeros(2), &DMatrix::identity(2, 2), weights).unwrap();
+    rls.update_with(&[1.0, 2.0], 1.0, 0.1, &weights);
+    let p = rls.covariance();
+    rls.set_theta(&[3.0, 4.0]).unwrap();
+    assert_eq!(rls.theta().as_slice(), [3.0, 4.0]);
+    assert_eq!(rls.covariance(), p);
+    assert!(matches!(
+        rls.set_theta(&[1.0]),
+        Err(Error::Size {
+            found: 1,
+            expected: 2,
+            ..
+        })
+    ));
+    assert!(matches!(
+        rls.set_theta(&[1.0, f64::NAN]),
+        Err(Error::Theta { index: 1, .. })
+    ));
+    assert_eq!(rls.theta().as_slice(), [3.0, 4.0]);
+}

@@ -253,7 +253,6 @@ impl Whitener {
             return;
         }
         let lanes = self.lanes;
-        let slots = p + 1;
         for (kept, value) in self.history[self.slot * lanes..][..lanes]
             .iter_mut()
             .zip(&*row)
@@ -266,8 +265,10 @@ impl Whitener {
         } else {
             &self.predictors[self.seen]
         };
-        for (lag, a) in predictor.iter().enumerate() {
-            let slot = (self.slot + slots - lag - 1) % slots;
+        let mut slot = self.slot;
+        for a in predictor {
+            // A division would cost more than the row.
+            slot = if slot == 0 { p } else { slot - 1 };
             let past = &self.history[slot * lanes..][..lanes];
             for (value, past) in row.iter_mut().zip(past) {
                 *value -= a * past;
@@ -279,7 +280,7 @@ impl Whitener {
             }
             self.seen += 1;
         }
-        self.slot = (self.slot + 1) % slots;
+        self.slot = if self.slot == p { 0 } else { self.slot + 1 };
     }
 
     /// Starts the next record, which is independent of the last.

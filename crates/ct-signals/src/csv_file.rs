@@ -10,12 +10,16 @@ use std::path::Path;
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::columns::{Columns, Found, Layout};
-use crate::record::{MIN_ROWS, median_step};
+use crate::record::{MIN_ROWS, median_step, quantile_of_steps};
 use crate::{Error, Hold, Record, Signal, unit};
 
-/// A step of the time above this many median steps is a gap: half-way between one sample and two,
-/// so that jitter up to a quarter of the interval passes and one missing sample does not.
+/// A step of the time above this many usual steps is a gap: half-way between one sample and two,
+/// so that one missing sample does not pass where the steps are even.
 const GAP: f64 = 1.5;
+
+/// The usual step is the one that this share of them does not exceed: with even steps the interval itself, with uneven ones a
+/// long one, so that a record is not called full of gaps because its clock is not a metronome.
+const USUAL: f64 = 0.95;
 
 /// A record is refused when more than this share of the output sits exactly at its limits ...
 const SATURATED_SHARE: f64 = 1.0 / 3.0;
@@ -30,8 +34,8 @@ const LARGEST: f64 = 1e15;
 
 /// Reads a record; `columns` says which column is what, `hold` what the input does in between.
 ///
-/// The time is converted to seconds. Its steps may vary, but no sample may be missing: a step above
-/// 1.5 times the median is a gap. Row numbers in messages are line numbers of the file.
+/// The time is converted to seconds. Its steps may vary, but no sample may be missing: a step half as long again as
+/// 95 % of the steps is a gap. Row numbers in messages are line numbers of the file.
 ///
 /// # Errors
 /// [`Error::CannotOpen`], [`Error::Folder`], [`Error::NotText`], [`Error::EmptyFile`],
@@ -403,9 +407,10 @@ impl Table {
 
     fn check_gaps(&self, file: &str, column: &Found) -> Result<(), Error> {
         let interval = median_step(&self.time);
+        let usual = quantile_of_steps(&self.time, USUAL);
         for (k, pair) in self.time.windows(2).enumerate() {
             let step = pair[1] - pair[0];
-            if step > GAP * interval {
+            if step > GAP * usual {
                 return Err(Error::Gap {
                     file: file.into(),
                     row: self.rows[k + 1],

@@ -64,6 +64,27 @@ where
     Ok(u)
 }
 
+/// Given levels (the actuator's unit), each held for `hold` samples (`>= 1`), over and over: `n` samples.
+///
+/// # Errors
+/// [`Error::InvalidSetting`] for a `hold` of 0, no levels, or a level that is not finite.
+pub fn levels(n: usize, hold: usize, levels: &[f64]) -> Result<Vec<f64>, Error> {
+    let setting = |setting, value: String, range: &str| {
+        Err(Error::InvalidSetting {
+            setting,
+            value,
+            range: range.into(),
+        })
+    };
+    if hold == 0 {
+        return setting("hold", "0".into(), "at least 1 sample");
+    }
+    if levels.is_empty() || levels.iter().any(|level| !level.is_finite()) {
+        return setting("levels", format!("{levels:?}"), "finite, at least one");
+    }
+    Ok((0..n).map(|k| levels[(k / hold) % levels.len()]).collect())
+}
+
 /// A pseudo-random binary sequence of maximal length: `n` samples of `low` or `high` (the
 /// actuator's unit), each bit held for `bit` samples (`>= 1`).
 ///

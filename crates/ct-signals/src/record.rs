@@ -163,8 +163,13 @@ impl Record {
     }
 }
 
-/// The median of the differences between neighbours; 0 with fewer than two values.
+/// The median of the differences between neighbours; 0 when there are none.
 pub(crate) fn median_step(time: &[f64]) -> f64 {
+    quantile_of_steps(time, 0.5)
+}
+
+/// The step of the time that the share `tau` of all steps does not exceed; 0 when there are none.
+pub(crate) fn quantile_of_steps(time: &[f64], tau: f64) -> f64 {
     if time.len() < 2 {
         return 0.0;
     }
@@ -173,7 +178,7 @@ pub(crate) fn median_step(time: &[f64]) -> f64 {
             .map(|pair| pair[1] - pair[0])
             .collect::<Vec<_>>(),
     )
-    .median()
+    .quantile(tau)
 }
 
 /// Refuses the first value that is NaN or infinite.

@@ -493,6 +493,23 @@ fn one_missing_sample_is_a_gap() {
     );
 }
 
+/// Steps of 1 to 3 s are uneven, not full of gaps; 9 s among them are a gap.
+#[test]
+fn uneven_steps_are_no_gaps() {
+    let mut rows = rows();
+    let mut time = 0.0;
+    for (k, row) in rows.iter_mut().enumerate() {
+        row[0] = time;
+        time += [1.0, 1.0, 2.0, 3.0][k % 4];
+    }
+    assert_eq!(read(&text(HEADER, &rows)).unwrap().len(), 40);
+    for row in &mut rows[20..] {
+        row[0] += 6.0;
+    }
+    let error = read(&text(HEADER, &rows)).unwrap_err();
+    assert!(matches!(error, Error::Gap { row: 22, .. }), "{error}");
+}
+
 #[test]
 fn a_missing_sample_is_found_in_jitter() {
     let mut rows = rows();

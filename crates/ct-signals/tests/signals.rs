@@ -137,6 +137,17 @@ fn bits_are_held() {
 }
 
 #[test]
+fn given_levels_are_held_over_and_over() {
+    let u = excitation::levels(11, 2, &[1.0, -1.0, 0.5]).unwrap();
+    let expected = [1.0, 1.0, -1.0, -1.0, 0.5, 0.5, 1.0, 1.0, -1.0, -1.0, 0.5];
+    assert_eq!(u, expected);
+    assert!(excitation::levels(0, 1, &[1.0]).unwrap().is_empty());
+    assert!(excitation::levels(5, 0, &[1.0]).is_err());
+    assert!(excitation::levels(5, 1, &[]).is_err());
+    assert!(excitation::levels(5, 1, &[f64::NAN]).is_err());
+}
+
+#[test]
 fn multisine_has_its_lines_and_no_others() {
     let (n, dt) = (400, 0.5);
     let lines = [3, 7, 20, 41];

@@ -4,13 +4,17 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use missing_effect::{Diagnosis, Options};
+use ct_signals::{Columns, Hold, read_csv};
+use missing_effect::Options;
 
+use crate::identify::{self, LevelChoice, Method, Order, Request};
 use crate::input::Files;
 use crate::look::Look;
-use crate::output::{self, Kind, Output};
+use crate::model_file::ControllerSettings;
+use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
-use crate::{Error, catalogue, edit, terminal, tour};
+use crate::tables::{baysse, baysse_text, udink, udink_text};
+use crate::{Error, catalogue, edit, model_file, terminal, tour};
 
 /// Says which physical effect a model of measured data is missing.
 #[derive(Debug, Parser)]
@@ -35,6 +39,10 @@ enum Command {
     Remove(Remove),
     /// List the catalogue of effects, or say all about one
     Effects(Effects),
+    /// Identify a linear model in continuous time from a record
+    Identify(Identify),
+    /// Compute the tables of a paper again, with many noises, and say which printed figures agree
+    Tables(Tables),
 }
 
 #[derive(Debug, Args)]
@@ -48,6 +56,16 @@ struct Compare {
     /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
+    /// In a loop whose [controller] is known: simulate it from its reference, or run on the measured command
+    #[arg(long = "loop", value_enum, default_value_t = LoopWay::Simulated, value_name = "WAY")]
+    way: LoopWay,
+    #[command(flatten)]
+    results: Results,
+}
+
+/// Where results go besides the terminal.
+#[derive(Debug, Args)]
+struct Results {
     /// Write the result as JSON
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
@@ -56,10 +74,19 @@ struct Compare {
     report: Option<PathBuf>,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LoopWay {
+    Simulated,
+    Measured,
+}
+
 #[derive(Debug, Args)]
 struct Diagnose {
     #[command(flatten)]
     compare: Compare,
+    /// Write the shape of what nothing explains as CSV, for `ctid add NAME --from F`
+    #[arg(long, value_name = "F.csv")]
+    unknown: Option<PathBuf>,
     /// Add at most so many effects
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     max_effects: Option<u8>,
@@ -67,11 +94,14 @@ struct Diagnose {
 
 #[derive(Debug, Args)]
 struct Add {
-    /// The effect, as `ctid effects` lists it
+    /// The effect, as `ctid effects` lists it, or with --from a name of your own
     effect: String,
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
+    /// The shape of a term of your own, as `ctid diagnose --unknown` writes it
+    #[arg(long, value_name = "F.csv", conflicts_with = "place")]
+    from: Option<PathBuf>,
     /// The vessel it acts in, where the plant has two
     #[arg(long = "where", value_enum)]
     place: Option<Vessel>,
@@ -98,6 +128,103 @@ struct Effects {
     effect: Option<String>,
 }
 
+#[derive(Debug, Args)]
+struct Identify {
+    /// Record (CSV)
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// How the parameters are found
+    #[arg(long, value_enum)]
+    method: Method,
+    /// Orders n of A and m of B in A y = B u + d
+    #[arg(long, value_name = "N,M", default_value = "1,0")]
+    order: Order,
+    /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
+    #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
+    model: Option<PathBuf>,
+    /// The columns' names, where their first letters do not tell
+    #[arg(long, value_name = "TIME,INPUT,OUTPUT", value_parser = columns)]
+    columns: Option<Columns>,
+    /// What the input does between samples
+    #[arg(long, value_enum, default_value_t = InputHold::Zero)]
+    hold: InputHold,
+    /// Memory of the recursion [s]; without it a fifth of the record, at least 10 time constants
+    #[arg(long, value_name = "S")]
+    memory: Option<f64>,
+    /// Bandwidth of the state variable filters [1/s]; without it 3 over the time constant
+    #[arg(long, value_name = "L")]
+    bandwidth: Option<f64>,
+    /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe
+    #[arg(long, value_enum, default_value_t = LevelChoice::Auto)]
+    levels: LevelChoice,
+    /// Bandwidth of a filter on the reading in front of the controller [1/s]; y is the filtered reading
+    #[arg(long, value_name = "ZETA")]
+    sensor_filter: Option<f64>,
+    #[command(flatten)]
+    results: Results,
+}
+
+/// Three names, in the order of the help.
+fn columns(text: &str) -> Result<Columns, String> {
+    let names: Vec<&str> = text.split(',').map(str::trim).collect();
+    let [time, input, output] = names[..] else {
+        return Err(format!(
+            "three names are needed, those of time, input and output, and {} are given",
+            names.len()
+        ));
+    };
+    Ok(Columns {
+        time: Some(time.to_owned()),
+        input: Some(input.to_owned()),
+        output: Some(output.to_owned()),
+        reference: None,
+    })
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum InputHold {
+    /// It stands until the next sample: a D/A converter
+    Zero,
+    /// It runs on a line to the next sample: a measured input
+    First,
+}
+
+#[derive(Debug, Args)]
+struct Tables {
+    /// The paper
+    #[arg(value_enum, default_value_t = Paper::Udink)]
+    paper: Paper,
+    /// Noises: each table is run once with each; without it as many as a paper's bands are for, 200 or 100
+    #[arg(long, value_name = "N")]
+    runs: Option<usize>,
+    /// What the noises are drawn from
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Write the record of baysse's emulated rig as CSV, for `diagnose` or `identify`
+    #[arg(long, value_name = "F.csv")]
+    record: Option<PathBuf>,
+    #[command(flatten)]
+    results: Results,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Paper {
+    /// A. J. Udink ten Cate, WP-85-54, IIASA, 1985: tables 1 to 4
+    Udink,
+    /// A. Baysse, F. J. Carrillo, A. Habbadi, output error in closed loop: tables I and II
+    Baysse,
+}
+
+impl Paper {
+    /// The runs that its bands are for.
+    fn runs(self) -> usize {
+        match self {
+            Self::Udink => 200,
+            Self::Baysse => 100,
+        }
+    }
+}
+
 /// Does what the command line asks for; what a person reads goes to `out`.
 ///
 /// # Errors
@@ -110,7 +237,14 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Add(Add {
             effect,
             model,
+            from: Some(shape),
+            ..
+        })) => say(out, &(edit::add_term(&model, &effect, &shape)? + "\n")),
+        Some(Command::Add(Add {
+            effect,
+            model,
             place,
+            from: None,
         })) => {
             let place = place.map(|vessel| match vessel {
                 Vessel::Upper => "upper",
@@ -125,6 +259,23 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Effects(Effects {
             effect: Some(effect),
         })) => say(out, &catalogue::describe(&effect, look)?),
+        Some(Command::Identify(arguments)) => arguments.run(out, look),
+        Some(Command::Tables(arguments)) => arguments.run(out, look),
+    }
+}
+
+impl Results {
+    /// Where the results go, checked.
+    fn plan(&self, inputs: &[&Path], unknown: Option<&Path>) -> Result<Vec<Output>, Error> {
+        let unknown = unknown.map(|path| (Kind::Unknown, path));
+        let wanted: Vec<_> = self.wanted().chain(unknown).collect();
+        output::plan(&wanted, inputs)
+    }
+
+    fn wanted(&self) -> impl Iterator<Item = (Kind, &Path)> {
+        let json = self.json.as_deref().map(|path| (Kind::Json, path));
+        let report = self.report.as_deref().map(|path| (Kind::Report, path));
+        json.into_iter().chain(report)
     }
 }
 
@@ -137,21 +288,20 @@ impl Compare {
         }
     }
 
-    /// Where the results go, checked.
-    fn outputs(&self) -> Result<Vec<Output>, Error> {
-        let json = self.json.as_deref().map(|path| (Kind::Json, path));
-        let report = self.report.as_deref().map(|path| (Kind::Report, path));
-        let wanted: Vec<_> = json.into_iter().chain(report).collect();
-        output::plan(&wanted, &self.files().all())
+    fn options(&self) -> Options {
+        Options {
+            simulate_loop: self.way == LoopWay::Simulated,
+            ..Options::default()
+        }
     }
 
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
         let problem = files.read()?;
-        let outputs = self.outputs()?;
+        let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
-        let diagnosis = missing_effect::compare(&problem, &Options::default());
+        let diagnosis = missing_effect::compare(&problem, &self.options());
         bar.clear();
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
@@ -168,8 +318,9 @@ impl Diagnose {
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
         let problem = files.read()?;
-        let outputs = self.compare.outputs()?;
-        let mut options = Options::default();
+        let unknown = self.unknown.as_deref();
+        let outputs = self.compare.results.plan(&files.all(), unknown)?;
+        let mut options = self.compare.options();
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
         }
@@ -188,24 +339,141 @@ impl Diagnose {
     }
 }
 
+impl Identify {
+    /// Which columns, the hold, and the controller with its limits.
+    fn layout(&self) -> Result<(Columns, Hold, Option<ControllerSettings>), Error> {
+        if let Some(model) = &self.model {
+            let model = model_file::read(model)?;
+            return Ok((model.columns, model.hold, model.controller));
+        }
+        let hold = match self.hold {
+            InputHold::Zero => Hold::Zero,
+            InputHold::First => Hold::First,
+        };
+        Ok((self.columns.clone().unwrap_or_default(), hold, None))
+    }
+
+    /// What was asked, if it goes together.
+    fn request(&self, controller: Option<ControllerSettings>) -> Result<Request, Error> {
+        let method = self.method.id();
+        let wrong = |what: String| Err(Error::Usage(what));
+        let of_loop = self.method.is_of_loop();
+        if !of_loop && self.levels != LevelChoice::Auto {
+            return wrong(format!(
+                "--levels does not go with --method {method}, which estimates an offset; leave it out"
+            ));
+        }
+        if of_loop && self.method != Method::RecursiveFcloe && self.memory.is_some() {
+            return wrong(format!(
+                "--memory does not go with --method {method}, which weighs the whole record alike; leave it out"
+            ));
+        }
+        let mut request = Request {
+            memory: self.memory,
+            bandwidth: self.bandwidth,
+            levels: self.levels,
+            ..Request::new(self.method, self.order)
+        };
+        let controller = controller.filter(|_| of_loop);
+        if let Some(settings) = controller {
+            request.controller = Some(settings.linear()?);
+            request.limits = (settings.u_min, settings.u_max);
+        }
+        if let Some(zeta) = self.sensor_filter {
+            let Some(controller) = request.controller else {
+                return wrong("--sensor-filter is of a loop: give --model with a [controller], and a method that uses it".to_owned());
+            };
+            request.controller = Some(controller.with_sensor_filter(zeta)?);
+        }
+        Ok(request)
+    }
+
+    fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        let (columns, hold, controller) = self.layout()?;
+        let request = self.request(controller)?;
+        let record = read_csv(&self.data, &columns, hold)?;
+        let inputs: Vec<&Path> = [Some(&self.data), self.model.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(PathBuf::as_path)
+            .collect();
+        let outputs = self.results.plan(&inputs, None)?;
+        let bar = Bar::new();
+        bar.phase("identifying");
+        let found = identify::identify(&record, &request);
+        bar.clear();
+        let found = found?;
+        finish(
+            &found,
+            &identify::text::text(&found, look),
+            &outputs,
+            out,
+            look,
+        )
+    }
+}
+
+impl Tables {
+    fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        if self.record.is_some() && !matches!(self.paper, Paper::Baysse) {
+            let what =
+                "--record is of the rig that `ctid tables baysse` emulates; no other paper has one";
+            return Err(Error::Usage(what.to_owned()));
+        }
+        let record = self.record.as_deref().map(|path| (Kind::Record, path));
+        let wanted: Vec<_> = self.results.wanted().chain(record).collect();
+        let outputs = output::plan(&wanted, &[])?;
+        let runs = self.runs.unwrap_or(self.paper.runs());
+        let bar = Bar::new();
+        let progress = |progress| bar.show(progress);
+        match self.paper {
+            Paper::Udink => {
+                let settings = udink::Settings::default();
+                let study = udink::study(&settings, runs, self.seed, &progress);
+                bar.clear();
+                let study = study?;
+                finish(&study, &udink_text::text(&study, look), &outputs, out, look)
+            }
+            Paper::Baysse => {
+                let study = baysse::study(runs, self.seed, &progress);
+                bar.clear();
+                let study = study?;
+                finish(
+                    &study,
+                    &baysse_text::text(&study, look),
+                    &outputs,
+                    out,
+                    look,
+                )
+            }
+        }
+    }
+}
+
 /// Writes the files, then says what was found and what was written.
 fn finish(
-    diagnosis: &Diagnosis,
+    found: &impl Found,
     text: &str,
     outputs: &[Output],
     out: &mut dyn Write,
     look: Look,
 ) -> Result<(), Error> {
     // The files first: whoever pipes the text into `head` still gets them.
+    let mut written = Vec::with_capacity(outputs.len());
     for output in outputs {
-        output.write(diagnosis)?;
+        written.push(output.write(found)?);
     }
     let mut text = text.to_string();
     if !outputs.is_empty() {
         text.push('\n');
     }
-    for output in outputs {
-        text += &look.faint(format!("wrote {}", output.path().display()));
+    for (output, written) in outputs.iter().zip(written) {
+        let path = output.path().display();
+        text += &look.faint(if written {
+            format!("wrote {path}")
+        } else {
+            format!("{path} is not written: nothing is left unexplained that has a shape")
+        });
         text.push('\n');
     }
     say(out, &text)

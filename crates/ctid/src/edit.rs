@@ -3,10 +3,11 @@
 
 use std::path::Path;
 
-use plants::{Place, Placed};
+use plants::{Fitted, Place, Placed, Term};
 use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
 
 use crate::model_file::{self, ModelFile};
+use crate::term_file::{self, TermFile};
 use crate::{Error, atomic, names};
 
 /// Adds an effect to a model file; `place` is `upper` or `lower`, where there is a choice. Returns
@@ -20,7 +21,18 @@ pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Err
     change(path, |text| with_effect(&name, text, effect, place))
 }
 
-/// Removes an effect from a model file. Returns what was done, in one line.
+/// Adds a term of the user's own, its shape read from a CSV file. Returns what was done, in one line.
+///
+/// # Errors
+/// Where the name is taken or the shape cannot act on this plant; the file is then as it was.
+pub fn add_term(path: &Path, name: &str, shape: &Path) -> Result<String, Error> {
+    let file = path.display().to_string();
+    let read = term_file::read(shape)?;
+    let from = shape.display().to_string();
+    change(path, |text| with_term(&file, text, name, &from, &read))
+}
+
+/// Removes an effect or a term from a model file. Returns what was done, in one line.
 ///
 /// # Errors
 /// Where the effect is unknown or not on; the file is then as it was.
@@ -61,11 +73,14 @@ pub fn with_effect(
     place: Option<&str>,
 ) -> Result<Edited, Error> {
     let model = model_file::parse(file, text)?;
-    let effect = names::effect(effect)?;
     let refuse = |what: String| Error::File {
         file: file.to_string(),
         what,
     };
+    if has_table(&document(file, text)?, effect) {
+        return with_waiting_term(file, text, effect, &model);
+    }
+    let effect = names::effect(effect)?;
     if model.effects.iter().any(|on| on.effect.id == effect.id) {
         return Err(refuse(format!(
             "{} is on already; `ctid remove {0}` takes it out",
@@ -106,45 +121,137 @@ pub fn with_effect(
     Ok(Edited { text, done })
 }
 
-/// The text of a model file without an effect; its `[effect.X]` table stays for another day.
+/// Whether the document has a `[term.X]` table.
+fn has_table(document: &DocumentMut, name: &str) -> bool {
+    document
+        .get("term")
+        .and_then(Item::as_table_like)
+        .is_some_and(|terms| terms.contains_key(name))
+}
+
+/// The text with a term whose table is there already.
+fn with_waiting_term(
+    file: &str,
+    text: &str,
+    name: &str,
+    model: &ModelFile,
+) -> Result<Edited, Error> {
+    if model.terms.iter().any(|on| on.term.name == name) {
+        return Err(Error::File {
+            file: file.to_string(),
+            what: format!("{name} is on already; `ctid remove {name}` takes it out"),
+        });
+    }
+    let mut document = document(file, text)?;
+    push(&mut document, name);
+    let text = document.to_string();
+    let model = model_file::parse(file, &text)?;
+    let done = format!("{file}: added {name}; effects = {}", list(&model));
+    Ok(Edited { text, done })
+}
+
+/// The text of a model file with a term of the user's own; `from` names the file of its shape in messages.
+///
+/// # Errors
+/// As [`add_term`].
+pub fn with_term(
+    file: &str,
+    text: &str,
+    name: &str,
+    from: &str,
+    shape: &TermFile,
+) -> Result<Edited, Error> {
+    let model = model_file::parse(file, text)?;
+    let mut document = document(file, text)?;
+    if has_table(&document, name) {
+        return Err(Error::File {
+            file: file.to_string(),
+            what: format!("[term.{name}] is there already; give another name, or delete the table"),
+        });
+    }
+    let refuse = |what: String| Error::File {
+        file: from.to_string(),
+        what,
+    };
+    let (place, vessel) = term_file::place_of(model.plant, &shape.place).map_err(&refuse)?;
+    let term = Term {
+        name: name.to_string(),
+        place,
+        vessel,
+        variable: term_file::variable_of(&shape.variable).map_err(&refuse)?,
+        knots: shape.at.clone(),
+        ordinates: shape.value.clone(),
+        fitted: Fitted::Scale,
+    };
+    term.check(model.plant)
+        .map_err(|error| refuse(error.to_string()))?;
+    let mut table = Table::new();
+    table.insert("place", value(&shape.place));
+    table.insert("variable", value(&shape.variable));
+    table.insert("at", value(Array::from_iter(shape.at.iter().copied())));
+    table.insert("at_unit", value(&shape.at_unit));
+    table.insert(
+        "value",
+        value(Array::from_iter(shape.value.iter().copied())),
+    );
+    table.insert("unit", value(&shape.unit));
+    table.decor_mut().set_prefix("\n");
+    let mut tables = Table::new();
+    tables.set_implicit(true);
+    document
+        .entry("term")
+        .or_insert(Item::Table(tables))
+        .as_table_like_mut()
+        .ok_or_else(|| Error::File {
+            file: file.to_string(),
+            what: "[term] is not a table; make it one".to_string(),
+        })?
+        .insert(name, Item::Table(table));
+    push(&mut document, name);
+    let text = document.to_string();
+    let model = model_file::parse(file, &text)?;
+    let done = format!(
+        "{file}: added {name}, a term in the {} with {} knots; effects = {}",
+        shape.variable,
+        shape.at.len(),
+        list(&model)
+    );
+    Ok(Edited { text, done })
+}
+
+/// The text of a model file without an effect or a term; its `[effect.X]` table stays for another day.
 ///
 /// # Errors
 /// As [`remove`].
 pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Error> {
     let model = model_file::parse(file, text)?;
-    let effect = names::effect(effect)?;
     let mut document = document(file, text)?;
+    let (kind, id) = if has_table(&document, effect) {
+        ("term", effect)
+    } else {
+        ("effect", names::effect(effect)?.id)
+    };
     let removed = document
         .get_mut("effects")
         .and_then(Item::as_array_mut)
-        .is_some_and(|effects| take_out(effects, effect.id));
+        .is_some_and(|effects| take_out(effects, id));
     if !removed {
         return Err(Error::File {
             file: file.to_string(),
             what: format!(
                 "{} is not on, so it cannot be removed; effects = {}",
-                effect.id,
+                id,
                 list(&model)
             ),
         });
     }
     let text = document.to_string();
     let model = model_file::parse(file, &text)?;
-    let kept = match document
-        .get("effect")
-        .and_then(|table| table.get(effect.id))
-    {
-        Some(_) => format!(
-            "; [effect.{}] stays for the day it is added again",
-            effect.id
-        ),
+    let kept = match document.get(kind).and_then(|table| table.get(id)) {
+        Some(_) => format!("; [{kind}.{id}] stays for the day it is added again"),
         None => String::new(),
     };
-    let done = format!(
-        "{file}: removed {}; effects = {}{kept}",
-        effect.id,
-        list(&model)
-    );
+    let done = format!("{file}: removed {}; effects = {}{kept}", id, list(&model));
     Ok(Edited { text, done })
 }
 
@@ -245,7 +352,9 @@ fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
 }
 
 fn list(model: &ModelFile) -> String {
-    let ids: Vec<&str> = model.effects.iter().map(|on| on.effect.id).collect();
+    let effects = model.effects.iter().map(|on| on.effect.id);
+    let terms = model.terms.iter().map(|on| on.term.name.as_str());
+    let ids: Vec<&str> = effects.chain(terms).collect();
     format!("{ids:?}")
 }
 

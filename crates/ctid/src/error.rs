@@ -39,9 +39,24 @@ pub enum Error {
     /// The computation.
     #[error(transparent)]
     Diagnosis(#[from] missing_effect::Error),
+    /// A recursive estimator.
+    #[error(transparent)]
+    Estimator(#[from] stabilized_oe::Error),
+    /// A linear model.
+    #[error(transparent)]
+    Linear(#[from] ct_lti::Error),
+    /// A linear model in a loop.
+    #[error(transparent)]
+    Loop(#[from] fcloe::Error),
     /// Standard output is gone.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] std::io::Error),
+}
+
+impl From<ct_rls::Error> for Error {
+    fn from(error: ct_rls::Error) -> Self {
+        Self::Estimator(error.into())
+    }
 }
 
 impl Error {

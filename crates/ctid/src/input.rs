@@ -4,15 +4,21 @@ use std::path::{Path, PathBuf};
 
 use ct_signals::{ROWS_PER_PARAMETER, Record, read_csv};
 use missing_effect::Problem;
-use plants::controller::Pi;
-use plants::{Plant, Scales};
+use plants::controller::Controller;
+use plants::{Outlet, Plant, Scales};
 
-use crate::model_file::{self, ModelFile};
+use crate::model_file::{self, ControllerLaw, ControllerSettings, ModelFile};
 use crate::output::same_file;
 use crate::{Error, numbers};
 
 /// A level this many times the tank's height is in another unit.
 const BEYOND_THE_TANK: f64 = 1.5;
+
+/// Readings this far below zero, as a part of what the record spans, are no noise about an empty tank.
+const BELOW_THE_OUTLET: f64 = 0.1;
+
+/// Sampling intervals that differ by less than this part are one: times are read from text.
+const SAME_INTERVAL: f64 = 0.01;
 
 /// The files of a problem.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,21 +128,69 @@ pub fn problem(
 ) -> Result<Problem, Error> {
     check_units(&records, &test)?;
     check_height(model_name, &model, records.iter().chain(&test))?;
+    check_levels(&model, records.iter().chain(&test))?;
     check_rows(&model, &records)?;
-    // The operating point plays no part in the loop's stability, and is not known.
+    check_terms(model_name, &model, &records[0])?;
     let controller = model
         .controller
-        .map(|c| Pi::new(c.gain, c.integral_time, (c.u_min, c.u_max), 0.0))
+        .as_ref()
+        .map(|settings| controller(model_name, settings, &records))
         .transpose()?;
     Ok(Problem {
         plant: model.plant,
         known: model.known,
         effects: model.effects,
+        terms: model.terms.into_iter().map(|own| own.term).collect(),
         start: model.start,
         fixed: model.fixed,
         controller,
         records,
         test,
+    })
+}
+
+/// The controller as it ran in the records.
+fn controller(
+    model_name: &str,
+    settings: &ControllerSettings,
+    records: &[Record],
+) -> Result<Controller, Error> {
+    let interval = records.first().map_or(1.0, Record::sample_interval);
+    for record in records {
+        if let Some(reference) = &record.reference
+            && !reference.unit.is_empty()
+            && !record.output.unit.is_empty()
+            && reference.unit != record.output.unit
+        {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "the reference is in {}, the output in {}: a controller compares the two; convert one of them, or correct its header",
+                    reference.unit, record.output.unit
+                ),
+            });
+        }
+        if matches!(settings.law, ControllerLaw::Pi { .. }) {
+            continue;
+        }
+        let uneven = record
+            .time
+            .windows(2)
+            .find(|pair| (pair[1] - pair[0] - interval).abs() > SAME_INTERVAL * interval);
+        if let Some(pair) = uneven {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "a controller of type \"RS\" runs at one interval, {interval} s, but {} s follow t = {} s; resample the record, or delete [controller] from {model_name}",
+                    numbers::significant(pair[1] - pair[0], 4),
+                    pair[0]
+                ),
+            });
+        }
+    }
+    settings.controller(interval).map_err(|error| Error::File {
+        file: model_name.to_string(),
+        what: error.to_string(),
     })
 }
 
@@ -191,6 +245,67 @@ fn check_height<'a>(
                     record.output.unit
                 ),
             });
+        }
+    }
+    Ok(())
+}
+
+/// Where the outflow is a square root of the level a reading far below zero has another zero than the outlet: no such
+/// level can be simulated. Noise about an empty tank may reach below it, and so may a sensor whose offset is in the model.
+fn check_levels<'a>(
+    model: &ModelFile,
+    mut records: impl Iterator<Item = &'a Record>,
+) -> Result<(), Error> {
+    let offset = model
+        .effects
+        .iter()
+        .any(|placed| placed.effect.id == "sensor_offset");
+    if model.plant.outlet() != Outlet::Torricelli || offset {
+        return Ok(());
+    }
+    let below = records.find_map(|record| {
+        let (low, high) = record.output_range();
+        (low < -BELOW_THE_OUTLET * (high - low)).then_some((record, low))
+    });
+    let Some((record, low)) = below else {
+        return Ok(());
+    };
+    let unit = match record.output.unit.as_str() {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    Err(Error::File {
+        file: record.name.clone(),
+        what: format!(
+            "column \"{}\" falls to {}{unit}, but {} lets out by the square root of the level, which is not below zero: \
+             add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, where the \
+             offset is to be fitted, run `ctid add sensor_offset`",
+            record.output.name,
+            numbers::significant(low, 3),
+            model.plant.id()
+        ),
+    })
+}
+
+/// A term is written in the units of the record that it was found on.
+fn check_terms(model_name: &str, model: &ModelFile, record: &Record) -> Result<(), Error> {
+    let area_known =
+        model.plant.outlet() == plants::Outlet::Torricelli && model.known.area[0].is_some();
+    for own in &model.terms {
+        for (written, unit, what) in [
+            (&own.at_unit, own.term.variable.unit(), "at"),
+            (&own.unit, own.term.unit(), "value"),
+        ] {
+            let here = unit.label(&record.output.unit, &record.input.unit, area_known);
+            if !written.is_empty() && *written != here {
+                return Err(Error::File {
+                    file: model_name.to_string(),
+                    what: format!(
+                        "[term.{}] has {what} in {written}, but with {} it would be in {here}; convert its numbers and its unit",
+                        own.term.name, record.name
+                    ),
+                });
+            }
         }
     }
     Ok(())
@@ -284,6 +399,37 @@ mod tests {
             ),
             "{message}"
         );
+    }
+
+    #[test]
+    fn a_level_below_the_outlet_is_refused_where_its_root_is_taken() {
+        let lowered = |by: f64| {
+            let mut record = record("a.csv", 50, "cm");
+            record.output.values.iter_mut().for_each(|y| *y -= by);
+            record
+        };
+        assert_eq!(
+            refused(
+                "plant = \"single-tank\"",
+                vec![record("b.csv", 50, "cm")],
+                vec![lowered(30.0)]
+            ),
+            "a.csv: column \"y\" falls to -28.0 cm, but single-tank lets out by the square root of the level, which is not \
+             below zero: add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, \
+             where the offset is to be fitted, run `ctid add sensor_offset`"
+        );
+        let taken = |model: &str, by: f64| {
+            let model = model_file::parse("tank.toml", model).unwrap();
+            problem("tank.toml", model, vec![lowered(by)], vec![]).is_ok()
+        };
+        // The readings run from 2 to 14 cm.
+        assert!(!taken("plant = \"single-tank\"", 3.3));
+        assert!(taken("plant = \"single-tank\"", 3.1));
+        assert!(taken("plant = \"single-tank-linear\"", 30.0));
+        assert!(taken(
+            "plant = \"single-tank\"\neffects = [\"sensor_offset\"]",
+            4.0
+        ));
     }
 
     #[test]

@@ -5,7 +5,10 @@
 //! | the command line | [`run`], [`Cli`] |
 //! | the model file | [`model_file`]; its effects are edited by [`edit`] |
 //! | records and model, read and checked | [`input`] |
+//! | a missing term as a file | [`term_file`] |
 //! | the tour | [`tour`] |
+//! | linear models from a record | [`mod@identify`] |
+//! | a paper's tables, computed again | [`tables`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
 //!
@@ -16,18 +19,21 @@ pub mod catalogue;
 mod commands;
 pub mod edit;
 mod error;
+pub mod identify;
 pub mod input;
 pub mod look;
 pub mod model_file;
 mod names;
-mod numbers;
 pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
 mod signature;
+pub mod tables;
+pub mod term_file;
 pub mod terminal;
 pub mod tour;
 
 pub use commands::{Cli, run};
 pub use error::{Error, one_line};
+use missing_effect::numbers;

@@ -28,11 +28,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ct_signals::{Columns, Hold};
-use plants::{EffectInfo, Known, Place, Placed, Plant, Scales, Structure, controller::Pi};
+use plants::{
+    EffectInfo, Fitted, Known, Place, Placed, Plant, Scales, Structure, Term,
+    controller::Controller,
+};
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::{Error, names};
+use crate::{Error, names, term_file};
 
 /// What a model file says, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +44,8 @@ pub struct ModelFile {
     pub plant: Plant,
     /// The effects that have been added, in the file's order.
     pub effects: Vec<Placed>,
+    /// The terms of the user's own that have been added, in the file's order.
+    pub terms: Vec<OwnTerm>,
     /// Which column of the records is what.
     pub columns: Columns,
     /// Constants that are not fitted.
@@ -55,17 +60,95 @@ pub struct ModelFile {
     pub hold: Hold,
 }
 
-/// The settings of a PI controller; [`Pi::new`] has accepted them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A term of the user's own, and the units that it is written in; empty where the file does not say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnTerm {
+    /// The term.
+    pub term: Term,
+    /// Unit of its knots.
+    pub at_unit: String,
+    /// Unit of its values.
+    pub unit: String,
+}
+
+/// How a controller answers to `e = r - y`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ControllerLaw {
+    /// `u = u_op + gain (e + (1/integral_time) int e dt)`.
+    Pi {
+        /// Proportional gain \[input/output\].
+        gain: f64,
+        /// Integral time \[s\].
+        integral_time: f64,
+    },
+    /// `S(q^-1) u = R(q^-1) e`, the powers 0, 1, 2, ... of a delay of one sample.
+    Sampled {
+        /// R.
+        r: Vec<f64>,
+        /// S.
+        s: Vec<f64>,
+    },
+    /// `S(p) u = R(p) e`, the highest power first.
+    Continuous {
+        /// R.
+        r: Vec<f64>,
+        /// S.
+        s: Vec<f64>,
+    },
+}
+
+/// The settings of a controller; those of a PI have been accepted by [`Controller::pi`].
+#[derive(Debug, Clone, PartialEq)]
 pub struct ControllerSettings {
-    /// Proportional gain \[input/output\].
-    pub gain: f64,
-    /// Integral time \[s\].
-    pub integral_time: f64,
+    /// What it does with the error.
+    pub law: ControllerLaw,
     /// Smallest command \[input unit\]; minus infinity where none is given.
     pub u_min: f64,
     /// Largest command \[input unit\]; infinity where none is given.
     pub u_max: f64,
+}
+
+impl ControllerSettings {
+    /// The controller in continuous time, without its limits.
+    ///
+    /// # Errors
+    /// Where it is sampled, or is no controller.
+    pub fn linear(&self) -> Result<fcloe::Controller, Error> {
+        let polynomial = |highest_first: &[f64]| {
+            ct_lti::Polynomial::new(highest_first.iter().rev().copied().collect::<Vec<_>>())
+        };
+        Ok(match &self.law {
+            ControllerLaw::Pi {
+                gain,
+                integral_time,
+            } => fcloe::Controller::pi(*gain, *gain / *integral_time)?,
+            ControllerLaw::Continuous { r, s } => {
+                fcloe::Controller::new(polynomial(r)?, polynomial(s)?)?
+            }
+            ControllerLaw::Sampled { .. } => {
+                return Err(Error::Usage(
+                    "[controller] is given in powers of a delay, but this method needs it in continuous time; write variable = \"p\" and its polynomials in p"
+                        .to_owned(),
+                ));
+            }
+        })
+    }
+
+    /// The controller, run every `interval` seconds.
+    ///
+    /// # Errors
+    /// Where it cannot work.
+    pub fn controller(&self, interval: f64) -> Result<Controller, plants::Error> {
+        let limits = (self.u_min, self.u_max);
+        match &self.law {
+            ControllerLaw::Pi {
+                gain,
+                integral_time,
+            } => Controller::pi(*gain, *integral_time, limits),
+            ControllerLaw::Sampled { r, s } => Controller::sampled(r, s, limits),
+            ControllerLaw::Continuous { r, s } => Controller::continuous(r, s, interval, limits),
+        }
+    }
 }
 
 impl ModelFile {
@@ -78,6 +161,12 @@ impl ModelFile {
         self.effects
             .iter()
             .try_fold(plant, |structure, &placed| structure.with(placed))
+            .and_then(|structure| {
+                let mut terms = self.terms.iter();
+                terms.try_fold(structure, |structure, own| {
+                    structure.with_term(own.term.clone())
+                })
+            })
     }
 }
 
@@ -126,6 +215,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
     let mut model = ModelFile {
         plant,
         effects: Vec::new(),
+        terms: Vec::new(),
         columns: raw.columns,
         known,
         start: BTreeMap::new(),
@@ -134,7 +224,21 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
         hold: raw.hold,
     };
     let settings = source.effect_tables(plant, &raw.effect)?;
+    let terms = source.terms(plant, &raw.term)?;
     for name in &raw.effects {
+        if let Some((term, fixed)) = terms.get(name.as_ref().as_str()) {
+            if model.terms.iter().any(|on| on.term.name == term.term.name) {
+                let what = format!("{} stands here twice; keep it once", name.as_ref());
+                return Err(source.at(name.span().start, what));
+            }
+            if *fixed {
+                let scale = format!("{}.scale", term.term.name);
+                model.start.insert(scale.clone(), 1.0);
+                model.fixed.push(scale);
+            }
+            model.terms.push(term.clone());
+            continue;
+        }
         let placed = source.placed(plant, &model.effects, name, &settings)?;
         model.effects.push(placed);
     }
@@ -176,7 +280,24 @@ struct Raw {
     #[serde(default)]
     effect: BTreeMap<Spanned<String>, Spanned<EffectTable>>,
     #[serde(default)]
+    term: BTreeMap<Spanned<String>, Spanned<RawTerm>>,
+    #[serde(default)]
     hold: Hold,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTerm {
+    place: Spanned<String>,
+    variable: Spanned<String>,
+    at: Vec<Number>,
+    value: Vec<Number>,
+    #[serde(default)]
+    at_unit: String,
+    #[serde(default)]
+    unit: String,
+    #[serde(default)]
+    fixed: bool,
 }
 
 #[derive(Deserialize, Default)]
@@ -196,6 +317,9 @@ struct RawController {
     kind: Option<Spanned<String>>,
     gain: Option<Spanned<Number>>,
     integral_time: Option<Spanned<Number>>,
+    variable: Option<Spanned<String>>,
+    r: Option<Spanned<Vec<Number>>>,
+    s: Option<Spanned<Vec<Number>>>,
     u_min: Option<Spanned<Number>>,
     u_max: Option<Spanned<Number>>,
 }
@@ -274,6 +398,9 @@ impl Source<'_> {
             );
         } else if let Some((_, rest)) = what.split_once("unknown variant `") {
             what = format!("unknown word `{rest}");
+        } else if toml::from_str::<toml::Table>(self.text).is_err() {
+            // what is wrong is the writing, not what it says
+            what += "; write `key = value`, words in quotes, numbers without quotes and without a unit, each key once";
         }
         let Some(span) = error.span() else {
             return Error::File {
@@ -375,16 +502,35 @@ impl Source<'_> {
     fn controller(&self, raw: &Spanned<RawController>) -> Result<ControllerSettings, Error> {
         let at = raw.span().start;
         let raw = raw.as_ref();
-        match &raw.kind {
-            Some(kind) if kind.as_ref() == "PI" => {}
-            Some(kind) => {
-                let what = format!(
-                    "controller type \"{}\" is not known; write type = \"PI\"",
-                    kind.as_ref()
-                );
+        const TYPES: &str =
+            "write type = \"PI\" with gain and integral_time, or type = \"RS\" with r and s";
+        let Some(kind) = &raw.kind else {
+            return Err(self.at(at, format!("[controller] has no type; {TYPES}")));
+        };
+        let foreign: &[(&str, Option<usize>)] = match kind.as_ref().as_str() {
+            "PI" => &[
+                ("r", raw.r.as_ref().map(|r| r.span().start)),
+                ("s", raw.s.as_ref().map(|s| s.span().start)),
+                ("variable", raw.variable.as_ref().map(|v| v.span().start)),
+            ],
+            "RS" => &[
+                ("gain", raw.gain.as_ref().map(|n| n.span().start)),
+                (
+                    "integral_time",
+                    raw.integral_time.as_ref().map(|n| n.span().start),
+                ),
+            ],
+            other => {
+                let what = format!("controller type \"{other}\" is not known; {TYPES}");
                 return Err(self.at(kind.span().start, what));
             }
-            None => return Err(self.at(at, "[controller] has no type; write type = \"PI\"")),
+        };
+        if let Some((key, Some(place))) = foreign.iter().find(|(_, place)| place.is_some()) {
+            let what = format!(
+                "{key} is not a setting of a controller of type \"{}\"; delete it",
+                kind.as_ref()
+            );
+            return Err(self.at(*place, what));
         }
         let needed = |key: &str, number: &Option<Spanned<Number>>| match number {
             Some(number) => self.finite(key, number),
@@ -393,14 +539,47 @@ impl Source<'_> {
         let limit = |key: &str, number: &Option<Spanned<Number>>, none: f64| {
             number.as_ref().map_or(Ok(none), |n| self.finite(key, n))
         };
+        let law = if kind.as_ref() == "PI" {
+            ControllerLaw::Pi {
+                gain: needed("gain", &raw.gain)?,
+                integral_time: needed("integral_time", &raw.integral_time)?,
+            }
+        } else {
+            let list = |key: &str, list: &Option<Spanned<Vec<Number>>>| match list {
+                Some(list) => Ok(list
+                    .as_ref()
+                    .iter()
+                    .map(|n| n.value())
+                    .collect::<Vec<f64>>()),
+                None => Err(self.at(
+                    at,
+                    format!("[controller] has no {key}; write {key} = [...]"),
+                )),
+            };
+            let (r, s) = (list("r", &raw.r)?, list("s", &raw.s)?);
+            match raw
+                .variable
+                .as_ref()
+                .map(|v| (v.as_ref().as_str(), v.span().start))
+            {
+                None | Some(("q", _)) => ControllerLaw::Sampled { r, s },
+                Some(("p", _)) => ControllerLaw::Continuous { r, s },
+                Some((other, place)) => {
+                    let what = format!(
+                        "variable \"{other}\" is not known; write variable = \"q\" for powers of a delay of one sample, or \"p\" for derivatives, highest power first"
+                    );
+                    return Err(self.at(place, what));
+                }
+            }
+        };
         let settings = ControllerSettings {
-            gain: needed("gain", &raw.gain)?,
-            integral_time: needed("integral_time", &raw.integral_time)?,
+            law,
             u_min: limit("u_min", &raw.u_min, f64::NEG_INFINITY)?,
             u_max: limit("u_max", &raw.u_max, f64::INFINITY)?,
         };
-        let limits = (settings.u_min, settings.u_max);
-        Pi::new(settings.gain, settings.integral_time, limits, 0.0)
+        // The interval is the records'; what cannot work does not hang on it.
+        settings
+            .controller(1.0)
             .map_err(|error| self.at(at, error.to_string()))?;
         Ok(settings)
     }
@@ -445,6 +624,41 @@ impl Source<'_> {
             settings.insert(effect.id, setting);
         }
         Ok(settings)
+    }
+
+    /// The `[term.X]` tables, and whether each is kept as it stands; one that is not on is checked too.
+    fn terms(
+        &self,
+        plant: Plant,
+        tables: &BTreeMap<Spanned<String>, Spanned<RawTerm>>,
+    ) -> Result<BTreeMap<String, (OwnTerm, bool)>, Error> {
+        let mut terms = BTreeMap::new();
+        for (name, table) in tables {
+            let raw = table.as_ref();
+            let (place, vessel) = term_file::place_of(plant, raw.place.as_ref())
+                .map_err(|what| self.at(raw.place.span().start, what))?;
+            let variable = term_file::variable_of(raw.variable.as_ref())
+                .map_err(|what| self.at(raw.variable.span().start, what))?;
+            let numbers = |list: &[Number]| list.iter().map(|number| number.value()).collect();
+            let term = Term {
+                name: name.as_ref().clone(),
+                place,
+                vessel,
+                variable,
+                knots: numbers(&raw.at),
+                ordinates: numbers(&raw.value),
+                fitted: Fitted::Scale,
+            };
+            term.check(plant)
+                .map_err(|error| self.at(name.span().start, error.to_string()))?;
+            let own = OwnTerm {
+                term,
+                at_unit: raw.at_unit.clone(),
+                unit: raw.unit.clone(),
+            };
+            terms.insert(name.as_ref().clone(), (own, raw.fixed));
+        }
+        Ok(terms)
     }
 
     /// The table's names are parameters of the effect at its place, and what is fixed has a value.

@@ -5,19 +5,70 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use missing_effect::Diagnosis;
+use serde::Serialize;
 
-use crate::{Error, atomic, report};
+use crate::identify::Identification;
+use crate::tables::{baysse, udink};
+use crate::{Error, atomic, report, term_file};
 
 /// How much of an existing page is looked at: the mark stands in its head.
 const HEAD: u64 = 4096;
 
+/// Keys that tell JSON of ctid's from others', beside `schema`: one for each kind of result.
+const KEYS: [&str; 3] = ["verdict", "paper", "method"];
+
 /// What is in a file that the program writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// The diagnosis as JSON.
+    /// The result as JSON.
     Json,
-    /// The diagnosis as a page.
+    /// The result as a page.
     Report,
+    /// A record as CSV.
+    Record,
+    /// The shape of what is missing, as CSV; nothing is written where nothing is.
+    Unknown,
+}
+
+/// What a command finds, which is written as JSON with `schema` and one of the keys that ctid knows its own files by, or as a page.
+pub trait Found: Serialize {
+    /// The page, complete.
+    fn page(&self) -> String;
+
+    /// The record as CSV, where there is one.
+    fn record(&self) -> String {
+        String::new()
+    }
+
+    /// The shape of what nothing explains as CSV, where there is one.
+    fn unknown(&self) -> Option<String> {
+        None
+    }
+}
+
+impl Found for Diagnosis {
+    fn page(&self) -> String {
+        report::html(self)
+    }
+    fn unknown(&self) -> Option<String> {
+        self.unknown.as_ref().map(term_file::text)
+    }
+}
+
+impl Found for udink::Study {
+    fn page(&self) -> String {
+        report::udink(self)
+    }
+}
+
+impl Found for baysse::Study {
+    fn page(&self) -> String {
+        report::baysse(self)
+    }
+
+    fn record(&self) -> String {
+        baysse::csv(&self.second.record)
+    }
 }
 
 /// A file that will be written.
@@ -25,6 +76,12 @@ pub enum Kind {
 pub struct Output {
     kind: Kind,
     path: PathBuf,
+}
+
+impl Found for Identification {
+    fn page(&self) -> String {
+        report::identification(self)
+    }
 }
 
 /// Checks where results may go: not onto an input, not onto each other, not over a file that ctid
@@ -65,20 +122,26 @@ impl Output {
         &self.path
     }
 
-    /// Writes it.
+    /// Writes it; says whether there was something to write.
     ///
     /// # Errors
     /// Where the disk does not take it; what stood there before is then still there.
-    pub fn write(&self, diagnosis: &Diagnosis) -> Result<(), Error> {
+    pub fn write(&self, found: &impl Found) -> Result<bool, Error> {
         let content = match self.kind {
             Kind::Json => {
-                let text = serde_json::to_string_pretty(diagnosis)
+                let text = serde_json::to_string_pretty(found)
                     .map_err(|error| Error::file(&self.path, error.to_string()))?;
                 text + "\n"
             }
-            Kind::Report => report::html(diagnosis),
+            Kind::Report => found.page(),
+            Kind::Record => found.record(),
+            Kind::Unknown => match found.unknown() {
+                Some(text) => text,
+                None => return Ok(false),
+            },
         };
-        atomic::write(&self.path, content.as_bytes())
+        atomic::write(&self.path, content.as_bytes())?;
+        Ok(true)
     }
 }
 
@@ -137,16 +200,23 @@ fn standing(kind: Kind, path: &Path) -> Standing {
     }
 }
 
-/// ctid wrote it: a page with the mark, or JSON with the keys of a diagnosis.
+/// ctid wrote it: a page with the mark, or JSON with the keys of a result.
 fn is_ours(kind: Kind, path: &Path) -> bool {
     let Ok(mut file) = fs::File::open(path) else {
         return false;
     };
     match kind {
+        // Nothing in a record says who wrote it.
+        Kind::Record => false,
         Kind::Report => {
             let mut head = Vec::new();
             let read = file.take(HEAD).read_to_end(&mut head);
             read.is_ok() && String::from_utf8_lossy(&head).contains(report::GENERATOR)
+        }
+        Kind::Unknown => {
+            let mut head = Vec::new();
+            let read = file.take(HEAD).read_to_end(&mut head);
+            read.is_ok() && head.starts_with(term_file::HEADER.as_bytes())
         }
         Kind::Json => {
             let mut text = String::new();
@@ -154,7 +224,8 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
             let value = serde_json::from_str::<serde_json::Value>(&text);
             read.is_ok()
                 && value.is_ok_and(|value| {
-                    value.get("schema").is_some() && value.get("verdict").is_some()
+                    let has = |key: &&str| value.get(key).is_some();
+                    has(&"schema") && KEYS.iter().any(has)
                 })
         }
     }

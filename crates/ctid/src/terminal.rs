@@ -364,13 +364,14 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
     if diagnosis.scores.is_empty() {
         return String::new();
     }
-    // As much as the width takes.
-    let variants: [&[Ranked]; 5] = [
+    // As much as the width takes; what an effect does to the error goes last.
+    let variants: [&[Ranked]; 6] = [
         &[Place, Effect, Gain, Error, Size, Visible],
         &[Place, Effect, Gain, Error, SizeAlone, Visible],
-        &[Place, Effect, Gain, Size, Visible],
-        &[Place, Effect, Gain, SizeAlone, Visible],
-        &[Place, Effect, Gain],
+        &[Place, Effect, Error, SizeAlone, Visible],
+        &[Place, Effect, Error, SizeAlone],
+        &[Place, Effect, Gain, Error],
+        &[Effect, Error],
     ];
     let fits = |lines: &Vec<String>| {
         lines
@@ -381,7 +382,7 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
     let lines = tables
         .iter()
         .find(|lines| fits(lines))
-        .unwrap_or(&tables[4]);
+        .unwrap_or(&tables[5]);
 
     let title = match diagnosis.verdict {
         Verdict::Adequate => "The catalogue, one effect at a time: none is called for",
@@ -552,7 +553,7 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
             look.warning("Something is missing, and more than one effect fits these data")
         }
         Verdict::Unexplained => {
-            look.warning("Something is missing that the catalogue does not explain")
+            look.warning("What is left is not noise, and no effect of the catalogue explains it")
         }
     };
     let mut text = format!("{headline}\n");

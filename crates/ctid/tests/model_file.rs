@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use ct_signals::Hold;
-use ctid::model_file::{self, ModelFile};
+use ctid::model_file::{self, ControllerLaw, ModelFile};
 use plants::Plant;
 
 fn parse(text: &str) -> ModelFile {
@@ -84,7 +84,14 @@ fixed = ["rim"]
     assert_eq!(model.fixed, ["overflow.rim"]);
     assert_eq!(model.hold, Hold::First);
     let controller = model.controller.unwrap();
-    assert_eq!((controller.gain, controller.u_max), (0.6, 10.0));
+    assert_eq!(controller.u_max, 10.0);
+    assert_eq!(
+        controller.law,
+        ControllerLaw::Pi {
+            gain: 0.6,
+            integral_time: 90.0
+        }
+    );
 }
 
 /// The catalogue names it; the file format does not.
@@ -194,7 +201,11 @@ fn text_where_a_number_belongs() {
 #[test]
 fn a_syntax_error() {
     refuses("plant = \"single-tank\"\neffects = [", "tank.toml:2: ", "");
-    refuses("plant = single-tank", "tank.toml:1: ", "");
+    refuses(
+        "plant = single-tank",
+        "tank.toml:1: ",
+        "words in quotes, numbers without quotes and without a unit",
+    );
     refuses(
         "plant = \"single-tank\"\nplant = \"first-order\"",
         "tank.toml:2: ",
@@ -304,6 +315,31 @@ fn controllers_that_cannot_work() {
         &controller("type = \"PID\"\ngain = 1.0"),
         "tank.toml:4: controller type \"PID\" is not known",
         "type = \"PI\"",
+    );
+    refuses(
+        &controller("type = \"RS\"\nr = [1.0]"),
+        "tank.toml:3: [controller] has no s",
+        "write s = [...]",
+    );
+    refuses(
+        &controller("type = \"RS\"\nr = [1.0]\ns = [0.0, 1.0]"),
+        "tank.toml:3: controller: s = []",
+        "give s[0]",
+    );
+    refuses(
+        &controller("type = \"RS\"\nr = [1.0]\ns = [1.0]\ngain = 2"),
+        "tank.toml:7: gain is not a setting of a controller of type \"RS\"",
+        "delete it",
+    );
+    refuses(
+        &controller("type = \"RS\"\nr = [1.0]\ns = [1.0]\nvariable = \"z\""),
+        "tank.toml:7: variable \"z\" is not known",
+        "highest power first",
+    );
+    refuses(
+        &controller("type = \"RS\"\nr = [1, 0, 0]\ns = [1, 1]\nvariable = \"p\""),
+        "tank.toml:3: controller: r/s as a transfer function in p",
+        "add poles",
     );
     refuses(
         &controller("type = \"PI\"\ngain = 1.0"),

@@ -172,6 +172,28 @@ fn an_effect_with_a_stand_in_is_a_result() {
 }
 
 #[test]
+fn the_ranking_keeps_the_error_at_eighty_columns() {
+    let place = Place::empty();
+    for (tanks, effect) in [
+        (Tanks::single(), ("sensor_lag", 0, vec![8.0])),
+        (Tanks::cascaded(), ("const_leak", 0, vec![6.0])),
+    ] {
+        let tanks = Tanks {
+            hidden: vec![effect],
+            ..tanks
+        };
+        place.write("data.csv", tanks.csv());
+        place.write("model.toml", tanks.model());
+        let text = place.succeeds("diagnose data.csv --model model.toml");
+        let (_, ranking) = text
+            .split_once("The catalogue, one effect at a time")
+            .unwrap();
+        let heading = ranking.lines().nth(1).unwrap();
+        assert!(heading.contains("error after"), "{ranking}");
+    }
+}
+
+#[test]
 fn something_that_nothing_explains_is_a_result() {
     // A sensor that is off by a wave of its reading: no effect of the catalogue. Chance decides
     // whether one of them imitates it on a record.

@@ -29,4 +29,30 @@ pub enum Error {
         /// How many were tried.
         starts: usize,
     },
+    /// The loop cannot be simulated without what it was to follow.
+    #[error(
+        "{record}: the record holds no reference, which a controller follows: name its column as reference under [columns]"
+    )]
+    NoReference {
+        /// The record.
+        record: String,
+    },
+    /// The reference never moves.
+    #[error(
+        "{record}: the reference stays at {value}, so that nothing but noise moves the loop: take a record in which the set point changes"
+    )]
+    ConstantReference {
+        /// The record.
+        record: String,
+        /// Where it stays.
+        value: f64,
+    },
+    /// A controller's command is held from sample to sample.
+    #[error(
+        "{record}: hold = \"first\" says that the command runs in straight lines, but a controller holds it: write hold = \"zero\", or delete [controller]"
+    )]
+    CommandNotHeld {
+        /// The record.
+        record: String,
+    },
 }

@@ -50,7 +50,8 @@ pub struct Fit {
     pub cost: f64,
     /// Root mean square of the simulation error \[output unit\].
     pub rmse: f64,
-    /// The noise in whose metric it was fitted.
+    /// The noise in whose metric it was fitted. After [`coloured`] its innovations are those of the residual; in a
+    /// metric that was given they are as they were given.
     pub noise: ArModel,
     /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance at its best.
     pub deviance: f64,
@@ -74,6 +75,27 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Whether two fits of one setup in one metric ended in the same minimum.
+    #[must_use]
+    pub fn same_minimum(&self, other: &Self) -> bool {
+        self.samples as f64 * (self.cost / other.cost).ln().abs() <= SAME_MINIMUM
+            || self.cost == other.cost
+    }
+
+    /// The better of this fit and one of the same setup in the same metric from other starts. Starts are counted
+    /// together; those of both count as agreed where both ended in the same minimum.
+    #[must_use]
+    pub fn or_better(self, other: Self) -> Self {
+        let starts = self.starts + other.starts;
+        let agree = self
+            .same_minimum(&other)
+            .then_some(self.agree + other.agree);
+        let mut best = if other.cost < self.cost { other } else { self };
+        best.starts = starts;
+        best.agree = agree.unwrap_or(best.agree);
+        best
+    }
+
     /// The same fit, with the starts counted of the one it continues.
     #[must_use]
     pub fn continuing(mut self, first: &Self) -> Self {
@@ -265,7 +287,7 @@ pub fn coloured(setup: &Setup, fit: Fit, order: usize, stopping: Stopping) -> Re
     let (starts, agree) = (fit.starts, fit.agree);
     let mut fit = fit;
     for _ in 0..8 {
-        let residuals = setup.residuals(&fit.x)?;
+        let residuals = setup.disturbance(&fit.x)?;
         let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
         let noise = ArModel::fit(&segments, order)?;
         let same = noise.order() == fit.noise.order()
@@ -303,6 +325,9 @@ pub fn coloured(setup: &Setup, fit: Fit, order: usize, stopping: Stopping) -> Re
                 fit.freedom = freedom;
             }
         }
+    } else {
+        // A white metric's scale plays no part in a fit, and may stand for any: here it becomes the noise's own.
+        fit.noise = ArModel::white(fit.variance().sqrt());
     }
     fit.starts = starts;
     fit.agree = agree;

@@ -3,6 +3,7 @@
 
 mod ar;
 mod error;
+mod feedback;
 mod fit;
 mod levenberg_marquardt;
 mod marginal;
@@ -13,9 +14,10 @@ mod starts;
 mod triangle;
 
 pub use error::Error;
+pub use feedback::{LinearPlant, Replay, replay};
 pub use fit::{Fit, FitOptions, coloured, fit, fit_from, fit_initial_levels, noise_of};
 pub use levenberg_marquardt::{Stop, Stopping};
-pub use sandwich::{Robust, robust, sandwich_std_errors};
-pub use setup::{Rows, Setup, Simulated};
+pub use sandwich::{Robust, robust};
+pub use setup::{LoopRun, Rows, Setup, Simulated};
 pub use starts::{random_starts, starts_around};
 pub use triangle::Triangle;

@@ -62,24 +62,6 @@ pub fn robust(setup: &Setup, fit: &Fit, order: usize) -> Result<Robust, Error> {
     })
 }
 
-/// Standard errors of a fit under a known noise, whatever the metric of the fit.
-///
-/// # Errors
-/// Where the simulation is not finite at the fit.
-pub fn sandwich_std_errors(
-    setup: &Setup,
-    fit: &Fit,
-    noise: &ArModel,
-) -> Result<Vec<Option<f64>>, Error> {
-    let rows = setup
-        .rows(&fit.x)
-        .ok_or(Error::NoFiniteStart { starts: 1 })?;
-    let variances = Sandwich::new(&rows, fit)
-        .variances(noise, noise.sigma().powi(2))
-        .unwrap_or_default();
-    Ok(fit.spread(variances.into_iter().map(f64::sqrt)))
-}
-
 /// `C` and the rows `M J` of the entries that are not at a bound.
 struct Sandwich {
     bread: Option<Vec<Vec<f64>>>,

@@ -3,14 +3,21 @@
 use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Hold, Record};
-use plants::{Command, Dual, MAX_VESSELS, Scalar, Scales, Simulator, Structure};
+use plants::{
+    Command, Dual, MAX_VESSELS, Scalar, Scales, Simulator, Structure, controller::Controller,
+};
 
-use crate::{Error, Triangle, reading_step::reading_step};
+use crate::{
+    Error, LinearPlant, Replay, Triangle,
+    feedback::{Feedback, Inverse, step},
+    reading_step::reading_step,
+};
 
 /// A structure, the records, and which parameters are free.
 ///
 /// The fitted vector holds the structure's parameters (free ones and fixed ones), then for every record the initial
-/// level of every vessel and what stood behind every lag ([`Structure::lags`]).
+/// level of every vessel and what stood behind every lag ([`Structure::lags`]) and, where the loop is simulated
+/// ([`Setup::in_loop`]), the states of the controller.
 #[derive(Debug, Clone)]
 pub struct Setup<'a> {
     /// The structure.
@@ -27,6 +34,17 @@ pub struct Setup<'a> {
     free: Vec<usize>,
     /// How many entries come before the initial states.
     parameters: usize,
+    /// The controller, where the loop is simulated.
+    feedback: Option<Feedback>,
+}
+
+/// A loop that ran on its reference.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopRun {
+    /// The reading, a series for each record.
+    pub output: Vec<Vec<f64>>,
+    /// The controller's command, a series for each record.
+    pub command: Vec<Vec<f64>>,
 }
 
 /// What a simulation shows.
@@ -110,6 +128,15 @@ impl<'a> Setup<'a> {
         records: &'a [Record],
         fixed: BTreeMap<String, f64>,
     ) -> Result<Self, Error> {
+        Self::build(structure, records, fixed, None)
+    }
+
+    fn build(
+        structure: Structure,
+        records: &'a [Record],
+        fixed: BTreeMap<String, f64>,
+        feedback: Option<Feedback>,
+    ) -> Result<Self, Error> {
         if records.is_empty() {
             return Err(Error::NoRecord);
         }
@@ -138,7 +165,7 @@ impl<'a> Setup<'a> {
         let mut free: Vec<usize> = (0..names.len())
             .filter(|&i| !fixed.contains_key(&names[i]))
             .collect();
-        let reach = structure.scales.largest_level().max(1e-9);
+        let reach = structure.scales.largest_level().max(f64::MIN_POSITIVE);
         // An empty tank is a trap: the outflow's slope is infinite there, and a step that overshot to it would stay.
         let lowest = if plant.outlet() == plants::Outlet::Torricelli {
             1e-6 * reach
@@ -168,6 +195,16 @@ impl<'a> Setup<'a> {
                 names.push(name);
                 bounds.push(range);
             }
+            if let Some(feedback) = &feedback {
+                for (name, range) in feedback.entries(r, structure.scales.input) {
+                    let name = name + &of;
+                    if feedback.released && !fixed.contains_key(&name) {
+                        free.push(names.len());
+                    }
+                    names.push(name);
+                    bounds.push(range);
+                }
+            }
         }
         Ok(Self {
             structure,
@@ -178,7 +215,62 @@ impl<'a> Setup<'a> {
             bounds,
             free,
             parameters,
+            feedback,
         })
+    }
+
+    /// The same structure and records in the loop of a controller, simulated from the reference, and the vector `x` with
+    /// the controller's initial states: those with which it gives the measured command.
+    ///
+    /// From here on [`Setup::rows`], [`Setup::linearise`] and all fits take the loop for the model, and their rows are
+    /// filtered so that the residual is the disturbance at the plant's output (the head of `feedback.rs` says how and
+    /// why). [`Setup::simulate`] and [`Setup::residuals`] go on to run on the measured command, so that errors compare.
+    ///
+    /// # Errors
+    /// Where a record has no reference or a constant one, or its command is not held.
+    pub fn in_loop(&self, controller: &Controller, x: &[f64]) -> Result<(Self, Vec<f64>), Error> {
+        let (sum, count) = self
+            .records
+            .iter()
+            .flat_map(|record| &record.input.values)
+            .fold((0.0, 0.0), |(sum, count), u| (sum + u, count + 1.0));
+        let plant = LinearPlant::at(&self.structure, &x[..self.parameter_count()], sum / count)?;
+        let interval = self.structure.scales.sample_interval;
+        let feedback = Feedback::new(controller, self.records, plant, interval)?;
+        let mut with = x[..self.parameter_count()].to_vec();
+        for (r, replay) in feedback.replays.iter().enumerate() {
+            with.extend(&x[self.plant_states_of(r)]);
+            with.extend(&replay.states);
+        }
+        Ok((self.rebuilt(self.structure.clone(), Some(feedback))?, with))
+    }
+
+    fn rebuilt(&self, structure: Structure, feedback: Option<Feedback>) -> Result<Self, Error> {
+        let mut setup = Self::build(structure, self.records, self.fixed.clone(), feedback)?;
+        setup.substeps = self.substeps;
+        Ok(setup)
+    }
+
+    /// The same setup with the controller's initial states fitted like the others.
+    ///
+    /// They are known from the measured command, and by default they stay there: the knowledge of where the command
+    /// stood is worth much. Let go, they take the offset of a linear tank with them, whose standard error is then gone, and
+    /// a static coefficient of a tank is known half as well.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn with_unknown_controller_states(&self) -> Result<Self, Error> {
+        let mut feedback = self.feedback.clone();
+        if let Some(feedback) = &mut feedback {
+            feedback.released = true;
+        }
+        self.rebuilt(self.structure.clone(), feedback)
+    }
+
+    /// What the controller gives on the measured reading of each record; empty where the loop is not simulated.
+    #[must_use]
+    pub fn replays(&self) -> &[Replay] {
+        self.feedback.as_ref().map_or(&[], |f| &f.replays)
     }
 
     /// A setup from records alone: the scales are taken from them.
@@ -205,12 +297,10 @@ impl<'a> Setup<'a> {
     /// # Errors
     /// As [`Setup::new`].
     pub fn with_structure(&self, structure: Structure) -> Result<Self, Error> {
-        let mut setup = Self::new(structure, self.records, self.fixed.clone())?;
-        setup.substeps = self.substeps;
-        Ok(setup)
+        self.rebuilt(structure, self.feedback.clone())
     }
 
-    /// The same structure against other records, in the same scales.
+    /// The same structure against other records, in the same scales, run on the measured command.
     ///
     /// # Errors
     /// As [`Setup::new`].
@@ -263,11 +353,13 @@ impl<'a> Setup<'a> {
                     level.clone()
                 }
             }));
+            let controller = self.feedback.as_ref().map_or(0, |f| f.controller.states());
+            units.extend((0..controller).map(|_| input.clone()));
         }
         units
     }
 
-    /// Entries of one record: its initial levels and what its lags begin with.
+    /// Entries of one record: its initial levels, what its lags begin with, the controller's states.
     pub(crate) fn states(&self) -> usize {
         (self.names.len() - self.parameters) / self.records.len()
     }
@@ -300,6 +392,19 @@ impl<'a> Setup<'a> {
         from..from + n
     }
 
+    /// Positions of the plant's initial states of record `r`, from 0, without those of the controller.
+    #[must_use]
+    pub fn plant_states_of(&self, r: usize) -> std::ops::Range<usize> {
+        let own = self.states_of(r);
+        let controller = self.feedback.as_ref().map_or(0, |f| f.controller.states());
+        own.start..own.end - controller
+    }
+
+    /// The controller's initial states as they give the measured command of record `r`.
+    pub(crate) fn controller_states(&self, r: usize) -> &[f64] {
+        self.feedback.as_ref().map_or(&[], |f| &f.replays[r].states)
+    }
+
     /// Runs one record on any scalar; `each` sees every sample's reading and the levels; it may stop the run.
     fn run<T: Scalar>(
         &self,
@@ -320,7 +425,7 @@ impl<'a> Setup<'a> {
         }
     }
 
-    /// Simulates all records.
+    /// Simulates all records on their measured commands.
     ///
     /// # Errors
     /// Where the vector has the wrong length.
@@ -334,7 +439,7 @@ impl<'a> Setup<'a> {
             let mut simulator = Simulator::new(
                 &self.structure,
                 &x[..self.parameter_count()],
-                &x[self.states_of(r)],
+                &x[self.plant_states_of(r)],
                 record.input.values[0],
             )?;
             let mut output = Vec::with_capacity(record.len());
@@ -356,7 +461,75 @@ impl<'a> Setup<'a> {
         Ok(simulated)
     }
 
-    /// Measured minus model, a series for each record.
+    /// The loop that runs on its reference; `None` where no controller is known.
+    ///
+    /// # Errors
+    /// Where the vector has the wrong length.
+    pub fn simulate_loop(&self, x: &[f64]) -> Result<Option<LoopRun>, Error> {
+        let Some(feedback) = &self.feedback else {
+            return Ok(None);
+        };
+        let mut run = LoopRun {
+            output: Vec::with_capacity(self.records.len()),
+            command: Vec::with_capacity(self.records.len()),
+        };
+        for (r, record) in self.records.iter().enumerate() {
+            let states = self.plant_states_of(r);
+            let theta = &x[..self.parameter_count()];
+            let at_rest = record.input.values[0];
+            let mut simulator =
+                Simulator::new(&self.structure, theta, &x[states.clone()], at_rest)?;
+            simulator.set_substeps(self.substeps);
+            let mut regulator = feedback
+                .controller
+                .start(&x[states.end..self.states_of(r).end]);
+            let (mut output, mut command) = (Vec::new(), Vec::new());
+            for k in 0..record.len() {
+                let y = simulator.read();
+                let h = step(record, k);
+                let beside = feedback.replays[r].beside[k];
+                let u = regulator.command_beside(reference(record, k), y, beside, h);
+                simulator.advance_held(u, h);
+                output.push(y);
+                command.push(u);
+            }
+            run.output.push(output);
+            run.command.push(command);
+        }
+        Ok(Some(run))
+    }
+
+    /// What is taken for noise, a series for each record: measured minus model or, where the loop is simulated, the
+    /// disturbance at the plant's output that explains it.
+    ///
+    /// # Errors
+    /// As [`Setup::simulate`].
+    pub fn disturbance(&self, x: &[f64]) -> Result<Vec<Vec<f64>>, Error> {
+        let (Some(feedback), Some(run)) = (&self.feedback, self.simulate_loop(x)?) else {
+            return self.residuals(x);
+        };
+        let mut inverse = feedback.inverse(1);
+        let series = self
+            .records
+            .iter()
+            .zip(run.output)
+            .zip(feedback.replays.iter());
+        Ok(series
+            .map(|((record, model), replay)| {
+                inverse.reset();
+                let samples = record.output.values.iter().zip(model).zip(&replay.limited);
+                samples
+                    .map(|((y, model), limited)| {
+                        let mut row = [y - model];
+                        inverse.push(&mut row, *limited);
+                        row[0]
+                    })
+                    .collect()
+            })
+            .collect())
+    }
+
+    /// Measured minus model, both on the measured command, a series for each record.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
@@ -422,8 +595,11 @@ impl<'a> Setup<'a> {
             0..=4 => self.each_row_in_lanes::<4>(x, each),
             5..=6 => self.each_row_in_lanes::<6>(x, each),
             7..=8 => self.each_row_in_lanes::<8>(x, each),
-            9..=12 => self.each_row_in_lanes::<12>(x, each),
-            _ => self.each_row_in_lanes::<16>(x, each),
+            9..=10 => self.each_row_in_lanes::<10>(x, each),
+            11..=12 => self.each_row_in_lanes::<12>(x, each),
+            // One lane more, and a compiler copies a dual by a call instead of in registers.
+            13..=15 => self.each_row_in_lanes::<15>(x, each),
+            _ => self.each_row_in_lanes::<8>(x, each),
         }
     }
 
@@ -435,8 +611,16 @@ impl<'a> Setup<'a> {
         let columns = self.free.len() + 1;
         let mut row = vec![0.0; columns];
         let count = self.parameter_count();
+        let mut inverse: Option<Inverse> = self
+            .feedback
+            .as_ref()
+            .map(|feedback| feedback.inverse(columns));
         for (r, record) in self.records.iter().enumerate() {
             let own = self.states_of(r);
+            let plant = self.plant_states_of(r);
+            if let Some(inverse) = &mut inverse {
+                inverse.reset();
+            }
             // Columns of this record: the free parameters and its own initial levels, in lanes of one simulator or,
             // where they are too many, of several that run side by side.
             let lanes: Vec<usize> = (0..self.free.len())
@@ -452,28 +636,44 @@ impl<'a> Setup<'a> {
                     Dual::<L>::variable(x[i], lane)
                 };
                 let theta: Vec<_> = (0..count).map(dual).collect();
-                let levels: Vec<_> = own.clone().map(dual).collect();
+                let levels: Vec<_> = plant.clone().map(dual).collect();
                 let mut simulator =
                     Simulator::new(&self.structure, &theta, &levels, record.input.values[0])
                         .ok()?;
                 simulator.set_substeps(self.substeps);
-                simulators.push(simulator);
+                let regulator = self.feedback.as_ref().map(|feedback| {
+                    let states: Vec<_> = (plant.end..own.end).map(dual).collect();
+                    feedback.controller.start(&states)
+                });
+                simulators.push((simulator, regulator));
             }
             let n = record.len();
             for k in 0..n {
                 row.fill(0.0);
                 let mut model = f64::NAN;
-                for (simulator, chunk) in simulators.iter_mut().zip(lanes.chunks(L)) {
+                for ((simulator, regulator), chunk) in simulators.iter_mut().zip(lanes.chunks(L)) {
                     let y = simulator.read();
                     model = y.re;
                     for (lane, &column) in chunk.iter().enumerate() {
                         row[column] = y.eps[lane];
                     }
-                    if k + 1 < n {
-                        simulator.advance(command(record, k), record.time[k + 1] - record.time[k]);
+                    if k + 1 == n {
+                        continue;
+                    }
+                    let h = record.time[k + 1] - record.time[k];
+                    match (regulator, &self.feedback) {
+                        (Some(regulator), Some(feedback)) => {
+                            let beside = feedback.replays[r].beside[k];
+                            let u = regulator.command_beside(reference(record, k), y, beside, h);
+                            simulator.advance_held(u, h);
+                        }
+                        _ => simulator.advance(command(record, k), h),
                     }
                 }
                 row[columns - 1] = record.output.values[k] - model;
+                if let (Some(inverse), Some(feedback)) = (&mut inverse, &self.feedback) {
+                    inverse.push(&mut row, feedback.replays[r].limited[k]);
+                }
                 if !row.iter().all(|value| value.is_finite()) {
                     return None;
                 }
@@ -568,4 +768,9 @@ fn command(record: &Record, k: usize) -> Command {
         Hold::Zero => Command::held(u[k]),
         Hold::First => Command::ramp(u[k], u[k + 1]),
     }
+}
+
+/// The set point at sample `k`; not a number where the record has none.
+fn reference(record: &Record, k: usize) -> f64 {
+    record.reference.as_ref().map_or(f64::NAN, |r| r.values[k])
 }

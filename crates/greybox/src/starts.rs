@@ -45,16 +45,20 @@ fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
     } else {
         y
     };
-    let drive = if u.abs() > 1e-12 {
-        u
-    } else {
-        scales.input_range.max(1e-12)
+    // A mean of next to nothing says nothing.
+    let largest = scales.input.0.abs().max(scales.input.1.abs());
+    let driven = u.abs() > 1e-6 * largest;
+    let drive = match (driven, largest > 0.0) {
+        (true, _) => u,
+        (false, true) => largest,
+        (false, false) => 1.0,
     };
     // The static gain's sign and rough size, from the correlation of command and level.
     let slope = {
         let (variance, covariance) = (uu / count - u * u, uy / count - u * y);
         let (low, high) = scales.level[structure.plant.vessels() - 1];
-        let size = (high - low) / (scales.input.1 - scales.input.0).max(1e-12);
+        let span = scales.input.1 - scales.input.0;
+        let size = if span > 0.0 { (high - low) / span } else { 0.0 };
         if variance > 0.0 && covariance < 0.0 {
             -size
         } else {
@@ -75,24 +79,22 @@ fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
         }
         Plant::SingleTankLinear => vec![slope, tau[1], y - slope * u],
         Plant::CascadedTanksLinear => vec![slope, tau[0], tau[1], y - slope * u],
-        Plant::FirstOrder => vec![if u.abs() > 1e-12 { y / u } else { slope }, tau[1]],
+        Plant::FirstOrder => vec![if driven { y / u } else { slope }, tau[1]],
     };
-    for &placed in structure.effects() {
-        x.extend(
-            structure
-                .effect_parameters(placed)
-                .iter()
-                .map(|p| p.starts.first().copied().unwrap_or(p.lower)),
-        );
-    }
+    let added = structure.parameters().split_off(x.len());
+    x.extend(
+        added
+            .iter()
+            .map(|p| p.starts.first().copied().unwrap_or(p.lower)),
+    );
     extend_levels(setup, &mut x);
     x
 }
 
 /// Appends initial states: the measured level from the first reading, the upper one and lags at rest under the first
-/// command.
+/// command, the controller's as they give the measured command.
 pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
-    for record in setup.records {
+    for (r, record) in setup.records.iter().enumerate() {
         let (u0, y0) = (record.input.values[0], record.output.values[0]);
         match setup.structure.plant {
             Plant::CascadedTanks => x.push((x[0] * u0 / x[1]).powi(2)),
@@ -101,6 +103,7 @@ pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
         }
         x.push(y0);
         x.extend(setup.structure.lags().iter().map(|_| 0.0));
+        x.extend(setup.controller_states(r));
     }
 }
 

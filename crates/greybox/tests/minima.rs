@@ -77,6 +77,12 @@ fn starts_reach_both_basins_and_the_best_is_named() {
             .count();
         assert_eq!(together.agree, agree);
         assert_eq!(agree, right);
+        // In two rounds, either before the other: every start counts once.
+        for (first, second) in [starts.split_at(3), starts.split_at(8)] {
+            let round = |starts: &[Vec<f64>]| fit_from(&setup, starts, &white, stopping).unwrap();
+            let both = round(first).or_better(round(second));
+            assert_eq!((both.cost, both.starts, both.agree), (best, 12, agree));
+        }
     }
     assert!(
         upper_first > 30 && lower_first > 30,

@@ -5,7 +5,7 @@ mod support;
 
 use approx::assert_relative_eq;
 use ct_signals::ArModel;
-use greybox::{fit_from, sandwich_std_errors};
+use greybox::{fit_from, robust};
 use nalgebra::DMatrix;
 use support::{PRECISE, Rig};
 
@@ -44,29 +44,29 @@ fn agrees_with_dense_algebra_whatever_the_metric() {
         .record(samples as u64)
     });
     let setup = rig.setup(&records);
-    let noise = ArModel::from_coefficients(&[1.2, -0.5, 0.1], 0.07).unwrap();
     for metric in [
         ArModel::white(1.0),
         ArModel::from_coefficients(&[0.6, 0.2], 1.0).unwrap(),
     ] {
         let fit = fit_from(&setup, &[rig.truth(2)], &metric, PRECISE).unwrap();
-        let ours = sandwich_std_errors(&setup, &fit, &noise).unwrap();
+        let ours = robust(&setup, &fit, 3).unwrap();
+        assert!(ours.noise.order() > 0);
         let rows = setup.rows(&fit.x).unwrap();
         let j = DMatrix::from_row_slice(115, rows.columns, &rows.values)
             .columns(0, rows.columns - 1)
             .into_owned();
         let weighted = covariance(&metric, &[70, 45]).try_inverse().unwrap() * &j;
         let bread = (j.transpose() * &weighted).try_inverse().unwrap();
-        let filling = weighted.transpose() * covariance(&noise, &[70, 45]) * &weighted;
-        let dense = &bread * filling * &bread * 0.07_f64.powi(2);
-        for (i, ours) in ours.iter().enumerate() {
+        let filling = weighted.transpose() * covariance(&ours.noise, &[70, 45]) * &weighted;
+        let dense = &bread * filling * &bread * ours.noise.sigma().powi(2);
+        for (i, ours) in ours.std_errors.iter().enumerate() {
             assert_relative_eq!(ours.unwrap(), dense[(i, i)].sqrt(), max_relative = 1e-7);
         }
-        // In its own metric it is the ordinary standard error.
-        let own = ArModel::from_coefficients(metric.coefficients(), fit.variance().sqrt()).unwrap();
-        let same = sandwich_std_errors(&setup, &fit, &own).unwrap();
-        for (a, b) in same.iter().zip(fit.std_errors()) {
-            assert_relative_eq!(a.unwrap(), b.unwrap(), max_relative = 1e-9);
-        }
+    }
+    // In its own metric it is the ordinary standard error.
+    let fit = fit_from(&setup, &[rig.truth(2)], &ArModel::white(1.0), PRECISE).unwrap();
+    let same = robust(&setup, &fit, 0).unwrap().std_errors;
+    for (a, b) in same.iter().zip(fit.std_errors()) {
+        assert_relative_eq!(a.unwrap(), b.unwrap(), max_relative = 1e-9);
     }
 }

@@ -1,8 +1,9 @@
 //! The fitted plant linearised: its slowest time constant, and whether the loop that the model file describes can have
 //! produced the record: an unstable one cannot.
 
+use greybox::LinearPlant;
 use nalgebra::DMatrix;
-use plants::{Command, Dual, MAX_VESSELS, Scalar, Simulator, controller::Pi};
+use plants::controller::Controller;
 
 use crate::{Error, search::Node};
 
@@ -11,38 +12,31 @@ const GROWTH: f64 = 1.0;
 
 /// Refuses a controller that makes the fitted plant unstable at its operating point.
 ///
-/// The sampled loop is linearised: levels over one sampling interval by duals, the command's effect by a central
-/// difference, the integral exactly. What an effect adds as memory (dead time, lags) is left out.
-pub(crate) fn check_stable(node: &Node, controller: &Pi) -> Result<(), Error> {
+/// The sampled loop is linearised; what an effect adds as memory (dead time, lags) is left out.
+pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), Error> {
     let setup = &node.setup;
-    let structure = &setup.structure;
-    let n = structure.plant.vessels();
-    let h = structure.scales.sample_interval;
-    let theta = &node.fit.x[..setup.parameter_count()];
-    let level = &structure.scales.operating_level[..n];
-    let command = mean_command(node);
-    let own = transition(node)?;
-    let after = |u: f64| -> Result<[f64; MAX_VESSELS], Error> {
-        let mut simulator = Simulator::new(structure, theta, level, u)?;
-        simulator.advance(Command::held(u), h);
-        Ok(simulator.levels())
-    };
-    let step = 1e-4 * structure.scales.input_range.max(1e-9);
-    let (more, less) = (after(command + step)?, after(command - step)?);
-
-    // Levels, then the integral of the control error.
-    let (gain, integral_time) = (controller.gain(), controller.integral_time());
-    let mut a = DMatrix::<f64>::zeros(n + 1, n + 1);
+    let plant = linearised(node)?;
+    let own = controller.linear(setup.structure.scales.sample_interval, false);
+    let (n, m) = (plant.b.len(), own.b.len());
+    // Levels x, then the controller's states z: e = -x_last, u = c z + d e.
+    let mut a = DMatrix::<f64>::zeros(n + m, n + m);
     for i in 0..n {
-        let by_command = (more[i] - less[i]) / (2.0 * step);
         for j in 0..n {
-            a[(i, j)] = own[(i, j)];
+            a[(i, j)] = plant.a[i][j];
         }
-        a[(i, n - 1)] -= by_command * gain;
-        a[(i, n)] = by_command * gain / integral_time;
+        a[(i, n - 1)] -= plant.b[i] * own.d;
+        for j in 0..m {
+            a[(i, n + j)] = plant.b[i] * own.c[j];
+        }
     }
-    a[(n, n - 1)] = -h;
-    a[(n, n)] = 1.0;
+    for i in 0..m {
+        // What stands for an operating point is a constant, and no part of the loop.
+        let constant = own.b[i] == 0.0 && (0..m).all(|j| own.a[i][j] == f64::from(i == j));
+        for j in 0..m {
+            a[(n + i, n + j)] = if constant { 0.0 } else { own.a[i][j] };
+        }
+        a[(n + i, n - 1)] = -own.b[i];
+    }
     let radius = radius(&a);
     let samples = setup
         .records
@@ -52,8 +46,7 @@ pub(crate) fn check_stable(node: &Node, controller: &Pi) -> Result<(), Error> {
         .unwrap_or(0);
     if radius.ln() * samples as f64 > GROWTH {
         return Err(Error::UnstableLoop {
-            gain,
-            integral_time,
+            controller: controller.describe(),
             radius,
         });
     }
@@ -64,7 +57,8 @@ pub(crate) fn check_stable(node: &Node, controller: &Pi) -> Result<(), Error> {
 ///
 /// What an effect adds as memory is left out.
 pub(crate) fn slowest_time_constant(node: &Node) -> Result<f64, Error> {
-    let decay = -radius(&transition(node)?).ln();
+    let a = linearised(node)?.a;
+    let decay = -radius(&DMatrix::from_fn(a.len(), a.len(), |i, j| a[i][j])).ln();
     let interval = node.setup.structure.scales.sample_interval;
     Ok(if decay > 0.0 {
         interval / decay
@@ -73,24 +67,11 @@ pub(crate) fn slowest_time_constant(node: &Node) -> Result<f64, Error> {
     })
 }
 
-/// What the levels at one sample do to those at the next, at the operating point.
-fn transition(node: &Node) -> Result<DMatrix<f64>, Error> {
+/// The plant at its operating point.
+fn linearised(node: &Node) -> Result<LinearPlant, Error> {
+    let theta = &node.fit.x[..node.setup.parameter_count()];
     let structure = &node.setup.structure;
-    let n = structure.plant.vessels();
-    let theta: Vec<_> = node.fit.x[..node.setup.parameter_count()]
-        .iter()
-        .map(|value| Dual::<MAX_VESSELS>::constant(*value))
-        .collect();
-    let level: Vec<_> = structure.scales.operating_level[..n]
-        .iter()
-        .enumerate()
-        .map(|(i, value)| Dual::variable(*value, i))
-        .collect();
-    let command = mean_command(node);
-    let mut simulator = Simulator::new(structure, &theta, &level, command)?;
-    simulator.advance(Command::held(command), structure.scales.sample_interval);
-    let next = simulator.levels();
-    Ok(DMatrix::from_fn(n, n, |i, j| next[i].eps[j]))
+    Ok(LinearPlant::at(structure, theta, mean_command(node))?)
 }
 
 fn mean_command(node: &Node) -> f64 {

@@ -1,7 +1,10 @@
 //! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
 //! printed or plotted is derived from them.
 
+use ct_signals::ArModel;
 use serde::Serialize;
+
+use crate::Unknown;
 
 /// What the search found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -11,7 +14,7 @@ pub enum Verdict {
     Effect,
     /// Something is missing, and at least one added effect has a stand-in that fits as well.
     Undecided,
-    /// Something is missing, and nothing in the catalogue explains it.
+    /// What the model leaves is not noise, and nothing in the catalogue explains it.
     Unexplained,
     /// Nothing is missing that these data would show.
     Adequate,
@@ -50,6 +53,9 @@ pub struct ResidualTests {
 /// The residual in one bin of something: a time window, a range of level, of flow, ...
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bin {
+    /// Position of the record that a window lies in, fitted ones first; `None` where all fitted records are counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub record: Option<usize>,
     /// Lower edge.
     pub from: f64,
     /// Upper edge.
@@ -60,14 +66,14 @@ pub struct Bin {
     pub mean: f64,
     /// Root mean square of the residual, in the output's unit.
     pub rms: f64,
-    /// It fails: its mean square is clearly above that of the whole record's noise.
+    /// It fails: its mean square is clearly above what the noise would show there.
     pub fails: bool,
 }
 
-/// Where a model fails, in the first record it was fitted to.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Where a model fails, in all records that it was fitted to.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Failures {
-    /// By time \[s\].
+    /// By time \[s\], record by record.
     pub by_time: Vec<Bin>,
     /// By the model's level, in the output's unit.
     pub by_level: Vec<Bin>,
@@ -142,6 +148,16 @@ pub struct NoiseFloor {
 }
 
 impl NoiseFloor {
+    /// The noise that a residual is judged against: that of the floor's level and, where that is the noise's own, of its
+    /// colour.
+    pub(crate) fn model(&self) -> Result<ArModel, ct_signals::Error> {
+        if self.level > self.innovation {
+            ArModel::from_coefficients(&self.coefficients, self.innovation)
+        } else {
+            Ok(ArModel::white(self.level))
+        }
+    }
+
     /// The floor where the residual is not noise alone: what a model lacks is in the residual too, but hardly in what
     /// cannot be predicted from the residual's own past.
     pub(crate) fn of_what_is_new(self) -> Self {
@@ -150,6 +166,37 @@ impl NoiseFloor {
             source: format!("what the past of {} does not predict", self.source),
             ..self
         }
+    }
+}
+
+/// The loop that the records come from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ControlLoop {
+    /// The loop was simulated from its reference; otherwise the model ran on the measured command.
+    pub simulated: bool,
+    /// p-value of the test that the noise does not show in the command; `None` where a controller is known.
+    pub feedback_p: Option<f64>,
+    /// Measured command less the one that the controller gives on the measured reading, root mean square, in the input's
+    /// unit; `None` where that was not looked at.
+    pub mismatch: Option<f64>,
+    /// What the user should know of it, in words.
+    pub said: Vec<String>,
+}
+
+impl ControlLoop {
+    /// A loop whose model ran on the measured command, and what that means.
+    pub(crate) fn measured(feedback_p: Option<f64>, mismatch: Option<f64>, said: String) -> Self {
+        Self {
+            simulated: false,
+            feedback_p,
+            mismatch,
+            said: vec![said],
+        }
+    }
+
+    /// Standard errors have to allow for what feedback does.
+    pub(crate) fn widens(known: Option<&Self>) -> bool {
+        known.is_some_and(|known| !known.simulated)
     }
 }
 
@@ -189,11 +236,15 @@ pub struct Diagnosis {
     pub noise: NoiseFloor,
     /// The scores of the single effects at the first step, best first.
     pub scores: Vec<Score>,
+    /// What is missing where the catalogue does not explain it.
+    pub unknown: Option<Unknown>,
+    /// The loop that the records come from, where there is one.
+    pub control_loop: Option<ControlLoop>,
     /// The findings in words.
     pub sentences: Vec<String>,
     /// The plant, as the model file names it.
     pub plant: String,
-    /// The effects that the model file already had.
+    /// The effects and the terms that the model file already had.
     pub known_effects: Vec<String>,
     /// Unit of the input.
     pub input_unit: String,
@@ -204,4 +255,14 @@ pub struct Diagnosis {
     pub records: Vec<Shown>,
     /// How long it took \[s\].
     pub seconds: f64,
+}
+
+impl Diagnosis {
+    /// Adds what is known of the loop, and what there is to say of it.
+    pub(crate) fn speak_of_the_loop(&mut self, known: Option<ControlLoop>) {
+        if let Some(known) = &known {
+            self.sentences.extend_from_slice(&known.said);
+        }
+        self.control_loop = known;
+    }
 }

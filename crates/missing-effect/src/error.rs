@@ -15,14 +15,12 @@ pub enum Error {
     Fit(#[from] greybox::Error),
     /// The controller and the fitted plant do not make a stable loop.
     #[error(
-        "controller: the loop of gain = {gain}, integral_time = {integral_time} s and the fitted plant is unstable (an oscillation or drift grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",
+        "controller: the loop of {controller} and the fitted plant is unstable (an oscillation or drift grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",
         growth(*radius)
     )]
     UnstableLoop {
-        /// Proportional gain \[input/output\].
-        gain: f64,
-        /// Integral time \[s\].
-        integral_time: f64,
+        /// Its settings, as [`plants::controller::Controller::describe`] writes them.
+        controller: String,
         /// Largest magnitude of the sampled loop's eigenvalues.
         radius: f64,
     },

@@ -4,6 +4,7 @@
 //! of effects that explain the failure, confirms each of them, groups what the data cannot tell apart, and returns
 //! the trail of the falling error.
 
+mod closed_loop;
 mod confirm;
 mod control_loop;
 mod diagnose;
@@ -11,6 +12,7 @@ mod diagnosis;
 mod error;
 mod locate;
 mod noise_floor;
+pub mod numbers;
 mod problem;
 mod remains;
 mod scores;
@@ -18,10 +20,13 @@ mod search;
 mod sentences;
 mod step;
 mod trail;
+mod unknown;
 
 pub use diagnose::{compare, diagnose};
 pub use diagnosis::{
-    Bin, Diagnosis, Failures, NoiseFloor, Parameter, ResidualTests, Score, Shown, Step, Verdict,
+    Bin, ControlLoop, Diagnosis, Failures, NoiseFloor, Parameter, ResidualTests, Score, Shown,
+    Step, Verdict,
 };
 pub use error::Error;
 pub use problem::{Options, Problem, Progress};
+pub use unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window};

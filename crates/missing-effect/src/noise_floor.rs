@@ -15,7 +15,7 @@ pub(crate) fn colour(node: &Node) -> Result<ArModel, Error> {
 
 /// The autoregressive model of a node's residual as it is, without what the fit has taken from the noise.
 pub(crate) fn residual_colour(node: &Node) -> Result<ArModel, Error> {
-    let residuals = node.setup.residuals(&node.fit.x)?;
+    let residuals = node.setup.disturbance(&node.fit.x)?;
     let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
     Ok(ArModel::fit(&segments, NOISE_ORDER)?)
 }

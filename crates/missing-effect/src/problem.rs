@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, fit_from, random_starts};
-use plants::{Known, Placed, Plant, controller::Pi};
+use plants::{Known, Placed, Plant, Term, controller::Controller};
 
-use crate::{Error, control_loop::check_stable, search::Node};
+use crate::{ControlLoop, Error, closed_loop::enclose, search::Node};
 
 /// What the fit of a believed model is taken to.
 pub(crate) const STOPPING: Stopping = Stopping {
@@ -23,6 +23,8 @@ pub struct Problem {
     pub known: Known,
     /// The effects that are on already.
     pub effects: Vec<Placed>,
+    /// Terms of the user's own that are on already; a fit changes their scale.
+    pub terms: Vec<Term>,
     /// First guesses, by name: `alpha`, `overflow.rim`.
     pub start: BTreeMap<String, f64>,
     /// Names in `start` that are not fitted.
@@ -30,7 +32,7 @@ pub struct Problem {
     /// The records that are fitted together.
     pub records: Vec<Record>,
     /// The controller of the loop, where there is one: it must make the fitted plant stable.
-    pub controller: Option<Pi>,
+    pub controller: Option<Controller>,
     /// Records that take no part in any fit or choice and are only scored.
     pub test: Vec<Record>,
 }
@@ -44,6 +46,9 @@ pub struct Options {
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
+    /// Where a controller is known and the records hold its reference: the loop is simulated; otherwise the model runs on
+    /// the measured command.
+    pub simulate_loop: bool,
 }
 
 impl Default for Options {
@@ -52,6 +57,7 @@ impl Default for Options {
             max_effects: 6,
             starts: 12,
             seed: 1,
+            simulate_loop: true,
         }
     }
 }
@@ -67,20 +73,31 @@ pub struct Progress {
     pub total: usize,
 }
 
-/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried.
-pub(crate) fn base<'a>(problem: &'a Problem, options: &Options) -> Result<Node<'a>, Error> {
+/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried. In a
+/// loop that is known it is then fitted there.
+pub(crate) fn base<'a>(
+    problem: &'a Problem,
+    options: &Options,
+) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
     let fixed: BTreeMap<String, f64> = problem
         .fixed
         .iter()
         .filter_map(|name| problem.start.get(name).map(|value| (name.clone(), *value)))
         .collect();
-    let mut setup = Setup::from_records(
+    let without = Setup::from_records(
         problem.plant,
         problem.known.clone(),
         &problem.effects,
         &problem.records,
-        fixed,
+        BTreeMap::new(),
     )?;
+    let structure = problem
+        .terms
+        .iter()
+        .try_fold(without.structure, |structure, term| {
+            structure.with_term(term.clone())
+        })?;
+    let mut setup = Setup::new(structure, &problem.records, fixed)?;
     for record in &problem.records {
         record.require_rows(setup.free().len())?;
     }
@@ -111,8 +128,5 @@ pub(crate) fn base<'a>(problem: &'a Problem, options: &Options) -> Result<Node<'
         fit,
         added: Vec::new(),
     };
-    if let Some(controller) = &problem.controller {
-        check_stable(&node, controller)?;
-    }
-    Ok(node)
+    enclose(problem, options, node)
 }

@@ -52,21 +52,47 @@ pub(crate) enum Remains {
     Slow(f64, f64),
 }
 
-/// What the residual of a model holds that is not noise; `own` is its fit with the colour of its own residual.
-pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Remains>, Error> {
-    if least_p(node, of_command)? < NOT_NOISE {
-        return Ok(Some(Remains::Input));
+/// What a residual shows that noise does not, and in which of the fitted records, where it is one of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Left {
+    pub what: Remains,
+    pub record: Option<usize>,
+}
+
+impl Left {
+    /// The size of the noise above which there is something to explain. A wander is a noise too, in whose metric effects
+    /// are confirmed as in any other; what else remains is in the noise model by mistake, but hardly in what it cannot
+    /// predict.
+    pub(crate) fn above(&self, noise: &ArModel) -> f64 {
+        match self.what {
+            Remains::Slow(..) => noise.stationary_std(),
+            _ => noise.sigma(),
+        }
     }
-    let residuals = node.setup.residuals(&own.x)?;
+}
+
+/// What the residual of a model holds that is not noise; `own` is its fit with the colour of its own residual.
+pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
+    let (p, record) = least_p(node, of_command)?;
+    if p < NOT_NOISE {
+        return Ok(Some(Left {
+            what: Remains::Input,
+            record,
+        }));
+    }
+    let residuals = node.setup.disturbance(&own.x)?;
     let records = node.setup.records;
     let level = NOT_NOISE / records.len() as f64;
-    for (record, residual) in records.iter().zip(&residuals) {
-        if let Some(found) = period(record, residual, level)? {
-            return Ok(Some(found));
-        }
-        let white = standardised(&own.noise, residual);
-        if let Some(found) = instant(record, &white, level) {
-            return Ok(Some(found));
+    for (k, (record, residual)) in records.iter().zip(&residuals).enumerate() {
+        let found = match period(record, residual, level)? {
+            None => instant(record, &standardised(&own.noise, residual), level),
+            found => found,
+        };
+        if let Some(what) = found {
+            return Ok(Some(Left {
+                what,
+                record: Some(k),
+            }));
         }
     }
     if own.noise.order() == 0 {
@@ -77,28 +103,43 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Remains>, Error> 
         0.5 * interval * slowness(&own.noise),
         slowest_time_constant(node)?,
     );
-    Ok((wander > process).then_some(Remains::Slow(wander, process)))
+    Ok((wander > process).then_some(Left {
+        what: Remains::Slow(wander, process),
+        record: None,
+    }))
 }
 
 /// p-value of the test that the command itself does not show in a node's residual; of several records the smallest,
 /// corrected for having taken it.
 pub(crate) fn input_p(node: &Node) -> Result<f64, Error> {
-    least_p(node, |u| vec![u.to_vec()])
+    Ok(least_p(node, |u| vec![u.to_vec()])?.0)
 }
 
-/// The same for all signals that are made of a record's command.
-fn least_p(node: &Node, signals: impl Fn(&[f64]) -> Vec<Vec<f64>>) -> Result<f64, Error> {
-    let residuals = node.setup.residuals(&node.fit.x)?;
-    let (mut least, mut count) = (1.0_f64, 0.0);
-    for (record, residual) in node.setup.records.iter().zip(&residuals) {
+/// The same for all signals that are made of a record's command, and the record that shows it most.
+fn least_p(
+    node: &Node,
+    signals: impl Fn(&[f64]) -> Vec<Vec<f64>>,
+) -> Result<(f64, Option<usize>), Error> {
+    let residuals = node.setup.disturbance(&node.fit.x)?;
+    // In a loop the command holds the noise that came back; what moves it from outside is the reference.
+    let in_loop = !node.setup.replays().is_empty();
+    let (mut least, mut at, mut count) = (1.0, None, 0.0);
+    for (k, (record, residual)) in node.setup.records.iter().zip(&residuals).enumerate() {
         let lags = (record.len() / 10).clamp(2, 25);
-        for signal in signals(&record.input.values) {
+        let from_outside = record
+            .reference
+            .as_ref()
+            .filter(|_| in_loop)
+            .unwrap_or(&record.input);
+        for signal in signals(&from_outside.values) {
             let (_, p) = prewhitened_input_test(&signal, residual, lags)?;
-            least = least.min(p);
+            if p < least {
+                (least, at) = (p, Some(k));
+            }
             count += 1.0;
         }
     }
-    Ok((least * count).min(1.0))
+    Ok(((least * count).min(1.0), at))
 }
 
 /// The command, its square about the mean, and the size of its moves.

@@ -27,24 +27,22 @@ impl Node<'_> {
 
     /// The size of every added effect lies inside its plausible range, neither absent nor at the far end.
     pub fn plausible(&self) -> bool {
-        self.added.iter().all(|placed| {
-            let Some(leading) = self
-                .setup
-                .structure
-                .effect_parameters(*placed)
-                .into_iter()
-                .next()
-            else {
-                return true;
-            };
-            let name = format!("{}.{}", placed.effect.id, leading.name);
-            let Some(at) = self.setup.names().iter().position(|known| *known == name) else {
-                return true;
-            };
-            let room = 1e-6 * (leading.upper - leading.lower);
-            let size = self.fit.x[at];
-            size > leading.lower + room && size < leading.upper - room
-        })
+        !self.added.iter().any(|placed| self.at_the_edge(*placed))
+    }
+
+    /// The size of an added effect is absent or at the far end of its plausible range.
+    pub fn at_the_edge(&self, placed: Placed) -> bool {
+        let parameters = self.setup.structure.effect_parameters(placed);
+        let Some(leading) = parameters.first() else {
+            return false;
+        };
+        let name = format!("{}.{}", placed.effect.id, leading.name);
+        let Some(at) = self.setup.names().iter().position(|known| *known == name) else {
+            return false;
+        };
+        let room = 1e-6 * (leading.upper - leading.lower);
+        let size = self.fit.x[at];
+        size <= leading.lower + room || size >= leading.upper - room
     }
 }
 
@@ -79,7 +77,7 @@ const QUICK: Stopping = Stopping {
     cost: 1e-3,
 };
 /// What a fit is taken to once its structure has a name.
-const FINE: Stopping = Stopping {
+pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
@@ -90,9 +88,9 @@ const FOLLOWED: usize = 2;
 
 /// A rough fit this near in the criterion may come within a group's margin.
 const NEAR: f64 = 25.0;
-/// Effects of a set that follow the clock alone. One plant may well have two; three drifts, swings and steps are a series that
-/// fits any course of time, whatever made it.
-const BY_CLOCK: usize = 2;
+/// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
+/// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
+const BY_CLOCK: usize = 1;
 /// Sets are one where what they explain differs by less than this part of it.
 const SAME_TAKEN: f64 = 0.15;
 /// Stand-ins that are refitted for each effect, the most promising first.

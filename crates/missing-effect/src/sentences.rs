@@ -1,44 +1,33 @@
 //! The findings in words.
 
-use crate::{Diagnosis, Parameter, Step, Verdict, remains::Remains};
+use crate::{
+    Diagnosis, Parameter, Step, Unknown, Verdict,
+    numbers::{significant, value_and_error},
+    remains::{Left, Remains},
+    search::Node,
+};
 
 /// A value with its standard error to two significant digits of the latter.
 pub(crate) fn with_error(parameter: &Parameter) -> String {
-    let unit = if parameter.unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {}", parameter.unit)
-    };
-    match parameter.std_error {
-        Some(error) if error > 0.0 && error.is_finite() => {
-            let digits = (1 - error.log10().floor() as i32).clamp(0, 12) as usize;
-            format!("{:.digits$} ± {:.digits$}{unit}", parameter.value, error)
-        }
-        _ => format!(
-            "{:.4}{unit}, at the edge of what is plausible or of what the data determine",
-            parameter.value
-        ),
-    }
+    let (value, error) = value_and_error(parameter.value, parameter.std_error);
+    let error = error.map_or(String::new(), |error| format!(" ± {error}"));
+    with_unit(&format!("{value}{error}"), &parameter.unit)
 }
 
-fn list(names: &[String]) -> String {
+fn with_unit(number: &str, unit: &str) -> String {
+    format!("{number} {unit}").trim_end().to_string()
+}
+
+fn list(names: &[String], last_word: &str) -> String {
     match names {
         [] => String::new(),
         [one] => one.clone(),
-        [most @ .., last] => format!("{} or {last}", most.join(", ")),
+        [most @ .., last] => format!("{} {last_word} {last}", most.join(", ")),
     }
 }
 
-/// A number to two significant digits, without an exponent.
-fn two_digits(value: f64) -> String {
-    let exponent = value.abs().max(f64::MIN_POSITIVE).log10().floor();
-    let step = 10_f64.powf(exponent - 1.0);
-    let digits = (1.0 - exponent).clamp(0.0, 12.0) as usize;
-    format!("{:.digits$}", (value / step).round() * step)
-}
-
 /// What is left in the residual of a step, as the end of a sentence.
-fn left_over(remains: Remains, step: &Step, diagnosis: &Diagnosis) -> String {
+fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
     // A comparison has not looked into the catalogue.
     let effect = if diagnosis.scores.is_empty() {
         "an effect that the model lacks"
@@ -51,14 +40,28 @@ fn left_over(remains: Remains, step: &Step, diagnosis: &Diagnosis) -> String {
         .iter()
         .filter_map(|record| Some(record.time.last()? - record.time.first()?))
         .fold(0.0, f64::max);
-    match remains {
-        Remains::Input => format!("the input still shows in the residual of {rmse:.3} {unit} rms"),
+    let several = diagnosis
+        .records
+        .iter()
+        .filter(|record| !record.held_out)
+        .count()
+        > 1;
+    let name = left
+        .record
+        .filter(|_| several)
+        .and_then(|k| diagnosis.records.get(k));
+    let residual = format!(
+        "the residual of {rmse:.3} {unit} rms{}",
+        name.map_or(String::new(), |record| format!(" (in {})", record.name))
+    );
+    match left.what {
+        Remains::Input => format!("the input still shows in {residual}"),
         Remains::Period(period) => format!(
-            "the residual of {rmse:.3} {unit} rms swings with a period of about {} s, which noise does not: it may be a disturbance or {effect}",
-            two_digits(period)
+            "{residual} swings with a period of about {} s, which noise does not: it may be a disturbance or {effect}",
+            significant(period, 2)
         ),
         Remains::Instant(at, length) => format!(
-            "the residual of {rmse:.3} {unit} rms holds something sudden, {} s, which noise does not: it may be a disturbance, a fault of the sensor or {effect}",
+            "{residual} holds something sudden, {} s, which noise does not: it may be a disturbance, a fault of the sensor or {effect}",
             if length > 0.0 {
                 format!("from {at:.0} to {:.0}", at + length)
             } else {
@@ -66,24 +69,24 @@ fn left_over(remains: Remains, step: &Step, diagnosis: &Diagnosis) -> String {
             }
         ),
         Remains::Slow(wander, process) => format!(
-            "the residual of {rmse:.3} {unit} rms wanders more slowly than the process: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or {effect}",
+            "{residual} wanders more slowly than the process: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or {effect}",
             if wander < record {
-                format!("{} s", two_digits(wander))
+                format!("{} s", significant(wander, 2))
             } else {
                 "longer than the record".to_string()
             },
-            two_digits(process)
+            significant(process, 2)
         ),
     }
 }
 
 /// What a comparison alone can say.
-pub(crate) fn of_comparison(diagnosis: &Diagnosis, remains: Option<Remains>) -> Vec<String> {
+pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<String> {
     let Some(step) = diagnosis.steps.first() else {
         return Vec::new();
     };
     let unit = &diagnosis.output_unit;
-    vec![match (diagnosis.verdict, remains) {
+    vec![match (diagnosis.verdict, left) {
         (Verdict::Adequate, _) => format!(
             "The model explains the data: its simulation error of {:.3} {unit} rms looks like noise.",
             step.rmse
@@ -92,9 +95,9 @@ pub(crate) fn of_comparison(diagnosis: &Diagnosis, remains: Option<Remains>) -> 
             "The model does not explain the data: its simulation error of {:.3} {unit} rms holds more than noise.",
             step.rmse
         ),
-        (_, Some(remains)) => format!(
+        (_, Some(left)) => format!(
             "The model does not explain the data: {}.",
-            left_over(remains, step, diagnosis)
+            left_over(left, step, diagnosis)
         ),
     }]
 }
@@ -107,13 +110,72 @@ pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
     )
 }
 
-/// What there is to say, the verdict first.
-pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, remains: Option<Remains>) -> Vec<String> {
+/// The best that the catalogue has where it is not the answer.
+pub(crate) fn of_a_part(last: &Node, unit: &str) -> String {
+    let names: Vec<String> = last
+        .added
+        .iter()
+        .map(|placed| placed.effect.id.to_string())
+        .collect();
+    format!(
+        "The best that the catalogue has is {}, which leaves {:.3} {unit} rms: too much would be left that is not noise, so it is not taken for the answer.",
+        list(&names, "and"),
+        last.fit.rmse
+    )
+}
+
+/// That the minimum of the last model was not found twice.
+pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
+    let step = diagnosis.steps.last()?;
+    (step.starts_agree < 2).then(|| {
+        format!(
+            "Of {} starts {} ended in the minimum that is shown: there may be a better one, and other values of the parameters.",
+            step.starts,
+            if step.starts_agree == 0 { "none" } else { "one alone" }
+        )
+    })
+}
+
+/// What the colour of the noise costs, where it costs something.
+pub(crate) fn of_the_colour(price: f64) -> Option<String> {
+    (price >= 1.2).then(|| format!(
+        "The noise is coloured, and hides what white noise of the same size would show: an effect has to be about {} times larger to be seen. Smaller ones than the sizes under \"visible from\" may be there.",
+        significant(price, 2)
+    ))
+}
+
+/// The sizes from which on the likeliest effects would have been seen.
+fn visible(diagnosis: &Diagnosis) -> String {
+    let sizes: Vec<String> = diagnosis
+        .scores
+        .iter()
+        .filter_map(|score| {
+            let size = score.size.as_ref()?;
+            let smallest = significant(score.smallest_visible?, 2);
+            Some(format!(
+                "{} {}",
+                score.effect,
+                with_unit(&smallest, &size.unit)
+            ))
+        })
+        .take(4)
+        .collect();
+    sizes.join(", ")
+}
+
+/// What there is to say, the verdict first; `at_the_edge` are the added effects whose size ends where their plausible
+/// range does.
+pub(crate) fn of_diagnosis(
+    diagnosis: &Diagnosis,
+    left: Option<Left>,
+    at_the_edge: &[bool],
+) -> Vec<String> {
     let unit = &diagnosis.output_unit;
     let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
         return Vec::new();
     };
     let mut said = Vec::new();
+    let shaped = diagnosis.unknown.as_ref().map(of_unknown);
     let held_out = |step: &Step| {
         step.rmse_test.map_or(String::new(), |e| {
             format!(", {e:.3} {unit} on held-out data")
@@ -126,45 +188,41 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, remains: Option<Remains>) -> V
                 first.rmse,
                 held_out(first)
             ));
-            let visible: Vec<String> = diagnosis
-                .scores
-                .iter()
-                .filter_map(|score| {
-                    let size = score.size.as_ref()?;
-                    Some(
-                        format!(
-                            "{} {:.2} {}",
-                            score.effect, score.smallest_visible?, size.unit
-                        )
-                        .trim_end()
-                        .to_string(),
-                    )
-                })
-                .take(4)
-                .collect();
+            let visible = visible(diagnosis);
             if !visible.is_empty() {
-                said.push(format!(
-                    "These data would have shown {}.",
-                    visible.join(", ")
-                ));
+                said.push(format!("These data would have shown {visible}."));
             }
         }
-        Verdict::Unexplained => said.push(format!(
-            "Something is missing, and nothing in the catalogue explains it: {}.",
-            remains.map_or_else(
-                || format!(
-                    "the residual of {:.3} {unit} rms holds more than noise",
-                    first.rmse
-                ),
-                |remains| left_over(remains, first, diagnosis)
-            )
-        )),
+        Verdict::Unexplained => match left {
+            // A right model under a slow disturbance leaves this too.
+            Some(left) if matches!(left.what, Remains::Slow(..)) => {
+                said.push(format!(
+                    "Nothing in the catalogue is called for, but what is left is not noise: {}.",
+                    left_over(left, first, diagnosis)
+                ));
+                let visible = visible(diagnosis);
+                if !visible.is_empty() {
+                    said.push(format!("It hides what is smaller than {visible}."));
+                }
+            }
+            _ => said.push(format!(
+                "Something is missing, and nothing in the catalogue explains it: {}.",
+                left.map_or_else(
+                    || format!(
+                        "the residual of {:.3} {unit} rms holds more than noise",
+                        first.rmse
+                    ),
+                    |left| left_over(left, first, diagnosis)
+                )
+            )),
+        },
         Verdict::Effect | Verdict::Undecided => {
-            for ((effect, group), step) in diagnosis
+            for (k, ((effect, group), step)) in diagnosis
                 .effects
                 .iter()
                 .zip(&diagnosis.groups)
                 .zip(diagnosis.steps.iter().skip(1))
+                .enumerate()
             {
                 let size = last
                     .parameters
@@ -181,13 +239,18 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, remains: Option<Remains>) -> V
                     .place
                     .as_ref()
                     .map_or(String::new(), |place| format!(" in the {place} tank"));
+                let doubt = if at_the_edge.get(k) == Some(&true) {
+                    " In doubt: its size ends at the edge of what is plausible, so it describes the data rather than explains them."
+                } else {
+                    ""
+                };
                 if group.len() > 1 {
                     said.push(format!(
-                        "It is {}: this data cannot tell them apart; {effect}{place}{size} fits best.",
-                        list(group)
+                        "It is {}: this data cannot tell them apart; {effect}{place}{size} fits best.{doubt}",
+                        list(group, "or")
                     ));
                 } else {
-                    said.push(format!("It is {effect}{place}{size}."));
+                    said.push(format!("It is {effect}{place}{size}.{doubt}"));
                 }
             }
             said.push(format!(
@@ -200,13 +263,105 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, remains: Option<Remains>) -> V
                     _ => String::new(),
                 }
             ));
-            if let Some(remains) = remains {
+            if let Some(left) = left {
                 said.push(format!(
                     "Something remains: {}.",
-                    left_over(remains, last, diagnosis)
+                    left_over(left, last, diagnosis)
                 ));
             }
         }
     }
+    said.extend(shaped);
     said
+}
+
+/// Where what is missing acts, on what it depends, and what it looks like.
+fn of_unknown(unknown: &Unknown) -> String {
+    let place = |name: &str| match name {
+        "actuator" => "at the actuator".to_string(),
+        "sensor" => "at the sensor".to_string(),
+        "vessel" => "in the vessel's balance".to_string(),
+        which => format!("in the balance of the {which} tank"),
+    };
+    let mut said = format!("What is missing acts {}", place(&unknown.place));
+    let others: Vec<String> = unknown
+        .places
+        .iter()
+        .filter(|other| {
+            other.below_best < crate::unknown::SAME_PLACE && other.place != unknown.place
+        })
+        .map(|other| place(&other.place))
+        .collect();
+    if !others.is_empty() && unknown.variable == "time" {
+        said += &format!(
+            " (or {}: the likelihood does not tell)",
+            others.join(" or ")
+        );
+    }
+    if unknown.variable == "time" {
+        said += " and follows no variable of the plant, so that it is a function of time";
+        if let Some(window) = unknown.windows.first() {
+            said += &format!(
+                ": most from {:.0} to {:.0} s, {} {} on average",
+                window.from,
+                window.to,
+                significant(window.mean, 2),
+                unknown.unit
+            );
+        }
+    } else {
+        let variable = match (unknown.variable, unknown.place.as_str()) {
+            ("input", _) => "the command",
+            ("rate", _) => "the net inflow",
+            (_, "sensor") => "the reading",
+            _ => "the level",
+        };
+        said += &format!(" and depends on {variable}");
+        if let Some(share) = unknown.shares.first() {
+            said += &format!(
+                ", which predicts {:.0} ± {:.0} % of it on data that were left out",
+                100.0 * share.share.min(1.0),
+                (100.0 * share.std_error).max(1.0)
+            );
+        }
+        let (low, high) = unknown
+            .ordinates
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(*v), high.max(*v))
+            });
+        said += &format!(
+            "; it ranges over {} {}",
+            significant(high - low, 2),
+            unknown.unit
+        );
+    }
+    match &unknown.primitive {
+        Some(nearest) => {
+            said += &format!("; the nearest simple shape is a {}", nearest.name);
+            if let Some(at) = nearest.at {
+                let (at, unit) = (significant(at, 2), &unknown.variable_unit);
+                said += &match nearest.name {
+                    "swing" => format!(" of a period of {at} {unit}"),
+                    "end of a range" => format!(" below {at} {unit}"),
+                    _ => format!(" at {at} {unit}"),
+                };
+            }
+            if !nearest.effects.is_empty() {
+                said += &format!(
+                    " ({} would leave one)",
+                    list(
+                        &nearest
+                            .effects
+                            .iter()
+                            .map(|e| (*e).to_string())
+                            .collect::<Vec<_>>(),
+                        "or"
+                    )
+                );
+            }
+        }
+        None => said += "; no simple shape comes near",
+    }
+    said + "."
 }

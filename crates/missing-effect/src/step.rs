@@ -1,11 +1,12 @@
 //! From a fitted node to what is reported of it.
 
-use ct_signals::{Record, residual_tests};
+use ct_signals::{ArModel, Record, residual_tests};
 use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
 
 use crate::{
     Error, Parameter, ResidualTests, Step,
-    locate::{Series, locate},
+    closed_loop::widened,
+    locate::{Located, Series, locate},
     noise_floor::NOISE_ORDER,
     remains::input_p,
     search::Node,
@@ -85,8 +86,16 @@ pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -
         .collect()
 }
 
-/// The report of one node; `bic` is its criterion under the colour of its own residual, `floor` the noise's standard deviation.
-pub(crate) fn report(node: &Node, bic: f64, floor: f64, test: &[Record]) -> Result<Step, Error> {
+/// The report of one node; `bic` is its criterion under the colour of its own residual, `judge` the noise
+/// against which its residual is judged; `widen`: the standard errors allow
+/// for the bias of feedback.
+pub(crate) fn report(
+    node: &Node,
+    bic: f64,
+    judge: &ArModel,
+    test: &[Record],
+    widen: bool,
+) -> Result<Step, Error> {
     let Node { setup, fit, added } = node;
     let last = added.last();
     let simulated = setup.simulate(&fit.x)?.output;
@@ -104,16 +113,30 @@ pub(crate) fn report(node: &Node, bic: f64, floor: f64, test: &[Record]) -> Resu
         whiteness_p: residual_tests::ljung_box(residual, portmanteau, 0)?,
         input_p: input_p(node)?,
     };
-    let failures = locate(&Series {
-        time: &record.time,
-        input: &record.input.values,
-        model: &simulated[0],
-        residual,
-        floor,
+    let series: Vec<Series> = setup
+        .records
+        .iter()
+        .zip(&simulated)
+        .zip(&residuals)
+        .map(|((record, model), residual)| Series {
+            name: &record.name,
+            time: &record.time,
+            input: &record.input.values,
+            model,
+            residual,
+        })
+        .collect();
+    let failures = locate(&Located {
+        series: &series,
+        noise: judge,
         output_unit: &record.output.unit,
         input_unit: &record.input.unit,
     });
     let held_out = hold_out(node, test)?;
+    let mut errors = std_errors(node)?;
+    if widen {
+        errors = widened(node, errors)?;
+    }
     let rmse_test = held_out.as_ref().map(|held_out| held_out.rmse);
     let mut series = simulated;
     series.extend(held_out.into_iter().flat_map(|held_out| held_out.outputs));
@@ -123,7 +146,7 @@ pub(crate) fn report(node: &Node, bic: f64, floor: f64, test: &[Record]) -> Resu
         rmse: fit.rmse,
         rmse_test,
         bic,
-        parameters: parameters(setup, fit, &std_errors(node)?),
+        parameters: parameters(setup, fit, &errors),
         starts: fit.starts,
         starts_agree: fit.agree,
         tests,

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use crate::{
     Law, Scalar,
+    inflow::Inflow,
     moments::{decayed, exponential_moments},
-    vessels::Inflow,
 };
 
 /// Corners of a ramp that lie closer together than this share of the interval are one.
@@ -105,7 +105,7 @@ impl<T: Scalar> Actuator<T> {
             last: zero,
             drifts,
         };
-        let at_rest = actuator.position(at_rest);
+        let at_rest = actuator.position(T::constant(at_rest));
         actuator.last = actuator.effective(at_rest, start);
         if delay.is_some() {
             actuator.past.push_back(Piece {
@@ -125,9 +125,9 @@ impl<T: Scalar> Actuator<T> {
     }
 
     /// Where the actuator stands at a recorded command.
-    fn position(&mut self, u: f64) -> T {
+    fn position(&mut self, u: T) -> T {
         let moved = self.laws.iter_mut().find_map(|law| law.position(u));
-        moved.unwrap_or(T::constant(u))
+        moved.unwrap_or(u)
     }
 
     fn effective(&mut self, u: T, t: f64) -> T {
@@ -194,7 +194,7 @@ impl<T: Scalar> Actuator<T> {
     /// and the command on it is what arrives after static laws and dead time.
     pub(crate) fn pieces(
         &mut self,
-        from: f64,
+        from: T,
         to: Option<f64>,
         t: f64,
         h: f64,
@@ -203,7 +203,7 @@ impl<T: Scalar> Actuator<T> {
         let length = T::constant(h);
         let zero = T::constant(0.0);
         let from = self.position(from);
-        let commanded = match to.map(|to| self.position(to)) {
+        let commanded = match to.map(|to| self.position(T::constant(to))) {
             None => {
                 let signal = Signal::held(self.effective(from, t));
                 if self.delay.is_none() {

@@ -1,76 +1,410 @@
-//! A PI controller with limits, to close the loop around a [`crate::Simulator`].
+//! Controllers with limits, to close the loop around a [`crate::Simulator`], on any [`Scalar`].
+//!
+//! - **PI**: `u = b + gain e`, `b+ = b + gain h/integral_time e`, `e = r - y`; the integral stands still while the
+//!   command is limited and would be driven further out.
+//! - **R/S**: `S(q^-1) u = R(q^-1) e`, `s_0 = 1`, in the transposed direct form `u = x_1 + r_0 e`,
+//!   `x_i+ = x_(i+1) + r_i e - s_i u`, where `u` is the command as it was limited (K. J. Astrom, B. Wittenmark, Computer
+//!   Controlled Systems, 3rd ed. 1997, section 9.4), so that no integral in it winds up either. Around an operating point,
+//!   where `S(1)` is not zero, one more state holds its command.
+//!
+//! The states of a controller are in units of the command. The sum of those that the command sees is what it would be at
+//! `e = 0`: a PI has one, `b`, operating point and integral in one.
 
-use crate::Error;
+use ct_lti::{Hold, StateSpace, TransferFunction};
 
-/// `u = u_op + gain (e + (1/integral_time) int e dt)`, limited; the integral stands still while the command is limited
-/// and would be driven further out.
+use crate::{Error, Scalar};
+
+/// The most states that a controller may have.
+pub const MAX_CONTROLLER_STATES: usize = 8;
+
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pi {
-    gain: f64,
-    integral_time: f64,
-    limits: (f64, f64),
-    operating_point: f64,
-    integral: f64,
+enum Kind {
+    Pi {
+        gain: f64,
+        integral_time: f64,
+    },
+    /// `r` and `s` are equally long, `s[0] = 1`.
+    Sampled {
+        r: Vec<f64>,
+        s: Vec<f64>,
+        /// The last state is the command of the operating point.
+        operating_point: bool,
+    },
 }
+
+/// The settings of a controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Controller {
+    kind: Kind,
+    limits: (f64, f64),
+}
+
+/// A controller without limits as `x+ = A x + b e`, `u = c x + d e`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearController {
+    /// A, row by row.
+    pub a: Vec<Vec<f64>>,
+    /// b.
+    pub b: Vec<f64>,
+    /// c.
+    pub c: Vec<f64>,
+    /// d.
+    pub d: f64,
+}
+
+fn refused<T>(what: String) -> Result<T, Error> {
+    Err(Error::Controller { what })
+}
+
+fn checked(kind: Kind, limits: (f64, f64)) -> Result<Controller, Error> {
+    if limits.0.is_nan() || limits.1.is_nan() || limits.0 >= limits.1 {
+        return refused(format!(
+            "u_min = {} is not below u_max = {}: swap them",
+            limits.0, limits.1
+        ));
+    }
+    Ok(Controller { kind, limits })
+}
+
+impl Controller {
+    /// A PI controller: `gain` \[input/output\], `integral_time` \[s\], `limits` \[input\].
+    ///
+    /// # Errors
+    /// Where a setting is not finite, the gain is zero, the integral time not positive, or the limits are crossed.
+    pub fn pi(gain: f64, integral_time: f64, limits: (f64, f64)) -> Result<Self, Error> {
+        if !gain.is_finite() || gain == 0.0 {
+            return refused(format!("gain = {gain}: give a finite gain other than zero"));
+        }
+        if !(integral_time.is_finite() && integral_time > 0.0) {
+            return refused(format!(
+                "integral_time = {integral_time} s: give a positive time"
+            ));
+        }
+        checked(
+            Kind::Pi {
+                gain,
+                integral_time,
+            },
+            limits,
+        )
+    }
+
+    /// `S(q^-1) u = R(q^-1) e`, the coefficients of the powers 0, 1, 2, ... of `q^-1`, a sample each; `limits` \[input\].
+    ///
+    /// # Errors
+    /// Where a coefficient is not finite, `s[0]` or all of `r` is zero, there are too many states, or the limits are crossed.
+    pub fn sampled(r: &[f64], s: &[f64], limits: (f64, f64)) -> Result<Self, Error> {
+        if let Some(value) = r.iter().chain(s).find(|value| !value.is_finite()) {
+            return refused(format!(
+                "{value} among the coefficients: give finite numbers"
+            ));
+        }
+        let Some(&first) = s.first().filter(|first| **first != 0.0) else {
+            return refused(
+                "s = [] or begins with 0: the command has to follow at once, give s[0]".into(),
+            );
+        };
+        if r.iter().all(|value| *value == 0.0) {
+            return refused("r is zero throughout: there is no controller; delete it".into());
+        }
+        let length = r.len().max(s.len());
+        let padded = |of: &[f64]| -> Vec<f64> {
+            (0..length)
+                .map(|i| of.get(i).map_or(0.0, |value| value / first))
+                .collect()
+        };
+        let (r, s) = (padded(r), padded(s));
+        let size: f64 = s.iter().map(|value| value.abs()).sum();
+        let operating_point = s.iter().sum::<f64>().abs() > 1e-9 * size;
+        let states = length - 1 + usize::from(operating_point);
+        if states > MAX_CONTROLLER_STATES {
+            return refused(format!(
+                "{states} states where at most {MAX_CONTROLLER_STATES} are known: reduce the orders of r and s"
+            ));
+        }
+        checked(
+            Kind::Sampled {
+                r,
+                s,
+                operating_point,
+            },
+            limits,
+        )
+    }
+
+    /// `S(p) u = R(p) e`, highest power first as they are written, sampled every `step` seconds; between samples it sees
+    /// the last reading.
+    ///
+    /// # Errors
+    /// Where `R/S` is not proper, cannot be sampled, or [`Controller::sampled`] refuses it.
+    pub fn continuous(r: &[f64], s: &[f64], step: f64, limits: (f64, f64)) -> Result<Self, Error> {
+        let bad = |error: ct_lti::Error| Error::Controller {
+            what: format!("r/s as a transfer function in p: {error}"),
+        };
+        let rising = |of: &[f64]| -> Vec<f64> { of.iter().rev().copied().collect() };
+        let system = TransferFunction::from_coefficients(&rising(r), &rising(s)).map_err(bad)?;
+        let space = StateSpace::controllable(&system).map_err(bad)?;
+        let n = space.order();
+        let sampled = space.sampled(Hold::Zero, step).map_err(bad)?;
+        // The characteristic polynomial by Faddeev and LeVerrier, then R = S times the pulse response.
+        let mut s = vec![1.0];
+        let mut m = vec![0.0; n * n];
+        for k in 1..=n {
+            // M <- Phi M + s_(k-1) I, s_k = -trace(Phi M)/k.
+            let last = s[k - 1];
+            m = times(&sampled.phi, &m, n);
+            for i in 0..n {
+                m[i * n + i] += last;
+            }
+            let product = times(&sampled.phi, &m, n);
+            let trace: f64 = (0..n).map(|i| product[i * n + i]).sum();
+            s.push(-trace / k as f64);
+        }
+        // An integral is one exactly: rounding would let it leak.
+        let (sum, size) = s.iter().fold((0.0, 0.0), |(sum, size), value: &f64| {
+            (sum + value, size + value.abs())
+        });
+        if sum.abs() < 1e-9 * size
+            && let Some(last) = s.last_mut()
+        {
+            *last -= sum;
+        }
+        let mut pulse = vec![space.d()];
+        let mut x = sampled.g0.clone();
+        for _ in 0..n {
+            pulse.push(space.c().iter().zip(&x).map(|(c, x)| c * x).sum());
+            x = (0..n)
+                .map(|i| (0..n).map(|j| sampled.phi[i * n + j] * x[j]).sum())
+                .collect();
+        }
+        let r: Vec<f64> = (0..=n)
+            .map(|k| (0..=k).map(|i| s[i] * pulse[k - i]).sum())
+            .collect();
+        Self::sampled(&r, &s, limits)
+    }
+
+    /// How many states it has.
+    #[must_use]
+    pub fn states(&self) -> usize {
+        match &self.kind {
+            Kind::Pi { .. } => 1,
+            Kind::Sampled {
+                r, operating_point, ..
+            } => r.len() - 1 + usize::from(*operating_point),
+        }
+    }
+
+    /// Smallest and largest command \[input\].
+    #[must_use]
+    pub fn limits(&self) -> (f64, f64) {
+        self.limits
+    }
+
+    /// What the command answers to an error at once \[input/output\].
+    #[must_use]
+    pub fn direct(&self) -> f64 {
+        match &self.kind {
+            Kind::Pi { gain, .. } => *gain,
+            Kind::Sampled { r, .. } => r[0],
+        }
+    }
+
+    /// Its settings in the words of a model file.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        match &self.kind {
+            Kind::Pi {
+                gain,
+                integral_time,
+            } => format!("gain = {gain}, integral_time = {integral_time} s"),
+            Kind::Sampled { r, s, .. } => format!("r = {r:?}, s = {s:?} (sampled)"),
+        }
+    }
+
+    /// Starts it; states that are not given are zero.
+    #[must_use]
+    pub fn start<T: Scalar>(&self, states: &[T]) -> Regulator<T> {
+        let zero = T::constant(0.0);
+        let given = |i: usize| states.get(i).copied().unwrap_or(zero);
+        Regulator {
+            controller: self.clone(),
+            states: (0..self.states()).map(given).collect(),
+            limited: false,
+        }
+    }
+
+    /// The linear controller over steps of `h` seconds; where the command is `limited` it answers to nothing, and its
+    /// states move on as they do then.
+    #[must_use]
+    pub fn linear(&self, h: f64, limited: bool) -> LinearController {
+        let n = self.states();
+        let mut a = vec![vec![0.0; n]; n];
+        let mut b = vec![0.0; n];
+        let mut c = vec![0.0; n];
+        match &self.kind {
+            Kind::Pi {
+                gain,
+                integral_time,
+            } => {
+                a[0][0] = 1.0;
+                c[0] = 1.0;
+                if !limited {
+                    b[0] = gain * h / integral_time;
+                }
+            }
+            Kind::Sampled {
+                r,
+                s,
+                operating_point,
+            } => {
+                let order = r.len() - 1;
+                for i in 0..order {
+                    b[i] = r[i + 1];
+                    if i + 1 < order {
+                        a[i][i + 1] = 1.0;
+                    }
+                    if !limited {
+                        a[i][0] -= s[i + 1];
+                        b[i] -= s[i + 1] * r[0];
+                    }
+                }
+                if order > 0 {
+                    c[0] = 1.0;
+                }
+                if *operating_point {
+                    a[order][order] = 1.0;
+                    c[order] = 1.0;
+                }
+            }
+        }
+        LinearController {
+            a,
+            b,
+            c: if limited { vec![0.0; n] } else { c },
+            d: if limited { 0.0 } else { self.direct() },
+        }
+    }
+}
+
+fn times(a: &[f64], b: &[f64], n: usize) -> Vec<f64> {
+    let mut product = vec![0.0; n * n];
+    for i in 0..n {
+        for k in 0..n {
+            for j in 0..n {
+                product[i * n + j] += a[i * n + k] * b[k * n + j];
+            }
+        }
+    }
+    product
+}
+
+/// A controller that runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Regulator<T> {
+    controller: Controller,
+    states: Vec<T>,
+    limited: bool,
+}
+
+impl<T: Scalar> Regulator<T> {
+    /// The command for a set point and a reading, to be held over the next `h` seconds.
+    pub fn command(&mut self, reference: f64, reading: T, h: f64) -> T {
+        self.command_beside(reference, reading, 0.0, h)
+    }
+
+    /// The same, where something else adds `beside` to the command before it is limited.
+    pub fn command_beside(&mut self, reference: f64, reading: T, beside: f64, h: f64) -> T {
+        let error = -reading + reference;
+        let limits = self.controller.limits;
+        let limit = |wanted: T| {
+            if wanted.value() > limits.1 {
+                T::constant(limits.1)
+            } else if wanted.value() < limits.0 {
+                T::constant(limits.0)
+            } else {
+                wanted
+            }
+        };
+        let states = &mut self.states;
+        match &self.controller.kind {
+            Kind::Pi {
+                gain,
+                integral_time,
+            } => {
+                let wanted = states[0] + error * *gain + beside;
+                let given = limit(wanted);
+                self.limited = wanted.value() != given.value();
+                let push = gain * error.value();
+                let outwards = (wanted.value() - given.value()) * push > 0.0;
+                if !outwards {
+                    states[0] = states[0] + error * (gain * h / integral_time);
+                }
+                given
+            }
+            Kind::Sampled {
+                r,
+                s,
+                operating_point,
+            } => {
+                let order = r.len() - 1;
+                let at_rest = if *operating_point {
+                    states[order]
+                } else {
+                    T::constant(0.0)
+                };
+                let seen = if order > 0 {
+                    states[0]
+                } else {
+                    T::constant(0.0)
+                };
+                let wanted = at_rest + seen + error * r[0] + beside;
+                let given = limit(wanted);
+                self.limited = wanted.value() != given.value();
+                // What stands beside the controller does not pass through it.
+                let own = given - at_rest - beside;
+                for i in 0..order {
+                    let next = if i + 1 < order {
+                        states[i + 1]
+                    } else {
+                        T::constant(0.0)
+                    };
+                    states[i] = next + error * r[i + 1] - own * s[i + 1];
+                }
+                given
+            }
+        }
+    }
+
+    /// Whether the last command was limited.
+    #[must_use]
+    pub fn limited(&self) -> bool {
+        self.limited
+    }
+}
+
+/// A PI controller that runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pi(Regulator<f64>);
 
 impl Pi {
     /// `gain` \[input/output\], `integral_time` \[s\], `limits` and `operating_point` \[input\].
     ///
     /// # Errors
-    /// Where a setting is not finite, the gain is zero, the integral time not positive, or the limits are crossed.
+    /// As [`Controller::pi`].
     pub fn new(
         gain: f64,
         integral_time: f64,
         limits: (f64, f64),
         operating_point: f64,
     ) -> Result<Self, Error> {
-        let error = |what: String| Err(Error::Controller { what });
-        if !gain.is_finite() || gain == 0.0 {
-            return error(format!("gain = {gain}: give a finite gain other than zero"));
-        }
-        if !(integral_time.is_finite() && integral_time > 0.0) {
-            return error(format!(
-                "integral_time = {integral_time} s: give a positive time"
-            ));
-        }
-        if limits.0.is_nan() || limits.1.is_nan() || limits.0 >= limits.1 {
-            return error(format!(
-                "u_min = {} is not below u_max = {}: swap them",
-                limits.0, limits.1
-            ));
-        }
-        Ok(Self {
-            gain,
-            integral_time,
-            limits,
-            operating_point,
-            integral: 0.0,
-        })
-    }
-
-    /// Proportional gain \[input/output\].
-    #[must_use]
-    pub fn gain(&self) -> f64 {
-        self.gain
-    }
-
-    /// Integral time \[s\].
-    #[must_use]
-    pub fn integral_time(&self) -> f64 {
-        self.integral_time
+        Ok(Self(
+            Controller::pi(gain, integral_time, limits)?.start(&[operating_point]),
+        ))
     }
 
     /// The command for a set point and a reading, to be held over the next `h` seconds.
     pub fn command(&mut self, reference: f64, reading: f64, h: f64) -> f64 {
-        let error = reference - reading;
-        let wanted =
-            self.operating_point + self.gain * (error + self.integral / self.integral_time);
-        let given = wanted.clamp(self.limits.0, self.limits.1);
-        let outwards = (wanted - given) * self.gain * error > 0.0;
-        if !outwards {
-            self.integral += error * h;
-        }
-        given
+        self.0.command(reference, reading, h)
     }
 }
 
@@ -94,5 +428,76 @@ mod tests {
         assert!(Pi::new(1.0, 0.0, (0.0, 1.0), 0.0).is_err());
         assert!(Pi::new(1.0, 1.0, (1.0, 1.0), 0.0).is_err());
         assert!(Pi::new(1.0, f64::NAN, (0.0, 1.0), 0.0).is_err());
+        let none = (f64::NEG_INFINITY, f64::INFINITY);
+        assert!(Controller::sampled(&[1.0], &[], none).is_err());
+        assert!(Controller::sampled(&[0.0], &[1.0], none).is_err());
+        assert!(Controller::sampled(&[1.0], &[0.0, 1.0], none).is_err());
+        assert!(Controller::sampled(&[1.0; 11], &[1.0], none).is_err());
+        assert!(Controller::continuous(&[1.0, 0.0, 0.0], &[1.0, 1.0], 1.0, none).is_err());
+    }
+
+    /// A PI written as R/S, sampled and in p, gives the same commands as long as nothing is limited.
+    #[test]
+    fn a_pi_is_one_of_the_controllers_r_over_s() {
+        let (gain, time, h) = (0.7, 30.0, 2.0);
+        let none = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut pi = Controller::pi(gain, time, none).unwrap().start(&[3.0]);
+        let r = [gain, gain * (h / time - 1.0)];
+        let mut sampled = Controller::sampled(&r, &[1.0, -1.0], none)
+            .unwrap()
+            .start(&[3.0]);
+        let mut in_p = Controller::continuous(&[gain * time, gain], &[time, 0.0], h, none)
+            .unwrap()
+            .start(&[3.0]);
+        for k in 0..200 {
+            let y = (0.3 * f64::from(k)).sin();
+            let u = pi.command(1.0, y, h);
+            assert!((sampled.command(1.0, y, h) - u).abs() < 1e-12);
+            assert!((in_p.command(1.0, y, h) - u).abs() < 1e-9);
+        }
+    }
+
+    /// A controller of second order in p against its own step response in closed form: `1/(p + a) + 1/(p + b)`.
+    #[test]
+    fn a_controller_in_p_is_sampled_exactly() {
+        let (a, b, h) = (0.1, 0.4, 1.5);
+        let none = (f64::NEG_INFINITY, f64::INFINITY);
+        let controller =
+            Controller::continuous(&[2.0, a + b], &[1.0, a + b, a * b], h, none).unwrap();
+        let mut regulator = controller.start::<f64>(&[]);
+        for k in 0..50 {
+            let t = h * f64::from(k);
+            let wanted = (1.0 - (-a * t).exp()) / a + (1.0 - (-b * t).exp()) / b;
+            assert!((regulator.command(1.0, 0.0, h) - wanted).abs() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn the_linear_controller_is_the_one_that_runs() {
+        let wide = (-1e9, 1e9);
+        for controller in [
+            Controller::pi(0.7, 30.0, wide).unwrap(),
+            Controller::sampled(&[1.0, -0.8, 0.1], &[1.0, -1.3, 0.3], wide).unwrap(),
+            Controller::sampled(&[1.0, -0.8], &[1.0, -0.3, 0.1], wide).unwrap(),
+            Controller::sampled(&[2.0], &[1.0], wide).unwrap(),
+        ] {
+            let linear = controller.linear(2.0, false);
+            let mut x: Vec<f64> = (0..controller.states()).map(|i| 1.0 + i as f64).collect();
+            let mut regulator = controller.start(&x);
+            for k in 0..30 {
+                let e = (0.5 * f64::from(k)).cos();
+                let u: f64 =
+                    linear.c.iter().zip(&x).map(|(c, x)| c * x).sum::<f64>() + linear.d * e;
+                let given = regulator.command(e, 0.0, 2.0);
+                // The operating point stands beside the recursion.
+                assert!((given - u).abs() < 1e-9, "{controller:?} {k}: {given} {u}");
+                x = linear
+                    .a
+                    .iter()
+                    .zip(&linear.b)
+                    .map(|(row, b)| row.iter().zip(&x).map(|(a, x)| a * x).sum::<f64>() + b * e)
+                    .collect();
+            }
+        }
     }
 }

@@ -56,6 +56,14 @@ pub enum Error {
         /// How many are needed.
         needed: usize,
     },
+    /// A term of the user's own that cannot be.
+    #[error("term `{term}`: {what}")]
+    Term {
+        /// Its name.
+        term: String,
+        /// What is wrong and what to do.
+        what: String,
+    },
     /// A controller that cannot work.
     #[error("controller: {what}")]
     Controller {

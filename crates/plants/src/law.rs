@@ -28,7 +28,7 @@ pub struct Side<T> {
 pub trait Law<T: Scalar>: Send {
     /// Actuator: where what the command moves stands, for a law with memory, which must be the first in the chain. Asked
     /// once for each recorded command, in the order of time; on a ramp it runs straight between the two ends.
-    fn position(&mut self, _u: f64) -> Option<T> {
+    fn position(&mut self, _u: T) -> Option<T> {
         None
     }
     /// Actuator: the command that acts, for the command that was given \[input unit\]. Without memory.
@@ -52,19 +52,16 @@ pub trait Law<T: Scalar>: Send {
     fn gain(&self, _t: T) -> Option<T> {
         None
     }
-    /// Vessel: the head that drives the outflow, which a law may take for another than the level, given the level of the
-    /// next vessel \[level unit\].
-    fn head(&self, level: T, _next: T) -> T {
-        level
-    }
-    /// Vessel: outflow to the next vessel at a head, given what the law before it says \[flow\].
-    fn outflow(&self, _level: T, nominal: T, _t: T) -> T {
-        nominal
-    }
-    /// Vessel: the net inflow with what this law takes out and what is lost \[flow\].
-    fn net(&self, _level: T, net: T, _t: T) -> T {
-        net
-    }
+    /// Vessel: changes the head that drives the outflow, which begins as the level, given the level of the next vessel
+    /// \[level unit\]. In place, as the next three: they are called several times a step, and a dual with many lanes is
+    /// long.
+    fn head(&self, _head: &mut T, _next: &T) {}
+    /// Vessel: changes the outflow to the next vessel at a head, as the law before it left it \[flow\].
+    fn outflow(&self, _head: &T, _outflow: &mut T, _t: &T) {}
+    /// Vessel: takes out of the net inflow what is lost \[flow\].
+    fn net(&self, _level: &T, _net: &mut T, _t: &T) {}
+    /// Vessel: changes the surface at a level \[area\].
+    fn area(&self, _level: &T, _area: &mut T) {}
     /// Vessel: the instant at which the law jumps, if it does \[s\]. A step is cut there, and [`Law::switch_over`] called
     /// between the two parts; a law that asked the time instead could not tell the two sides of the cut apart.
     fn switch(&self) -> Option<T> {
@@ -75,10 +72,6 @@ pub trait Law<T: Scalar>: Send {
     /// Vessel: a side tank that it adds to a plant of one vessel.
     fn side(&self) -> Option<Side<T>> {
         None
-    }
-    /// Vessel: surface at a level \[area\].
-    fn area(&self, _level: T, nominal: T) -> T {
-        nominal
     }
     /// Vessel: its rim.
     fn rim(&self) -> Option<Rim<T>> {

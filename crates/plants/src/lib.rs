@@ -18,11 +18,22 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! # Steps that are longer than a time constant
+//! A step of up to one time constant of the fastest vessel is a Runge-Kutta step of order four. A longer one is cut into
+//! parts that double, each an exponential Runge-Kutta step (ETDRK4): S. M. Cox, P. C. Matthews, J. Computational Physics
+//! 176 (2002) 430-455; A.-K. Kassam, L. N. Trefethen, SIAM J. Scientific Computing 26 (2005) 1214-1233. A vessel that has
+//! settled takes one part. With one step a sample of 1.6 to 45 time constants, any single effect and levels from 4 to 20,
+//! the output errs by at most 0.0003 (linear vessels; those without an effect in them are exact) and 0.004 (Torricelli):
+//! `cargo test -p plants --test fast_vessels -- --nocapture`. A level that moves too far within the shortest part, 1/32 of
+//! a step, for its forgetting to be one number goes by an implicit part of order one that keeps the balance of mass.
 
 mod actuator;
 pub mod controller;
+mod damped;
 pub mod effects;
 mod error;
+mod inflow;
 mod law;
 mod linear;
 mod moments;
@@ -31,6 +42,7 @@ mod scalar;
 mod sensor;
 mod simulator;
 mod structure;
+mod term;
 mod unit;
 mod vessels;
 
@@ -41,4 +53,5 @@ pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scalar::{Dual, Scalar};
 pub use simulator::{Command, Simulator};
 pub use structure::{Known, MAX_VESSELS, Placed, Scales, Site, Structure};
+pub use term::{Fitted, MOST_KNOTS, Term, Variable};
 pub use unit::Unit;

@@ -1,6 +1,6 @@
 //! Exact propagation of linear vessels under a polynomial inflow, by the matrix exponential.
 
-use crate::{Scalar, structure::MAX_VESSELS, vessels::Inflow};
+use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
 
 /// Vessels, and the inflow's three coefficients and the constant one beside them.
 const N: usize = MAX_VESSELS + 4;
@@ -18,7 +18,7 @@ pub(crate) struct Propagators<T> {
 /// Steps that differ by less than this share are one step: times are read from text.
 const SAME_STEP: f64 = 1e-9;
 /// Exponentials that are kept.
-const KEPT: usize = 4;
+const KEPT: usize = 12;
 
 impl<T: Scalar> Propagators<T> {
     pub(crate) fn new(vessels: Vec<(T, T)>) -> Self {
@@ -47,6 +47,29 @@ impl<T: Scalar> Propagators<T> {
             }
             return next;
         }
+        let rows = self.rows(h);
+        let [a, b, c] = q.coefficients();
+        let mut next = *levels;
+        for (row, to) in rows.iter().zip(next.iter_mut()) {
+            let mut sum = row[n] * a + row[n + 1] * b + row[n + 2] * c + row[n + 3];
+            for j in 0..n {
+                sum = sum + row[j] * levels[j];
+            }
+            *to = sum;
+        }
+        next
+    }
+
+    /// What the second vessel gets over a step of length `h`: from the first one's level, and from its inflow's three
+    /// coefficients.
+    pub(crate) fn second_from(&mut self, h: T) -> (T, [T; 3]) {
+        let n = self.vessels.len();
+        let row = &self.rows(h)[1];
+        (row[0], [row[n], row[n + 1], row[n + 2]])
+    }
+
+    /// The exponential's rows for a step of length `h`, which is not zero.
+    fn rows(&mut self, h: T) -> &[[T; N]] {
         let found = self.known.iter().position(|(known, _)| {
             (known.value() - h.value()).abs() <= SAME_STEP * h.value() && known.same_derivatives(h)
         });
@@ -58,17 +81,7 @@ impl<T: Scalar> Propagators<T> {
             self.known.push((h, rows));
             self.known.len() - 1
         });
-        let rows = &self.known[at].1;
-        let [a, b, c] = q.coefficients();
-        let mut next = *levels;
-        for (row, to) in rows.iter().zip(next.iter_mut()) {
-            let mut sum = row[n] * a + row[n + 1] * b + row[n + 2] * c + row[n + 3];
-            for j in 0..n {
-                sum = sum + row[j] * levels[j];
-            }
-            *to = sum;
-        }
-        next
+        &self.known[at].1
     }
 
     /// The first rows of `exp(M)`, where `M` drives the vessels over the unit interval by

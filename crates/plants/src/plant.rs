@@ -133,10 +133,11 @@ impl Plant {
             upper,
             starts: vec![(lower * upper).abs().sqrt()],
         };
-        // Time constants from a tenth of a sample to thirty records; the rest follows from them, generously.
+        // Time constants from a tenth of a sample (below it a vessel is over before it is read, whatever it is) to
+        // thirty records; the rest follows from them, generously. No unit is preferred: nothing here has a size.
         let tau = (0.1 * scales.sample_interval, 30.0 * scales.duration);
-        let level = scales.largest_level().max(1e-9);
-        let input = scales.input.1.abs().max(scales.input.0.abs()).max(1e-9);
+        let level = positive(scales.largest_level());
+        let input = positive(scales.input.1.abs().max(scales.input.0.abs()));
         let flow = |area: f64| (area * level / tau.1 * 1e-3, area * level / tau.0 * 1e3);
         let gain = |area: f64| {
             info(
@@ -147,13 +148,18 @@ impl Plant {
                 flow(area).1 / input,
             )
         };
+        // Torricelli: tau = 2 S sqrt(H)/alpha = 2 S Q/alpha^2. The measured vessel, the last one, is the shortest at its
+        // largest level; that bounds the throughput Q, and Q the upper vessel, whose level is not known.
+        let last = self.vessels() - 1;
+        let (low, high) = scales.level[last];
+        let content = scales.area[last] * positive(low.abs().max(high.abs()));
         let alpha = |name, meaning, area: f64| {
             info(
                 name,
                 ALPHA,
                 meaning,
                 flow(area).0 / level.sqrt(),
-                flow(area).1 / level.sqrt(),
+                2.0 * (area * content).sqrt() / tau.0,
             )
         };
         let lag = |name, meaning| info(name, Unit::TIME, meaning, tau.0, tau.1);
@@ -204,6 +210,11 @@ impl Plant {
             Self::FirstOrder => vec![static_gain(), lag("tau", "time constant")],
         }
     }
+}
+
+/// A size to divide by: one where there is none.
+fn positive(size: f64) -> f64 {
+    if size > 0.0 { size } else { 1.0 }
 }
 
 impl std::str::FromStr for Plant {

@@ -6,6 +6,7 @@ use crate::{
     effects,
     sensor::Sensor,
     structure::MAX_VESSELS,
+    term,
     vessels::{Stretch, Vessels},
 };
 
@@ -35,7 +36,8 @@ impl Command {
 ///
 /// Linear plants without effects in their vessels are propagated exactly (matrix exponential); others by
 /// Runge-Kutta of order four in [`Simulator::set_substeps`] equal parts of the sampling interval, cut where the
-/// input jumps behind a dead time, where a level meets its rim and where a law jumps. Nothing is allocated per step,
+/// input jumps behind a dead time, where a level meets its rim and where a law jumps. Parts that are longer than a vessel's
+/// time constant are exponential Runge-Kutta steps (see the [front page](crate#steps-that-are-longer-than-a-time-constant)). Nothing is allocated per step,
 /// but for the first step of a new length of a linear plant, and the queue behind a dead time while it fills.
 pub struct Simulator<T: Scalar> {
     actuator: Actuator<T>,
@@ -77,7 +79,12 @@ impl<T: Scalar> Simulator<T> {
             .iter()
             .map(|&placed| structure.effect_parameters(placed).len())
             .collect();
-        let needed = own + counts.iter().sum::<usize>();
+        let term_counts: Vec<usize> = structure
+            .terms()
+            .iter()
+            .map(|term| term.parameters(&structure.scales).len())
+            .collect();
+        let needed = own + counts.iter().chain(&term_counts).sum::<usize>();
         if theta.len() != needed {
             return Err(Error::Count {
                 what: "parameters",
@@ -118,6 +125,15 @@ impl<T: Scalar> Simulator<T> {
                     Place::Vessel => vessels.push((placed.vessel, law)),
                     Place::Sensor => sensor.push(law),
                 }
+            }
+            at += count;
+        }
+        for (term, count) in structure.terms().iter().zip(term_counts) {
+            let law = term::bind(term, &theta[at..at + count]);
+            match term.place {
+                Place::Actuator => actuator.push(law),
+                Place::Vessel => vessels.push((term.vessel, law)),
+                Place::Sensor => sensor.push(law),
             }
             at += count;
         }
@@ -163,6 +179,15 @@ impl<T: Scalar> Simulator<T> {
 
     /// Moves on by one sampling interval of length `h` \[s\].
     pub fn advance(&mut self, command: Command, h: f64) {
+        self.step(T::constant(command.from), command.to, h);
+    }
+
+    /// The same under a held command that has derivatives, as a controller gives it.
+    pub fn advance_held(&mut self, command: T, h: f64) {
+        self.step(command, None, h);
+    }
+
+    fn step(&mut self, from: T, to: Option<f64>, h: f64) {
         let Self {
             actuator,
             vessels,
@@ -174,33 +199,27 @@ impl<T: Scalar> Simulator<T> {
         } = self;
         let gain = *pump_gain;
         let mut now = T::constant(*time);
-        actuator.pieces(
-            command.from,
-            command.to,
-            *time,
-            h,
-            |actuator, length, signal| {
-                // A short piece needs no more parts than its share of the interval.
-                let parts = *substeps as f64 * length.value() / h;
-                let parts = ((parts - 1e-9).ceil() as usize).max(1);
-                let part = if parts == 1 {
-                    length
+        actuator.pieces(from, to, *time, h, |actuator, length, signal| {
+            // A short piece needs no more parts than its share of the interval.
+            let parts = *substeps as f64 * length.value() / h;
+            let parts = ((parts - 1e-9).ceil() as usize).max(1);
+            let part = if parts == 1 {
+                length
+            } else {
+                length * (1.0 / parts as f64)
+            };
+            for i in 0..parts {
+                let signal = signal.from(part * i as f64);
+                let inflow = actuator.inflow(part, signal, gain, now);
+                if sensor.has_lag() {
+                    let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
+                    vessels.step(part, inflow, now, &mut Some(&mut follow));
                 } else {
-                    length * (1.0 / parts as f64)
-                };
-                for i in 0..parts {
-                    let signal = signal.from(part * i as f64);
-                    let inflow = actuator.inflow(part, signal, gain, now);
-                    if sensor.has_lag() {
-                        let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
-                        vessels.step(part, inflow, now, &mut Some(&mut follow));
-                    } else {
-                        vessels.step(part, inflow, now, &mut None);
-                    }
-                    now = now + part;
+                    vessels.step(part, inflow, now, &mut None);
                 }
-            },
-        );
+                now = now + part;
+            }
+        });
         *time += h;
     }
 }

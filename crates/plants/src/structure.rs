@@ -1,7 +1,7 @@
 //! A structure: a plant, what is known of it, and the effects that are on, in chain order.
 
 use crate::{
-    Error, ParameterInfo, Plant,
+    Error, ParameterInfo, Plant, Term,
     effects::{self, EffectInfo, Place},
     plant::Outlet,
 };
@@ -116,6 +116,8 @@ pub struct Structure {
     pub known: Known,
     /// The effects that are on; kept in chain order, whatever the order they were added in.
     effects: Vec<Placed>,
+    /// Terms of the user's own, in the order they were added in.
+    pub(crate) terms: Vec<Term>,
     /// What the data visit.
     pub scales: Scales,
 }
@@ -128,6 +130,7 @@ impl Structure {
             plant,
             known,
             effects: Vec::new(),
+            terms: Vec::new(),
             scales,
         };
         if plant.outlet() == Outlet::Torricelli {
@@ -219,12 +222,15 @@ impl Structure {
         parameters
     }
 
-    /// All parameters: the plant's, then each effect's in chain order. Initial levels are apart.
+    /// All parameters: the plant's, then each effect's in chain order, then each term's. Initial levels are apart.
     #[must_use]
     pub fn parameters(&self) -> Vec<ParameterInfo> {
         let mut all = self.plant.parameters(&self.scales);
         for &placed in &self.effects {
             all.extend(self.effect_parameters(placed));
+        }
+        for term in &self.terms {
+            all.extend(term.parameters(&self.scales));
         }
         all
     }
@@ -274,6 +280,14 @@ impl Structure {
                 self.effect_parameters(placed)
                     .iter()
                     .map(|p| format!("{}.{}", placed.effect.id, p.name)),
+            );
+        }
+        for term in &self.terms {
+            let parameters = term.parameters(&self.scales);
+            all.extend(
+                parameters
+                    .iter()
+                    .map(|p| format!("{}.{}", term.name, p.name)),
             );
         }
         all

@@ -183,3 +183,20 @@ fn what_cannot_be_is_refused() {
         assert_eq!(plant.id().parse::<Plant>(), Ok(plant));
     }
 }
+
+#[test]
+fn bounds_follow_the_unit_of_the_command_and_the_shortest_time_constant() {
+    let (h, high) = (2.0, 22.0);
+    let bounds = |unit: f64, name: &str| {
+        let scales = plants::Scales::from_ranges((2.0 * unit, 7.0 * unit), (7.0, high), h, 1800.0);
+        let parameters = Plant::CascadedTanks.parameters(&scales);
+        let info = parameters.iter().find(|info| info.name == name).unwrap();
+        (info.lower, info.upper)
+    };
+    let (volt, tiny) = (bounds(1.0, "pump_gain"), bounds(1e-13, "pump_gain"));
+    assert!((tiny.0 * 1e-13 / volt.0 - 1.0).abs() < 1e-12);
+    assert!((tiny.1 * 1e-13 / volt.1 - 1.0).abs() < 1e-12);
+    // tau = 2 S sqrt(H)/alpha of the measured tank at its largest level, S = 1.
+    let shortest = 2.0 * high.sqrt() / bounds(1.0, "alpha_lower").1;
+    assert!((shortest - 0.1 * h).abs() < 1e-12);
+}

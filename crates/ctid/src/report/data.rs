@@ -1,6 +1,6 @@
 //! What the report's script draws, as JSON: the curves thinned for display, the rest as it stands.
 
-use missing_effect::{Diagnosis, Failures, ResidualTests, Score, Shown, Step};
+use missing_effect::{Diagnosis, Failures, ResidualTests, Score, Shown, Step, Unknown};
 use serde::Serialize;
 
 use super::decimate::min_max;
@@ -20,6 +20,8 @@ struct Report<'a> {
     /// The effects that were added and all that cannot be told apart from them.
     groups: &'a [Vec<String>],
     effects: &'a [String],
+    /// What nothing explains.
+    unknown: Option<&'a Unknown>,
 }
 
 #[derive(Serialize)]
@@ -50,7 +52,7 @@ struct Run {
     residual: Curve,
 }
 
-/// Samples of the first fitted record, spread evenly over it: what the residual depends on. The
+/// Samples of the fitted records, spread evenly over them: what the residual depends on. The
 /// extremes alone would show a wider cloud than there is.
 #[derive(Serialize)]
 struct Cloud {
@@ -80,9 +82,15 @@ pub(super) fn json(diagnosis: &Diagnosis) -> String {
         scores: &diagnosis.scores,
         groups: &diagnosis.groups,
         effects: &diagnosis.effects,
+        unknown: diagnosis.unknown.as_ref(),
     };
+    script_safe(&report)
+}
+
+/// JSON without what could close a `<script>` element.
+pub(super) fn script_safe(data: &impl Serialize) -> String {
     // Writing plain structs to memory cannot fail; an empty object would draw an empty report.
-    serde_json::to_string(&report)
+    serde_json::to_string(data)
         .unwrap_or_else(|_| "{}".to_owned())
         .replace('<', "\\u003c")
 }
@@ -131,17 +139,33 @@ fn run(record: &Shown, simulated: &[f64]) -> Run {
 }
 
 fn cloud(step: &Step, records: &[Shown]) -> Option<Cloud> {
-    let (record, simulated) = records
-        .iter()
-        .zip(&step.simulated)
-        .find(|(record, _)| !record.held_out)?;
-    let residual = residual(record, simulated);
+    let fitted = || {
+        records
+            .iter()
+            .zip(&step.simulated)
+            .filter(|(record, _)| !record.held_out)
+    };
+    let residual: Vec<f64> = fitted()
+        .flat_map(|(record, simulated)| residual(record, simulated))
+        .collect();
+    if residual.is_empty() {
+        return None;
+    }
+    // Sample for sample with the residual.
+    let level: Vec<f64> = fitted()
+        .flat_map(|(record, simulated)| simulated.iter().take(record.output.len()))
+        .copied()
+        .collect();
+    let flow: Vec<f64> = fitted()
+        .flat_map(|(record, simulated)| record.input.iter().take(simulated.len()))
+        .copied()
+        .collect();
     let at: Vec<usize> = (0..residual.len())
         .step_by(residual.len().div_ceil(POINTS).max(1))
         .collect();
     Some(Cloud {
-        level: pick(simulated, &at),
-        flow: pick(&record.input, &at),
+        level: pick(&level, &at),
+        flow: pick(&flow, &at),
         residual: pick(&residual, &at),
     })
 }
@@ -172,7 +196,7 @@ fn pick(values: &[f64], at: &[usize]) -> Vec<f64> {
 }
 
 /// Rounds to significant digits: nobody sees more, and the file is half as large.
-fn rounded(value: f64, digits: usize) -> f64 {
+pub(super) fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }
 

@@ -3,27 +3,34 @@
 //! The words and the tables are written here and stand without a script; the plots are drawn in the
 //! browser by `report.js` with plotly.js, which the build script has packed. The page loads nothing:
 //! its content security policy forbids every connection. The same diagnosis gives the same bytes.
+//!
+//! What every page shares is in `page.rs`, `plots.js` and `report.css`; pages whose plots are curves alone say in
+//! `figures.rs` what `figures.js` draws.
 
+mod baysse;
 mod data;
 mod decimate;
+mod figures;
+mod identification;
+mod page;
 #[cfg(test)]
 mod sample;
 mod tables;
 mod text;
+mod udink;
 
 use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
+pub use self::baysse::html as baysse;
+pub use self::identification::html as identification;
+use self::page::{NOTICES, Page, figure, figure_with, section};
 use self::text::{escape, significant};
+pub use self::udink::html as udink;
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.
 pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
 
-const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
-                      img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'";
-const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
-/// plotly.js, gzipped, in base64.
-const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
 
 /// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and
 /// no scores; what is empty is left out.
@@ -35,6 +42,7 @@ pub fn html(diagnosis: &Diagnosis) -> String {
         step_buttons(diagnosis),
         "<main>".to_owned(),
         fit(diagnosis),
+        unknown(diagnosis),
         failures(diagnosis),
         residual_tests(diagnosis),
         ranking(diagnosis),
@@ -43,18 +51,12 @@ pub fn html(diagnosis: &Diagnosis) -> String {
         footer(),
     ]
     .concat();
-    format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-         {GENERATOR}\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}\n\
-         <script type=\"application/json\" id=\"data\">{data}</script>\n\
-         <script type=\"text/plain\" id=\"plotly\">{PLOTLY}</script>\n\
-         <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
-    )
+    page::html(&Page {
+        title: &title,
+        body: &body,
+        data: &data,
+        script: SCRIPT,
+    })
 }
 
 /// The verdict, the fall of the error in large numbers, and what was looked at.
@@ -67,9 +69,7 @@ fn headline(diagnosis: &Diagnosis) -> String {
     format!(
         "<header>\n<p class=\"kicker\">ctid report · {plant}</p>\n<h1>{verdict}</h1>\n\
          <div class=\"verdict\">\n{sentences}</div>\n{trail}{facts}\
-         <noscript><p class=\"notice\">The plots need a browser that runs scripts; \
-         the findings and the tables do not.</p></noscript>\n\
-         <p class=\"notice\" id=\"no-plots\" hidden></p>\n</header>\n",
+         {NOTICES}</header>\n",
         plant = escape(&diagnosis.plant),
         verdict = verdict(diagnosis),
         trail = trail(diagnosis),
@@ -84,7 +84,9 @@ fn verdict(diagnosis: &Diagnosis) -> &'static str {
     match diagnosis.verdict {
         Verdict::Effect => "The missing effect is found",
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
-        Verdict::Unexplained => "Something is missing that the catalogue does not explain",
+        Verdict::Unexplained => {
+            "What is left is not noise, and no effect of the catalogue explains it"
+        }
         Verdict::Adequate => "The model is adequate",
     }
 }
@@ -235,6 +237,41 @@ fn failures(diagnosis: &Diagnosis) -> String {
     )
 }
 
+/// What nothing explains, where it has a shape.
+fn unknown(diagnosis: &Diagnosis) -> String {
+    let Some(unknown) = &diagnosis.unknown else {
+        return String::new();
+    };
+    let mut figures = figure(
+        "unknown-path",
+        "The missing term against time",
+        "Smoothed, with its 95 % band, on the first fitted record; shaded where the band does not hold zero.",
+    );
+    if unknown.variable != "time" {
+        figures.push_str(&figure(
+            "unknown-shape",
+            &format!("Against the {}", variable(unknown.variable)),
+            "Fitted with all parameters of the plant, without what those imitate; with its 95 % band.",
+        ));
+    }
+    section(
+        "unknown",
+        "What nothing explains",
+        "The term that has to be added to the last model so that it meets the data. <code>ctid diagnose --unknown F.csv</code> writes \
+         its shape, <code>ctid add NAME --from F.csv</code> keeps it as a term of your own.",
+        &format!("{figures}{}", tables::shares(unknown)),
+    )
+}
+
+/// A variable of a missing term in words.
+fn variable(name: &str) -> &str {
+    match name {
+        "rate" => "net inflow",
+        "input" => "command",
+        other => other,
+    }
+}
+
 const BINNED: &str = "Above the samples with the mean of each bin, below the root mean square of each bin; \
                       first fitted record.";
 
@@ -365,35 +402,6 @@ fn footer() -> String {
 
 fn label(step: &Step) -> String {
     escape(&data::step_label(step))
-}
-
-fn section(id: &str, title: &str, lead: &str, content: &str) -> String {
-    let lead = if lead.is_empty() {
-        String::new()
-    } else {
-        format!("<p class=\"lead\">{lead}</p>\n")
-    };
-    format!(
-        "<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{title}</h2>\n{lead}{content}</section>\n"
-    )
-}
-
-/// A place for a plot. `heading` is HTML, `caption` is text.
-fn figure(id: &str, heading: &str, caption: &str) -> String {
-    figure_with(id, heading, &escape(caption))
-}
-
-/// A place for a plot, heading and caption in HTML.
-fn figure_with(id: &str, heading: &str, caption: &str) -> String {
-    let caption = if caption.is_empty() {
-        String::new()
-    } else {
-        format!("<p class=\"caption\">{caption}</p>")
-    };
-    format!(
-        "<figure aria-labelledby=\"plot-{id}-name\">\n<figcaption><h3 id=\"plot-{id}-name\">{heading}</h3>\
-         {caption}</figcaption>\n<div class=\"plot\" id=\"plot-{id}\"></div>\n</figure>\n"
-    )
 }
 
 #[cfg(test)]

@@ -1,69 +1,32 @@
-// Draws the plots of the report: unpacks plotly.js, then draws every figure for the chosen step.
+// Draws the plots of a diagnosis: every figure for the chosen step.
 "use strict";
 (() => {
   const report = JSON.parse(document.getElementById("data").textContent);
-  const narrow = matchMedia("(max-width: 40rem)");
-  const dark = matchMedia("(prefers-color-scheme: dark)");
-  const touch = matchMedia("(pointer: coarse)").matches;
+  const { narrow, touch, theme, plain, pretty, named, axis, config } = plots;
   const records = report.records || [];
   const steps = report.steps || [];
-  // The bins of the failures belong to the first fitted record.
   const located = Math.max(0, records.findIndex((record) => !record.held_out));
   let chosen = steps.length - 1;
   let residualRecord = located;
   let sameAxes = true;
-  let printing = false;
 
-  // Okabe and Ito's colours, told apart by colour-blind readers; lightened on a dark ground.
-  const LIGHT = {
-    text: "#1b1f26", faint: "#59616e", grid: "#e3e6eb", zero: "#a9b0bb", measured: "#1b1f26",
-    failing: "#e69f00", passing: "#8794a6", ground: "#ffffff",
-    band: "rgba(0,99,163,0.12)", held: "#a8518a", best: "#0072b2", equal: "#56a3d4",
-    steps: ["#d55e00", "#0072b2", "#008a66", "#b5578f", "#8a6d00", "#4a6fa5"],
-  };
-  const DARK = {
-    text: "#e7eaef", faint: "#a3acb9", grid: "#2b313a", zero: "#5c6674", measured: "#dfe3e9",
-    failing: "#f0b428", passing: "#75839a", ground: "#14171c",
-    band: "rgba(108,188,242,0.16)", held: "#e39ac8", best: "#56b4e9", equal: "#2f7fb0",
-    steps: ["#ff8a3c", "#56b4e9", "#2fc79a", "#e39ac8", "#e0c341", "#9db4dd"],
-  };
   const DASHES = ["dash", "solid", "dot", "dashdot", "longdash", "longdashdot"];
-  const FONT = "system-ui, -apple-system, Segoe UI, Roboto, Arial, sans-serif";
-  const theme = () => (dark.matches && !printing ? DARK : LIGHT);
   const stepColour = (k) => theme().steps[k % theme().steps.length];
 
   // --- words -------------------------------------------------------------------------------
 
-  // plotly reads a little HTML in its texts; names from files are no HTML.
-  const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-  const pretty = (unit) => plain(unit || "").replace(/\^(-?[\d.]+)/g, "<sup>$1</sup>");
   const OUT = pretty(report.output_unit);
   const IN = pretty(report.input_unit);
-  const named = (name, unit) => (unit ? `${name} [${unit}]` : name);
   const sized = (value, unit) => `${value === null ? "–" : Number(value.toPrecision(2))} ${unit}`.trim();
 
   // --- parts of a figure -------------------------------------------------------------------
 
-  function axis(title, more) {
-    const c = theme();
-    return Object.assign({
-      title: { text: title, standoff: 8 }, gridcolor: c.grid, zerolinecolor: c.zero, linecolor: c.zero,
-      tickcolor: c.zero, automargin: true, nticks: narrow.matches ? 6 : undefined,
-    }, more);
-  }
-
-  function layout(height, more) {
-    const c = theme();
-    return Object.assign({
-      height, autosize: true, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { family: FONT, size: narrow.matches ? 11 : 12.5, color: c.text },
-      margin: { l: 52, r: 10, t: 10, b: 40 },
-      legend: { orientation: "h", x: 0, xanchor: "left", y: 1.01, yanchor: "bottom", bgcolor: "rgba(0,0,0,0)", uirevision: chosen },
-      hoverlabel: { bgcolor: c.ground, bordercolor: c.zero, font: { color: c.text, family: FONT } },
-      modebar: { bgcolor: "rgba(0,0,0,0)", color: c.faint, activecolor: c.best },
-      dragmode: touch ? false : "zoom", uirevision: "kept", showlegend: false, bargap: 0.12,
-    }, more);
-  }
+  // The curves that were switched on stay so while the step stays.
+  const layout = (height, more) => {
+    const made = plots.layout(height, more);
+    made.legend.uirevision = chosen;
+    return made;
+  };
 
   const present = (values) => values.filter((v) => v !== null && v !== undefined);
   const largest = (values) => present(values).reduce((most, v) => Math.max(most, Math.abs(v)), 0);
@@ -71,10 +34,10 @@
   const seen = () => (sameAxes ? steps : [steps[chosen]]);
   const level = () => (report.noise_floor > 0 ? report.noise_floor : null);
 
-  // The windows in which the chosen step fails: the larger the error, the stronger.
-  function failingWindows() {
+  // The windows of a record in which the chosen step fails: the larger the error, the stronger.
+  function failingWindows(r) {
     const most = largest(seen().flatMap((s) => s.failures.by_time.map((b) => b.rms))) || 1;
-    return steps[chosen].failures.by_time.filter((b) => b.fails).map((b) => ({
+    return steps[chosen].failures.by_time.filter((b) => b.fails && b.record === r).map((b) => ({
       type: "rect", xref: "x", yref: "paper", x0: b.from, x1: b.to, y0: 0, y1: 1, layer: "below",
       fillcolor: theme().failing, opacity: 0.08 + 0.37 * ((b.rms || 0) / most), line: { width: 0 },
     }));
@@ -122,7 +85,7 @@
       line: { color: c.faint, width: 1.2, shape: "hv" }, hovertemplate: `%{y:.4~g} ${IN}`,
     });
     return { data, layout: layout(narrow.matches ? 400 : 460, {
-      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: r === located ? failingWindows() : [],
+      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: failingWindows(r),
       xaxis: axis("time [s]", { anchor: "y2", exponentformat: "none", hoverformat: ".6~g", showspikes: false }),
       yaxis: axis(named("output", OUT), { domain: [0.33, 1] }),
       yaxis2: axis(named("input", IN), { domain: [0, 0.24], nticks: 4 }),
@@ -138,7 +101,7 @@
       x: run.residual.t, y: run.residual.y, mode: "lines", line: { color: stepColour(chosen), width: 1.4 }, name: "residual",
       hovertemplate: `%{x:.6~g} s: %{y:.3~g} ${OUT}<extra></extra>`,
     }], layout: layout(narrow.matches ? 240 : 280, {
-      hovermode: "x", shapes: (residualRecord === located ? failingWindows() : []).concat(floor),
+      hovermode: "x", shapes: failingWindows(residualRecord).concat(floor),
       xaxis: axis("time [s]", { exponentformat: "none", hoverformat: ".6~g" }), yaxis: axis(named("residual", OUT), { range: [-most, most] }),
     }) };
   }
@@ -266,7 +229,40 @@
     }) };
   }
 
+  // A curve with its band.
+  function banded(x, y, error, title, name) {
+    const c = theme();
+    const edge = (sign) => y.map((v, k) => v + sign * 1.96 * error[k]);
+    const unit = pretty(report.unknown.unit);
+    const line = { width: 0 };
+    return { data: [
+      { x, y: edge(-1), mode: "lines", line, hoverinfo: "skip" },
+      { x, y: edge(1), mode: "lines", line, fill: "tonexty", fillcolor: c.band, hoverinfo: "skip" },
+      { x, y, mode: x.length > 20 ? "lines" : "lines+markers", line: { color: c.best, width: 2.2 }, marker: { size: 6 },
+        customdata: error.map((e) => 1.96 * e), hovertemplate: `%{x:.5~g}: %{y:.3~g} ± %{customdata:.2~g} ${unit}<extra></extra>` },
+    ], layout: layout(narrow.matches ? 260 : 300, {
+      hovermode: "closest", xaxis: axis(title, { exponentformat: "none" }), yaxis: axis(named(name, unit), { zeroline: true }),
+    }) };
+  }
+
+  function unknownPath() {
+    const u = report.unknown;
+    const made = banded(u.time, u.value, u.std_error, "time [s]", "missing term");
+    made.layout.shapes = u.windows.map((w) => ({
+      type: "rect", xref: "x", yref: "paper", x0: w.from, x1: w.to, y0: 0, y1: 1, layer: "below", fillcolor: theme().failing, opacity: 0.12, line: { width: 0 },
+    }));
+    return made;
+  }
+
+  function unknownShape() {
+    const u = report.unknown;
+    const name = { rate: "net inflow", input: "command" }[u.variable] || u.variable;
+    return banded(u.knots, u.ordinates, u.ordinate_errors, named(name, pretty(u.variable_unit)), "missing term");
+  }
+
   const figures = {
+    "unknown-path": unknownPath,
+    "unknown-shape": unknownShape,
     "by-time": byTime,
     "by-level": () => binned("by_level", "level", named("simulated output", OUT)),
     "by-flow": () => binned("by_flow", "flow", named("input", IN)),
@@ -281,13 +277,8 @@
 
   // --- drawing -----------------------------------------------------------------------------
 
-  const config = {
-    displaylogo: false, responsive: true, displayModeBar: touch ? false : "hover",
-    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], toImageButtonOptions: { scale: 2 },
-  };
-
   // On a touch screen a finger scrolls the page; the plots worth a zoom show their tools above.
-  const ZOOMED = /^(record-\d+|by-time|by-level|by-flow)$/;
+  const ZOOMED = /^(record-\d+|by-time|by-level|by-flow|unknown-path)$/;
   function withTools({ data, layout }) {
     layout.margin.t = 34;
     Object.assign(layout.legend, { y: 0, yref: "container", yanchor: "bottom" });
@@ -331,8 +322,8 @@
   function choose(k) {
     chosen = Math.min(Math.max(k, 0), steps.length - 1);
     words();
-    // The ranking is that of the first step and stays.
-    Object.keys(figures).filter((id) => id !== "scores").forEach(draw);
+    // The ranking is that of the first step, the unknown that of the last: they stay.
+    Object.keys(figures).filter((id) => id !== "scores" && !id.startsWith("unknown")).forEach(draw);
   }
 
   // The residual and its record show the same stretch of time.
@@ -393,40 +384,9 @@
     }
     const axes = document.getElementById("same-axes");
     if (axes) axes.addEventListener("change", () => { sameAxes = axes.checked; choose(chosen); });
-    const redraw = () => { paint(); drawAll(); };
-    dark.addEventListener("change", redraw);
-    narrow.addEventListener("change", redraw);
-    // On paper: the light colours, and as wide as the sheet.
-    const paper = (on) => {
-      printing = on;
-      redraw();
-      document.querySelectorAll(".js-plotly-plot").forEach((box) => Plotly.relayout(box, on ? { width: 660, autosize: false } : { width: null, autosize: true }));
-    };
-    addEventListener("beforeprint", () => paper(true));
-    addEventListener("afterprint", () => paper(false));
-  }
-
-  async function unpack() {
-    const element = document.getElementById("plotly");
-    const bytes = Uint8Array.from(atob(element.textContent), (c) => c.charCodeAt(0));
-    element.remove();
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    const script = document.createElement("script");
-    script.textContent = await new Response(stream).text();
-    document.head.append(script);
   }
 
   paint();
   words();
-  unpack().then(() => {
-    drawAll();
-    link();
-    listen();
-    document.documentElement.dataset.drawn = "yes";
-  }).catch((error) => {
-    const notice = document.getElementById("no-plots");
-    notice.textContent = `The plots could not be drawn (${error.message}). The findings and the tables stand; a browser from 2023 or later draws the plots.`;
-    notice.hidden = false;
-    document.querySelectorAll("#steps, .choice, figure").forEach((part) => { part.hidden = true; });
-  });
+  plots.start(() => { paint(); drawAll(); }, () => { link(); listen(); });
 })();

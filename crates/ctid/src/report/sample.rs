@@ -69,6 +69,7 @@ fn bins(by: &[f64], residual: &[f64], edges: &[f64]) -> Vec<Bin> {
             let count = inside.len();
             let rms = rms(&inside);
             Bin {
+                record: None,
                 from: edge[0],
                 to: edge[1],
                 count,
@@ -92,13 +93,17 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
     let rate: Vec<f64> = (0..simulated.len())
         .map(|k| (simulated[k] - simulated[k.saturating_sub(1)]) / PERIOD)
         .collect();
-    let by_time = bins(&record.time, residual, &even_edges(&record.time, 24));
+    let mut by_time = bins(&record.time, residual, &even_edges(&record.time, 24));
+    for bin in &mut by_time {
+        bin.record = Some(0);
+    }
     let level = rms(residual);
     let by_frequency = (0..8)
         .map(|octave| {
             let from = 0.000_25 * f64::from(1 << octave);
             let rms = (level - NOISE).max(0.0) / f64::from(1 << octave).powf(0.9) + 0.3 * NOISE;
             Bin {
+                record: None,
                 from,
                 to: 2.0 * from,
                 count: 1 << octave,
@@ -300,6 +305,8 @@ pub(super) fn two_tanks() -> Diagnosis {
             score("sensor_drift", -6.2, 0.58, volt(0.01)),
             score("coupled_tank", -6.4, 0.58, None),
         ],
+        unknown: None,
+        control_loop: None,
         sentences: vec![
             "The model lacks an overflow of the upper tank: its rim is at 7.50 ± 0.03 V.".into(),
             "It also lacks pump_deadzone or pump_nonlinearity; these data cannot tell them apart. \

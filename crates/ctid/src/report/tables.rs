@@ -1,6 +1,6 @@
 //! The tables of the report.
 
-use missing_effect::{Diagnosis, Parameter, Step};
+use missing_effect::{Diagnosis, Parameter, Step, Unknown};
 
 use super::data::step_label;
 use super::text::{code, escape, significant, unit, with_error};
@@ -62,6 +62,38 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
         return String::new();
     }
     format!("<p>Added to the model, in this order:</p>\n<ol class=\"groups\">\n{items}</ol>\n")
+}
+
+/// How much of a missing term each variable predicts.
+pub(super) fn shares(unknown: &Unknown) -> String {
+    let rows: String = unknown
+        .shares
+        .iter()
+        .map(|share| {
+            let error = if share.std_error.is_finite() {
+                format!(" ± {:.0}", (100.0 * share.std_error).max(1.0))
+            } else {
+                String::new()
+            };
+            format!(
+                "<tr><td>{}</td><td>{}</td><td class=\"number\">{:.0}{error} %</td></tr>\n",
+                escape(&share.place),
+                super::variable(share.variable),
+                100.0 * share.share.clamp(-9.99, 1.0),
+            )
+        })
+        .collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    table(
+        "What it depends on",
+        "<tr><th>place</th><th>variable</th><th class=\"number\">predicted</th></tr>",
+        &rows,
+        "How much of it a curve in one variable predicts on parts of the data that were left out of its fit. \
+         What depends on a variable alone is predicted nearly in full; where none is, it is a function of time, as far as \
+         these data tell.",
+    )
 }
 
 /// The catalogue, best effect first.
@@ -231,7 +263,7 @@ fn percent(part: f64) -> String {
 }
 
 /// A table that scrolls inside its own box, also by the keyboard.
-fn table(name: &str, head: &str, rows: &str, caption: &str) -> String {
+pub(super) fn table(name: &str, head: &str, rows: &str, caption: &str) -> String {
     format!(
         "<h3>{name}</h3>\n<div class=\"scroll\" role=\"region\" aria-label=\"{name}\" tabindex=\"0\">\n\
          <table><thead>{head}</thead>\n<tbody>{rows}</tbody></table>\n</div>\n\

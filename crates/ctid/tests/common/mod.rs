@@ -11,7 +11,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use plants::{EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
+use plants::{EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -253,6 +253,8 @@ pub struct Tanks {
     pub levels: Vec<f64>,
     /// What is built into them: effect, vessel, parameters; in chain order.
     pub hidden: Vec<(&'static str, usize, Vec<f64>)>,
+    /// What is built into them that no effect describes.
+    pub terms: Vec<Term>,
     pub rows: usize,
     /// Standard deviation of the sensor's noise \[cm\].
     pub noise: f64,
@@ -269,6 +271,7 @@ impl Tanks {
             theta: vec![10.0, 12.5],
             levels: vec![16.0],
             hidden: Vec::new(),
+            terms: Vec::new(),
             rows: 700,
             noise: 0.05,
             seed: 1,
@@ -298,6 +301,10 @@ impl Tanks {
             let (effect, vessel) = (EffectInfo::find(id).unwrap(), *vessel);
             structure = structure.with(Placed { effect, vessel }).unwrap();
             theta.extend(parameters);
+        }
+        for term in &self.terms {
+            structure = structure.with_term(term.clone()).unwrap();
+            theta.push(1.0);
         }
         // At rest until the first step.
         let (mut u, mut until) = (5.0, 30);

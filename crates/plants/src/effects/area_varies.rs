@@ -44,10 +44,10 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for AreaVaries<T> {
-    fn area(&self, level: T, nominal: T) -> T {
-        let width = self.taper * (level - self.operating_level) * (1.0 / self.scale) + 1.0;
+    fn area(&self, level: &T, area: &mut T) {
+        let width = self.taper * (*level - self.operating_level) * (1.0 / self.scale) + 1.0;
         // A vessel that has narrowed to a tenth does not narrow further: the surface never vanishes.
         let width = width.max(T::constant(0.1));
-        nominal * width * width
+        *area = *area * width * width;
     }
 }

@@ -37,7 +37,7 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for ConstLeak<T> {
-    fn net(&self, _level: T, net: T, _t: T) -> T {
-        net - self.0
+    fn net(&self, _level: &T, net: &mut T, _t: &T) {
+        *net = *net - self.0;
     }
 }

@@ -64,10 +64,9 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for CoupledTank<T> {
-    fn head(&self, level: T, next: T) -> T {
-        match *self {
-            Self::Side(_) => level,
-            Self::Backflow(share) => level - share * next,
+    fn head(&self, head: &mut T, next: &T) {
+        if let Self::Backflow(share) = *self {
+            *head = *head - share * *next;
         }
     }
     fn side(&self) -> Option<Side<T>> {

@@ -36,7 +36,8 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for LaminarOutflow<T> {
-    fn outflow(&self, level: T, nominal: T, _t: T) -> T {
-        nominal + self.0 * level
+    fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
+        // A step may look below the bottom, from where nothing flows back.
+        *outflow = *outflow + self.0 * level.max(T::constant(0.0));
     }
 }

@@ -56,7 +56,7 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for LeakAtHeight<T> {
-    fn net(&self, level: T, net: T, _t: T) -> T {
-        net - self.coefficient * square_root(level - self.height)
+    fn net(&self, level: &T, net: &mut T, _t: &T) {
+        *net = *net - self.coefficient * square_root(*level - self.height);
     }
 }

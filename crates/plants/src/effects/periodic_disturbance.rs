@@ -64,8 +64,8 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for PeriodicDisturbance<T> {
-    fn net(&self, _level: T, net: T, t: T) -> T {
-        let (sin, cos) = (self.frequency * t).sin_cos();
-        net + (self.sine * sin + self.cosine * cos)
+    fn net(&self, _level: &T, net: &mut T, t: &T) {
+        let (sin, cos) = (self.frequency * *t).sin_cos();
+        *net = *net + (self.sine * sin + self.cosine * cos);
     }
 }

@@ -43,12 +43,11 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for PipeHeight<T> {
-    fn outflow(&self, level: T, nominal: T, _t: T) -> T {
+    fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         // An empty tank lets nothing out, however long its pipe.
-        if level.value() <= 0.0 {
-            return nominal;
+        if level.value() > 0.0 {
+            // alpha sqrt(H) sqrt(1 + h/H): at h = 0 a factor of exactly one.
+            *outflow = *outflow * (self.0 / *level + 1.0).sqrt();
         }
-        // alpha sqrt(H) sqrt(1 + h/H): at h = 0 a factor of exactly one.
-        nominal * (self.0 / level + 1.0).sqrt()
     }
 }

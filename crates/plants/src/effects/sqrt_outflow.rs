@@ -38,7 +38,7 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for SqrtOutflow<T> {
-    fn outflow(&self, level: T, nominal: T, _t: T) -> T {
+    fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         let root = self.operating_level.sqrt();
         // More than the square root bends the outflow down again, from some level on. No outlet does that: what is added
         // stays what it was there, and what it is at empty below.
@@ -48,6 +48,7 @@ impl<T: Scalar> Law<T> for SqrtOutflow<T> {
             let share = self.curvature / excess;
             level = level.min(share * share * self.operating_level);
         }
-        nominal + self.curvature * ((square_root(level) - root) * (2.0 * root) - (level - self.operating_level))
+        *outflow = *outflow
+            + self.curvature * ((square_root(level) - root) * (2.0 * root) - (level - self.operating_level))
     }
 }

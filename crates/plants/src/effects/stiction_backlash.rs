@@ -50,15 +50,15 @@ const VARIED: f64 = 0.05;
 
 /// One element that sticks.
 #[derive(Clone, Copy)]
-struct Element {
+struct Element<T> {
     width: f64,
     jump: f64,
-    position: f64,
+    position: T,
 }
 
-impl Element {
-    fn follow(&mut self, u: f64) {
-        let gap = u - self.position;
+impl<T: Scalar> Element<T> {
+    fn follow(&mut self, u: T) {
+        let gap = u.value() - self.position.value();
         if gap.abs() > 0.5 * self.width * (1.0 + self.jump) {
             self.position = u - gap.signum() * 0.5 * self.width * (1.0 - self.jump);
         }
@@ -71,9 +71,9 @@ impl Element {
 /// a fit does not move it.
 struct StictionBacklash<T> {
     width: T,
-    element: Element,
-    narrower: Element,
-    wider: Element,
+    element: Element<T>,
+    narrower: Element<T>,
+    wider: Element<T>,
     begun: bool,
 }
 
@@ -82,7 +82,7 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
     let (low, high) = site.scales.input;
     // At no width at all the chord is short and lies on the one side that there is.
     let reach = (VARIED * width).max(1e-6 * (high - low).abs());
-    let at = |width: f64| Element { width: width.max(0.0), jump, position: 0.0 };
+    let at = |width: f64| Element { width: width.max(0.0), jump, position: T::constant(0.0) };
     StictionBacklash {
         width: parameters[0],
         element: at(width),
@@ -93,7 +93,7 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for StictionBacklash<T> {
-    fn position(&mut self, u: f64) -> Option<T> {
+    fn position(&mut self, u: T) -> Option<T> {
         let begun = std::mem::replace(&mut self.begun, true);
         for element in [&mut self.element, &mut self.narrower, &mut self.wider] {
             if begun {
@@ -102,7 +102,8 @@ impl<T: Scalar> Law<T> for StictionBacklash<T> {
                 element.position = u;
             }
         }
-        let chord = (self.wider.position - self.narrower.position) / (self.wider.width - self.narrower.width);
+        let apart = self.wider.position.value() - self.narrower.position.value();
+        let chord = apart / (self.wider.width - self.narrower.width);
         Some((self.width - self.width.value()) * chord + self.element.position)
     }
 }

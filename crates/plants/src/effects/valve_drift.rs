@@ -38,7 +38,7 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for ValveDrift<T> {
-    fn outflow(&self, _level: T, nominal: T, t: T) -> T {
-        nominal * (self.change * t * (1.0 / self.duration) + 1.0)
+    fn outflow(&self, _head: &T, outflow: &mut T, t: &T) {
+        *outflow = *outflow * (self.change * *t * (1.0 / self.duration) + 1.0);
     }
 }

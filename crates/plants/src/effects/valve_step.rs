@@ -51,8 +51,10 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for ValveStep<T> {
-    fn outflow(&self, _level: T, nominal: T, _t: T) -> T {
-        if self.past { nominal * (self.change + 1.0) } else { nominal }
+    fn outflow(&self, _head: &T, outflow: &mut T, _t: &T) {
+        if self.past {
+            *outflow = *outflow * (self.change + 1.0);
+        }
     }
     fn switch(&self) -> Option<T> {
         // A change of nothing needs no cut, unless its derivative is wanted.

@@ -4,8 +4,8 @@
 pub mod reference;
 
 use plants::{
-    CATALOGUE, Command, Dual, Known, ParameterInfo, Placed, Plant, Scalar, Scales, Simulator,
-    Structure,
+    CATALOGUE, Command, Dual, Known, Outlet, ParameterInfo, Placed, Plant, Scalar, Scales,
+    Simulator, Structure,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -63,6 +63,19 @@ pub fn base(plant: Plant) -> Case {
         at_rest: 4.7,
         h,
     }
+}
+
+/// The plant with a vessel whose time constant is the sampling interval over `ratio`, at the same levels.
+pub fn fast(plant: Plant, vessel: usize, ratio: f64) -> Case {
+    let mut case = base(plant);
+    if plant.outlet() == Outlet::Linear {
+        case.theta[1 + vessel] = case.h / ratio;
+    } else {
+        // tau = 2 S sqrt(H)/alpha = 2 S H/Q
+        let scales = &mut case.structure.scales;
+        scales.area[vessel] = case.h / ratio * scales.flow / (2.0 * 11.0);
+    }
+    case
 }
 
 /// Every effect of the catalogue at every place that it takes on this plant.

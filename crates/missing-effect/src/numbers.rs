@@ -1,7 +1,8 @@
-//! Numbers for people: as many digits as they deserve, aligned in columns for the terminal.
+//! Numbers for people: as many digits as they deserve, and columns of them.
 
 /// A number with this many significant digits, `-` where there is none.
-pub(crate) fn significant(value: f64, digits: i32) -> String {
+#[must_use]
+pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return match value {
             f64::INFINITY => "infinite".to_string(),
@@ -19,7 +20,8 @@ pub(crate) fn significant(value: f64, digits: i32) -> String {
 
 /// A value and its standard error, both to the second digit of the error. `None` for the error
 /// where the data do not give one.
-pub(crate) fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<String>) {
+#[must_use]
+pub fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<String>) {
     let Some(error) = std_error.filter(|error| error.is_finite() && *error > 0.0) else {
         return (significant(value, 4), None);
     };
@@ -39,7 +41,8 @@ pub(crate) fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Op
 }
 
 /// A whole number, `-` where there is none.
-pub(crate) fn whole(value: f64) -> String {
+#[must_use]
+pub fn whole(value: f64) -> String {
     if value.is_finite() {
         decimals(value, 0)
     } else {
@@ -49,7 +52,8 @@ pub(crate) fn whole(value: f64) -> String {
 
 /// Numbers that stand under each other: all with the decimals that give the smallest of them two
 /// significant digits; `-` where there is none.
-pub(crate) fn column(values: &[Option<f64>]) -> Vec<String> {
+#[must_use]
+pub fn column(values: &[Option<f64>]) -> Vec<String> {
     let finite = || values.iter().flatten().filter(|value| value.is_finite());
     let places = finite()
         .filter(|value| **value != 0.0)
@@ -69,7 +73,8 @@ pub(crate) fn column(values: &[Option<f64>]) -> Vec<String> {
 }
 
 /// A duration, from milliseconds to days.
-pub(crate) fn duration(seconds: f64) -> String {
+#[must_use]
+pub fn duration(seconds: f64) -> String {
     let (value, unit) = match seconds.abs() {
         s if s >= 2.0 * 86_400.0 => (seconds / 86_400.0, "days"),
         s if s >= 2.0 * 3_600.0 => (seconds / 3_600.0, "h"),
@@ -86,7 +91,8 @@ pub(crate) fn duration(seconds: f64) -> String {
 }
 
 /// The power of ten of the first digit.
-pub(crate) fn exponent(value: f64) -> i32 {
+#[must_use]
+pub fn exponent(value: f64) -> i32 {
     if value == 0.0 {
         return 0;
     }
@@ -98,7 +104,8 @@ pub(crate) fn exponent(value: f64) -> i32 {
 }
 
 /// Fixed decimals; negative `places` round to tens, hundreds, ...
-pub(crate) fn decimals(value: f64, places: i32) -> String {
+#[must_use]
+pub fn decimals(value: f64, places: i32) -> String {
     let text = match usize::try_from(places) {
         Ok(places) => format!("{value:.places$}"),
         Err(_) => {

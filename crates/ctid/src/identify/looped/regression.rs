@@ -1,0 +1,99 @@
+//! Least squares and instruments, over a ladder of bandwidths.
+
+use fcloe::start::{self, Stage};
+use fcloe::{LoopRecord, PlantModel};
+
+use super::levels::chosen;
+use super::{Found, Start, Task};
+use crate::Error;
+use crate::identify::rms;
+
+/// Renewals of instruments with a filter that stays, and of both.
+const INSTRUMENTS: usize = 3;
+const REFINEMENTS: usize = 10;
+
+impl Task<'_> {
+    /// The regression whose loop gives the record best, over the bandwidths.
+    pub(super) fn regression(
+        &self,
+        record: LoopRecord,
+        with_instruments: bool,
+    ) -> Result<Found, Error> {
+        let records = std::slice::from_ref(&record);
+        let lambdas = match self.request.bandwidth {
+            Some(lambda) => vec![lambda],
+            None => start::lambda_ladder(records, &self.controller, None)?,
+        };
+        let mut best: Option<(f64, PlantModel, Start)> = None;
+        for &lambda in &lambdas {
+            let filter = ct_lti::Polynomial::new([lambda, 1.0])?.pow(self.orders.n);
+            let least_squares =
+                start::least_squares(records, &self.controller, self.orders, &filter);
+            let Ok(mut plant) = least_squares else {
+                continue;
+            };
+            let mut stage = Stage::LeastSquares;
+            if with_instruments {
+                let Ok((better, its)) = self.instruments(records, &filter, &plant) else {
+                    continue;
+                };
+                (plant, stage) = (better, its);
+            }
+            let Ok(simulated) = self.simulated(&record, &plant, self.levels_of(&record)) else {
+                continue;
+            };
+            let error = rms(record.y.iter().zip(&simulated).map(|(y, model)| y - model));
+            if error.is_finite() && best.as_ref().is_none_or(|(least, ..)| error < *least) {
+                let start = Start {
+                    from: name(stage),
+                    bandwidth: lambda,
+                    theta: plant.theta().to_vec(),
+                };
+                best = Some((error, plant, start));
+            }
+        }
+        let tried = lambdas.len();
+        let (_, plant, start) = best.ok_or(fcloe::Error::NoStart { tried })?;
+        Ok(Found {
+            std_errors: vec![None; plant.theta().len()],
+            levels: self.levels_of(&record),
+            levels_from: chosen(&record),
+            plant,
+            start,
+            batch: None,
+            recursion: None,
+            record,
+            warnings: vec![
+                "a regression gives no standard errors here: --method fcloe starts from it and does".to_owned(),
+            ],
+        })
+    }
+
+    /// Instruments with the filter that stays, then with one that is renewed.
+    fn instruments(
+        &self,
+        records: &[LoopRecord],
+        filter: &ct_lti::Polynomial,
+        first: &PlantModel,
+    ) -> Result<(PlantModel, Stage), Error> {
+        let mut plant = first.clone();
+        for _ in 0..INSTRUMENTS {
+            plant = start::instruments(records, &self.controller, filter, &plant)?;
+        }
+        let refined = start::refine(records, &self.controller, &plant, REFINEMENTS)?;
+        Ok(if refined.rests {
+            (refined.plant, Stage::Refined)
+        } else {
+            (plant, Stage::Instruments)
+        })
+    }
+}
+
+pub(super) fn name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::LeastSquares => "least squares",
+        Stage::Instruments => "instruments",
+        Stage::Refined => "instruments, filter renewed",
+        Stage::Guess => "a guess",
+    }
+}

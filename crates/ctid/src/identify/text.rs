@@ -1,0 +1,384 @@
+//! What `ctid identify` prints.
+
+use fcloe::{Condition, NoisePath, Verdict};
+
+use super::{Identification, InLoop, LevelChoice, rms};
+use crate::look::{Look, Side, table};
+use crate::numbers;
+use crate::plot::{self, Curve, plot};
+
+/// The whole of it.
+#[must_use]
+pub fn text(found: &Identification, look: Look) -> String {
+    let title = format!(
+        "{}: order {} by {}",
+        found.record,
+        found.order,
+        found.method.id()
+    );
+    let mut text = format!("{}\n", look.heading(&title));
+    text += &look.paragraph("  ", &model(found));
+    text.push('\n');
+    text += &overlay(found, look);
+    text += &parameters(found, look);
+    text += &dynamics(found);
+    text.push('\n');
+    text += &in_loop(found, look);
+    text += &drift(found, look);
+    text += &error(found, look);
+    for warning in &found.warnings {
+        text += &look.warning("note: ");
+        text += look.paragraph("      ", warning).trim_start();
+    }
+    text
+}
+
+/// The equation.
+pub(crate) fn model(found: &Identification) -> String {
+    let sum = |letter: char, from: usize, to: usize| {
+        let term = |i: usize| match i {
+            0 => format!("{letter}0"),
+            1 => format!("{letter}1 s"),
+            i => format!("{letter}{i} s^{i}"),
+        };
+        (from..=to).map(term).collect::<Vec<_>>().join(" + ")
+    };
+    let (a, b) = (sum('a', 1, found.order.n), sum('b', 0, found.order.m));
+    match &found.in_loop {
+        None => format!("(1 + {a}) y = ({b}) u + offset"),
+        Some(_) => format!("(1 + {a}) y = ({b}) u, y and u as deviations"),
+    }
+}
+
+fn overlay(found: &Identification, look: Look) -> String {
+    let shown = &found.shown;
+    let curves = [
+        Curve {
+            values: &shown.output.values,
+            colour: plot::MEASURED,
+        },
+        Curve {
+            values: &shown.simulated,
+            colour: plot::MODEL,
+        },
+    ];
+    let limits = plot::limits([shown.output.values.as_slice(), &shown.simulated]);
+    let (Some(first), Some(last)) = (shown.time.first(), shown.time.last()) else {
+        return String::new();
+    };
+    format!(
+        "{}{}\n{}\n",
+        look.heading("Measured and simulated"),
+        bracketed(&shown.output.unit),
+        plot(&curves, (0.0, last - first), limits, 9, look)
+    )
+}
+
+fn bracketed(unit: &str) -> String {
+    if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" [{unit}]")
+    }
+}
+
+fn parameters(found: &Identification, look: Look) -> String {
+    let (title, last) = match &found.trajectory {
+        Some(_) => ("Parameters at the end of the record", "over the record"),
+        None => ("Parameters", ""),
+    };
+    let heading = ["parameter", "value", "std. error", "", last];
+    let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
+    for (i, parameter) in found.parameters.iter().enumerate() {
+        let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
+        let values = found.trajectory.as_ref().and_then(|t| t.values.get(i));
+        let range = values.map(|values| {
+            let (low, high) = plot::limits([settled(values)]);
+            let digits = |value| numbers::significant(value, 4);
+            format!("{} .. {}", digits(low), digits(high))
+        });
+        rows.push(vec![
+            parameter.name.clone(),
+            value,
+            error.unwrap_or("not known".to_owned()),
+            parameter.unit.clone(),
+            range.unwrap_or_default(),
+        ]);
+    }
+    let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
+    let mut text = format!("{}\n", look.heading(title));
+    for line in table(&sides, &rows) {
+        text += &format!("  {line}\n");
+    }
+    let note = match (&found.settings, &found.trajectory) {
+        (Some(settings), _) => format!(
+            "(memory {}, filters of {} 1/s, started from a time constant of {}; the last column is of the second half)",
+            numbers::duration(settings.memory),
+            numbers::significant(settings.bandwidth, 3),
+            numbers::duration(settings.first_order),
+        ),
+        (None, Some(_)) => {
+            "(the last column is of the second half; standard errors take the residual for white)"
+                .to_owned()
+        }
+        (None, None) => return text,
+    };
+    text += &look.faint(look.paragraph("  ", &note).trim_end());
+    text.push('\n');
+    text
+}
+
+/// The second half: the start is not the record's.
+fn settled(values: &[f64]) -> &[f64] {
+    values.get(values.len() / 2..).unwrap_or_default()
+}
+
+fn dynamics(found: &Identification) -> String {
+    let mut parts: Vec<String> = found
+        .time_constants
+        .iter()
+        .map(|t| format!("time constant {} s", numbers::significant(*t, 4)))
+        .collect();
+    parts.extend(found.oscillations.iter().map(|pair| {
+        format!(
+            "period {} s with damping {}",
+            numbers::significant(pair.period, 4),
+            numbers::significant(pair.damping, 2)
+        )
+    }));
+    format!("  {}\n", parts.join(", "))
+}
+
+fn drift(found: &Identification, look: Look) -> String {
+    let Some(drift) = &found.drift else {
+        return String::new();
+    };
+    let (Some(low), Some(high)) = (drift.level.first(), drift.level.last()) else {
+        return String::new();
+    };
+    let unit = &found.shown.output.unit;
+    let heading = [
+        "",
+        &format!("near {} {unit}", numbers::significant(*low, 3)),
+        &format!("near {} {unit}", numbers::significant(*high, 3)),
+        "",
+        "apart by",
+    ];
+    let mut rows = vec![heading.map(|name| look.faint(name.trim_end())).to_vec()];
+    let time_constant = time_constant_name(found);
+    let gain_unit = found
+        .parameters
+        .get(found.order.n)
+        .map_or("", |b0| &b0.unit);
+    for (name, unit, over_level) in [
+        ("gain b0", gain_unit, &drift.gain),
+        (time_constant, "s", &drift.time_constant),
+    ] {
+        let Some(ends) = over_level.ends() else {
+            continue;
+        };
+        let [low, high] = ends.map(|(value, error)| {
+            let (value, error) = numbers::value_and_error(value, Some(error));
+            error.map_or(value.clone(), |error| format!("{value} ± {error}"))
+        });
+        let apart = format!(
+            "{} std. errors",
+            numbers::decimals(over_level.difference.abs(), 1)
+        );
+        let apart = if over_level.moves() {
+            look.warning(apart)
+        } else {
+            apart
+        };
+        rows.push(vec![name.to_owned(), low, high, unit.to_owned(), apart]);
+    }
+    let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
+    let mut text = format!("{}\n", look.heading("Drift with the level"));
+    for line in table(&sides, &rows) {
+        text += &format!("  {line}\n");
+    }
+    text += &look.paragraph("  ", drift_verdict(found));
+    text.push('\n');
+    text
+}
+
+/// What `a_1` is.
+pub(crate) fn time_constant_name(found: &Identification) -> &'static str {
+    match found.order.n {
+        1 => "time constant a1",
+        _ => "sum of the time constants a1",
+    }
+}
+
+/// What the drift says, nothing where none is known.
+pub(crate) fn drift_verdict(found: &Identification) -> &'static str {
+    match &found.drift {
+        None => "",
+        Some(drift) if drift.gain.moves() || drift.time_constant.moves() => {
+            "The estimates move with the level by more than chance: the process is not linear over this range, or not of this order."
+        }
+        Some(_) => {
+            "The estimates do not move with the level beyond their standard errors; a shorter --memory sees faster changes, less surely."
+        }
+    }
+}
+
+fn error(found: &Identification, look: Look) -> String {
+    let unit = &found.shown.output.unit;
+    let deviation = {
+        let values = &found.shown.output.values;
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        rms(values.iter().map(|y| y - mean))
+    };
+    let line = format!(
+        "{} {unit} root mean square, of an output that deviates by {} {unit}: fit {} %",
+        numbers::significant(found.simulation_rmse, 3),
+        numbers::significant(deviation, 3),
+        numbers::significant(found.fit_percent, 3),
+    );
+    let title = "Simulation error of the final model";
+    let mut text = format!("{}\n", look.heading(title));
+    text += &look.paragraph("  ", &line);
+    let note = match found.in_loop.as_ref().map(|looped| looped.r.is_empty()) {
+        None => {
+            "(the model runs on the input alone, from a fitted initial state; it is not a prediction error)"
+        }
+        Some(true) => {
+            "(the model runs on the input alone, from rest; it is not a prediction error)"
+        }
+        Some(false) => {
+            "(the model's loop runs on the reference alone, from rest; it is not a prediction error)"
+        }
+    };
+    text + &look.faint(look.paragraph("  ", note).trim_end()) + "\n\n"
+}
+
+fn in_loop(found: &Identification, look: Look) -> String {
+    let Some(in_loop) = &found.in_loop else {
+        return String::new();
+    };
+    let mut text = format!("{}\n", look.heading("The loop, and the way there"));
+    for (name, sentence) in facts(found, in_loop) {
+        text += &look.paragraph("  - ", &format!("{name}: {sentence}"));
+    }
+    text.push('\n');
+    text
+}
+
+/// What is known of the loop and of the way to the estimates.
+pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static str, String)> {
+    let (y, u) = (&found.shown.output.unit, &found.shown.input.unit);
+    let digits = |value| numbers::significant(value, 4);
+    let open = in_loop.r.is_empty();
+    let polynomial = |coefficients: &[f64]| {
+        let term = |(power, c): (usize, &f64)| match power {
+            0 => digits(*c),
+            1 => format!("{} s", digits(*c)),
+            power => format!("{} s^{power}", digits(*c)),
+        };
+        let terms = coefficients.iter().enumerate().filter(|(_, c)| **c != 0.0);
+        terms.map(term).collect::<Vec<_>>().join(" + ")
+    };
+    let mut facts = vec![(
+        "controller",
+        match open {
+            true => "none, open loop".to_owned(),
+            false => format!("({})/({})", polynomial(&in_loop.r), polynomial(&in_loop.s)),
+        },
+    )];
+    let [drive, output] = in_loop.levels.map(digits);
+    let from = match in_loop.levels_from {
+        LevelChoice::Estimated => "estimated",
+        LevelChoice::Rest => "means of the first rows, before anything moves",
+        LevelChoice::Mean => "means of the record",
+        LevelChoice::Zero | LevelChoice::Auto => "as given",
+    };
+    let driven = if open {
+        format!("u = {drive} {u}")
+    } else {
+        format!("r = {drive} {y}")
+    };
+    facts.push(("at rest", format!("{driven}, y = {output} {y} ({from})")));
+    if let Some(mismatch) = &in_loop.mismatch {
+        let [systematic, size] =
+            [mismatch.systematic, mismatch.size].map(|v| numbers::significant(v, 2));
+        facts.push((
+            "measured command",
+            format!("the controller misses {systematic} of {size} {u} root mean square"),
+        ));
+    }
+    let theta: Vec<String> = in_loop.start.theta.iter().map(|v| digits(*v)).collect();
+    let from = in_loop.start.from;
+    let bandwidth = numbers::significant(in_loop.start.bandwidth, 3);
+    let start = if found.trajectory.is_some() || in_loop.batch.is_some() {
+        "start"
+    } else {
+        "regression"
+    };
+    facts.push((
+        start,
+        format!(
+            "{from} with filters of {bandwidth} 1/s: {}",
+            theta.join(", ")
+        ),
+    ));
+    if let Some(batch) = &in_loop.batch {
+        let end = if batch.stop.was_successful() {
+            "at a minimum"
+        } else {
+            "before a minimum"
+        };
+        let noise = match batch.noise {
+            _ if open => "",
+            NoisePath::Loop => "; the noise circulates in the loop",
+            NoisePath::Record => "; the noise is on the record alone",
+        };
+        facts.push((
+            "fit",
+            format!(
+                "{} steps, ended {end}, the best of {} starts{noise}",
+                batch.iterations, batch.starts
+            ),
+        ));
+    }
+    if let Some(health) = &in_loop.health {
+        facts.push((
+            "recursion",
+            format!(
+                "{} steps cut to the limit, {} shortened and {} refused to keep the loop stable; output error {} {y}",
+                health.limited,
+                health.shortened,
+                health.refused,
+                numbers::significant(health.residual_rms, 3)
+            ),
+        ));
+    }
+    if let Some(convergence) = &in_loop.convergence {
+        facts.push(("condition (14)", condition(&convergence.condition)));
+    }
+    facts
+}
+
+/// The verdict of condition (14), in words.
+pub(crate) fn condition(condition: &Condition) -> String {
+    let verdict = match condition.verdict {
+        Verdict::Holds => "it holds: a recursion that keeps the filter of this start converges",
+        Verdict::Positive => {
+            "it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
+        }
+        Verdict::Negative => {
+            "it fails, and the real part falls below 0: a recursion that keeps the filter of this start may go the wrong way; renew the filter"
+        }
+        Verdict::Unstable => "the loop of the estimates is not stable",
+    };
+    if condition.verdict == Verdict::Unstable {
+        return verdict.to_owned();
+    }
+    let least = numbers::significant(condition.least, 3);
+    let at = match condition.frequency {
+        0.0 => "at low frequencies".to_owned(),
+        f64::INFINITY => "at high frequencies".to_owned(),
+        frequency => format!("at {} rad/s", numbers::significant(frequency, 3)),
+    };
+    format!("Re P^/P is least {at}, {least}, and has to be above 1/2; {verdict}")
+}

@@ -1,0 +1,81 @@
+//! What every page shares: the shell that holds style, data and scripts, and the places for what it shows.
+
+use super::GENERATOR;
+use super::text::escape;
+
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
+                      img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'";
+const STYLE: &str = include_str!("report.css");
+/// Colours, axes and the unpacking of plotly.js: comes before the page's own script.
+const PLOTS: &str = include_str!("plots.js");
+/// plotly.js, gzipped, in base64.
+pub(super) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
+
+/// Stands where the plots need a script.
+pub(super) const NOTICES: &str = "<noscript><p class=\"notice\">The plots need a browser that runs scripts; \
+     the findings and the tables do not.</p></noscript>\n\
+     <p class=\"notice\" id=\"no-plots\" hidden></p>\n";
+
+/// A page to be.
+pub(super) struct Page<'a> {
+    /// HTML.
+    pub title: &'a str,
+    /// HTML.
+    pub body: &'a str,
+    /// JSON, safe inside a `<script>` element.
+    pub data: &'a str,
+    /// What draws it.
+    pub script: &'a str,
+}
+
+/// The complete file.
+pub(super) fn html(page: &Page) -> String {
+    let Page {
+        title,
+        body,
+        data,
+        script,
+    } = page;
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
+         {GENERATOR}\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}\n\
+         <script type=\"application/json\" id=\"data\">{data}</script>\n\
+         <script type=\"text/plain\" id=\"plotly\">{PLOTLY}</script>\n\
+         <script>\n{PLOTS}{script}</script>\n</body>\n</html>\n"
+    )
+}
+
+/// A part of the page under a heading; `title`, `lead` and `content` are HTML.
+pub(super) fn section(id: &str, title: &str, lead: &str, content: &str) -> String {
+    let lead = if lead.is_empty() {
+        String::new()
+    } else {
+        format!("<p class=\"lead\">{lead}</p>\n")
+    };
+    format!(
+        "<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{title}</h2>\n{lead}{content}</section>\n"
+    )
+}
+
+/// A place for a plot. `heading` is HTML, `caption` is text.
+pub(super) fn figure(id: &str, heading: &str, caption: &str) -> String {
+    figure_with(id, heading, &escape(caption))
+}
+
+/// A place for a plot, heading and caption in HTML.
+pub(super) fn figure_with(id: &str, heading: &str, caption: &str) -> String {
+    let caption = if caption.is_empty() {
+        String::new()
+    } else {
+        format!("<p class=\"caption\">{caption}</p>")
+    };
+    format!(
+        "<figure aria-labelledby=\"plot-{id}-name\">\n<figcaption><h3 id=\"plot-{id}-name\">{heading}</h3>\
+         {caption}</figcaption>\n<div class=\"plot\" id=\"plot-{id}\"></div>\n</figure>\n"
+    )
+}

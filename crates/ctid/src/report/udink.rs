@@ -1,0 +1,386 @@
+//! The page of `ctid tables udink`.
+
+use super::figures::{self, Colour, Curve, Figure, Panel, Values};
+use super::page::{self, NOTICES, Page, figure, section};
+use super::tables::table;
+use super::text::{escape, significant};
+use crate::tables::gains::{Gains, Kind, Row, TRUTH};
+use crate::tables::udink::{LargerP, Rule, Study};
+use crate::tables::{Cell, Comparison};
+
+/// The page as a complete HTML file. The same study gives the same bytes.
+pub fn html(study: &Study) -> String {
+    let body: String = [
+        headline(study),
+        "<main>".to_owned(),
+        responses(),
+        cells(study),
+        larger_p(&study.larger_p),
+        gains(&study.gains),
+        "</main>".to_owned(),
+        "<footer><p>Written by ctid. This file holds all its data and loads nothing.</p></footer>"
+            .to_owned(),
+    ]
+    .concat();
+    page::html(&Page {
+        title: "ctid: tables 1 to 4 of Udink ten Cate",
+        body: &body,
+        data: &figures::json(&all_figures(study)),
+        script: figures::SCRIPT,
+    })
+}
+
+fn headline(study: &Study) -> String {
+    let trail: String = [("Euler's rule", &study.euler), ("exact step", &study.exact)]
+        .iter()
+        .map(|(name, comparison)| {
+            format!(
+                "<li><span class=\"number\">{} <small>of {}</small></span>\
+                 <span class=\"label\">cells inside with {name}</span></li>\n",
+                comparison.inside, comparison.of
+            )
+        })
+        .collect();
+    let assumptions: String = study
+        .assumptions
+        .iter()
+        .map(|sentence| format!("<li>{}</li>\n", escape(sentence)))
+        .collect();
+    format!(
+        "<header>\n<p class=\"kicker\">ctid report · A. J. Udink ten Cate, WP-85-54, IIASA, 1985</p>\n\
+         <h1>Tables 1 to 4: {}</h1>\n\
+         <div class=\"verdict\"><p>The paper prints one run of each table. Here are {} runs, each with another noise, \
+         the same in every table. A cell is inside where the printed figure, give or take its rounding, lies in the \
+         5 to 95 % range of the runs; of cells that agree, one in ten lies outside by chance.</p></div>\n\
+         <ol class=\"trail apart\">\n{trail}</ol>\n\
+         <details><summary>What the paper does not print, and is assumed</summary><ul>\n{assumptions}</ul></details>\n\
+         {NOTICES}</header>\n",
+        study.verdict(),
+        study.runs
+    )
+}
+
+fn responses() -> String {
+    section(
+        "responses",
+        "Figure 1, drawn again",
+        "The responses of table 3: the first of the noises, with Euler's rule. Dashed: the true values, K = 1 and tau = 10 s. \
+         E is the criterion: the squared relative errors of both, added up over time.",
+        &figure("responses", "Output, estimates and criterion", ""),
+    )
+}
+
+fn cells(study: &Study) -> String {
+    let mut content = String::from("<div class=\"pairs\">\n");
+    for number in numbers(study) {
+        content += &figure(
+            &format!("cells-{number}"),
+            &format!("Table {number}: share of the runs below the printed figure"),
+            "",
+        );
+    }
+    content += "</div>\n";
+    for number in numbers(study) {
+        content += &cells_table(study, number);
+    }
+    content += &outside(study);
+    section(
+        "cells",
+        "The printed figures against the runs",
+        "Shaded: 5 to 95 %. E250 is the criterion at 250 s; differences of it are given besides, as its values share their past.",
+        &content,
+    )
+}
+
+fn numbers(study: &Study) -> Vec<usize> {
+    let mut numbers: Vec<usize> = study.euler.tables.iter().map(|cell| cell.table).collect();
+    numbers.dedup();
+    numbers
+}
+
+fn cells_table(study: &Study, number: usize) -> String {
+    let rows: String = study
+        .euler
+        .tables
+        .iter()
+        .zip(&study.exact.tables)
+        .filter(|(cell, _)| cell.table == number)
+        .map(|(euler, exact)| {
+            format!(
+                "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td>{}{}</tr>\n",
+                euler.cell,
+                format_args!("{:.*}", euler.decimals, euler.paper),
+                of_rule(euler),
+                of_rule(exact)
+            )
+        })
+        .collect();
+    table(
+        &format!("Table {number}"),
+        "<tr><th scope=\"col\">Cell</th><th scope=\"col\" class=\"number\">Paper</th>\
+         <th scope=\"col\" class=\"number\">Euler: median</th><th scope=\"col\" class=\"number\">5 to 95 %</th><th scope=\"col\"></th>\
+         <th scope=\"col\" class=\"number\">Exact: median</th><th scope=\"col\" class=\"number\">5 to 95 %</th><th scope=\"col\"></th></tr>",
+        &rows,
+        "",
+    )
+}
+
+fn of_rule(cell: &Cell) -> String {
+    let (class, word) = if cell.inside {
+        ("", "inside")
+    } else {
+        (" class=\"chosen\"", "outside")
+    };
+    format!(
+        "<td class=\"number\">{}</td><td class=\"number\">{}</td><td{class}>{word}</td>",
+        significant(cell.median, 4),
+        cell.range(" to ").replace('-', "−")
+    )
+}
+
+fn outside(study: &Study) -> String {
+    let list = |name: &str, comparison: &Comparison| {
+        let items: String = comparison
+            .outside
+            .iter()
+            .map(|cell| {
+                format!(
+                    "<li>table {}, {}: {}</li>\n",
+                    cell.table,
+                    cell.cell,
+                    escape(cell.why)
+                )
+            })
+            .collect();
+        format!("<h3>Outside with {name}</h3>\n<ul>\n{items}</ul>\n")
+    };
+    list("Euler's rule", &study.euler) + &list("the exact step", &study.exact)
+}
+
+fn larger_p(rows: &[LargerP]) -> String {
+    let cells: String = rows
+        .iter()
+        .map(|row| {
+            let failed = |count: usize| format!("{count} of {}", row.runs);
+            let class = |count: usize| if count > 0 { " chosen" } else { "" };
+            format!(
+                "<tr><th scope=\"row\">× {}</th><td class=\"number{}\">{}</td><td class=\"number{}\">{}</td>\
+                 <td class=\"number\">{}</td><td class=\"number\">{}</td></tr>\n",
+                row.factor_name(),
+                class(row.euler_failed),
+                failed(row.euler_failed),
+                class(row.exact_failed),
+                failed(row.exact_failed),
+                significant(row.euler_criterion, 4),
+                significant(row.exact_criterion, 4),
+            )
+        })
+        .collect();
+    section(
+        "larger",
+        "“Larger values lead to numerical difficulties”",
+        "So the paper of P(0). It is Euler's rule that fails: it keeps P positive definite only while the step times phi′P phi stays below 1. \
+         The exact step has no such limit.",
+        &table(
+            "Table 1 with larger P(0)",
+            "<tr><th scope=\"col\">P(0)</th><th scope=\"col\" class=\"number\">Euler: runs lost</th>\
+             <th scope=\"col\" class=\"number\">Exact: runs lost</th><th scope=\"col\" class=\"number\">Euler: E1000</th>\
+             <th scope=\"col\" class=\"number\">Exact: E1000</th></tr>",
+            &cells,
+            "E1000: median of the criterion at 1000 s; lower is better. The largest P(0) is not the best one.",
+        ),
+    )
+}
+
+fn gains(gains: &Gains) -> String {
+    let rows: String = gains
+        .rows
+        .iter()
+        .map(|row| gain_row(row, gains.noises))
+        .collect();
+    let content = [
+        figure(
+            "counterexample",
+            "Without noise: the estimates over time",
+            "Exact step of 0.01 s, no bounds. Dashed: the truth. The block-diagonal gain ends elsewhere, \
+             which the paper's theorem excludes; the other two have a proof, and converge. V = delta′P⁻¹ delta, over theta and c, falls for them; for the block-diagonal gain it rises.",
+        ),
+        figure(
+            "gains",
+            "With noise: largest error of a parameter over time",
+            "Relative to the true value, which is 1. The first of the noises; lines end where runs are lost. Thin: Euler's rule.",
+        ),
+        table(
+            "Three gains, two rules, with bounds on c and without",
+            "<tr><th scope=\"col\">Gain</th><th scope=\"col\">Rule</th><th scope=\"col\">Bounds</th>\
+             <th scope=\"col\" class=\"number\">Without noise: ends at</th>\
+             <th scope=\"col\" class=\"number\">With noise: error</th><th scope=\"col\" class=\"number\">5 to 95 %</th>\
+             <th scope=\"col\" class=\"number\">Runs lost</th></tr>",
+            &rows,
+            "Ends at: a1, a2, b0 at 2000 s, step 0.05 s; the truth is (1, 1, 1). Error: of the worst parameter, mean over the last quarter \
+             of 1000 s, step 0.1 s, 1 % of noise; median of the noises. The constant gain stays at P(0) = I and does not average the noise out.",
+        ),
+    ]
+    .concat();
+    section(
+        "gains",
+        "The three gains on one experiment of second order",
+        "a2 y″ + a1 y′ + y = b0 u with all parameters 1, three sines, derivatives given, started from (2, 2, 0.5) with P(0) = I. \
+         Bounds keep c where C/A is strictly positive real.",
+        &content,
+    )
+}
+
+fn gain_row(row: &Row, noises: usize) -> String {
+    let end = row.quiet_end.map_or("lost".to_owned(), |end| {
+        let end = end.map(|value| format!("{value:.3}"));
+        format!("({})", end.join(", "))
+    });
+    let lost = match row.noisy_failed {
+        0 => "none".to_owned(),
+        lost => format!("{lost} of {noises}"),
+    };
+    format!(
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td class=\"number\">{end}</td>\
+         <td class=\"number\">{}</td><td class=\"number\">{} to {}</td><td class=\"number\">{lost}</td></tr>\n",
+        row.variant.gain.name(),
+        row.variant.rule.name(),
+        if row.variant.bounded { "on c" } else { "none" },
+        significant(row.noisy_error, 2),
+        significant(row.noisy_q05, 2),
+        significant(row.noisy_q95, 2),
+    )
+}
+
+fn all_figures(study: &Study) -> Vec<Figure> {
+    let mut all = vec![responses_figure(study)];
+    all.extend(numbers(study).into_iter().map(|n| cells_figure(study, n)));
+    all.extend([
+        counterexample_figure(&study.gains),
+        gains_figure(&study.gains),
+    ]);
+    all
+}
+
+fn responses_figure(study: &Study) -> Figure {
+    let shown = &study.figure;
+    let panels = [
+        ("y", "", None),
+        ("K^", "", Some(study.settings.gain)),
+        ("tau^", "s", Some(study.settings.time_constant)),
+        ("c^", "s", None),
+        ("E", "s", None),
+    ]
+    .map(|(title, unit, truth)| Panel {
+        lines: truth.into_iter().collect(),
+        ..Panel::new(title, unit)
+    });
+    let curves = [
+        ("disturbed output y", &shown.y, Colour::Named("measured")),
+        ("K^", &shown.gain, Colour::Of(1)),
+        ("tau^", &shown.time_constant, Colour::Of(0)),
+        ("c^", &shown.filter, Colour::Of(2)),
+        ("criterion", &shown.criterion, Colour::Of(3)),
+    ];
+    let curves = curves
+        .into_iter()
+        .enumerate()
+        .map(|(panel, (name, values, colour))| {
+            Curve::line(name, panel, colour, (&shown.time, values))
+        });
+    Figure::over_time("responses", 820, panels.into(), curves.collect())
+}
+
+fn cells_figure(study: &Study, number: usize) -> Figure {
+    let curve = |name: &str, comparison: &Comparison, colour, marker| {
+        let cells: Vec<&Cell> = comparison
+            .tables
+            .iter()
+            .filter(|cell| cell.table == number)
+            .collect();
+        let shares: Vec<f64> = cells.iter().map(|cell| 100.0 * cell.below).collect();
+        Curve {
+            marker: Some(marker),
+            y: Values::Names(cells.iter().map(|cell| cell.cell).collect()),
+            x: shares,
+            ..Curve::line(name, 0, colour, (&[], &[]))
+        }
+        .named()
+    };
+    let curves = vec![
+        curve("Euler", &study.euler, Colour::Of(0), "circle"),
+        curve("exact", &study.exact, Colour::Of(1), "diamond"),
+    ];
+    let count = curves
+        .iter()
+        .map(|curve| curve.x.len())
+        .max()
+        .unwrap_or_default();
+    Figure {
+        x_title: "runs below the printed figure",
+        x_unit: "%".to_owned(),
+        x_range: Some([-3.0, 103.0]),
+        x_band: Some([5.0, 95.0]),
+        categories: true,
+        ..Figure::over_time(
+            &format!("cells-{number}"),
+            90 + 21 * count as u32,
+            vec![Panel::new("", "")],
+            curves,
+        )
+    }
+}
+
+/// A gain's colour and dash, the same in both figures.
+fn look(kind: Kind) -> (Colour, &'static str) {
+    match kind {
+        Kind::BlockDiagonal => (Colour::Of(0), "solid"),
+        Kind::Full => (Colour::Of(1), "dash"),
+        Kind::Constant => (Colour::Of(2), "dot"),
+    }
+}
+
+fn counterexample_figure(gains: &Gains) -> Figure {
+    let panels = [("a1", "s"), ("a2", "s^2"), ("b0", "")]
+        .into_iter()
+        .zip(TRUTH)
+        .map(|((name, unit), truth)| Panel {
+            lines: vec![truth],
+            ..Panel::new(name, unit)
+        });
+    let panels: Vec<Panel> = panels.chain([Panel::new("V", "")]).collect();
+    let mut curves = Vec::new();
+    for found in &gains.counterexample {
+        let (colour, dash) = look(found.gain);
+        let values = found.theta.iter().chain([&found.lyapunov]);
+        for (panel, values) in values.enumerate() {
+            let curve = Curve::line(found.gain.name(), panel, colour, (&found.time, values));
+            let curve = curve.dashed(dash);
+            curves.push(if panel == 0 { curve.named() } else { curve });
+        }
+    }
+    Figure::over_time("counterexample", 660, panels, curves)
+}
+
+/// Bounds in the upper panel, none in the lower; Euler's rule thin.
+fn gains_figure(gains: &Gains) -> Figure {
+    let panels = ["error, no bounds", "error, c bounded"].map(|title| Panel {
+        log: true,
+        range: Some([-2.3, 1.3]),
+        ..Panel::new(title, "")
+    });
+    let curves = gains.rows.iter().map(|row| {
+        let (colour, dash) = look(row.variant.gain);
+        let exact = row.variant.rule == Rule::Exact;
+        let name = format!("{}, {}", row.variant.gain.name(), row.variant.rule.name());
+        let panel = usize::from(row.variant.bounded);
+        let data = (&row.curve.time[..], &row.curve.values[..]);
+        let curve = Curve {
+            width: if exact { 2.2 } else { 1.0 },
+            legend: !row.variant.bounded,
+            ..Curve::line(&name, panel, colour, data)
+        };
+        curve.dashed(if exact { "solid" } else { dash })
+    });
+    Figure::over_time("gains", 560, panels.into(), curves.collect())
+}

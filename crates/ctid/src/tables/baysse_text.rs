@@ -1,0 +1,217 @@
+//! What `ctid tables baysse` prints.
+
+use super::baysse::{Cell, Study};
+use crate::look::{Look, Side, table};
+use crate::numbers;
+use crate::plot::{self, Curve, plot};
+
+/// The whole of it.
+#[must_use]
+pub fn text(study: &Study, look: Look) -> String {
+    let title =
+        "A. Baysse, F. J. Carrillo, A. Habbadi, identification in closed loop: tables I and II";
+    let mut text = format!("{}\n", look.heading(title));
+    let lead = format!(
+        "The printed figures beside {} runs, each with another noise. The band is where the figure of the runs has to be; * marks one outside. \
+         The standard deviation is that of the figure from one such set of runs to the next.",
+        study.runs
+    );
+    text += &look.paragraph("  ", &lead);
+    text += &cells(study, look);
+    text += &summary(study, look);
+    text += &figure(study, look);
+    for (title, sentences) in [
+        (
+            "Assumed, as the paper does not print it",
+            study.assumptions.clone(),
+        ),
+        (
+            "What cannot be as it is printed",
+            study.misprints.iter().map(ToString::to_string).collect(),
+        ),
+    ] {
+        text += &format!("\n{}\n", look.heading(title));
+        for sentence in sentences {
+            text += &look.paragraph("  - ", &sentence);
+        }
+    }
+    text
+}
+
+fn cells(study: &Study, look: Look) -> String {
+    let mut rows = Vec::new();
+    let mut last = (0, "");
+    for cell in &study.tables {
+        if cell.table != last.0 {
+            let heading = ["paper", "here", "std. dev.", "band"].map(|name| look.faint(name));
+            let number = if cell.table == 1 { "I" } else { "II" };
+            let mut row = vec![look.strong(format!("Table {number}")), String::new()];
+            row.extend(heading);
+            rows.push(row);
+        }
+        let name = if (cell.table, cell.method) == last {
+            ""
+        } else {
+            cell.method
+        };
+        last = (cell.table, cell.method);
+        let mark = match cell.inside {
+            Some(false) => look.warning("*"),
+            _ => " ".to_owned(),
+        };
+        rows.push(vec![
+            format!("  {name}"),
+            cell.of.to_owned(),
+            printed(cell),
+            figure_of(cell),
+            numbers::significant(cell.sd, 2),
+            band(cell, " .. ") + &mark,
+        ]);
+    }
+    let [left, right] = [Side::Left, Side::Right];
+    let mut text = String::new();
+    for line in table(&[left, left, right, right, right, right], &rows) {
+        if line.contains("Table ") {
+            text.push('\n');
+        }
+        text += &format!("{line}\n");
+    }
+    text.push('\n');
+    text
+}
+
+/// As the paper prints it, small numbers in powers of ten.
+pub(crate) fn printed(cell: &Cell) -> String {
+    match cell.paper {
+        Some(paper) if paper < SMALL => format!("{paper:.2e}"),
+        Some(paper) => format!("{paper:.*}", cell.decimals),
+        None => "-".to_owned(),
+    }
+}
+
+/// Below this, powers of ten.
+const SMALL: f64 = 0.01;
+
+/// To the second digit of its deviation.
+pub(crate) fn figure_of(cell: &Cell) -> String {
+    if cell.mean.abs() < SMALL {
+        return format!("{:.2e}", cell.mean);
+    }
+    let places = 1 - numbers::exponent(cell.sd);
+    numbers::decimals(cell.mean, places.min(MOST_DECIMALS))
+}
+
+/// Nobody reads more, however sure it is.
+const MOST_DECIMALS: i32 = 4;
+
+/// Its ends, `> 7.5` where it is open, nothing without one.
+pub(crate) fn band(cell: &Cell, between: &str) -> String {
+    match cell.band {
+        None => String::new(),
+        Some([low, high]) if high.is_infinite() => format!("> {low}"),
+        Some([low, high]) => {
+            let places = 1 - numbers::exponent(high - low);
+            let end = |end: f64| match end.abs() < SMALL {
+                true => format!("{end:.1e}"),
+                false => short(&numbers::decimals(end, places)),
+            };
+            format!("{}{between}{}", end(low), end(high))
+        }
+    }
+}
+
+/// Without zeros at the end of its decimals.
+fn short(number: &str) -> String {
+    match number.contains('.') {
+        true => number
+            .trim_end_matches('0')
+            .trim_end_matches('.')
+            .to_owned(),
+        false => number.to_owned(),
+    }
+}
+
+fn summary(study: &Study, look: Look) -> String {
+    let Study { inside, of, .. } = study;
+    let verdict = look.strong(format!("{inside} of {of} cells inside their bands"));
+    let mut text = format!("{verdict}\n");
+    for cell in study.outside() {
+        let line = format!("table {}, {}: {}", cell.table, cell.cell, figure_of(cell));
+        text += &look.paragraph("    - ", &line);
+    }
+    for sentence in notes(study) {
+        text += &look.paragraph("  ", &sentence);
+    }
+    text
+}
+
+/// What the cells do not say.
+pub(crate) fn notes(study: &Study) -> Vec<String> {
+    let mean = |counts: &[usize]| {
+        let mean = counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64;
+        numbers::decimals(mean, 2)
+    };
+    let counts = &study.first.iterations;
+    let [gain, tau] = study.second.tangent;
+    let printed = |of: &str| {
+        let mut cells = study.tables.iter();
+        let cell = cells.find(|cell| cell.method == "Ki = 0.074" && cell.of == of);
+        cell.map_or(String::new(), figure_of)
+    };
+    let (printed_k, printed_tau) = (printed("K"), printed("tau"));
+    let difference = match study.first.diagonal_difference {
+        0.0 => "are the same to the last digit".to_owned(),
+        share => format!(
+            "differ by {} of themselves at most",
+            numbers::significant(share, 1)
+        ),
+    };
+    vec![
+        format!(
+            "With mu diag(J'') the estimates in theta and delta {difference}, and need {} and {} iterations.",
+            mean(&counts.plain_diagonal),
+            mean(&counts.normalised_diagonal),
+        ),
+        format!(
+            "Table II took {} iterations in theta and {} in delta, from a start that is far off.",
+            mean(&study.second.plain.iterations),
+            mean(&study.second.normalised.iterations),
+        ),
+        format!(
+            "The emulated tank has K = {gain:.3} and tau = {tau:.2} s at its operating point: the output error finds them where it knows the sensor's filter, \
+             instruments on raw levels find the secant, which a dead zone of the pump moves."
+        ),
+        format!(
+            "With Ki = 0.074 as printed, in the rig and in the model, it finds K = {printed_k} and tau = {printed_tau} s: not what the paper prints."
+        ),
+    ]
+}
+
+fn figure(study: &Study, look: Look) -> String {
+    let shown = &study.second.figure;
+    let curves = [
+        Curve {
+            values: &shown.instruments,
+            colour: plot::RESIDUAL,
+        },
+        Curve {
+            values: &shown.measured,
+            colour: plot::MEASURED,
+        },
+        Curve {
+            values: &shown.output_error,
+            colour: plot::MODEL,
+        },
+    ];
+    let limits = plot::limits(curves.iter().map(|curve| curve.values));
+    let (Some(first), Some(last)) = (shown.time.first(), shown.time.last()) else {
+        return String::new();
+    };
+    format!(
+        "\n{}\n{}",
+        look.heading(
+            "Figure 3: measured (cyan), by instruments (magenta), by output error (yellow) [cm]"
+        ),
+        plot(&curves, (0.0, last - first), limits, 9, look)
+    )
+}

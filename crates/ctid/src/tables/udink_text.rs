@@ -1,0 +1,196 @@
+//! What `ctid tables udink` prints.
+
+use super::gains::Gains;
+use super::udink::{LargerP, Study};
+use super::{Cell, Comparison};
+use crate::look::{Look, Side, table};
+use crate::numbers;
+
+/// The whole of it.
+#[must_use]
+pub fn text(study: &Study, look: Look) -> String {
+    let mut text = format!(
+        "{}\n",
+        look.heading("A. J. Udink ten Cate, WP-85-54, IIASA, 1985: tables 1 to 4")
+    );
+    let lead = format!(
+        "The printed figures against {} runs, each with another noise: median and 5 to 95 % range, by Euler's rule and by the \
+         exact step; * marks a printed figure outside.",
+        study.runs
+    );
+    text += &look.paragraph("  ", &lead);
+    text += &cells(study, look);
+    text += &summary(study, look);
+    text += &format!(
+        "{}\n",
+        look.heading("Assumed, as the paper does not print it")
+    );
+    for sentence in &study.assumptions {
+        text += &look.paragraph("  - ", sentence);
+    }
+    text.push('\n');
+    text + &larger_p(&study.larger_p, look) + &gains(&study.gains, look)
+}
+
+fn cells(study: &Study, look: Look) -> String {
+    let heading = ["", "paper", "Euler", "5 to 95 % ", "exact", "5 to 95 % "];
+    let mut rows = Vec::new();
+    let mut last = 0;
+    for (euler, exact) in study.euler.tables.iter().zip(&study.exact.tables) {
+        if euler.table != last {
+            last = euler.table;
+            let mut first = heading.map(|name| look.faint(name));
+            first[0] = look.strong(format!("Table {last}"));
+            rows.push(first.to_vec());
+        }
+        let mut row = vec![format!("  {}", euler.cell), printed(euler)];
+        row.extend(of_rule(euler, look));
+        row.extend(of_rule(exact, look));
+        rows.push(row);
+    }
+    let [left, right] = [Side::Left, Side::Right];
+    let mut text = String::new();
+    let sides = [left, right, right, right, right, right];
+    for line in table(&sides, &rows) {
+        if line.contains("Table ") {
+            text.push('\n');
+        }
+        text += &format!("{line}\n");
+    }
+    text.push('\n');
+    text
+}
+
+fn of_rule(cell: &Cell, look: Look) -> [String; 2] {
+    let mark = if cell.inside {
+        " ".to_owned()
+    } else {
+        look.warning("*")
+    };
+    [figure(cell.median), cell.range(" .. ") + &mark]
+}
+
+/// As the paper prints it.
+fn printed(cell: &Cell) -> String {
+    format!("{:.*}", cell.decimals, cell.paper)
+}
+
+/// Three digits, and a fourth from 100 on.
+fn figure(value: f64) -> String {
+    numbers::significant(value, if value.abs() >= 100.0 { 4 } else { 3 })
+}
+
+fn summary(study: &Study, look: Look) -> String {
+    let mut text = format!(
+        "{}\n",
+        look.strong(format!("Against the paper: {}", study.verdict()))
+    );
+    for (name, comparison) in [
+        ("Euler's rule", &study.euler),
+        ("the exact step", &study.exact),
+    ] {
+        let Comparison {
+            inside, of, failed, ..
+        } = comparison;
+        let lost = match failed {
+            0 => "no run was lost".to_owned(),
+            lost => format!("{lost} runs were lost"),
+        };
+        text += &look.paragraph(
+            "  ",
+            &format!("{name}: {inside} of {of} cells inside; {lost}"),
+        );
+        for cell in &comparison.outside {
+            let line = format!("table {}, {}: {}", cell.table, cell.cell, cell.why);
+            text += &look.paragraph("    - ", &line);
+        }
+    }
+    text.push('\n');
+    text
+}
+
+fn larger_p(rows: &[LargerP], look: Look) -> String {
+    let heading = [
+        "P(0)",
+        "Euler lost",
+        "exact lost",
+        "Euler E1000",
+        "exact E1000",
+    ];
+    let mut lines = vec![heading.map(|name| look.faint(name)).to_vec()];
+    for row in rows {
+        let lost = |count: usize| {
+            let text = format!("{count} of {}", row.runs);
+            if count > 0 { look.warning(text) } else { text }
+        };
+        lines.push(vec![
+            format!("x {}", row.factor_name()),
+            lost(row.euler_failed),
+            lost(row.exact_failed),
+            figure(row.euler_criterion),
+            figure(row.exact_criterion),
+        ]);
+    }
+    let title = "Table 1 with larger P(0): runs lost, and the median of the criterion";
+    let mut text = format!("{}\n", look.heading(title));
+    for line in table(&[Side::Right; 5], &lines) {
+        text += &format!("  {line}\n");
+    }
+    text.push('\n');
+    text
+}
+
+fn gains(gains: &Gains, look: Look) -> String {
+    let heading = [
+        "gain",
+        "rule",
+        "bounds",
+        "end: a1, a2, b0",
+        "error",
+        "5 to 95 %",
+        "lost",
+    ];
+    let mut lines = vec![heading.map(|name| look.faint(name)).to_vec()];
+    for row in &gains.rows {
+        let end = row.quiet_end.map_or("lost".to_owned(), |end| {
+            end.map(|value| format!("{value:.3}")).join(", ")
+        });
+        let [low, high] = [row.noisy_q05, row.noisy_q95].map(|q| numbers::significant(q, 2));
+        let range = match row.noisy_error.is_finite() {
+            true => format!("{low} .. {high}"),
+            false => "-".to_owned(),
+        };
+        lines.push(vec![
+            row.variant.gain.name().to_owned(),
+            row.variant.rule.name().to_owned(),
+            if row.variant.bounded { "on c" } else { "-" }.to_owned(),
+            end,
+            numbers::significant(row.noisy_error, 2),
+            range,
+            row.noisy_failed.to_string(),
+        ]);
+    }
+    let sides = [
+        Side::Left,
+        Side::Left,
+        Side::Left,
+        Side::Left,
+        Side::Right,
+        Side::Right,
+        Side::Right,
+    ];
+    let mut text = format!(
+        "{}\n",
+        look.heading("Three gains on one experiment of second order")
+    );
+    for line in table(&sides, &lines) {
+        text += &format!("  {line}\n");
+    }
+    let note = format!(
+        "The truth is 1, 1, 1. End: the estimates without noise, at 2000 s. Error: with 1 % of noise, of the worst parameter, mean over the last \
+         quarter of 1000 s; median of {} noises. The block-diagonal gain of the paper ends elsewhere without noise, which its theorem \
+         excludes; with bounds on c it does not.",
+        gains.noises
+    );
+    text + &look.paragraph("  ", &note)
+}

@@ -1,0 +1,398 @@
+//! Identification in a loop: what is found, and what is refused.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::Place;
+use ct_signals::{Hold, Record, Signal, excitation};
+use ctid::identify::{Identification, LevelChoice, Method, Order, Request, identify};
+use fcloe::{Controller, LoopData, Noise, PlantModel, continuous_loop, noise_at_snr, sampled_loop};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use serde_json::Value;
+
+const METHODS: [Method; 4] = [
+    Method::Ls,
+    Method::Iv,
+    Method::Fcloe,
+    Method::RecursiveFcloe,
+];
+const PI: (f64, f64) = (0.25, 100.0);
+
+fn controller() -> Controller {
+    Controller::pi(PI.0, PI.0 / PI.1).unwrap()
+}
+
+fn first_order() -> PlantModel {
+    PlantModel::first_order(6.0, 110.0).unwrap()
+}
+
+/// A loop that rests for a minute, then moves; levels of a tank. Noise circulates, in dB, or there is none.
+fn record(plant: &PlantModel, controller: &Controller, snr: Option<f64>, seed: u64) -> Record {
+    with_bits(30, plant, controller, snr, seed)
+}
+
+fn with_bits(
+    bit: usize,
+    plant: &PlantModel,
+    controller: &Controller,
+    snr: Option<f64>,
+    seed: u64,
+) -> Record {
+    let mut r = vec![0.0; 60];
+    r.extend(excitation::prbs(3000, bit, -1.0, 1.0, 7).unwrap());
+    let hold = ct_lti::Hold::Zero;
+    let run = |noise| continuous_loop(plant, controller, 1.0, &r, hold, noise).unwrap();
+    let clean = run(Noise::None);
+    let LoopData { y, u } = match snr {
+        None => clean,
+        Some(snr) => {
+            let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+            run(Noise::InLoop(&noise_at_snr(&clean.y, snr, rng).unwrap()))
+        }
+    };
+    let raised = |values: Vec<f64>, level: f64| values.iter().map(|v| v + level).collect();
+    let open = controller.is_open_loop();
+    Record {
+        name: "loop".into(),
+        time: (0..r.len()).map(|k| k as f64).collect(),
+        input: Signal::new("u", "V", raised(u, 4.0)),
+        output: Signal::new("y", "cm", raised(y, 20.0)),
+        reference: (!open).then(|| Signal::new("r", "cm", raised(r, 20.0))),
+        hold: Hold::Zero,
+    }
+}
+
+fn found(record: &Record, method: Method, order: Order, levels: LevelChoice) -> Identification {
+    let request = Request {
+        controller: record.reference.as_ref().map(|_| controller()),
+        levels,
+        ..Request::new(method, order)
+    };
+    identify(record, &request).unwrap()
+}
+
+#[test]
+fn without_noise_the_plant_is_found_in_the_loop_and_without() {
+    let second = PlantModel::new(&[210.0, 9000.0], &[5.0, 40.0]).unwrap();
+    for plant in [first_order(), second] {
+        let order = Order {
+            n: plant.orders().n,
+            m: plant.orders().m,
+        };
+        for controller in [controller(), Controller::none()] {
+            let record = record(&plant, &controller, None, 0);
+            for method in METHODS {
+                let found = found(&record, method, order, LevelChoice::Auto);
+                // A regression on u that is no line between samples is a little off.
+                let close = match method {
+                    Method::Fcloe => 1e-6,
+                    _ => 0.02,
+                };
+                for (parameter, truth) in found.parameters.iter().zip(plant.theta()) {
+                    assert!(
+                        (parameter.value / truth - 1.0).abs() < close,
+                        "{method:?} {order}: {} is {}, not {truth}",
+                        parameter.name,
+                        parameter.value
+                    );
+                }
+                assert!(found.fit_percent > 98.0, "{method:?} {}", found.fit_percent);
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_in_the_loop_biases_least_squares_and_not_the_others() {
+    let (plant, order) = (first_order(), Order { n: 1, m: 0 });
+    let truth = plant.theta();
+    let mut covered = 0;
+    for seed in 0..10 {
+        let record = record(&plant, &controller(), Some(15.0), seed);
+        let of = |method| found(&record, method, order, LevelChoice::Rest);
+        let off = |found: &Identification| (found.parameters[0].value / truth[0] - 1.0).abs();
+        assert!(off(&of(Method::Iv)) < 0.06 && off(&of(Method::RecursiveFcloe)) < 0.06);
+        let batch = of(Method::Fcloe);
+        let error = batch.parameters[0].std_error.unwrap();
+        covered += usize::from((batch.parameters[0].value - truth[0]).abs() < 2.0 * error);
+        // Slow moves, and a filter that is wide enough for the noise to come through.
+        let record = with_bits(300, &plant, &controller(), Some(20.0), seed);
+        let request = Request {
+            controller: Some(controller()),
+            bandwidth: Some(0.3),
+            ..Request::new(Method::Ls, order)
+        };
+        let biased = identify(&record, &request).unwrap();
+        assert!(off(&biased) > 0.15, "{}", biased.parameters[0].value);
+    }
+    assert!(covered >= 8, "{covered} of 10");
+}
+
+#[test]
+fn the_levels_are_those_at_rest() {
+    let order = Order { n: 1, m: 0 };
+    let record = record(&first_order(), &controller(), Some(30.0), 1);
+    for (levels, from) in [
+        (LevelChoice::Auto, LevelChoice::Estimated),
+        (LevelChoice::Estimated, LevelChoice::Estimated),
+        (LevelChoice::Rest, LevelChoice::Rest),
+        (LevelChoice::Mean, LevelChoice::Mean),
+    ] {
+        let found = found(&record, Method::Fcloe, order, levels)
+            .in_loop
+            .unwrap();
+        assert_eq!(found.levels_from, from);
+        let [r, y] = found.levels;
+        assert!(
+            (r - 20.0).abs() < 0.2 && (y - 20.0).abs() < 0.2,
+            "{found:?}"
+        );
+    }
+    let of = |levels, method| found(&record, method, order, levels);
+    let auto = of(LevelChoice::Auto, Method::Iv).in_loop.unwrap();
+    assert_eq!(auto.levels_from, LevelChoice::Rest);
+    // Raw levels as deviations: the secant, 20/4.
+    let secant = of(LevelChoice::Zero, Method::Ls);
+    assert!(
+        (secant.parameters[1].value - 5.0).abs() < 0.3,
+        "{:?}",
+        secant.parameters
+    );
+
+    // From a move on, nothing is at rest, and the batch fit of the beginning finds the levels.
+    let mut moving = record;
+    let cut = 90;
+    moving.time.drain(..cut);
+    for signal in [&mut moving.input, &mut moving.output] {
+        signal.values.drain(..cut);
+    }
+    moving.reference.as_mut().unwrap().values.drain(..cut);
+    let iv = found(&moving, Method::Iv, order, LevelChoice::Auto);
+    assert!(
+        iv.warnings
+            .iter()
+            .any(|w| w.contains("does not begin at rest")),
+        "{:?}",
+        iv.warnings
+    );
+}
+
+#[test]
+fn the_condition_of_the_start_is_told() {
+    let order = Order { n: 1, m: 0 };
+    let record = record(&first_order(), &controller(), Some(20.0), 2);
+    for method in METHODS {
+        let found = found(&record, method, order, LevelChoice::Auto);
+        let convergence = found.in_loop.unwrap().convergence;
+        assert_eq!(
+            convergence.is_some(),
+            matches!(method, Method::Fcloe | Method::RecursiveFcloe)
+        );
+        if let Some(convergence) = convergence {
+            assert!(convergence.condition.holds());
+            let least = convergence
+                .locus
+                .iter()
+                .map(|point| point.1)
+                .fold(f64::MAX, f64::min);
+            assert!((least + 0.5 - convergence.condition.least).abs() < 1e-3);
+        }
+    }
+}
+
+fn csv(record: &Record) -> String {
+    let mut text = "t [s],u [V],y [cm],r [cm]\n".to_owned();
+    let r = &record.reference.as_ref().unwrap().values;
+    for (k, time) in record.time.iter().enumerate() {
+        let (u, y) = (record.input.values[k], record.output.values[k]);
+        text += &format!("{time},{u:.6},{y:.6},{}\n", r[k]);
+    }
+    text
+}
+
+fn model(gain: f64, limits: &str) -> String {
+    let time = PI.1;
+    format!(
+        "plant = \"single-tank-linear\"\n[controller]\ntype = \"PI\"\ngain = {gain}\nintegral_time = {time}\n{limits}"
+    )
+}
+
+fn place() -> Place {
+    let place = Place::empty();
+    place.write(
+        "loop.csv",
+        csv(&record(&first_order(), &controller(), Some(25.0), 3)),
+    );
+    place.write("loop.toml", model(PI.0, ""));
+    place
+}
+
+#[test]
+fn the_program_writes_what_it_prints() {
+    let place = place();
+    for method in ["ls", "iv", "fcloe", "recursive-fcloe"] {
+        let text = place.succeeds(&format!(
+            "identify loop.csv --model loop.toml --method {method} --json out.json --report out.html"
+        ));
+        assert!(text.contains("The loop, and the way there"), "{text}");
+        for line in text.lines() {
+            assert!(line.chars().count() <= 80, "wider than 80: {line}");
+        }
+        let json = place.json("out.json");
+        assert_eq!(json["method"], method);
+        let names = json["parameters"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|p| &p["name"]);
+        assert_eq!(names.collect::<Vec<_>>(), ["a1", "b0"]);
+        assert_eq!(json["in_loop"]["r"].as_array().unwrap().len(), 2);
+        assert_eq!(json["trajectory"].is_null(), method != "recursive-fcloe");
+        let page = place.read("out.html");
+        let has = |id: &str| {
+            let drawn = page.contains(&format!("\"id\":\"{id}\""));
+            assert_eq!(drawn, page.contains(&format!("id=\"plot-{id}\"")), "{id}");
+            drawn
+        };
+        assert!(has("fit"));
+        assert_eq!(has("condition"), method.ends_with("fcloe"));
+        assert_eq!(has("trajectory"), method == "recursive-fcloe");
+    }
+    // Without the model there is no controller: open loop.
+    let json: Value = place.result("identify loop.csv --method fcloe");
+    assert_eq!(json["in_loop"]["r"], serde_json::json!([]));
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let place = place();
+    let bad = |words: &str, says: &[&str]| {
+        place.refuses(&format!("identify {words}"), says);
+    };
+    let loops = "loop.csv --model loop.toml --method";
+    for method in ["ls", "iv", "fcloe", "recursive-fcloe"] {
+        // no reference
+        let text = place.read("loop.csv");
+        let columns = text.lines().map(|line| line.rsplit_once(',').unwrap().0);
+        place.write("open.csv", columns.collect::<Vec<_>>().join("\n"));
+        bad(
+            &format!("open.csv --model loop.toml --method {method}"),
+            &["open.csv", "no reference r"],
+        );
+        // one that stands still
+        let still = text
+            .lines()
+            .map(|line| match line.rsplit_once(',').unwrap() {
+                (rest, r) if r.starts_with('r') => format!("{rest},{r}"),
+                (rest, _) => format!("{rest},20"),
+            });
+        place.write("still.csv", still.collect::<Vec<_>>().join("\n"));
+        bad(
+            &format!("still.csv --model loop.toml --method {method}"),
+            &["still.csv", "r is 20 throughout"],
+        );
+        // too short
+        let short: Vec<&str> = text.lines().take(16).collect();
+        place.write("short.csv", short.join("\n"));
+        bad(
+            &format!("short.csv --model loop.toml --method {method}"),
+            &["short.csv", "15", "20 are needed"],
+        );
+        // another controller: the size of the mismatch is said
+        place.write("other.toml", model(0.5, ""));
+        bad(
+            &format!("loop.csv --model other.toml --method {method}"),
+            &["loop.csv", "is not R/S (r - y)", "they differ by", "rms"],
+        );
+        // the sign
+        place.write("sign.toml", model(-PI.0, ""));
+        bad(
+            &format!("loop.csv --model sign.toml --method {method}"),
+            &["loop.csv", "sign"],
+        );
+    }
+    bad(
+        &format!("{loops} iv --memory 100"),
+        &["--memory does not go with"],
+    );
+    bad(
+        &format!("{loops} iv --levels estimated"),
+        &["--levels estimated is of --method fcloe"],
+    );
+    bad(
+        &format!("{loops} ct-rls --levels mean"),
+        &["--levels does not go with"],
+    );
+    bad(
+        &format!("{loops} fcloe --sensor-filter=-1"),
+        &["sensor filter", "-1"],
+    );
+    bad(
+        "loop.csv --method fcloe --sensor-filter 1",
+        &["--sensor-filter is of a loop"],
+    );
+    bad(
+        &format!("{loops} fcloe --bandwidth 0"),
+        &["--bandwidth is 0"],
+    );
+}
+
+/// A plant that goes the other way than its controller expects: the signals grow, and no stable loop gives them.
+#[test]
+fn a_loop_that_is_not_stable_is_refused() {
+    let plant = PlantModel::first_order(-1.0, 110.0).unwrap();
+    let r = excitation::prbs(1500, 30, -1.0, 1.0, 7).unwrap();
+    let data = sampled_loop(&plant, &controller(), 1.0, 1, &r, Noise::None, None).unwrap();
+    let record = Record {
+        name: "loop".into(),
+        time: (0..r.len()).map(|k| k as f64).collect(),
+        input: Signal::new("u", "V", data.u),
+        output: Signal::new("y", "cm", data.y),
+        reference: Some(Signal::new("r", "cm", r)),
+        hold: Hold::Zero,
+    };
+    for method in METHODS {
+        let request = Request {
+            controller: Some(controller()),
+            levels: LevelChoice::Zero,
+            ..Request::new(method, Order { n: 1, m: 0 })
+        };
+        let error = identify(&record, &request)
+            .map(|found| found.parameters)
+            .unwrap_err();
+        let error = error.to_string();
+        assert!(
+            error.starts_with("loop: ") && error.contains("stab"),
+            "{method:?}: {error}"
+        );
+    }
+}
+
+#[test]
+fn a_command_at_its_limits_and_a_controller_a_little_off_are_said() {
+    let place = place();
+    place.write("limits.toml", model(PI.0, "u_min = 3.9\nu_max = 4.1\n"));
+    let text = place.succeeds("identify loop.csv --model limits.toml --method fcloe");
+    assert!(text.contains("the command is at its limits"), "{text}");
+    place.write("off.toml", model(1.07 * PI.0, ""));
+    let text = place.succeeds("identify loop.csv --model off.toml --method fcloe");
+    assert!(text.contains("the controller misses"), "{text}");
+}
+
+#[test]
+fn a_controller_by_its_polynomials_is_the_same_one() {
+    let place = place();
+    let law = |more: &str| {
+        let r = format!("r = [{}, {}]", PI.0, PI.0 / PI.1);
+        format!("plant = \"first-order\"\n[controller]\ntype = \"RS\"\n{r}\ns = [1.0, 0.0]\n{more}")
+    };
+    place.write("p.toml", law("variable = \"p\"\n"));
+    let of =
+        |model: &str| place.result(&format!("identify loop.csv --method fcloe --model {model}"));
+    let [pi, p] = ["loop.toml", "p.toml"].map(|model| of(model)["parameters"].clone());
+    assert_eq!(pi, p);
+    place.write("sampled.toml", law(""));
+    let words = "identify loop.csv --method fcloe --model sampled.toml";
+    place.refuses(words, &["in continuous time", "variable = \"p\""]);
+}

@@ -1,0 +1,191 @@
+//! What nothing explains, from the program's outside: written as CSV, kept as a term of one's own, taken out again.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod common;
+
+use common::{Place, Tanks, lasting};
+use plants::{Fitted, Term, Variable};
+
+/// A tank with a wave in the level that no effect describes.
+fn wave(seed: u64) -> Tanks {
+    let knots: Vec<f64> = (0..160).map(|i| 0.25 * f64::from(i)).collect();
+    Tanks {
+        terms: vec![Term {
+            name: "wave".to_string(),
+            place: plants::Place::Vessel,
+            vessel: 0,
+            variable: Variable::Level,
+            ordinates: knots.iter().map(|h| 2.5 * (1.1 * h).sin()).collect(),
+            knots,
+            fitted: Fitted::Scale,
+        }],
+        seed,
+        ..Tanks::single()
+    }
+}
+
+fn place() -> Place {
+    let place = Place::empty();
+    place.write("a.csv", wave(1).csv());
+    place.write("b.csv", wave(2).csv());
+    place.write("tank.toml", wave(1).model());
+    place
+}
+
+#[test]
+fn the_unknown_is_written_kept_and_taken_out() {
+    let place = place();
+    let compare = "compare a.csv --model tank.toml --test b.csv";
+    let before = place.result(compare);
+    let text = place.succeeds(
+        "diagnose a.csv --model tank.toml --test b.csv --unknown u.csv --json d.json --report r.html",
+    );
+    let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        said.contains("acts in the vessel's balance and depends on the level"),
+        "{text}"
+    );
+    assert!(text.contains("wrote u.csv"));
+    let found = place.json("d.json");
+    assert_eq!(found["verdict"], "unexplained");
+    assert_eq!(found["unknown"]["variable"], "level");
+    let csv = place.read("u.csv");
+    assert!(
+        csv.starts_with("place,variable,at [cm],value [cm^3/s],std_error [cm^3/s]\nvessel,level,")
+    );
+    let page = place.read("r.html");
+    for id in [
+        "plot-unknown-path",
+        "plot-unknown-shape",
+        "What it depends on",
+    ] {
+        assert!(page.contains(id), "{id}");
+    }
+
+    let model = place.read("tank.toml");
+    let said = place.succeeds("add my_wave --from u.csv --model tank.toml");
+    assert!(
+        said.contains("added my_wave, a term in the level with"),
+        "{said}"
+    );
+    assert!(place.read("tank.toml").contains("effects = [\"my_wave\"]"));
+    let after = place.result(compare);
+    let error = |result: &serde_json::Value, key: &str| result["steps"][0][key].as_f64().unwrap();
+    for (key, part) in [("rmse", 0.25), ("rmse_test", 1.0)] {
+        let (before, after) = (error(&before, key), error(&after, key));
+        println!("{key}: {before:.3} -> {after:.3} cm");
+        assert!(after < part * before, "{key}: {before} -> {after}");
+    }
+    assert_eq!(after["known_effects"][0], "my_wave");
+    let parameters = after["steps"][0]["parameters"].as_array().unwrap();
+    assert!(parameters.iter().any(|p| p["name"] == "my_wave.scale"));
+
+    // Kept as it stands.
+    let held = place.read("tank.toml") + "fixed = true\n";
+    place.write("held.toml", held);
+    let kept = place.result("compare a.csv --model held.toml");
+    assert!(error(&kept, "rmse") < 0.25 * error(&before, "rmse"));
+
+    let said = place.succeeds("remove my_wave --model tank.toml");
+    assert!(
+        said.contains("[term.my_wave] stays for the day it is added again"),
+        "{said}"
+    );
+    assert!(place.read("tank.toml").starts_with(&model));
+    assert_eq!(lasting(place.result(compare)), lasting(before));
+    place.succeeds("add my_wave --model tank.toml");
+    assert_eq!(lasting(place.result(compare)), lasting(after));
+    place.refuses("add my_wave --model tank.toml", &["my_wave is on already"]);
+}
+
+#[test]
+fn nothing_is_written_where_nothing_is_unexplained() {
+    let place = Place::empty();
+    place.write("a.csv", Tanks::single().csv());
+    place.write("tank.toml", Tanks::single().model());
+    let text = place.succeeds("diagnose a.csv --model tank.toml --unknown u.csv");
+    assert!(text.contains("u.csv is not written"), "{text}");
+    assert!(!place.path("u.csv").exists());
+}
+
+#[test]
+fn a_shape_that_cannot_be_is_refused() {
+    let place = place();
+    let head = "place,variable,at [cm],value [cm^3/s]\n";
+    place.write(
+        "bad.csv",
+        format!("{head}vessel,level,8,1\nvessel,level,9,one\n"),
+    );
+    place.refuses(
+        "add mine --from bad.csv --model tank.toml",
+        &["bad.csv:3: column \"value\" holds \"one\"", "correct it"],
+    );
+    place.write("where.csv", format!("{head}upper,level,8,1\n"));
+    place.refuses(
+        "add mine --from where.csv --model tank.toml",
+        &["where.csv: \"upper\" is no place of plant single-tank"],
+    );
+    place.write("pump.csv", "place,variable,at,value\nactuator,level,8,1\n");
+    place.refuses(
+        "add mine --from pump.csv --model tank.toml",
+        &[
+            "pump.csv",
+            "at the actuator a term cannot depend on level",
+            "input, time",
+        ],
+    );
+    place.write(
+        "good.csv",
+        format!("{head}vessel,level,8,1\nvessel,level,9,2\n"),
+    );
+    place.refuses(
+        "add overflow --from good.csv --model tank.toml",
+        &["the catalogue has an effect"],
+    );
+    place.refuses(
+        "add my-leak --from good.csv --model tank.toml",
+        &["letters, digits and underscores"],
+    );
+    place.refuses(
+        "add mine --from none.csv --model tank.toml",
+        &["none.csv: the shape cannot be read"],
+    );
+    place.refuses(
+        "diagnose a.csv --model tank.toml --unknown tank.toml",
+        &["one of the inputs"],
+    );
+    place.write("notes.csv", "my,notes\n");
+    place.refuses(
+        "diagnose a.csv --model tank.toml --unknown notes.csv",
+        &["ctid did not write it"],
+    );
+    // A shape in another unit than the record's.
+    place.write(
+        "other.csv",
+        "place,variable,at [m],value [m^3/s]\nvessel,level,8,1\nvessel,level,9,2\n",
+    );
+    place.succeeds("add mine --from other.csv --model tank.toml");
+    place.refuses(
+        "compare a.csv --model tank.toml",
+        &["[term.mine] has at in m, but with a.csv it would be in cm"],
+    );
+    // A table that a person has spoilt.
+    let good = place.read("tank.toml");
+    place.write(
+        "tank.toml",
+        good.replace("at = [8.0, 9.0]", "at = [9.0, 8.0]"),
+    );
+    place.refuses(
+        "compare a.csv --model tank.toml",
+        &["tank.toml:", "knots have to rise"],
+    );
+    place.write(
+        "tank.toml",
+        good.replace("variable = \"level\"", "variable = \"flow\""),
+    );
+    place.refuses(
+        "compare a.csv --model tank.toml",
+        &["tank.toml:", "\"flow\" is no variable"],
+    );
+}

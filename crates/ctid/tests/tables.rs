@@ -1,0 +1,232 @@
+//! `ctid tables`: what it writes, and what it refuses.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::Place;
+use std::path::Path;
+
+use ctid::tables::udink::{Settings, study};
+use serde_json::Value;
+
+fn check(comparison: &Value) {
+    let cells = comparison["tables"].as_array().unwrap();
+    assert_eq!(cells.len(), 72);
+    assert_eq!(comparison["of"], 72);
+    let inside = cells.iter().filter(|cell| cell["inside"] == true).count();
+    assert_eq!(comparison["inside"], inside);
+    let outside = comparison["outside"].as_array().unwrap();
+    assert_eq!(outside.len(), 72 - inside);
+    assert!(outside.iter().all(|cell| cell["why"].is_string()));
+    for cell in cells {
+        let number = |key: &str| cell[key].as_f64().unwrap();
+        assert!((1..=4).contains(&cell["table"].as_u64().unwrap()));
+        assert!(cell["cell"].is_string());
+        assert!(number("q05") <= number("median") && number("median") <= number("q95"));
+        let [low, high] = [number("q05"), number("q95")];
+        // beside rounding of the printed figure, at most half a unit of the first digit
+        if (low..=high).contains(&number("paper")) {
+            assert_eq!(cell["inside"], true, "{cell}");
+        }
+    }
+    assert_eq!(cells[0]["cell"], "K avg");
+    assert_eq!(cells[0]["paper"], 1.079);
+}
+
+#[test]
+fn the_result_holds_every_cell_for_both_rules() {
+    let place = Place::empty();
+    let text = place.succeeds("tables udink --runs 25 --seed 3 --json a.json --report a.html");
+    for words in [
+        "Table 4",
+        "of 72 cells inside",
+        "consistent",
+        "Assumed, as the paper does not print it",
+        "Table 1 with larger P(0)",
+        "block-diagonal  exact",
+    ] {
+        assert!(text.contains(words), "no {words} in {text}");
+    }
+    assert!(!text.contains("identical"));
+    for line in text.lines() {
+        assert!(line.chars().count() <= 80, "wider than 80: {line}");
+    }
+    let json = place.json("a.json");
+    assert_eq!(json["schema"], 1);
+    assert_eq!(json["paper"], "udink");
+    assert_eq!(json["runs"], 25);
+    check(&json["euler"]);
+    check(&json["exact"]);
+    let page = place.read("a.html");
+    assert!(page.contains(ctid::report::GENERATOR));
+    for id in ["responses", "cells-1", "cells-4", "counterexample", "gains"] {
+        assert!(page.contains(&format!("id=\"plot-{id}\"")), "no plot {id}");
+        assert!(
+            page.contains(&format!("\"id\":\"{id}\"")),
+            "nothing draws {id}"
+        );
+    }
+    assert!(!page.contains("http://") && !page.contains("https://"));
+
+    // The seed decides, not the threads; and its own files may be written again.
+    let mut threads = place.command("tables --runs 25 --seed 3 --json b.json --report a.html");
+    threads.env("RAYON_NUM_THREADS", "3");
+    assert_eq!(common::outcome(threads).code, Some(0));
+    assert!(place.json("b.json") == json);
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let place = Place::empty();
+    place.write("notes.json", "{\"mine\": 1}");
+    place.refuses("tables --runs 0", &["--runs is 0", "20 or more"]);
+    place.refuses("tables --runs 19", &["--runs is 19", "20 or more"]);
+    place.refuses("tables --runs many", &["--runs", "many"]);
+    place.refuses("tables --seed -1", &["-1"]);
+    place.refuses("tables nobody", &["nobody", "udink"]);
+    place.refuses("tables --json notes.json", &["ctid did not write it"]);
+    place.refuses("tables --report no/where.html", &["there is no folder"]);
+    place.refuses("tables --json a --report a", &["cannot share"]);
+}
+
+#[test]
+fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
+    let study = study(&Settings::default(), 200, 1, &|_| {}).unwrap();
+    // One cell in ten lies outside by chance; what differs by the rule, not by chance, is named.
+    assert!(study.euler.inside >= 66, "{:?}", study.euler.outside);
+    assert!(study.exact.inside >= 62, "{:?}", study.exact.outside);
+    assert_eq!(study.euler.failed + study.exact.failed, 0);
+
+    // Where it lies beside the checkout: the range for the median of 200 noises of another program, cell by cell.
+    let bands =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reproduction/udink-accept.md");
+    let Ok(bands) = std::fs::read_to_string(&bands) else {
+        eprintln!("skipped: {} is not there", bands.display());
+        return;
+    };
+    let mut seen = 0;
+    for row in bands.lines() {
+        let columns: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let Some(table) = columns.first().and_then(|n| n.parse::<usize>().ok()) else {
+            continue;
+        };
+        for (comparison, column) in [(&study.euler, 3), (&study.exact, 5)] {
+            let (low, high) = columns[column].split_once("..").unwrap();
+            let [low, high] = [low, high].map(|end| end.trim().parse::<f64>().unwrap());
+            let mut cells = comparison.tables.iter();
+            let cell = cells.find(|cell| (cell.table, cell.cell) == (table, columns[1]));
+            let median = cell.unwrap().median;
+            assert!(
+                (low..=high).contains(&median),
+                "table {table}, {}: {median} instead of {low} to {high}",
+                columns[1]
+            );
+            seen += 1;
+        }
+    }
+    assert_eq!(seen, 144);
+}
+
+/// The bands are for 100 runs, and wider for fewer.
+#[test]
+fn the_second_paper_is_reproduced_cell_by_cell() {
+    let place = Place::empty();
+    let words = "tables baysse --runs 20 --seed 5 --json a.json --report a.html --record a.csv";
+    let text = place.succeeds(words);
+    for line in text.lines() {
+        assert!(line.chars().count() <= 80, "wider than 80: {line}");
+    }
+    for words in [
+        "Table I ",
+        "Table II",
+        "0.0074",
+        "1.895 V",
+        "32 of 32 cells",
+    ] {
+        assert!(text.contains(words), "no {words} in {text}");
+    }
+    let json = place.json("a.json");
+    assert_eq!(
+        (&json["paper"], &json["runs"]),
+        (&"baysse".into(), &20.into())
+    );
+    let cells = json["tables"].as_array().unwrap();
+    let mut banded = 0;
+    for cell in cells {
+        let number = |value: &Value| value.as_f64().unwrap();
+        assert!(
+            number(&cell["mean"]).is_finite() && number(&cell["sd"]) >= 0.0,
+            "{cell}"
+        );
+        let Some(band) = cell["band"].as_array() else {
+            assert!(cell["inside"].is_null(), "{cell}");
+            continue;
+        };
+        let above = number(&cell["mean"]) >= number(&band[0]);
+        let below = band[1].is_null() || number(&cell["mean"]) <= number(&band[1]);
+        assert_eq!(cell["inside"], above && below, "{cell}");
+        banded += 1;
+    }
+    assert_eq!(
+        (&json["inside"], &json["of"]),
+        (&banded.into(), &banded.into())
+    );
+    let printed: Vec<f64> = cells
+        .iter()
+        .filter_map(|cell| cell["paper"].as_f64())
+        .collect();
+    assert_eq!(printed.len(), 5 + 6 + 6 + 12);
+    assert_eq!((printed[0], printed[17]), (5.91416, 2.60));
+    assert!(json["first"]["diagonal_difference"].as_f64().unwrap() < 1e-9);
+    let counts = &json["first"]["iterations"];
+    assert_eq!(counts["plain_diagonal"], counts["normalised_diagonal"]);
+
+    let page = place.read("a.html");
+    for id in ["outputs", "clouds", "closer", "iterations"] {
+        assert!(page.contains(&format!("id=\"plot-{id}\"")), "no plot {id}");
+        assert!(
+            page.contains(&format!("\"id\":\"{id}\"")),
+            "nothing draws {id}"
+        );
+    }
+    assert!(!page.contains("http://") && !page.contains("https://"));
+
+    // The seed decides, not the threads.
+    let mut threads = place.command("tables baysse --runs 20 --seed 5 --json b.json");
+    threads.env("RAYON_NUM_THREADS", "3");
+    assert_eq!(common::outcome(threads).code, Some(0));
+    assert!(place.json("b.json") == json);
+
+    // A record that is there may be anybody's.
+    place.refuses(words, &["a.csv", "it is there already"]);
+    place.refuses("tables baysse --runs 9", &["--runs is 9", "10 or more"]);
+    place.refuses("tables --record b.csv", &["--record", "tables baysse"]);
+}
+
+/// docs/hidden-dead-zone.md: what the second paper's table II hides.
+#[test]
+fn the_emulated_rig_misses_its_dead_zone() {
+    let place = Place::empty();
+    place.succeeds("tables baysse --runs 10 --record rig.csv");
+    place.write("secant.toml", "plant = \"first-order\"\n");
+    place.write(
+        "tank.toml",
+        "plant = \"single-tank\"\n[known]\narea = 154.0\n",
+    );
+    for (model, before, after) in [("secant.toml", 0.5, 0.1), ("tank.toml", 0.2, 0.1)] {
+        let found = place.result(&format!("diagnose rig.csv --model {model} --max-effects 1"));
+        assert_eq!(
+            found["effects"],
+            serde_json::json!(["pump_deadzone"]),
+            "{model}"
+        );
+        let rmse = |step: usize| found["steps"][step]["rmse"].as_f64().unwrap();
+        assert!(
+            rmse(0) > before && rmse(1) < after,
+            "{model}: {} {}",
+            rmse(0),
+            rmse(1)
+        );
+    }
+}

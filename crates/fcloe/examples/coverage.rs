@@ -1,0 +1,51 @@
+//! Do 95 % intervals hold the truth in 95 % of the runs, with noise in the loop and on the record? 4000 runs of each, or
+//! as many as are asked for; a share of 400 is uncertain by 0.011, one of 4000 by 0.003.
+//!
+//! `cargo run --release -p fcloe --example coverage [-- RUNS]`
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+#[path = "../tests/support/rig.rs"]
+mod rig;
+
+use rig::Rig;
+
+fn main() {
+    let asked = std::env::args().nth(1).map(|runs| runs.parse());
+    let runs = asked.unwrap_or(Ok(4000)).expect("a number of runs");
+    println!("share of {runs} runs whose 95 % interval holds the truth, for each of a1.., b0..");
+    for in_loop in [true, false] {
+        println!(
+            "noise {}",
+            if in_loop {
+                "in the loop"
+            } else {
+                "on the record"
+            }
+        );
+        let show = |rig| show(&rig, runs);
+        show(Rig::first_order(in_loop));
+        show(Rig::second_order(in_loop));
+        show(Rig::second_order(in_loop).with_unknown_levels());
+        show(Rig::filtered_pid(in_loop));
+        show(Rig::direct_term(in_loop));
+    }
+    println!("noise on the record");
+    show(&Rig::open_loop(), runs);
+}
+
+fn show(rig: &Rig, runs: u64) {
+    let (hits, white, placed) = rig.coverage(runs);
+    let share = |hits: &[usize]| -> String {
+        let share = hits
+            .iter()
+            .map(|h| format!("{:6.3}", *h as f64 / runs as f64));
+        share.collect::<Vec<_>>().join(" ")
+    };
+    println!("  {}", rig.name);
+    println!("    with the residual's colour {}", share(&hits));
+    println!("    as if it were white        {}", share(&white));
+    println!(
+        "    noise placed rightly in    {:6.3}",
+        placed as f64 / runs as f64
+    );
+}

@@ -1,0 +1,87 @@
+//! How a batch fit goes about it.
+
+use serde::Serialize;
+
+use crate::Error;
+
+/// What is added to J''.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Damping {
+    /// `mu I`: depends on the units.
+    Identity,
+    /// `mu diag(J'')`: does not.
+    Diagonal,
+}
+
+/// How a step is made.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Along the gradient, the first length tried being the one to the lowest point of the linearised model. Slow in
+    /// a narrow valley: iterate in delta, and allow many iterations.
+    Gradient,
+    /// To the lowest point of the linearised model, halved until J falls.
+    GaussNewton,
+    /// Damped.
+    LevenbergMarquardt {
+        /// The first mu, above 0. The paper takes 0.1, and 1 after a poor start.
+        mu: f64,
+        /// What it multiplies.
+        damping: Damping,
+    },
+}
+
+/// What is iterated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Coordinates {
+    /// The parameters.
+    Theta,
+    /// `theta = theta0 (1 + delta)`; estimated levels are scaled by the spread of their signal.
+    Delta,
+}
+
+/// How to fit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Settings {
+    /// How a step is made.
+    pub method: Method,
+    /// What is iterated.
+    pub coordinates: Coordinates,
+    /// The fit ends with a step that changes no parameter by more than this share of itself, or from a point whose
+    /// minimum of the linearised model changes y^ by no more than this share of the residual (root mean square both).
+    pub tolerance: f64,
+    /// Most steps that are taken.
+    pub max_iterations: usize,
+}
+
+impl Default for Settings {
+    /// Levenberg-Marquardt with `0.1 diag(J'')` in theta, to 1e-8.
+    fn default() -> Self {
+        Self {
+            method: Method::LevenbergMarquardt {
+                mu: 0.1,
+                damping: Damping::Diagonal,
+            },
+            coordinates: Coordinates::Theta,
+            tolerance: 1e-8,
+            max_iterations: 100,
+        }
+    }
+}
+
+impl Settings {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let setting = |what, value, range| Err(Error::Setting { what, value, range });
+        if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
+            return setting("the tolerance", self.tolerance, "between 0 and 1");
+        }
+        match self.method {
+            Method::LevenbergMarquardt { mu, .. } if !(mu > 0.0 && mu.is_finite()) => {
+                setting("mu", mu, "finite and above 0")
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! Whether the measured u is what the controller makes of r and y.
+//!
+//! Method. The controller is run on the recorded r and y, and compared with u; both sides go through `H = (p/(p +
+//! lambda))^q`, q the number of integrators in S and 1/lambda a twentieth of the record, or else noise on y that the controller
+//! never saw would be a random walk, which seems to follow anything. The unknown initial states and the offset of u
+//! are fitted. What is left is the mismatch. Noise is part of it, so it is split: the *systematic* part is what r
+//! explains, filtered by a ladder of lags `1/(1 + T p)`, less what noise of that colour would show. A wrong gain, sign
+//! or unit of time shows there; noise does not, because r knows nothing of it.
+//!
+//! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better.
+//!
+//! Limits: what is wrong only at frequencies below lambda is not seen; a controller that is sampled much more slowly than the record's dynamics is not the continuous one, and shows.
+
+use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
+use ct_signals::ArModel;
+use serde::Serialize;
+
+use crate::normal_equations::NormalEquations;
+use crate::{Controller, Error, LoopRecord, Offsets};
+
+/// Frequencies below this over the length of the record are left out.
+const SLOWEST: f64 = 20.0;
+
+/// Added to the diagonal, as a share of it, so that dependent columns do no harm.
+const RIDGE: f64 = 1e-9;
+
+/// How far a controller is from the u that was measured, unit of u.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mismatch {
+    /// Root mean square of what the controller does not explain.
+    pub rms: f64,
+    /// Root mean square of that part of it which follows r.
+    pub systematic: f64,
+    /// Root mean square of what noise alone would show of that; it is taken off.
+    pub by_chance: f64,
+    /// Root mean square of u, its slowest moves left out where the controller integrates.
+    pub size: f64,
+}
+
+/// Compares the controller with a record's u; none in open loop, and where u is not recorded or does not move.
+///
+/// # Errors
+/// [`Error::Lti`] where the controller cannot be simulated at this step; a record that is not valid.
+pub fn controller_mismatch(
+    record: &LoopRecord,
+    controller: &Controller,
+) -> Result<Option<Mismatch>, Error> {
+    record.validate()?;
+    let (Some(r), Some(u)) = (&record.r, &record.u) else {
+        return Ok(None);
+    };
+    if controller.is_open_loop() || record.is_empty() {
+        return Ok(None);
+    }
+    let (n, length) = (u.len() as f64, record.step * u.len() as f64);
+    let law = controller.law()?;
+    let s = law.denominator().coefficients();
+    let integrators = s.iter().take_while(|s| **s == 0.0).count();
+    let slow = Polynomial::new([SLOWEST / length, 1.0])?.pow(integrators);
+    let rest = &Polynomial::new(&s[integrators..])? * &slow;
+    let law = TransferFunction::new(law.numerator().clone(), rest)?;
+    let law = StateSpace::controllable(&law)?;
+    let high = TransferFunction::new(Polynomial::p().pow(integrators), slow)?;
+    let high = StateSpace::controllable(&high)?;
+    // u jumps with r by the direct term, and is smooth beside that.
+    let direct = law.d();
+    let smooth = u.iter().zip(r).map(|(u, r)| u - direct * r);
+    let mean = smooth.clone().sum::<f64>() / n;
+    let smooth = response(&high, Hold::First, smooth.map(|u| u - mean), record.step)?;
+    // About its mean too, as the smooth part: else raw levels count as a jump at the beginning.
+    let level = r.iter().sum::<f64>() / n;
+    let moves = r.iter().map(|r| r - level);
+    let jumps = response(&high, record.r_hold, moves, record.step)?;
+    let u: Vec<f64> = smooth
+        .iter()
+        .zip(jumps)
+        .map(|(u, r)| u + direct * r)
+        .collect();
+    let size = (u.iter().map(|u| u * u).sum::<f64>() / n).sqrt();
+    if size == 0.0 {
+        return Ok(None);
+    }
+    // Raw signals are what the controller acts on; a known point may hold a scaling's offset.
+    let (r0, y0) = match record.offsets {
+        Offsets::Known(point) => (point.r, point.y),
+        _ => (0.0, 0.0),
+    };
+    let of_r = response(&law, record.r_hold, r.iter().map(|r| r - r0), record.step)?;
+    let free = free_responses(&law, u.len(), record.step)?;
+    let ladder: Vec<Vec<f64>> = ladder(r, record)?
+        .iter()
+        .map(|column| residual(&free, column))
+        .collect();
+    let mut best: Option<Mismatch> = None;
+    for hold in [Hold::First, Hold::Zero] {
+        let of_y = response(&law, hold, record.y.iter().map(|y| y - y0), record.step)?;
+        let missed: Vec<f64> = (0..u.len()).map(|k| u[k] - (of_r[k] - of_y[k])).collect();
+        let missed = residual(&free, &missed);
+        let rms = (missed.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
+        if rms.is_finite() && best.is_none_or(|best| rms < best.rms) {
+            let (follows, by_chance) = following(&free, &ladder, &missed)?;
+            best = Some(Mismatch {
+                rms,
+                systematic: ((follows - by_chance).max(0.0) / n).sqrt(),
+                by_chance: (by_chance / n).sqrt(),
+                size,
+            });
+        }
+    }
+    Ok(best)
+}
+
+/// The square of that part of what is missed which follows the ladder, and what noise of the same colour would show of
+/// it, by generalised least squares.
+fn following(free: &[Vec<f64>], ladder: &[Vec<f64>], missed: &[f64]) -> Result<(f64, f64), Error> {
+    let noise = ArModel::fit(&[&residual(ladder, missed)], 4)?;
+    let whitened: Vec<Vec<f64>> = ladder.iter().chain(free).map(|c| noise.whiten(c)).collect();
+    let sums = sums(&whitened, &noise.whiten(missed));
+    let Some(factor) = sums.factor(|i| RIDGE * sums.jj(i, i)) else {
+        return Ok((0.0, 0.0));
+    };
+    let mut x = factor.solve(|i| sums.je(i));
+    x.truncate(ladder.len());
+    let covariance = factor.inverse();
+    let plain = self::sums(ladder, missed);
+    let variance = noise.sigma() * noise.sigma();
+    let by_chance: f64 = (0..ladder.len())
+        .flat_map(|i| (0..ladder.len()).map(move |j| (i, j)))
+        .map(|(i, j)| variance * covariance[i][j] * plain.jj(i, j))
+        .sum();
+    Ok((plain.length_squared(&x), by_chance))
+}
+
+fn response(
+    law: &StateSpace,
+    hold: Hold,
+    input: impl Iterator<Item = f64>,
+    step: f64,
+) -> Result<Vec<f64>, Error> {
+    let mut simulator = Simulator::new(law.clone(), hold);
+    let outputs = input.map(|v| simulator.update(v, step));
+    Ok(outputs.collect::<Result<_, _>>()?)
+}
+
+/// A constant, and the controller's output from each of its states.
+fn free_responses(law: &StateSpace, n: usize, step: f64) -> Result<Vec<Vec<f64>>, Error> {
+    let mut columns = vec![vec![1.0; n]];
+    for i in 0..law.order() {
+        let mut simulator = Simulator::new(law.clone(), Hold::Zero);
+        let mut state = vec![0.0; law.order()];
+        state[i] = 1.0;
+        simulator.set_state(&state)?;
+        let outputs = (0..n).map(|_| simulator.update(0.0, step));
+        columns.push(outputs.collect::<Result<_, _>>()?);
+    }
+    Ok(columns)
+}
+
+/// r through lags from the step to a quarter of the record, and r itself.
+fn ladder(r: &[f64], record: &LoopRecord) -> Result<Vec<Vec<f64>>, Error> {
+    let mean = r.iter().sum::<f64>() / r.len().max(1) as f64;
+    let moves: Vec<f64> = r.iter().map(|r| r - mean).collect();
+    let mut columns = vec![moves.clone()];
+    let mut lag = record.step;
+    while lag < 0.25 * record.step * r.len() as f64 {
+        let filter = TransferFunction::from_coefficients(&[1.0], &[1.0, lag])?;
+        let filter = StateSpace::controllable(&filter)?;
+        columns.push(response(
+            &filter,
+            record.r_hold,
+            moves.iter().copied(),
+            record.step,
+        )?);
+        lag *= 3.0;
+    }
+    Ok(columns)
+}
+
+/// What is left of a signal beside its projection on the columns, dependent ones weighed down.
+fn residual(columns: &[Vec<f64>], signal: &[f64]) -> Vec<f64> {
+    let sums = sums(columns, signal);
+    let mut left = signal.to_vec();
+    let Some(factor) = sums.factor(|i| RIDGE * sums.jj(i, i)) else {
+        return left;
+    };
+    for (x, column) in factor.solve(|i| sums.je(i)).iter().zip(columns) {
+        for (left, c) in left.iter_mut().zip(column) {
+            *left -= x * c;
+        }
+    }
+    left
+}
+
+fn sums(columns: &[Vec<f64>], signal: &[f64]) -> NormalEquations {
+    let mut sums = NormalEquations::new(columns.len());
+    let columns: Vec<(usize, &[f64])> = columns.iter().map(Vec::as_slice).enumerate().collect();
+    sums.add(&columns, signal);
+    sums
+}

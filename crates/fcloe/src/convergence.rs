@@ -1,0 +1,121 @@
+//! Whether the recursive estimator converges: the condition on its filter, decided exactly.
+//!
+//! Condition (Baysse, Carrillo, Habbadi, (14)): with `P = A S + B R` of the true plant and `P^ = A^ S + B^ R` of the
+//! filter `S/P^` behind the sensitivities,
+//! ```text
+//! Re (P^/P)(jw) > 1/2   for all w, infinity included;   P Hurwitz.
+//! ```
+//! Decided by Sturm's chain on a polynomial in `x = w^2`, see [`TransferFunction::exceeds`]. Where R has an integrator
+//! it asks for `b0^ > b0/2` (w = 0), and for `m < n` or a strictly proper R/S for `an^ > an/2` (w infinite): a start may
+//! be twice too large, and much more, but not twice too small.
+//!
+//! What it says: it is sufficient for the recursion with a fixed filter, and far from necessary. A filter that is
+//! renewed with the estimates comes nearer to it by itself. The batch fit does not need it.
+
+use ct_lti::{Polynomial, Positivity, TransferFunction};
+use serde::{Deserialize, Serialize};
+
+use crate::{ClosedLoop, Controller, Error, PlantModel};
+
+/// What is known of condition (14) for one filter and one plant.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Condition {
+    /// The answer.
+    pub verdict: Verdict,
+    /// The smallest `Re (P^/P)(jw)` over all frequencies; NaN where P is not Hurwitz.
+    pub least: f64,
+    /// Where that is \[rad/time\]; infinite where it is the limit at high frequencies, NaN where P is not Hurwitz.
+    pub frequency: f64,
+}
+
+/// The answer of condition (14), and how bad it is where it fails; the worse, the greater.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// `Re (P^/P) > 1/2` at every frequency: the recursion converges with this filter.
+    Holds,
+    /// `Re (P^/P)` falls to 1/2 or below, but stays above 0: convergence is not guaranteed, and usual.
+    Positive,
+    /// `Re (P^/P)` is 0 or below at some frequency: what the data say at that frequency moves the estimates the wrong
+    /// way.
+    Negative,
+    /// P itself is not Hurwitz, so there is no such loop.
+    Unstable,
+}
+
+impl Condition {
+    /// With the filter's P^ and the plant's P.
+    ///
+    /// # Errors
+    /// [`Error::Lti`] for `P = 0`, a P^ of a higher degree, or numbers out of range.
+    pub fn new(filter: &Polynomial, truth: &Polynomial) -> Result<Self, Error> {
+        let ratio = TransferFunction::new(filter.clone(), truth.clone())?;
+        let verdict = match ratio.exceeds(0.5)? {
+            Positivity::Unstable => {
+                return Ok(Self {
+                    verdict: Verdict::Unstable,
+                    least: f64::NAN,
+                    frequency: f64::NAN,
+                });
+            }
+            // At infinity the condition has to hold with something to spare, too.
+            Positivity::Strict => Verdict::Holds,
+            _ if ratio.exceeds(0.0)?.is_strict() => Verdict::Positive,
+            _ => Verdict::Negative,
+        };
+        let (frequency, least) = ratio.least_real_part()?;
+        Ok(Self {
+            verdict,
+            least,
+            frequency,
+        })
+    }
+
+    /// With the filter of an estimate, against a plant that is taken for the true one.
+    ///
+    /// # Errors
+    /// As [`Condition::new`], and those of [`ClosedLoop::new`].
+    pub fn between(
+        estimate: &PlantModel,
+        truth: &PlantModel,
+        controller: &Controller,
+    ) -> Result<Self, Error> {
+        Self::new(
+            ClosedLoop::new(estimate, controller)?.characteristic(),
+            ClosedLoop::new(truth, controller)?.characteristic(),
+        )
+    }
+
+    /// Whether it holds.
+    pub fn holds(&self) -> bool {
+        self.verdict == Verdict::Holds
+    }
+}
+
+/// `P^/P - 1/2` along a logarithmic grid of frequencies, for a picture: `(w, real part, imaginary part)`. The condition
+/// holds where all of the curve is right of 0. The grid covers the roots of both polynomials and two decades beyond.
+///
+/// # Errors
+/// [`Error::Lti`], as [`Condition::new`].
+pub fn locus(
+    filter: &Polynomial,
+    truth: &Polynomial,
+    points: usize,
+) -> Result<Vec<(f64, f64, f64)>, Error> {
+    let ratio = TransferFunction::new(filter.clone(), truth.clone())?;
+    let mut roots = ratio.poles()?;
+    roots.extend(ratio.zeros()?);
+    let sizes = roots.iter().map(|z| z.norm()).filter(|w| *w > 0.0);
+    let (low, high) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
+    if high == 0.0 {
+        return Ok(Vec::new());
+    }
+    let (low, high) = ((low / 100.0).ln(), (high * 100.0).ln());
+    let last = points.saturating_sub(1).max(1) as f64;
+    let at = |k: usize| {
+        let w = (low + (high - low) * k as f64 / last).exp();
+        let z = ratio.at_frequency(w);
+        (w, z.re - 0.5, z.im)
+    };
+    Ok((0..points).map(at).collect())
+}

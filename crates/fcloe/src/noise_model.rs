@@ -1,0 +1,439 @@
+//! What the residual is made of, and what its colour does to the standard errors.
+//!
+//! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, and behind it, for noise that
+//! circulates in the loop, `F = A S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo,
+//! Habbadi, (13)). No autoregression of modest order stands for F: with an integrator in S it has a zero at frequency 0,
+//! just where the sensitivities of a slow experiment live, and standard errors without it are too large.
+//!
+//! Method: the residual is whitened with both, F inverted exactly from sample to sample, `w = F^-1 v`, and an
+//! autoregression fitted to what is left; the one with the larger marginal likelihood stays, less the penalty of
+//! Bayes' criterion for its coefficients. What the residual may hold beside noise is left out of both alike: a constant
+//! in w where S has a root at 0, which F cannot see but for its beginning, and a level of y that was estimated, which
+//! is a ramp in w.
+//!
+//! ```text
+//! cov(theta) = (J'J)^-1 J' V J (J'J)^-1,     (J'VJ) = sum_{k,l} R(k-l) s_k s_l',   R the autocovariance of v
+//! R(0) = C Sigma C' + D^2,  R(j) = C A^{j-1} G,  G = A Sigma C' + B D,  Sigma = A Sigma A' + B B'     (sigma^2 = 1)
+//! ```
+//! so that the double sum is one filter of the sensitivities, `f_k = sum_{l<k} R(k-l) s_l`, and J'VJ = sum
+//! `R(0) s s' + s f' + f s'`: no more memory for a longer record.
+//!
+//! Cost: `q nu^2` products a sample, for q columns and nu states of H.
+//!
+//! Reference: P. J. Huber, Proc. 5th Berkeley Symposium 1 (1967) 221-233, for the form of the covariance.
+
+use ct_lti::{Hold, Sampled, StateSpace};
+use ct_signals::ArModel;
+use serde::Serialize;
+
+use crate::normal_equations::NormalEquations;
+use crate::{ClosedLoop, Error};
+
+/// Where the noise enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoisePath {
+    /// On the record: the controller does not see it.
+    Record,
+    /// In the loop: the residual is `A S/P w`.
+    Loop,
+}
+
+/// The residual of one record.
+pub(crate) struct Residual {
+    /// Sampling interval \[time\].
+    pub(crate) step: f64,
+    /// Whether the level of y was estimated.
+    pub(crate) free_level: bool,
+    pub(crate) values: Vec<f64>,
+}
+
+/// A model of the residual.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoiseModel {
+    /// Where the noise enters.
+    pub path: NoisePath,
+    /// The noise there.
+    pub ar: ArModel,
+}
+
+impl NoiseModel {
+    /// The better of the two paths for the residuals of all records, or `path`. The loop's is out of the question where its
+    /// inverse grows without bound: a plant that is unstable without its controller.
+    pub(crate) fn of_residuals(
+        residuals: &[Residual],
+        closed: &ClosedLoop,
+        path: Option<NoisePath>,
+        max_order: usize,
+    ) -> Result<Self, Error> {
+        let of_w = closed.disturbance()?;
+        // A gain of 0 at frequency 0.
+        let blind = of_w.numerator().coefficient(0) == 0.0;
+        let system = StateSpace::controllable(&of_w)?;
+        let (mut on_record, mut in_loop) = (Vec::new(), Some(Vec::new()));
+        for residual in residuals {
+            let sampled = system.sampled(Hold::Zero, residual.step)?;
+            let (v, ones) = (&residual.values, vec![1.0; residual.values.len()]);
+            let unfilter = |v: &[f64]| unfiltered(&system, &sampled, v);
+            // What the residual may hold beside the noise, as it looks on each path.
+            let (mut here, mut there) = (Vec::new(), Vec::new());
+            if blind {
+                here.push(filtered(&system, &sampled, &ones));
+                there.push(ones.clone());
+            }
+            if residual.free_level {
+                there.push(unfilter(&ones));
+                here.push(ones);
+            }
+            on_record.push(Series {
+                values: v.clone(),
+                beside: here,
+            });
+            let w = Series {
+                values: unfilter(v),
+                beside: there,
+            };
+            let size = |s: &[f64]| s.iter().map(|s| s * s).sum::<f64>();
+            let bounded = w
+                .beside
+                .iter()
+                .chain([&w.values])
+                .all(|s| size(s).is_finite())
+                && size(&w.values) <= 1e8 * size(v);
+            in_loop = in_loop.filter(|_| bounded);
+            if let Some(all) = &mut in_loop {
+                all.push(w);
+            }
+        }
+        let (on_record, ar) = autoregression(on_record, max_order)?;
+        let in_loop = match (path, in_loop) {
+            (Some(NoisePath::Record), _) | (_, None) => None,
+            (_, Some(series)) => {
+                let (criterion, ar) = autoregression(series, max_order)?;
+                // A direct term other than 1 scales w: its part in the likelihood of the residual.
+                let samples: usize = residuals.iter().map(|r| r.values.len()).sum();
+                Some((criterion + 2.0 * samples as f64 * system.d().abs().ln(), ar))
+            }
+        };
+        Ok(match in_loop {
+            Some((criterion, ar)) if path.is_some() || criterion < on_record => Self {
+                path: NoisePath::Loop,
+                ar,
+            },
+            _ => Self {
+                path: NoisePath::Record,
+                ar,
+            },
+        })
+    }
+}
+
+/// A series, and the signals in it that are no noise.
+struct Series {
+    values: Vec<f64>,
+    beside: Vec<Vec<f64>>,
+}
+
+/// The autoregression of what is left of all series, and minus twice the logarithm of its marginal likelihood, with
+/// the penalty of Bayes' information criterion for its coefficients.
+fn autoregression(mut all: Vec<Series>, max_order: usize) -> Result<(f64, ArModel), Error> {
+    for series in &mut all {
+        let (sums, x) = series.regression();
+        if sums.cost() > 0.0 {
+            for (x, beside) in x.iter().zip(&series.beside) {
+                for (v, b) in series.values.iter_mut().zip(beside) {
+                    *v -= x * b;
+                }
+            }
+        }
+    }
+    let segments: Vec<&[f64]> = all.iter().map(|s| &s.values[..]).collect();
+    let ar = ArModel::fit(&segments, max_order)?;
+    let n: usize = segments.iter().map(|s| s.len()).sum();
+    let (mut squares, mut volume, mut left) = (0.0, 0.0, n as f64);
+    for series in &all {
+        volume += ar.log_det(series.values.len());
+        let whitened = Series {
+            values: ar.whiten(&series.values),
+            beside: series.beside.iter().map(|b| ar.whiten(b)).collect(),
+        };
+        let (sums, x) = whitened.regression();
+        squares += sums.cost();
+        if let Some(factor) = sums.factor(|_| 0.0) {
+            squares -= sums.length_squared(&x);
+            volume += factor.log_det();
+            left -= x.len() as f64;
+        }
+    }
+    let variance = (squares / left).max(f64::MIN_POSITIVE);
+    let penalty = ar.order() as f64 * (n as f64).ln();
+    Ok((left * variance.ln() + volume + penalty, ar))
+}
+
+impl Series {
+    /// Least squares of the values on what is beside the noise; 0 where that is not determined.
+    fn regression(&self) -> (NormalEquations, Vec<f64>) {
+        let q = self.beside.len();
+        let mut sums = NormalEquations::new(q);
+        let columns: Vec<(usize, &[f64])> =
+            self.beside.iter().map(Vec::as_slice).enumerate().collect();
+        sums.add(&columns, &self.values);
+        let factor = sums.factor(|_| 0.0);
+        let x = factor.map_or(vec![0.0; q], |factor| factor.solve(|i| sums.je(i)));
+        (sums, x)
+    }
+}
+
+/// `F w` from rest.
+fn filtered(system: &StateSpace, sampled: &Sampled, w: &[f64]) -> Vec<f64> {
+    let mut x = vec![0.0; system.order()];
+    let output = w.iter().map(|w| {
+        let v = system.output(&x, *w);
+        x = advanced(sampled, &x, *w);
+        v
+    });
+    output.collect()
+}
+
+/// `F^-1 v` from rest.
+fn unfiltered(system: &StateSpace, sampled: &Sampled, v: &[f64]) -> Vec<f64> {
+    let mut x = vec![0.0; system.order()];
+    let input = v.iter().map(|v| {
+        let w = (v - system.output(&x, 0.0)) / system.d();
+        x = advanced(sampled, &x, w);
+        w
+    });
+    input.collect()
+}
+
+fn advanced(sampled: &Sampled, x: &[f64], input: f64) -> Vec<f64> {
+    let rows = sampled.phi.chunks_exact(x.len().max(1)).zip(&sampled.g0);
+    rows.map(|(row, g)| dot(row, x) + g * input).collect()
+}
+
+/// `H` as a system in discrete time with innovations of variance 1, and the autocovariance of its output.
+pub(crate) struct Colour {
+    nu: usize,
+    /// Row by row.
+    a: Vec<f64>,
+    c: Vec<f64>,
+    g: Vec<f64>,
+    r0: f64,
+}
+
+impl Colour {
+    pub(crate) fn new(noise: &NoiseModel, closed: &ClosedLoop, step: f64) -> Result<Self, Error> {
+        let ar = noise.ar.coefficients();
+        let o = ar.len();
+        let system = match noise.path {
+            NoisePath::Record => StateSpace::new(vec![], vec![], vec![], 1.0)?,
+            NoisePath::Loop => StateSpace::controllable(&closed.disturbance()?)?,
+        };
+        let sampled = system.sampled(Hold::Zero, step)?;
+        let n = system.order();
+        let nu = o + n;
+        // States: the last o values of w, then those of F. w = ar' history + e.
+        let mut a = vec![0.0; nu * nu];
+        let mut b = vec![0.0; nu];
+        let mut c = vec![0.0; nu];
+        if o > 0 {
+            a[..o].copy_from_slice(ar);
+            b[0] = 1.0;
+        }
+        for i in 1..o {
+            a[i * nu + i - 1] = 1.0;
+        }
+        for i in 0..n {
+            let row = (o + i) * nu;
+            for (j, ar) in ar.iter().enumerate() {
+                a[row + j] = sampled.g0[i] * ar;
+            }
+            a[row + o..row + nu].copy_from_slice(&sampled.phi[i * n..(i + 1) * n]);
+            b[o + i] = sampled.g0[i];
+        }
+        for (c, ar) in c.iter_mut().zip(ar) {
+            *c = system.d() * ar;
+        }
+        c[o..].copy_from_slice(system.c());
+        let sigma = stationary(nu, &a, &b);
+        let of_c: Vec<f64> = (0..nu)
+            .map(|i| dot(&sigma[i * nu..(i + 1) * nu], &c))
+            .collect();
+        let g = (0..nu).map(|i| dot(&a[i * nu..(i + 1) * nu], &of_c) + b[i] * system.d());
+        Ok(Self {
+            g: g.collect(),
+            r0: dot(&c, &of_c) + system.d() * system.d(),
+            nu,
+            a,
+            c,
+        })
+    }
+
+    /// A filter for rows of q sensitivities.
+    pub(crate) fn filter(&self, q: usize) -> Meat<'_> {
+        Meat {
+            colour: self,
+            q,
+            states: vec![0.0; q * self.nu],
+            next: vec![0.0; self.nu],
+            past: vec![0.0; q],
+            sum: vec![0.0; q * q],
+        }
+    }
+}
+
+/// `Sigma = A Sigma A' + b b'` by doubling.
+fn stationary(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
+    let product = |x: &[f64], y: &[f64], transposed: bool| -> Vec<f64> {
+        let at = |i: usize, j: usize| -> f64 {
+            (0..n)
+                .map(|k| {
+                    x[i * n + k]
+                        * if transposed {
+                            y[j * n + k]
+                        } else {
+                            y[k * n + j]
+                        }
+                })
+                .sum()
+        };
+        (0..n * n).map(|ij| at(ij / n, ij % n)).collect()
+    };
+    let mut sigma: Vec<f64> = (0..n * n).map(|ij| b[ij / n] * b[ij % n]).collect();
+    let mut power = a.to_vec();
+    // 2^50 steps: poles up to 1e-15 from the unit circle.
+    for _ in 0..50 {
+        let more = product(&product(&power, &sigma, false), &power, true);
+        let size = |m: &[f64]| m.iter().map(|m| m.abs()).sum::<f64>();
+        let small = size(&more) <= 1e-17 * size(&sigma);
+        sigma.iter_mut().zip(&more).for_each(|(s, m)| *s += m);
+        if small {
+            break;
+        }
+        power = product(&power, &power, false);
+    }
+    sigma
+}
+
+/// Sums `J'VJ` row by row.
+pub(crate) struct Meat<'a> {
+    colour: &'a Colour,
+    q: usize,
+    /// The filter's states, column by column of J.
+    states: Vec<f64>,
+    next: Vec<f64>,
+    past: Vec<f64>,
+    /// `sum R(0)/2 s s' + s f'`, to be made symmetric.
+    sum: Vec<f64>,
+}
+
+impl Meat<'_> {
+    /// The next row of a record.
+    pub(crate) fn push(&mut self, row: &[f64]) {
+        let Colour { nu, a, c, g, r0 } = self.colour;
+        let nu = *nu;
+        for ((past, s), state) in self
+            .past
+            .iter_mut()
+            .zip(row)
+            .zip(self.states.chunks_exact_mut(nu.max(1)))
+        {
+            *past = 0.5 * r0 * s + dot(c, state);
+            for ((next, a), g) in self.next.iter_mut().zip(a.chunks_exact(nu.max(1))).zip(g) {
+                *next = dot(a, state) + g * s;
+            }
+            state.copy_from_slice(&self.next);
+        }
+        if nu == 0 {
+            for (past, s) in self.past.iter_mut().zip(row) {
+                *past = 0.5 * r0 * s;
+            }
+        }
+        for (sums, s) in self.sum.chunks_exact_mut(self.q.max(1)).zip(row) {
+            for (sum, past) in sums.iter_mut().zip(&self.past) {
+                *sum += s * past;
+            }
+        }
+    }
+
+    /// What was pushed so far, symmetric, row by row.
+    pub(crate) fn finish(self) -> Vec<f64> {
+        let q = self.q;
+        let at = |ij: usize| self.sum[ij] + self.sum[(ij % q) * q + ij / q];
+        (0..q * q).map(at).collect()
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Controller, PlantModel};
+
+    fn closed() -> ClosedLoop {
+        let plant = PlantModel::new(&[3.0, 2.0], &[2.0, 0.5]).unwrap();
+        ClosedLoop::new(&plant, &Controller::pi(0.5, 0.2).unwrap()).unwrap()
+    }
+
+    /// Response of H to one innovation.
+    fn impulse(noise: &NoiseModel, closed: &ClosedLoop, step: f64, n: usize) -> Vec<f64> {
+        let ar = noise.ar.coefficients();
+        let mut w: Vec<f64> = Vec::new();
+        for k in 0..n {
+            let past = ar.iter().enumerate().filter(|(i, _)| *i < k);
+            let own: f64 = past.map(|(i, a)| a * w[k - 1 - i]).sum();
+            w.push(own + if k == 0 { 1.0 } else { 0.0 });
+        }
+        if noise.path == NoisePath::Record {
+            return w;
+        }
+        let system = StateSpace::controllable(&closed.disturbance().unwrap()).unwrap();
+        filtered(&system, &system.sampled(Hold::Zero, step).unwrap(), &w)
+    }
+
+    /// The filter's double sum against one over the autocovariance of the impulse response.
+    #[test]
+    fn the_coloured_sum_is_the_double_sum() {
+        let (closed, step) = (closed(), 0.4);
+        let coefficients: [&[f64]; 3] = [&[], &[0.8], &[1.2, -0.5]];
+        for ar in coefficients {
+            for path in [NoisePath::Record, NoisePath::Loop] {
+                let ar = ArModel::from_coefficients(ar, 1.0).unwrap();
+                let noise = NoiseModel { path, ar };
+                let h = impulse(&noise, &closed, step, 2000);
+                let r = |lag: usize| -> f64 { h.iter().zip(&h[lag..]).map(|(a, b)| a * b).sum() };
+                let rows: Vec<[f64; 2]> = (0..40)
+                    .map(|k| [(0.3 * k as f64).sin(), (0.05 * (k * k) as f64).cos()])
+                    .collect();
+                let colour = Colour::new(&noise, &closed, step).unwrap();
+                let mut filter = colour.filter(2);
+                rows.iter().for_each(|row| filter.push(row));
+                let found = filter.finish();
+                for (ij, found) in found.iter().enumerate() {
+                    let (i, j) = (ij / 2, ij % 2);
+                    let mut expected = 0.0;
+                    for (k, a) in rows.iter().enumerate() {
+                        for (l, b) in rows.iter().enumerate() {
+                            expected += a[i] * b[j] * r(k.abs_diff(l));
+                        }
+                    }
+                    assert!((found - expected).abs() < 1e-9 * r(0) * 40.0, "{noise:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_inverse_undoes_the_loop() {
+        let system = StateSpace::controllable(&closed().disturbance().unwrap()).unwrap();
+        let sampled = system.sampled(Hold::Zero, 0.4).unwrap();
+        let w: Vec<f64> = (0..500)
+            .map(|k| (0.7 * (k * k % 31) as f64).sin())
+            .collect();
+        let back = unfiltered(&system, &sampled, &filtered(&system, &sampled, &w));
+        assert!(w.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-11));
+    }
+}

@@ -1,0 +1,309 @@
+//! Records, a controller and the orders of a plant: the criterion of the batch fit.
+//!
+//! Criterion (Baysse, Carrillo, Habbadi, (5)): `J = sum eps^2` over all samples of all records, `eps = y - y^`, each
+//! record simulated from rest at its operating point; `J' = -2 sum eps sigma`, `J'' ~ 2 sum sigma sigma'` (31). Where
+//! a record's offsets are estimated, `y^ = c_y + T(p) (r - c_r)` with `T = B R/P`, and its two levels join the
+//! parameters, with the sensitivities `1` and `-T 1`.
+//!
+//! Cost per sample with p parameters: the simulation, and `p (p + 3)/2` products for the sums.
+
+use ct_lti::Hold;
+
+use crate::control_check::{Mismatch, controller_mismatch};
+use crate::normal_equations::NormalEquations;
+use crate::simulation::BLOCK;
+use crate::{
+    ClosedLoop, Controller, Error, LoopRecord, LoopSimulator, Offsets, Orders, PlantModel,
+};
+
+/// A fit of parameters to fewer samples than this, or than 5 for each of them, is refused.
+const MIN_SAMPLES: usize = 20;
+const SAMPLES_PER_PARAMETER: usize = 5;
+
+/// A controller that misses more of u than this share is refused.
+const LARGEST_MISMATCH: f64 = 0.1;
+
+/// The levels of a record that were estimated.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Levels {
+    /// Level of r, or of u in open loop, at which the loop rested before the record.
+    pub drive: f64,
+    /// Level of y there.
+    pub y: f64,
+}
+
+/// One record, ready to be fitted.
+#[derive(Debug, Clone)]
+struct Prepared {
+    name: String,
+    step: f64,
+    hold: Hold,
+    /// Less the operating point.
+    drive: Vec<f64>,
+    y: Vec<f64>,
+    /// The operating point of the two.
+    levels: Levels,
+    /// Where its two columns begin, if its offsets are estimated.
+    column: Option<usize>,
+    /// Spread of drive and y.
+    spread: [f64; 2],
+}
+
+/// What is fitted to what.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    controller: Controller,
+    orders: Orders,
+    records: Vec<Prepared>,
+    mismatches: Vec<Option<Mismatch>>,
+    columns: usize,
+    samples: usize,
+}
+
+/// Why parameters have no criterion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Refused {
+    /// P^ is not Hurwitz.
+    Unstable,
+    /// Numbers out of range.
+    NotFinite,
+}
+
+impl Problem {
+    /// Checks everything that can be checked before a fit.
+    ///
+    /// # Errors
+    /// [`Error::NoRecord`]; [`Error::OrderZero`], [`Error::Improper`] for the orders; a record that is not valid, see
+    /// [`LoopRecord::validate`]; [`Error::MissingReference`], [`Error::MissingInput`]; [`Error::ConstantDrive`]; [`Error::TooShort`];
+    /// [`Error::ControllerMismatch`] where u is in the record and the controller misses more than 10 % of it.
+    pub fn new(
+        records: &[LoopRecord],
+        controller: &Controller,
+        orders: Orders,
+    ) -> Result<Self, Error> {
+        orders.check()?;
+        if records.is_empty() {
+            return Err(Error::NoRecord);
+        }
+        let mut columns = orders.parameters();
+        let mut prepared = Vec::with_capacity(records.len());
+        let mut mismatches = Vec::with_capacity(records.len());
+        for record in records {
+            record.validate()?;
+            let (drive, hold) = record.drive(controller)?;
+            let point = record.operating_point();
+            let open = controller.is_open_loop();
+            let levels = Levels {
+                drive: if open { point.u } else { point.r },
+                y: point.y,
+            };
+            let less =
+                |v: &[f64], level: f64| -> Vec<f64> { v.iter().map(|v| v - level).collect() };
+            let estimated = record.offsets == Offsets::Estimated;
+            prepared.push(Prepared {
+                name: record.name.clone(),
+                step: record.step,
+                hold,
+                drive: less(drive, levels.drive),
+                y: less(&record.y, levels.y),
+                levels,
+                column: estimated.then_some(columns),
+                spread: [spread(drive), spread(&record.y)],
+            });
+            if estimated {
+                columns += 2;
+            }
+            mismatches.push(controller_mismatch(record, controller)?);
+        }
+        let samples = prepared.iter().map(|record| record.y.len()).sum();
+        let needed = MIN_SAMPLES.max(SAMPLES_PER_PARAMETER * columns);
+        if samples < needed {
+            return Err(Error::TooShort {
+                samples,
+                needed,
+                parameters: columns,
+            });
+        }
+        if prepared.iter().all(|record| constant(&record.drive)) {
+            let first = &prepared[0];
+            return Err(Error::ConstantDrive {
+                signal: if controller.is_open_loop() { "u" } else { "r" },
+                value: first.drive.first().unwrap_or(&0.0) + first.levels.drive,
+            });
+        }
+        for (record, mismatch) in prepared.iter().zip(&mismatches) {
+            if let Some(mismatch) = mismatch
+                && mismatch.systematic > LARGEST_MISMATCH * mismatch.size
+                && mismatch.systematic > 2.0 * mismatch.by_chance
+            {
+                return Err(Error::ControllerMismatch {
+                    record: record.name.clone(),
+                    mismatch: mismatch.systematic,
+                    size: mismatch.size,
+                });
+            }
+        }
+        Ok(Self {
+            controller: controller.clone(),
+            orders,
+            records: prepared,
+            mismatches,
+            columns,
+            samples,
+        })
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// n and m.
+    pub fn orders(&self) -> Orders {
+        self.orders
+    }
+
+    /// Samples in all records.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// How far the controller is from each record's u; none for a record without u, and in open loop.
+    pub fn mismatches(&self) -> &[Option<Mismatch>] {
+        &self.mismatches
+    }
+
+    /// Sampling interval of each record, and whether its levels are estimated.
+    pub(crate) fn steps_and_free_levels(&self) -> impl Iterator<Item = (f64, bool)> {
+        let records = self.records.iter();
+        records.map(|record| (record.step, record.column.is_some()))
+    }
+
+    /// Parameters of the plant and estimated levels.
+    pub(crate) fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// The vector of all unknowns at this plant: theta, and each estimated level's distance from its start, 0.
+    pub(crate) fn start(&self, plant: &PlantModel) -> Vec<f64> {
+        let mut x = plant.theta().to_vec();
+        x.resize(self.columns, 0.0);
+        x
+    }
+
+    /// Sizes of the unknowns beyond theta, by which they are scaled: spreads of drive and output.
+    pub(crate) fn scales(&self) -> Vec<f64> {
+        let estimated = self.records.iter().filter(|r| r.column.is_some());
+        estimated.flat_map(|record| record.spread).collect()
+    }
+
+    /// The levels of each record: given, or estimated at x.
+    pub(crate) fn levels(&self, x: &[f64]) -> Vec<Levels> {
+        let at = |record: &Prepared| match record.column {
+            Some(column) => Levels {
+                drive: record.levels.drive + x[column],
+                y: record.levels.y + x[column + 1],
+            },
+            None => record.levels,
+        };
+        self.records.iter().map(at).collect()
+    }
+
+    /// The plant at x.
+    pub(crate) fn plant(&self, x: &[f64]) -> Result<PlantModel, Error> {
+        PlantModel::from_theta(self.orders, &x[..self.orders.parameters()])
+    }
+
+    /// J and its derivatives at x.
+    pub(crate) fn evaluate(&self, x: &[f64]) -> Result<NormalEquations, Refused> {
+        let plant = self.plant(x).map_err(|_| Refused::NotFinite)?;
+        let closed = ClosedLoop::new(&plant, &self.controller).map_err(|_| Refused::NotFinite)?;
+        if !closed.is_stable() {
+            return Err(Refused::Unstable);
+        }
+        let mut equations = NormalEquations::new(self.columns);
+        self.visit(&closed, &plant, x, |_, columns, e| {
+            equations.add(columns, e)
+        })
+        .map_err(|_| Refused::NotFinite)?;
+        if equations.is_finite() {
+            Ok(equations)
+        } else {
+            Err(Refused::NotFinite)
+        }
+    }
+
+    /// Simulates all records at x and shows the index of the record, the columns of its sensitivities and its
+    /// residual, up to [`BLOCK`] samples at a time.
+    pub(crate) fn visit(
+        &self,
+        closed: &ClosedLoop,
+        plant: &PlantModel,
+        x: &[f64],
+        mut see: impl FnMut(usize, &[(usize, &[f64])], &[f64]),
+    ) -> Result<(), Error> {
+        let mut last: Option<(f64, Hold, LoopSimulator)> = None;
+        let parameters = self.orders.parameters();
+        for (index, record) in self.records.iter().enumerate() {
+            let mut simulator = match last.take() {
+                Some((step, hold, mut simulator)) if step == record.step && hold == record.hold => {
+                    simulator.reset();
+                    simulator
+                }
+                _ => LoopSimulator::of_loop(
+                    closed,
+                    plant,
+                    &self.controller,
+                    record.hold,
+                    record.step,
+                )?,
+            };
+            let mut steps = record.column.map(|_| {
+                let mut steps = simulator.clone();
+                steps.reset();
+                steps
+            });
+            let (level, y_level) = match record.column {
+                Some(column) => (x[column], x[column + 1]),
+                None => (0.0, 0.0),
+            };
+            let (mut drive, mut e, mut step_response) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+            for (r, y) in record.drive.chunks(BLOCK).zip(record.y.chunks(BLOCK)) {
+                let len = r.len();
+                for (drive, r) in drive.iter_mut().zip(r) {
+                    *drive = r - level;
+                }
+                let block = simulator.sensitivities(&drive[..len]);
+                for ((e, y), model) in e.iter_mut().zip(y).zip(block.y()) {
+                    *e = y - model - y_level;
+                }
+                let mut columns: Vec<(usize, &[f64])> =
+                    (0..parameters).map(|j| (j, block.sigma(j))).collect();
+                if let (Some(column), Some(steps)) = (record.column, &mut steps) {
+                    let response = steps.outputs(&ONES[..len]);
+                    for (s, response) in step_response.iter_mut().zip(&response) {
+                        *s = -response;
+                    }
+                    columns.push((column, &step_response[..len]));
+                    columns.push((column + 1, &ONES[..len]));
+                }
+                see(index, &columns, &e[..len]);
+            }
+            last = Some((record.step, record.hold, simulator));
+        }
+        Ok(())
+    }
+}
+
+const ONES: [f64; BLOCK] = [1.0; BLOCK];
+
+fn constant(values: &[f64]) -> bool {
+    values.iter().all(|v| Some(v) == values.first())
+}
+
+/// Standard deviation.
+fn spread(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}

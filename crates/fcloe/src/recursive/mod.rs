@@ -1,0 +1,441 @@
+//! The recursive estimator: Gauss-Newton along the record, for a loop or for open loop.
+//!
+//! Model: `A y = B u` in a loop with a known R/S, driven by r; theta may drift. The model's loop runs beside the plant's
+//! from r alone, so noise that circulates does not bias.
+//!
+//! Equations: `theta' = P sigma eps`, `P' = eta P - P sigma sigma' P` with `sigma = S/P_f phi^` (Baysse, Carrillo,
+//! Habbadi, (12), (13); the recursion itself is cited there, not printed), sampled with sigma held, relative to a
+//! scale, `s = scale sigma`, `F = Ts P` over the scales:
+//! ```text
+//! g = F s/(l + s'F s),   F+ = (F - g s'F)/l,   theta+ = theta + scale g eps,   l = 1 - (1 - e^{-eta dt}) e^{-t/T_f}
+//! ```
+//! with eps the output error before the step. F is kept as factors by `ct-rls`, its exact step with
+//! `c = gamma = eta_k/(1 - l)`, `eta_k = -ln(l)/dt`, which is this step.
+//!
+//! What holds it back: F's trace stays at or below that of its start, so it cannot wind up; a step changes no parameter
+//! by more than the step limit; a step is halved until `P^(p - rate)` is Hurwitz, with rate 1 % of the start's slowest
+//! decay, and all parameters are in their range, and refused where 20 halvings do not do.
+//!
+//! Convergence: with a fixed filter where condition (14) holds, see [`Condition`](crate::Condition), for r that excites
+//! and independent noise; with an adaptive filter from nearly every start that was tried.
+//!
+//! Cost per update: `1.5 p^2` products for F, and the series of [`model`]; no allocation, unless stability is so close
+//! that integers decide it.
+
+mod health;
+mod model;
+mod settings;
+
+use ct_lti::Polynomial;
+use ct_rls::{DynamicRls, Guards, Health, Innovation, Outcome, RecursiveEstimator, Weights};
+use nalgebra::{DMatrix, DVector};
+
+pub use health::LoopHealth;
+pub use settings::{Filter, RecursiveSettings};
+
+use crate::{ClosedLoop, Controller, Error, Orders, PlantModel};
+use model::MovingLoop;
+
+/// Halvings of a step before it is refused.
+const HALVINGS: usize = 20;
+
+/// The rate at which the model's loop has to decay, of the start's slowest.
+const DECAY: f64 = 0.01;
+
+/// A parameter smaller than this share of its scale may change by the step limit times this share.
+const SMALL: f64 = 0.1;
+
+/// One sample of the loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoopSample {
+    /// Reference from this sample to the next, unit of y; in open loop the input.
+    pub drive: f64,
+    /// Output at this sample.
+    pub y: f64,
+}
+
+/// Recursive closed-loop output error.
+#[derive(Debug, Clone)]
+pub struct RecursiveFcloe {
+    orders: Orders,
+    controller: Controller,
+    settings: RecursiveSettings,
+    scale: Vec<f64>,
+    theta: Vec<f64>,
+    rls: DynamicRls,
+    model: MovingLoop,
+    /// The loop has to decay faster \[1/time\].
+    rate: f64,
+    time: f64,
+    last_drive: f64,
+    /// Of the output error, and how much of it has been seen.
+    variance: (f64, f64),
+    shortened: u64,
+    refused: u64,
+    limited: u64,
+    /// s, the parameters tried, their deltas, P^.
+    s: Vec<f64>,
+    tried: Vec<f64>,
+    delta: Vec<f64>,
+    step: Vec<f64>,
+    p: Vec<f64>,
+}
+
+impl RecursiveFcloe {
+    /// From a start whose loop is stable, at rest; the scales are the start's parameters, so none of them may be 0, see
+    /// [`RecursiveFcloe::with_scale`].
+    ///
+    /// # Errors
+    /// [`Error::Setting`], [`Error::ZeroStart`], [`Error::UnstableLoop`], [`Error::Lti`], [`Error::Rls`].
+    pub fn new(
+        start: &PlantModel,
+        controller: &Controller,
+        settings: RecursiveSettings,
+    ) -> Result<Self, Error> {
+        let scale: Vec<f64> = start.theta().to_vec();
+        Self::with_scale(start, &scale, controller, settings)
+    }
+
+    /// The same with a size for each parameter, by which it is scaled; its sign does not matter.
+    ///
+    /// # Errors
+    /// As [`RecursiveFcloe::new`]; [`Error::Length`].
+    pub fn with_scale(
+        start: &PlantModel,
+        scale: &[f64],
+        controller: &Controller,
+        settings: RecursiveSettings,
+    ) -> Result<Self, Error> {
+        settings.check()?;
+        let (theta, orders) = (start.theta(), start.orders());
+        let n = theta.len();
+        if scale.len() != n {
+            return Err(Error::Length {
+                what: "the scale",
+                expected: n,
+                found: scale.len(),
+            });
+        }
+        if let Some(index) = scale.iter().position(|s| *s == 0.0 || !s.is_finite()) {
+            return Err(Error::ZeroStart { index });
+        }
+        let closed = ClosedLoop::new(start, controller)?;
+        closed.require_stable()?;
+        let slowest = closed.characteristic().roots()?;
+        let rate = DECAY * slowest.last().map_or(0.0, |z| z.re.abs());
+        let scale: Vec<f64> = scale.iter().map(|s| s.abs()).collect();
+        let delta: Vec<f64> = theta.iter().zip(&scale).map(|(t, s)| t / s).collect();
+        let f0 = DMatrix::identity(n, n) * settings.gain;
+        let rls = DynamicRls::new(
+            DVector::from_vec(delta.clone()),
+            &f0,
+            Weights::least_squares(0.0)?,
+        )?;
+        let rls = rls.with_guards(Guards {
+            // The trace as ct-rls sums it may round the other way.
+            trace_limit: settings.gain * n as f64 * (1.0 + 1e-12),
+            silent_below: 0.0,
+        })?;
+        let mut model = MovingLoop::new(orders, controller);
+        model.set(theta, true);
+        let p = closed.characteristic().coefficients().to_vec();
+        Ok(Self {
+            orders,
+            controller: controller.clone(),
+            settings,
+            theta: theta.to_vec(),
+            rls,
+            model,
+            rate,
+            time: 0.0,
+            last_drive: 0.0,
+            variance: (0.0, 0.0),
+            shortened: 0,
+            refused: 0,
+            limited: 0,
+            s: vec![0.0; n],
+            tried: vec![0.0; n],
+            step: vec![0.0; n],
+            delta,
+            p,
+            scale,
+        })
+    }
+
+    /// n and m.
+    pub fn orders(&self) -> Orders {
+        self.orders
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// The plant as estimated.
+    ///
+    /// # Errors
+    /// None in practice: the estimates are checked at each step.
+    pub fn plant(&self) -> Result<PlantModel, Error> {
+        PlantModel::from_theta(self.orders, &self.theta)
+    }
+
+    /// P^ in the filter of the sensitivities.
+    ///
+    /// # Errors
+    /// None in practice, as above.
+    pub fn filter_polynomial(&self) -> Result<Polynomial, Error> {
+        Ok(Polynomial::new(self.model.filter())?)
+    }
+
+    /// Root mean square of the output error over the memory, unit of y; 0 before the first sample.
+    pub fn residual_rms(&self) -> f64 {
+        let (sum, weight) = self.variance;
+        if weight > 0.0 {
+            (sum / weight).sqrt()
+        } else {
+            0.0
+        }
+    }
+
+    /// F back to its start, and the forgetting too: after a jump of the parameters.
+    ///
+    /// # Errors
+    /// [`Error::Rls`].
+    pub fn restart(&mut self) -> Result<(), Error> {
+        let n = self.theta.len();
+        self.rls
+            .reset_covariance(&(DMatrix::identity(n, n) * self.settings.gain))?;
+        self.time = 0.0;
+        Ok(())
+    }
+
+    pub(crate) fn least_squares(&self) -> &DynamicRls {
+        &self.rls
+    }
+
+    pub(crate) fn scale(&self) -> &[f64] {
+        &self.scale
+    }
+
+    pub(crate) fn counts(&self) -> [u64; 3] {
+        [self.shortened, self.refused, self.limited]
+    }
+
+    /// The forgetting factor of this step.
+    fn forgetting_factor(&self, dt: f64) -> f64 {
+        let at_once = -(-self.settings.forgetting * dt).exp_m1();
+        1.0 - at_once * (-self.time / self.settings.fading).exp()
+    }
+
+    /// One step of Gauss-Newton from the output error.
+    fn learn(&mut self, drive: f64, epsilon: f64, dt: f64) -> Innovation {
+        let unused = |outcome| Innovation {
+            epsilon,
+            s: f64::NAN,
+            outcome,
+        };
+        self.model.sensitivities(drive, &self.scale, &mut self.s);
+        let l = self.forgetting_factor(dt);
+        let eta = -l.ln() / dt;
+        // eta/(1 - l), which is 1/dt where nothing is forgotten.
+        let c = if 1.0 - l > 1e-12 {
+            eta / (1.0 - l)
+        } else {
+            1.0 / dt
+        };
+        let Ok(weights) = Weights::new(c, c, if 1.0 - l > 1e-12 { eta } else { 0.0 }) else {
+            return unused(Outcome::BadStep);
+        };
+        let known: f64 = self.s.iter().zip(&self.delta).map(|(s, d)| s * d).sum();
+        let innovation = self.rls.update_with(&self.s, epsilon + known, dt, &weights);
+        let innovation = Innovation {
+            epsilon,
+            ..innovation
+        };
+        if !innovation.outcome.used() {
+            return innovation;
+        }
+        let (sum, weight) = self.variance;
+        self.variance = (l * sum + epsilon * epsilon, l * weight + 1.0);
+        self.take_step();
+        innovation
+    }
+
+    /// From `delta` towards what the least squares say, as far as is allowed.
+    fn take_step(&mut self) {
+        let mut share = 1.0_f64;
+        for ((step, new), old) in self
+            .step
+            .iter_mut()
+            .zip(self.rls.theta().iter())
+            .zip(&self.delta)
+        {
+            *step = new - old;
+            let most = self.settings.step_limit * old.abs().max(SMALL);
+            if step.abs() > most {
+                share = share.min(most / step.abs());
+            }
+        }
+        self.limited += u64::from(share < 1.0);
+        let mut moved = false;
+        for halving in 0..=HALVINGS {
+            for (i, tried) in self.tried.iter_mut().enumerate() {
+                *tried = self.scale[i] * (self.delta[i] + share * self.step[i]);
+            }
+            if self.allowed() {
+                self.shortened += u64::from(halving > 0);
+                moved = true;
+                break;
+            }
+            share *= 0.5;
+        }
+        if moved {
+            for (delta, step) in self.delta.iter_mut().zip(&self.step) {
+                *delta += share * step;
+            }
+            self.theta.copy_from_slice(&self.tried);
+            self.model
+                .set(&self.theta, self.settings.filter == Filter::Adaptive);
+        } else {
+            self.refused += 1;
+        }
+        // What was not taken is forgotten; the lengths agree, and the numbers are finite.
+        let kept = self.rls.set_theta(&self.delta);
+        debug_assert!(kept.is_ok());
+    }
+
+    /// Whether `tried` may be the estimates. Moves `p`.
+    fn allowed(&mut self) -> bool {
+        let range = self.settings.range;
+        let inside = self
+            .tried
+            .iter()
+            .zip(&self.scale)
+            .all(|(t, s)| t.abs() <= range * s);
+        let (leading, scale) = (self.tried[self.orders.n - 1], self.scale[self.orders.n - 1]);
+        let same_sign = leading * self.theta[self.orders.n - 1] > 0.0;
+        if !inside || !same_sign || leading.abs() < scale / range {
+            return false;
+        }
+        self.model.characteristic_at(&self.tried, &mut self.p);
+        // P^(p - rate).
+        let last = self.p.len() - 1;
+        for from in 0..last {
+            for i in (from..last).rev() {
+                self.p[i] -= self.rate * self.p[i + 1];
+            }
+        }
+        self.p[last] != 0.0 && ct_lti::is_hurwitz(&self.p)
+    }
+}
+
+impl RecursiveEstimator for RecursiveFcloe {
+    type Sample = LoopSample;
+    type Theta = [f64];
+    type Covariance = DMatrix<f64>;
+    type Error = Error;
+
+    /// Learns from y at this sample, then moves the model over dt with the drive held. Where y is missing (NaN) or of
+    /// no sense the model moves on all the same; where the drive is not finite, the last one is held.
+    fn update(&mut self, sample: &LoopSample, dt: f64) -> Innovation {
+        let point = self.settings.operating_point;
+        let level = if self.controller.is_open_loop() {
+            point.u
+        } else {
+            point.r
+        };
+        let drive = sample.drive - level;
+        let known = drive.is_finite() && drive.abs() <= 1e100;
+        if known {
+            self.last_drive = drive;
+        }
+        let (y, _) = self.model.signals(self.last_drive);
+        let epsilon = sample.y - point.y - y;
+        let steppable = dt > 0.0 && dt.is_finite() && self.model.substeps(dt).is_some();
+        if !steppable {
+            return Innovation {
+                epsilon,
+                s: f64::NAN,
+                outcome: Outcome::BadStep,
+            };
+        }
+        let mut innovation = if known {
+            self.learn(self.last_drive, epsilon, dt)
+        } else {
+            Innovation {
+                epsilon,
+                s: f64::NAN,
+                outcome: Outcome::NotFinite,
+            }
+        };
+        if !self.model.advance(self.last_drive, dt) {
+            innovation.outcome = Outcome::NotFinite;
+        }
+        self.time += dt;
+        innovation
+    }
+
+    /// `[a1, .., an, b0, .., bm]`.
+    fn theta(&self) -> &[f64] {
+        &self.theta
+    }
+
+    /// P in theta: times the noise's variance, the covariance of the estimates, where little is forgotten.
+    fn covariance(&self) -> DMatrix<f64> {
+        let f = self.rls.covariance();
+        DMatrix::from_fn(f.nrows(), f.ncols(), |i, j| {
+            f[(i, j)] * self.scale[i] * self.scale[j]
+        })
+    }
+
+    /// Of the least squares inside, in the relative parameters; [`RecursiveFcloe::loop_health`] says more.
+    fn health(&self) -> Result<Health, Error> {
+        Ok(self.rls.health()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The factors give what the equations of the head say of F itself, step by step.
+    #[test]
+    fn the_textbook_recursion() {
+        let plant = PlantModel::new(&[210.0, 9000.0], &[5.0, 40.0]).unwrap();
+        let controller = Controller::pi(0.3, 0.004).unwrap();
+        let (f0, eta, fading, dt) = (0.3, 0.01, 200.0, 2.0);
+        let mut settings = RecursiveSettings::new(f0, eta, fading, 1e9);
+        // The start is so near that neither limit nor border acts.
+        settings.range = 1e6;
+        let mut estimator = RecursiveFcloe::new(&plant, &controller, settings).unwrap();
+        let mut f = DMatrix::identity(4, 4) * f0;
+        for k in 0..600 {
+            let drive = if (k / 20 + k / 70) % 2 == 0 {
+                1.0
+            } else {
+                -1.0
+            };
+            let before = estimator.theta.clone();
+            let y = estimator.model.signals(drive).0 + 1e-4 * f64::from(k % 7);
+            let innovation = estimator.update(&LoopSample { drive, y }, dt);
+            let s = DVector::from_column_slice(&estimator.s);
+            let l = 1.0 - (1.0 - (-eta * dt).exp()) * (-f64::from(k) * dt / fading).exp();
+            let g = &f * &s / (l + (s.transpose() * &f * &s)[0]);
+            f = (&f - &g * (s.transpose() * &f)) / l;
+            f = (&f + f.transpose()) * 0.5;
+            if f.trace() > 4.0 * f0 {
+                f *= 4.0 * f0 / f.trace();
+            }
+            for i in 0..4 {
+                let step = plant.theta()[i] * g[i] * innovation.epsilon;
+                let expected = before[i] + step;
+                assert!((estimator.theta[i] - expected).abs() < 1e-9 * plant.theta()[i]);
+            }
+            let covariance = estimator.rls.covariance();
+            assert!((&covariance - &f).norm() < 1e-8 * f.norm(), "{k}");
+        }
+        assert_eq!(estimator.counts(), [0, 0, 0]);
+        assert!(f.trace() < 3.8 * f0, "nothing was learnt: {}", f.trace());
+    }
+}

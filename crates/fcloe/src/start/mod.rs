@@ -1,0 +1,19 @@
+//! Where a fit may start: regressions on filtered signals, which need no start themselves.
+//!
+//! | question | answer |
+//! |---|---|
+//! | Nothing is known but the orders | [`pipeline`]: a few candidates, the best first |
+//! | One regression, with my filter | [`least_squares`], biased by noise; then [`instruments`], which is not |
+//! | The best a regression can do | [`refine`] |
+//! | Which bandwidth of the filter? | [`lambda_ladder`] |
+//! | The paper's own first-order start | [`first_order`] |
+//!
+//! All work in open loop too (a controller of none): the instruments then are simulated from the measured u.
+
+pub mod first_order;
+mod ladder;
+mod regression;
+mod signals;
+
+pub use ladder::{Candidate, PipelineSettings, Stage, lambda_ladder, pipeline};
+pub use regression::{Refinement, instruments, least_squares, refine};

@@ -1,0 +1,195 @@
+//! Simulated experiments whose truth is known.
+
+use ct_lti::Hold;
+use ct_signals::excitation;
+use fcloe::{
+    Controller, LoopRecord, Noise, Offsets, PlantModel, Problem, Settings, Uncertainty,
+    continuous_loop, noise_at_snr,
+};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+/// A plant, its controller and a reference.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    pub name: &'static str,
+    pub plant: PlantModel,
+    pub controller: Controller,
+    pub step: f64,
+    pub r: Vec<f64>,
+    /// In decibels.
+    pub snr: f64,
+    pub in_loop: bool,
+    /// Raw levels instead of deviations, to be estimated.
+    pub unknown_levels: bool,
+    /// Of white noise, or the correlation of neighbours.
+    pub rho: f64,
+}
+
+impl Rig {
+    /// The first table's plant and controller, with a set of its unstated conditions that fits it.
+    pub fn first_order(in_loop: bool) -> Self {
+        let pattern = [0.82, 0.82, -0.82, -0.82, 0.82, -0.82, 0.82];
+        Self {
+            name: "n = 1, m = 0, PI, slow steps",
+            plant: PlantModel::first_order(6.0, 110.0).unwrap(),
+            controller: Controller::pi(0.2292, 0.0021).unwrap(),
+            step: 1.0,
+            r: excitation::levels(2800, 400, &pattern).unwrap(),
+            snr: 20.0,
+            in_loop,
+            unknown_levels: false,
+            rho: 0.0,
+        }
+    }
+
+    pub fn second_order(in_loop: bool) -> Self {
+        Self {
+            name: "n = 2, m = 1, PI, pseudo-random",
+            plant: PlantModel::new(&[210.0, 9000.0], &[5.0, 40.0]).unwrap(),
+            controller: Controller::pi(0.3, 0.004).unwrap(),
+            step: 2.0,
+            r: excitation::prbs(1270, 10, -1.0, 1.0, 7).unwrap(),
+            snr: 20.0,
+            in_loop,
+            unknown_levels: false,
+            rho: 0.0,
+        }
+    }
+
+    pub fn filtered_pid(in_loop: bool) -> Self {
+        Self {
+            name: "n = 2, m = 0, filtered PID and sensor filter, pseudo-random",
+            plant: PlantModel::new(&[210.0, 9000.0], &[5.0]).unwrap(),
+            controller: Controller::pid(0.3, 0.004, 4.0, 10.0)
+                .unwrap()
+                .with_sensor_filter(0.2)
+                .unwrap(),
+            step: 2.0,
+            r: excitation::prbs(1270, 10, -1.0, 1.0, 7).unwrap(),
+            snr: 20.0,
+            in_loop,
+            unknown_levels: false,
+            rho: 0.0,
+        }
+    }
+
+    /// A plant that passes its input on at once: so does the loop with the noise.
+    pub fn direct_term(in_loop: bool) -> Self {
+        Self {
+            name: "n = 1, m = 1, PI, pseudo-random",
+            plant: PlantModel::new(&[3.0], &[2.0, 0.7]).unwrap(),
+            controller: Controller::pi(0.5, 0.2).unwrap(),
+            step: 0.3,
+            ..Self::second_order(in_loop)
+        }
+    }
+
+    pub fn with_unknown_levels(self) -> Self {
+        Self {
+            name: "the same, levels estimated",
+            unknown_levels: true,
+            ..self
+        }
+    }
+
+    /// Without a controller, and coloured noise.
+    pub fn open_loop() -> Self {
+        Self {
+            name: "n = 2, m = 1, open loop, coloured noise",
+            controller: Controller::none(),
+            rho: 0.8,
+            ..Self::second_order(false)
+        }
+    }
+
+    pub fn record(&self, seed: u64) -> LoopRecord {
+        let data = |noise| {
+            continuous_loop(
+                &self.plant,
+                &self.controller,
+                self.step,
+                &self.r,
+                Hold::Zero,
+                noise,
+            )
+            .unwrap()
+        };
+        let clean = data(Noise::None);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut w = noise_at_snr(&clean.y, self.snr, &mut rng).unwrap();
+        for k in 1..w.len() {
+            w[k] = self.rho * w[k - 1] + (1.0 - self.rho * self.rho).sqrt() * w[k];
+        }
+        let mut data = data(if self.in_loop {
+            Noise::InLoop(&w)
+        } else {
+            Noise::OnRecord(&w)
+        });
+        let mut r = self.r.clone();
+        let mut offsets = Offsets::Deviations;
+        if self.unknown_levels {
+            for v in data.y.iter_mut().chain(&mut r) {
+                *v += 20.0;
+            }
+            offsets = Offsets::Estimated;
+        }
+        if self.controller.is_open_loop() {
+            return LoopRecord::open_loop(self.step, r, data.y, offsets);
+        }
+        LoopRecord::closed_loop(self.step, r, Some(data.u), data.y, offsets)
+    }
+
+    /// Estimates and their uncertainty, from a start that is off by a fifth.
+    pub fn fit(&self, seed: u64) -> (Vec<f64>, Uncertainty) {
+        let orders = self.plant.orders();
+        let problem = Problem::new(&[self.record(seed)], &self.controller, orders).unwrap();
+        let factors = [1.2, 0.85].into_iter().cycle();
+        let theta: Vec<f64> = self
+            .plant
+            .theta()
+            .iter()
+            .zip(factors)
+            .map(|(t, f)| t * f)
+            .collect();
+        let start = PlantModel::from_theta(orders, &theta).unwrap();
+        let fit = problem.fit(&start, &Settings::default()).unwrap();
+        assert!(fit.stop.was_successful(), "{:?}", fit.stop);
+        let uncertainty = problem.uncertainty(&fit, None).unwrap();
+        (fit.plant.theta().to_vec(), uncertainty)
+    }
+
+    /// In how many of `runs` the 95 % interval of each parameter holds the truth; then the same of intervals for a
+    /// white residual, and in how many the noise was placed where it is.
+    pub fn coverage(&self, runs: u64) -> (Vec<usize>, Vec<usize>, usize) {
+        use fcloe::NoisePath;
+        use rayon::prelude::*;
+
+        let truth = self.plant.theta();
+        let each: Vec<(Vec<bool>, Vec<bool>, bool)> = (0..runs)
+            .into_par_iter()
+            .map(|seed| {
+                let (theta, uncertainty) = self.fit(seed);
+                let half = uncertainty.half_widths(0.95).unwrap();
+                let hit = |half: &[f64]| -> Vec<bool> {
+                    (0..truth.len())
+                        .map(|i| (theta[i] - truth[i]).abs() <= half[i])
+                        .collect()
+                };
+                let white: Vec<f64> = uncertainty
+                    .white_std_errors
+                    .iter()
+                    .map(|s| 1.96 * s)
+                    .collect();
+                let placed = (uncertainty.noise.path == NoisePath::Loop) == self.in_loop;
+                (hit(&half), hit(&white), placed)
+            })
+            .collect();
+        let count = |of: &dyn Fn(usize) -> usize| (0..truth.len()).map(of).collect();
+        (
+            count(&|i| each.iter().filter(|run| run.0[i]).count()),
+            count(&|i| each.iter().filter(|run| run.1[i]).count()),
+            each.iter().filter(|run| run.2).count(),
+        )
+    }
+}

@@ -1,0 +1,289 @@
+//! The loop around the plant: the controller is simulated with it, from the reference.
+//!
+//! **Model**: `y = P u + v`, `u = C (r - y) + d`, limited as the controller does it; `v` any disturbance, `d` what was
+//! added to the command and is known: the measured command less the one that the controller gives on the measured
+//! reading. The loop runs on `r` and `d` alone, `ym = P um`, `um = C (r - ym) + d`, so that neither the model's output nor
+//! its derivatives hold any of the noise which came back through `u`. At the true parameters
+//! ```text
+//! y - ym = v / (1 + P C),   v = (1 + P C) (y - ym)
+//! ```
+//! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So rows
+//! (derivatives and residual) are filtered by `1 + P0 C`, `P0` the plant linearised once at a first fit: what is left is `v`
+//! itself, of which a noise model is then made. The filter does not move with the parameters and its derivatives hold no
+//! noise: the estimate is the one of an instrumental variable, unbiased whatever the colour of `v` and whatever `P0`, which
+//! only the variance hangs on. The filter's determinant is one, so likelihoods compare.
+//!
+//! **Assumptions**: `y[k]` is read before `u[k]` acts; the command is held; the reference is not constant; nothing of `v`
+//! is in `r`.
+//!
+//! **Cost**: a controller's step for every simulated sample, `O((p + 1) n^2)` for the filter of a row.
+//!
+//! **References**: I. D. Landau, A. Karimi, Recursive algorithms for identification in closed loop, Automatica 33 (1997)
+//! 1499-1523; M. Gilson, P. Van den Hof, Instrumental variable methods for closed-loop system identification, Automatica
+//! 41 (2005) 241-249; U. Forssell, L. Ljung, Closed-loop identification revisited, Automatica 35 (1999) 1215-1241.
+
+use std::sync::Arc;
+
+use ct_signals::{Hold, Record};
+use plants::controller::{Controller, LinearController, MAX_CONTROLLER_STATES};
+use plants::{Dual, MAX_VESSELS, Scalar, Simulator, Structure};
+
+use crate::{Error, Triangle};
+
+/// The controller on what was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replay {
+    /// The controller's states when the record begins, those that fit the measured command best.
+    pub states: Vec<f64>,
+    /// The measured command less the controller's \[input unit\].
+    pub beside: Vec<f64>,
+    /// Whether the controller was at a limit.
+    pub limited: Vec<bool>,
+    /// Root mean square of `beside` \[input unit\].
+    pub rms: f64,
+    /// Standard deviation of the measured command \[input unit\].
+    pub moves: f64,
+}
+
+/// Rounds in which the initial states are fitted: without limits the first one is exact.
+const ROUNDS: usize = 6;
+
+/// Runs a controller on the measured reference and reading of a record, and compares the measured command with its own.
+///
+/// # Errors
+/// Where the record has no reference, or its command is not held.
+pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error> {
+    let Some(reference) = &record.reference else {
+        return Err(Error::NoReference {
+            record: record.name.clone(),
+        });
+    };
+    if record.hold != Hold::Zero {
+        return Err(Error::CommandNotHeld {
+            record: record.name.clone(),
+        });
+    }
+    record.validate()?;
+    let (r, y, u) = (
+        &reference.values,
+        &record.output.values,
+        &record.input.values,
+    );
+    let n = controller.states();
+    let run = |states: &[f64]| {
+        let duals: Vec<Dual<MAX_CONTROLLER_STATES>> = states
+            .iter()
+            .enumerate()
+            .map(|(lane, value)| Dual::variable(*value, lane))
+            .collect();
+        let mut regulator = controller.start(&duals);
+        let mut triangle = Triangle::new(n + 1);
+        let mut row = vec![0.0; n + 1];
+        let (mut beside, mut limited) = (Vec::with_capacity(r.len()), Vec::with_capacity(r.len()));
+        for k in 0..r.len() {
+            let given = regulator.command(r[k], Dual::constant(y[k]), step(record, k));
+            row[..n].copy_from_slice(&given.eps[..n]);
+            row[n] = u[k] - given.re;
+            triangle.push(&row);
+            beside.push(row[n]);
+            limited.push(regulator.limited());
+        }
+        triangle.finish();
+        let rms = (beside.iter().map(|d| d * d).sum::<f64>() / r.len().max(1) as f64).sqrt();
+        (triangle, beside, limited, rms)
+    };
+    let free: Vec<usize> = (0..n).collect();
+    // What it would be at no error, in the state that the command sees.
+    let seen = controller.linear(1.0, false).c;
+    let mut states: Vec<f64> = seen
+        .iter()
+        .map(|c| {
+            c * (u[0] - controller.direct() * (r[0] - y[0])) / seen.iter().sum::<f64>().max(1.0)
+        })
+        .collect();
+    let mut best = run(&states);
+    for _ in 0..ROUNDS {
+        let step = best.0.solve(&free, &[], 0.0);
+        let moved: Vec<f64> = states.iter().zip(&step).map(|(x, d)| x + d).collect();
+        let next = run(&moved);
+        if next.3 >= best.3 || next.3.is_nan() {
+            break;
+        }
+        (states, best) = (moved, next);
+    }
+    let mean = u.iter().sum::<f64>() / u.len() as f64;
+    let moves = (u.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / u.len() as f64).sqrt();
+    Ok(Replay {
+        states,
+        beside: best.1,
+        limited: best.2,
+        rms: best.3,
+        moves,
+    })
+}
+
+/// The time from sample `k` to the next one, the last one as long as the one before.
+pub(crate) fn step(record: &Record, k: usize) -> f64 {
+    let k = k.min(record.len().saturating_sub(2));
+    record
+        .time
+        .get(k + 1)
+        .map_or(1.0, |next| next - record.time[k])
+}
+
+/// A plant linearised over one sampling interval: `x+ = A x + b u`, the last level is measured.
+///
+/// What an effect adds as memory (dead time, lags) is left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearPlant {
+    /// A, row by row.
+    pub a: Vec<Vec<f64>>,
+    /// b.
+    pub b: Vec<f64>,
+}
+
+impl LinearPlant {
+    /// At the operating levels of the structure's scales and a command.
+    ///
+    /// # Errors
+    /// Where there are not as many parameters as the structure has.
+    pub fn at(structure: &Structure, theta: &[f64], command: f64) -> Result<Self, Error> {
+        const LANES: usize = MAX_VESSELS + 1;
+        let n = structure.plant.vessels();
+        let theta: Vec<Dual<LANES>> = theta.iter().map(|value| Dual::constant(*value)).collect();
+        let levels: Vec<Dual<LANES>> = structure.scales.operating_level[..n]
+            .iter()
+            .enumerate()
+            .map(|(i, value)| Dual::variable(*value, i))
+            .collect();
+        let mut simulator = Simulator::new(structure, &theta, &levels, command)?;
+        simulator.advance_held(Dual::variable(command, n), structure.scales.sample_interval);
+        let next = simulator.levels();
+        Ok(Self {
+            a: (0..n).map(|i| next[i].eps[..n].to_vec()).collect(),
+            b: (0..n).map(|i| next[i].eps[n]).collect(),
+        })
+    }
+}
+
+/// A controller around the setup's plant.
+#[derive(Debug, Clone)]
+pub(crate) struct Feedback {
+    pub controller: Controller,
+    pub replays: Arc<Vec<Replay>>,
+    /// The controller's initial states are fitted.
+    pub released: bool,
+    plant: Arc<LinearPlant>,
+    interval: f64,
+}
+
+impl Feedback {
+    pub(crate) fn new(
+        controller: &Controller,
+        records: &[Record],
+        plant: LinearPlant,
+        interval: f64,
+    ) -> Result<Self, Error> {
+        for record in records {
+            if let Some(reference) = &record.reference {
+                let (low, high) = reference.range();
+                if low >= high {
+                    return Err(Error::ConstantReference {
+                        record: record.name.clone(),
+                        value: low,
+                    });
+                }
+            }
+        }
+        let replays = records
+            .iter()
+            .map(|record| replay(controller, record))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            controller: controller.clone(),
+            replays: Arc::new(replays),
+            released: false,
+            plant: Arc::new(plant),
+            interval,
+        })
+    }
+
+    /// Names and bounds of the controller's states in a record: within ten times what the command moves over.
+    pub(crate) fn entries(&self, record: usize, input: (f64, f64)) -> Vec<(String, (f64, f64))> {
+        let room = 10.0 * (input.1 - input.0);
+        let several = self.controller.states() > 1;
+        self.replays[record]
+            .states
+            .iter()
+            .enumerate()
+            .map(|(i, state)| {
+                let name = if several {
+                    format!("controller_{}(0)", i + 1)
+                } else {
+                    "controller(0)".to_string()
+                };
+                (name, (state - room, state + room))
+            })
+            .collect()
+    }
+
+    /// The filter `1 + P0 C` for rows of so many columns.
+    pub(crate) fn inverse(&self, columns: usize) -> Inverse {
+        let (n, m) = (self.plant.b.len(), self.controller.states());
+        Inverse {
+            plant: self.plant.clone(),
+            free: self.controller.linear(self.interval, false),
+            limited: self.controller.linear(self.interval, true),
+            levels: vec![0.0; columns * n],
+            states: vec![0.0; columns * m],
+            scratch: vec![0.0; n.max(m)],
+        }
+    }
+}
+
+/// `1 + P0 C` on the columns of rows.
+pub(crate) struct Inverse {
+    plant: Arc<LinearPlant>,
+    free: LinearController,
+    limited: LinearController,
+    levels: Vec<f64>,
+    states: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl Inverse {
+    /// A record begins: initial states have columns of their own.
+    pub(crate) fn reset(&mut self) {
+        self.levels.fill(0.0);
+        self.states.fill(0.0);
+    }
+
+    pub(crate) fn push(&mut self, row: &mut [f64], limited: bool) {
+        let controller = if limited { &self.limited } else { &self.free };
+        let (n, m) = (self.plant.b.len(), controller.b.len());
+        let product = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
+        for (column, value) in row.iter_mut().enumerate() {
+            let levels = &mut self.levels[column * n..(column + 1) * n];
+            let states = &mut self.states[column * m..(column + 1) * m];
+            let e = *value;
+            let back = product(&controller.c, states) + controller.d * e;
+            *value += levels[n - 1];
+            for (to, (a, b)) in self
+                .scratch
+                .iter_mut()
+                .zip(self.plant.a.iter().zip(&self.plant.b))
+            {
+                *to = product(a, levels) + b * back;
+            }
+            levels.copy_from_slice(&self.scratch[..n]);
+            for (to, (a, b)) in self
+                .scratch
+                .iter_mut()
+                .zip(controller.a.iter().zip(&controller.b))
+            {
+                *to = product(a, states) + b * e;
+            }
+            states.copy_from_slice(&self.scratch[..m]);
+        }
+    }
+}

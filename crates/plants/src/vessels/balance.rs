@@ -1,0 +1,252 @@
+//! The vessels' balance equations: rates, and how fast each vessel is.
+
+use crate::{Outlet, Scalar, Side, structure::MAX_VESSELS};
+
+use super::{
+    Levels, Vessels,
+    parts::STEP_LIMIT,
+    torricelli::{A_LITTLE, slope_of_root, square_root},
+};
+
+impl<T: Scalar> Vessels<T> {
+    /// A time within the present step, with its derivatives.
+    #[inline]
+    pub(super) fn time(&self, t: f64) -> T {
+        let Some((start, length)) = self.clock else {
+            return T::constant(t);
+        };
+        let share = if length.value() == 0.0 {
+            0.0
+        } else {
+            (t - start.value()) / length.value()
+        };
+        // The value is `t` to the last bit, as it is where there are no derivatives.
+        let moved = start + length * share;
+        moved - moved.value() + t
+    }
+
+    /// What vessel `i` alone lets out at a level.
+    #[inline(always)]
+    fn own_outflow(&self, i: usize, level: &T) -> T {
+        let vessel = &self.vessels[i];
+        match vessel.outlet {
+            Outlet::Torricelli => vessel.coefficient * square_root(*level),
+            Outlet::Linear => *level - vessel.coefficient,
+        }
+    }
+
+    /// The head that drives the outflow of vessel `i` at a level, the other levels being `levels`.
+    #[inline(always)]
+    fn head(&self, i: usize, level: &T, levels: &Levels<T>) -> T {
+        let mut head = *level;
+        if i + 1 < self.vessels.len() {
+            for &law in &self.vessels[i].laws {
+                self.laws[law].head(&mut head, &levels[i + 1]);
+            }
+        }
+        head
+    }
+
+    /// What flows out of vessel `i` to the next one at a level, the other levels being `levels`.
+    #[inline(always)]
+    fn outflow(&self, i: usize, level: &T, levels: &Levels<T>, t: &T) -> T {
+        let vessel = &self.vessels[i];
+        if vessel.laws.is_empty() {
+            return self.own_outflow(i, level);
+        }
+        let head = self.head(i, level, levels);
+        let mut outflow = self.own_outflow(i, &head);
+        for &law in &vessel.laws {
+            self.laws[law].outflow(&head, &mut outflow, t);
+        }
+        outflow
+    }
+
+    /// What flows out of vessel `i` to the next one, and its net inflow.
+    #[inline(always)]
+    pub(super) fn balance(&self, i: usize, inflow: T, levels: &Levels<T>, t: f64) -> (T, T) {
+        let level = &levels[i];
+        if self.vessels[i].laws.is_empty() {
+            let outflow = self.own_outflow(i, level);
+            return (outflow, inflow - outflow);
+        }
+        let t = self.time(t);
+        let outflow = self.outflow(i, level, levels, &t);
+        let mut net = inflow - outflow;
+        for &law in &self.vessels[i].laws {
+            self.laws[law].net(level, &mut net, &t);
+        }
+        if let Some(side) = &self.side {
+            net = net - self.exchange(side) * (*level - levels[i + 1]);
+        }
+        (outflow, net)
+    }
+
+    /// What flows to a side tank for each unit of level that it stands below its vessel.
+    #[inline]
+    fn exchange(&self, side: &Side<T>) -> T {
+        self.vessels[0].area * side.share / side.time_constant
+    }
+
+    /// Surface of vessel `i` at a level.
+    #[inline]
+    fn area(&self, i: usize, level: &T) -> T {
+        let vessel = &self.vessels[i];
+        let mut area = vessel.area;
+        for &law in &vessel.laws {
+            self.laws[law].area(level, &mut area);
+        }
+        area
+    }
+
+    /// The rate of vessel `i` at a level. The nominal area goes in as its inverse, and an area that is nominal as a
+    /// factor of one, so that both ways give the same bits.
+    #[inline(always)]
+    pub(super) fn rate(&self, i: usize, level: &T, net: T) -> T {
+        let vessel = &self.vessels[i];
+        let rate = match vessel.plain_inverse {
+            Some(inverse) => net * inverse,
+            None => net * vessel.inverse,
+        };
+        if vessel.laws.is_empty() {
+            rate
+        } else {
+            rate * (vessel.area / self.area(i, level))
+        }
+    }
+
+    /// Rates of all levels \[level unit/s\].
+    #[inline]
+    pub(super) fn rates(&self, levels: &Levels<T>, q: T, t: f64) -> Levels<T> {
+        let mut rates = [T::constant(0.0); MAX_VESSELS];
+        let mut inflow = q;
+        for (i, vessel) in self.vessels.iter().enumerate() {
+            let (outflow, net) = self.balance(i, inflow, levels, t);
+            inflow = outflow;
+            if vessel.spilling {
+                // The level stands at the rim, and the net inflow spills; where it turns negative the mode ends.
+                inflow = inflow + net * vessel.rim.fraction;
+            } else {
+                rates[i] = self.rate(i, &levels[i], net);
+            }
+        }
+        if let Some(side) = &self.side {
+            let last = self.states - 1;
+            rates[last] = (levels[last - 1] - levels[last]) / side.time_constant;
+        }
+        rates
+    }
+
+    /// Rates of linear vessels without effects, written as in [`Vessels::rates`].
+    pub(super) fn linear_rates(&self, levels: &Levels<T>, q: T) -> Levels<T> {
+        let mut rates = [T::constant(0.0); MAX_VESSELS];
+        let mut inflow = q;
+        for (i, vessel) in self.vessels.iter().enumerate() {
+            let outflow = levels[i] - vessel.coefficient;
+            let net = inflow - outflow;
+            inflow = outflow;
+            rates[i] = net * vessel.inverse;
+        }
+        rates
+    }
+
+    /// The net inflow of vessel `i` at levels, in the present modes.
+    pub(super) fn net(&self, i: usize, levels: &Levels<T>, q: T, t: f64) -> T {
+        let mut inflow = q;
+        for (k, vessel) in self.vessels.iter().enumerate().take(i) {
+            let (outflow, net) = self.balance(k, inflow, levels, t);
+            inflow = outflow;
+            if vessel.spilling {
+                inflow = inflow + net * vessel.rim.fraction;
+            }
+        }
+        self.balance(i, inflow, levels, t).1
+    }
+
+    /// By how much a higher level slows its own rise \[1/s\]: what the effects add to it by a difference, so that it
+    /// vanishes with them.
+    pub(super) fn slope(&self, i: usize, t: f64) -> T {
+        let level = self.levels[i];
+        let vessel = &self.vessels[i];
+        let own = match vessel.outlet {
+            Outlet::Torricelli => vessel.coefficient * slope_of_root(level),
+            Outlet::Linear => T::constant(1.0),
+        };
+        if vessel.laws.is_empty() {
+            return own * vessel.inverse;
+        }
+        let step = 1e-6 * (level.value().abs() + 1e-3);
+        let t = self.time(t);
+        let added =
+            |level: &T| self.outflow(i, level, &self.levels, &t) - self.own_outflow(i, level);
+        let mut slope = own + (added(&(level + step)) - added(&level)) * (1.0 / step);
+        if let Some(side) = &self.side {
+            slope = slope + self.exchange(side);
+        }
+        slope * vessel.inverse * (vessel.area / self.area(i, &level))
+    }
+
+    /// How fast each vessel forgets its level \[1/s\].
+    pub(super) fn forgetting(&self, t: f64) -> [T; MAX_VESSELS] {
+        let mut rates = [T::constant(0.0); MAX_VESSELS];
+        for (i, rate) in rates.iter_mut().enumerate().take(self.vessels.len()) {
+            *rate = match self.linear {
+                // Where the vessels' own forgetting is exact it alone is meant.
+                Some(_) => self.vessels[i].inverse,
+                None => self.slope(i, t).max(T::constant(0.0)),
+            };
+        }
+        if let Some(side) = &self.side {
+            rates[self.states - 1] = T::constant(1.0) / side.time_constant;
+        }
+        rates
+    }
+
+    /// How many time constants of its fastest vessel a step of length `h` lasts, up to a factor of two: what
+    /// Runge-Kutta must not be asked. It looks at values alone, so that derivatives follow one path.
+    #[inline]
+    pub(super) fn stiffness(&self, h: f64, t: f64) -> f64 {
+        let mut most = 0.0_f64;
+        for (i, vessel) in self.vessels.iter().enumerate() {
+            let level = self.levels[i];
+            match vessel.outlet {
+                // The outflow bends downwards from zero, so its slope is less than outflow/level: half of it for a root.
+                // An empty vessel is taken as one with a little in it: its slope is the same, and it may be about to fill.
+                Outlet::Torricelli => {
+                    let height = level.value().max(A_LITTLE);
+                    let (outflow, content) = if vessel.laws.is_empty() {
+                        let outflow = vessel.coefficient.value() * square_root(height);
+                        (outflow, height * vessel.area.value())
+                    } else {
+                        let level = T::constant(height);
+                        let now = T::constant(t);
+                        let outflow = self.outflow(i, &level, &self.levels, &now).value();
+                        // What pushes back leaves a smaller head, of the same slope.
+                        let head = self.head(i, &level, &self.levels).value().max(A_LITTLE);
+                        (outflow, head * self.area(i, &level).value())
+                    };
+                    // Without the division in the common case.
+                    if h * outflow > 2.0 * STEP_LIMIT * content {
+                        most = most.max(0.5 * h * outflow / content);
+                    }
+                }
+                Outlet::Linear if vessel.laws.is_empty() => {}
+                // The vessel's own forgetting is exact; here it is what the effects add to it.
+                Outlet::Linear => {
+                    let own = 1.0 / vessel.area.value().abs();
+                    let slope = self.slope(i, t).value().abs();
+                    let added = if h * own > STEP_LIMIT {
+                        slope - own
+                    } else {
+                        slope
+                    };
+                    most = most.max(0.5 * h * added);
+                }
+            }
+        }
+        if let Some(side) = &self.side {
+            most = most.max(h * (1.0 + side.share.value()) / side.time_constant.value());
+        }
+        most
+    }
+}

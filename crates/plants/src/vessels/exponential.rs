@@ -1,0 +1,178 @@
+//! One step beside an exact flow: that of linear vessels, which effects disturb, or each vessel's own forgetting.
+//!
+//! What is added to the exact flow is integrated by Runge-Kutta of order four where the step is short against the
+//! vessels' time constants, and by the exponential Runge-Kutta step of [`Damped`] where it is long: the stages of S. M.
+//! Cox and P. C. Matthews (2002), equations (26) to (29), for a chain, in which each vessel also drives the next one.
+
+use crate::{Scalar, damped::Damped, inflow::Inflow, linear::Propagators, structure::MAX_VESSELS};
+
+use super::{Levels, Vessels};
+
+/// Linear vessels have an exact flow; what effects add to it is integrated beside it, so that it vanishes with them.
+pub(super) struct LinearFlow<T> {
+    pub whole: Propagators<T>,
+    pub half: Propagators<T>,
+    /// Effects act, so that the exact flow is not all.
+    pub disturbed: bool,
+}
+
+/// The exact flow over one step.
+pub(super) struct Flow<T> {
+    half: Levels<T>,
+    whole: Levels<T>,
+    /// Where there are two vessels.
+    handed: Option<Handed<T>>,
+}
+
+/// What the second linear vessel gets from the first one.
+#[derive(Clone, Copy)]
+struct Handed<T> {
+    /// In half a step, by a deviation of the first one's level at its beginning.
+    deviation: T,
+    /// In half a step, by a constant drive of the first one.
+    drive: T,
+    /// In a whole step, by a drive of `a + b s + c s^2`.
+    whole: [T; 3],
+}
+
+impl<T: Scalar> Vessels<T> {
+    /// The levels after a step without events.
+    pub(super) fn flow(&mut self, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
+        let Some(flow) = &mut self.linear else {
+            return self.trial(h, q, t);
+        };
+        let whole = flow.whole.advance(&self.levels, h, q);
+        if !flow.disturbed {
+            return whole;
+        }
+        let first = q.part(T::constant(0.0), T::constant(0.5));
+        let half = flow.half.advance(&self.levels, h * 0.5, first);
+        let handed = (self.vessels.len() == 2 && h.value() > 0.0).then(|| {
+            // A drive of the level is an inflow over the area.
+            let area = self.vessels[0].area;
+            let (deviation, [drive, ..]) = flow.half.second_from(h * 0.5);
+            let (_, whole) = flow.whole.second_from(h);
+            Handed {
+                deviation,
+                drive: drive * area,
+                whole: whole.map(|weight| weight * area),
+            }
+        });
+        let flow = Flow {
+            half,
+            whole,
+            handed,
+        };
+        self.linear_trial(&flow, h, q, t)
+    }
+
+    /// One step of linear vessels: their exact flow, and beside it Runge-Kutta on what the effects add.
+    fn linear_trial(&self, flow: &Flow<T>, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
+        let (whole, half) = (flow.whole, flow.half);
+        let dt = h.value();
+        if let Some(rates) = self.damping {
+            return self.damped_trial(rates, Some(flow), h, q, t);
+        }
+        let added = |levels: &Levels<T>, flow: &Levels<T>, q: T, t: f64| {
+            let mut rates = self.rates(levels, q, t);
+            let linear = self.linear_rates(flow, q);
+            for (rate, linear) in rates.iter_mut().zip(linear) {
+                *rate = *rate - linear;
+            }
+            rates
+        };
+        let k1 = added(&self.levels, &self.levels, q.start, t);
+        let k2 = added(
+            &self.moved(&half, &k1, h * 0.5),
+            &half,
+            q.middle,
+            t + 0.5 * dt,
+        );
+        let k3 = added(
+            &self.moved(&half, &k2, h * 0.5),
+            &half,
+            q.middle,
+            t + 0.5 * dt,
+        );
+        let k4 = added(&self.moved(&whole, &k3, h), &whole, q.end, t + dt);
+        self.weighted(&whole, h, [&k1, &k2, &k3, &k4])
+    }
+
+    /// What is added to a flow, or to standing still, each vessel's own forgetting taken exactly.
+    pub(super) fn damped_trial(
+        &self,
+        rates: [T; MAX_VESSELS],
+        flow: Option<&Flow<T>>,
+        h: T,
+        q: Inflow<T>,
+        t: f64,
+    ) -> Levels<T> {
+        let n = self.states;
+        let zero = [T::constant(0.0); MAX_VESSELS];
+        let damped: [Damped<T>; MAX_VESSELS] = std::array::from_fn(|i| Damped::new(rates[i], h));
+        let [begin, half, whole] = match flow {
+            Some(flow) => [&self.levels, &flow.half, &flow.whole],
+            None => [&self.levels; 3],
+        };
+        // What drives the deviation from the flow, but for its forgetting and what a linear vessel hands on.
+        let driving = |at: &Levels<T>, deviation: &Levels<T>, q: T, t: f64| {
+            let mut levels = *at;
+            for i in 0..n {
+                levels[i] = levels[i] + deviation[i];
+            }
+            let mut drive = self.rates(&levels, q, t);
+            for i in 0..n {
+                drive[i] = drive[i] + deviation[i] * rates[i];
+            }
+            if flow.is_some() {
+                for (drive, own) in drive.iter_mut().zip(self.linear_rates(at, q)) {
+                    *drive = *drive - own;
+                }
+                for i in 1..self.vessels.len() {
+                    drive[i] = drive[i] - deviation[i - 1] * self.vessels[i].inverse;
+                }
+            }
+            drive
+        };
+        // What the first vessel's deviation, and its drive, bring to the second one in half a step and in a whole one.
+        let handed = flow.and_then(|flow| flow.handed);
+        let middle = t + 0.5 * h.value();
+        let from_zero = |k: &Levels<T>| {
+            let mut d = zero;
+            for i in 0..n {
+                d[i] = damped[i].half(k[i]);
+            }
+            if let Some(handed) = &handed {
+                d[1] = d[1] + k[0] * handed.drive;
+            }
+            d
+        };
+        let k1 = driving(begin, &zero, q.start, t);
+        let d2 = from_zero(&k1);
+        let k2 = driving(half, &d2, q.middle, middle);
+        let k3 = driving(half, &from_zero(&k2), q.middle, middle);
+        let mut d4 = zero;
+        for i in 0..n {
+            d4[i] = damped[i].half_from(d2[i], k3[i] * 2.0 - k1[i]);
+        }
+        if let Some(handed) = &handed {
+            d4[1] = d4[1] + d2[0] * handed.deviation + (k3[0] * 2.0 - k1[0]) * handed.drive;
+        }
+        let k4 = driving(whole, &d4, q.end, t + h.value());
+        let mut next = *whole;
+        for i in 0..n {
+            next[i] = next[i] + damped[i].whole([k1[i], (k2[i] + k3[i]) * 0.5, k4[i]]);
+        }
+        if let Some(handed) = &handed {
+            let drive = Inflow {
+                start: k1[0],
+                middle: (k2[0] + k3[0]) * 0.5,
+                end: k4[0],
+            };
+            for (c, weight) in drive.coefficients().into_iter().zip(handed.whole) {
+                next[1] = next[1] + c * weight;
+            }
+        }
+        next
+    }
+}

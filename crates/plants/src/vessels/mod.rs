@@ -1,0 +1,186 @@
+//! The vessels in series: their parts, their laws and their present levels.
+//!
+//! [`balance`] has the equations, [`parts`] cuts a step, [`rims`] finds what happens in a part, [`runge_kutta`] and
+//! [`exponential`] take it.
+
+mod balance;
+mod exponential;
+mod parts;
+mod rims;
+mod runge_kutta;
+mod torricelli;
+
+use crate::{
+    Law, Outlet, Rim, Scalar, Side, inflow::Inflow, linear::Propagators, structure::MAX_VESSELS,
+};
+
+use exponential::LinearFlow;
+pub(crate) use torricelli::square_root;
+
+pub(crate) type Levels<T> = [T; MAX_VESSELS];
+
+/// Who wants to see the smooth stretches of the measured level, if anybody.
+pub(crate) type Watch<'a, T> = Option<&'a mut dyn FnMut(&Stretch<T>)>;
+
+/// One vessel as the balance sees it.
+struct Vessel<T> {
+    area: T,
+    /// One over the area.
+    inverse: T,
+    /// The same, where it has no derivatives.
+    plain_inverse: Option<f64>,
+    outlet: Outlet,
+    /// `alpha` for Torricelli, `offset` for a linear outlet.
+    coefficient: T,
+    rim: Rim<T>,
+    spilling: bool,
+    /// Positions of the laws that act here.
+    laws: Vec<usize>,
+}
+
+/// The vessels in series.
+pub(crate) struct Vessels<T: Scalar> {
+    vessels: Vec<Vessel<T>>,
+    laws: Vec<Box<dyn Law<T>>>,
+    pub(crate) levels: Levels<T>,
+    /// For linear vessels.
+    linear: Option<LinearFlow<T>>,
+    /// A side tank of an only vessel; its level follows the vessel's in `levels`.
+    side: Option<Side<T>>,
+    /// Levels that move: the vessels' and the side tank's.
+    states: usize,
+    /// Laws that switch over at an instant that is still to come.
+    switches: Vec<usize>,
+    /// Beginning and length of the present step, where they have derivatives.
+    clock: Option<(T, T)>,
+    /// How fast every vessel forgets, where a part is long against that \[1/s\]: then it is taken exponentially.
+    damping: Option<[T; MAX_VESSELS]>,
+    /// Some vessel has a rim.
+    rims: bool,
+    /// All are Torricelli's, of areas without derivatives, and nothing acts in them.
+    bare: bool,
+    /// One over the shortest time constant of linear vessels; zero for others \[1/s\].
+    fastest: f64,
+}
+
+/// A stretch of time over which the measured level moved smoothly.
+pub(crate) struct Stretch<T> {
+    pub h: T,
+    pub before: T,
+    pub after: T,
+    pub rate_before: T,
+    pub rate_after: T,
+}
+
+impl<T: Scalar> Vessels<T> {
+    /// `parts`: area, outlet and its coefficient for each vessel; `laws`: the vessel each acts in, and the law.
+    pub(crate) fn new(
+        parts: Vec<(T, Outlet, T)>,
+        laws: Vec<(usize, Box<dyn Law<T>>)>,
+        levels: &[T],
+    ) -> Self {
+        let mut vessels: Vec<Vessel<T>> = parts
+            .into_iter()
+            .map(|(area, outlet, coefficient)| Vessel {
+                area,
+                inverse: T::constant(1.0) / area,
+                plain_inverse: area
+                    .same_derivatives(T::constant(0.0))
+                    .then(|| 1.0 / area.value()),
+                outlet,
+                coefficient,
+                rim: Rim {
+                    level: T::constant(f64::INFINITY),
+                    fraction: T::constant(0.0),
+                },
+                spilling: false,
+                laws: Vec::new(),
+            })
+            .collect();
+        let mut bound = Vec::with_capacity(laws.len());
+        for (vessel, law) in laws {
+            match law.rim() {
+                Some(rim) => vessels[vessel].rim = rim,
+                None => vessels[vessel].laws.push(bound.len()),
+            }
+            bound.push(law);
+        }
+        let side = bound.iter().find_map(|law| law.side());
+        let states = vessels.len() + usize::from(side.is_some());
+        let switches = (0..bound.len()).filter(|&law| bound[law].switch().is_some());
+        let switches = switches.collect();
+        let rims = vessels.iter().any(|v| v.rim.level.value() != f64::INFINITY);
+        let bare = bound.is_empty()
+            && vessels
+                .iter()
+                .all(|v| v.outlet == Outlet::Torricelli && v.plain_inverse.is_some());
+        let linear = vessels.iter().all(|v| v.outlet == Outlet::Linear);
+        let fastest = if linear {
+            let rates = vessels.iter().map(|v| 1.0 / v.area.value().abs());
+            rates.fold(0.0, f64::max)
+        } else {
+            0.0
+        };
+        let propagators =
+            || Propagators::new(vessels.iter().map(|v| (v.area, v.coefficient)).collect());
+        let linear = linear.then(|| LinearFlow {
+            whole: propagators(),
+            half: propagators(),
+            disturbed: vessels.iter().any(|v| !v.laws.is_empty()),
+        });
+        let mut initial = [T::constant(0.0); MAX_VESSELS];
+        for (level, given) in initial.iter_mut().zip(levels) {
+            *level = *given;
+        }
+        let mut all = Self {
+            vessels,
+            laws: bound,
+            levels: initial,
+            linear,
+            side,
+            states,
+            switches,
+            clock: None,
+            rims,
+            bare,
+            damping: None,
+            fastest,
+        };
+        all.keep_within();
+        if states > all.vessels.len() {
+            // At rest a side tank stands as high as its vessel.
+            all.levels[states - 1] = all.levels[0];
+        }
+        all
+    }
+
+    /// Levels lie between empty (where the outlet is Torricelli's) and the rim.
+    fn keep_within(&mut self) {
+        for (vessel, level) in self.vessels.iter().zip(&mut self.levels) {
+            if level.value() > vessel.rim.level.value() {
+                *level = vessel.rim.level;
+            }
+            if vessel.outlet == Outlet::Torricelli && level.value() < 0.0 {
+                *level = T::constant(0.0);
+            }
+        }
+    }
+
+    fn accept(&mut self, next: Levels<T>, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        if let Some(watch) = watch {
+            let last = self.vessels.len() - 1;
+            let before = self.levels;
+            let rate_before = self.rates(&before, q.start, t)[last];
+            let rate_after = self.rates(&next, q.end, t + h.value())[last];
+            watch(&Stretch {
+                h,
+                before: before[last],
+                after: next[last],
+                rate_before,
+                rate_after,
+            });
+        }
+        self.levels = next;
+        self.keep_within();
+    }
+}

@@ -1,0 +1,271 @@
+//! How a step is cut where it is long against a vessel's time constant, so that each part can be trusted.
+//!
+//! Up to one time constant a step is taken whole. A longer one is cut into parts that double: what a jump of the inflow
+//! sets off is over when they are long, and a vessel that has settled takes the rest in one exponential part. Where a
+//! level moves too far for its forgetting to be one number the parts are short, or at last implicit and of order one.
+
+use crate::{Outlet, Scalar, inflow::Inflow, structure::MAX_VESSELS};
+
+use super::{Stretch, Vessels, Watch};
+
+/// Runge-Kutta is trusted while a step is shorter than this many time constants of every vessel.
+pub(super) const STEP_LIMIT: f64 = 1.0;
+/// The same where a rim is near: then linear vessels too go by Runge-Kutta alone.
+const STEP_LIMIT_AT_RIM: f64 = 0.125;
+/// The most parts that a step of linear vessels is cut into for that.
+const MOST_PARTS: usize = 256;
+/// A step that is still too long for its vessels is cut into at most so many parts; beyond that it is taken implicitly.
+const UNITS: usize = 32;
+/// A long part may be as long as what has passed of its step, where no level will move by more than this share of
+/// itself: the fast part of the motion has died away by then.
+const SETTLING: f64 = 0.2;
+/// One part is enough where no fast vessel will move by more than this share of its level. What is over before the next
+/// reading leaves a trace only in the vessel that it flows into: the last one may move more.
+const SETTLED: [f64; 2] = [1e-4, 1e-2];
+
+impl<T: Scalar> Vessels<T> {
+    /// Moves on by `h` from time `start`; `watch` sees every smooth stretch of the measured level in turn.
+    pub(crate) fn step(&mut self, h: T, q: Inflow<T>, start: T, watch: &mut Watch<T>) {
+        let (mut h, mut q, mut start) = (h, q, start);
+        while let Some((law, at)) = self.next_switch(&start, &h) {
+            let (begin, whole) = (start, h);
+            let first = at - begin;
+            if first.value() >= 0.0 {
+                let share = first / whole;
+                self.stretch(first, q.part(T::constant(0.0), share), begin, watch);
+                (h, start) = (whole - first, at);
+                q = q.part(share, T::constant(1.0));
+            }
+            self.laws[law].switch_over();
+            self.switches.retain(|&waiting| waiting != law);
+        }
+        self.stretch(h, q, start, watch);
+    }
+
+    /// The first law to switch over before the end of a step, and when.
+    fn next_switch(&self, start: &T, h: &T) -> Option<(usize, T)> {
+        let end = start.value() + h.value();
+        self.switches
+            .iter()
+            .filter_map(|&law| Some((law, self.laws[law].switch()?)))
+            .filter(|(_, at)| at.value() < end)
+            .min_by(|a, b| a.1.value().total_cmp(&b.1.value()))
+    }
+
+    /// A step within which no law switches over.
+    fn stretch(&mut self, h: T, q: Inflow<T>, start: T, watch: &mut Watch<T>) {
+        let zero = T::constant(0.0);
+        let plain = h.same_derivatives(zero) && start.same_derivatives(zero);
+        self.clock = (!plain && !self.laws.is_empty()).then_some((start, h));
+        let t = start.value();
+        let wanted = self.fastest * h.value();
+        if wanted > STEP_LIMIT {
+            self.fast_linear_step(wanted, h, q, t, watch);
+        } else if self.rims && wanted > STEP_LIMIT_AT_RIM {
+            self.equal_parts(wanted / STEP_LIMIT_AT_RIM, h, q, t, watch);
+        } else {
+            self.part(h, q, t, watch);
+        }
+    }
+
+    fn equal_parts(&mut self, wanted: f64, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
+        let share = 1.0 / parts as f64;
+        let each = h * share;
+        for k in 0..parts {
+            let edge = |k: usize| T::constant(k as f64 * share);
+            let begin = t + k as f64 * each.value();
+            self.part(each, q.part(edge(k), edge(k + 1)), begin, watch);
+        }
+    }
+
+    /// A step of linear vessels that is longer than a time constant, in parts that double: what a jump of the input sets
+    /// off is over when they are long. Their lengths do not depend on effects, so that one at its absent value sees
+    /// the parts of the base model.
+    fn fast_linear_step(&mut self, wanted: f64, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
+        let share = 1.0 / parts as f64;
+        let (mut done, mut length) = (0, 1);
+        while done < parts {
+            let (from, to) = (done as f64 * share, (done + length) as f64 * share);
+            let part = h * (length as f64 * share);
+            let q = q.part(T::constant(from), T::constant(to));
+            let begin = t + h.value() * from;
+            let quiet = !self.rims || self.quiet_part(part, q, begin, watch);
+            if !self.rims {
+                self.damping = Some(self.forgetting(begin));
+                self.part(part, q, begin, watch);
+                self.damping = None;
+            } else if !quiet {
+                // Something happens at a rim: here Runge-Kutta alone, in short steps.
+                let wanted = self.fastest * part.value() / STEP_LIMIT_AT_RIM;
+                self.equal_parts(wanted, part, q, begin, watch);
+            }
+            done += length;
+            length = done;
+        }
+    }
+
+    /// A part of linear vessels with rims, in one piece: `false`, and nothing is done, where something happens at a rim.
+    fn quiet_part(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) -> bool {
+        if self.stiffness(h.value(), t) > STEP_LIMIT {
+            return false;
+        }
+        self.settle_modes(q.start, t, None);
+        self.damping = Some(self.forgetting(t));
+        // What stands at its rim drives the next vessel by a parabola: then the exponential step is exact.
+        let next = if self.vessels.iter().any(|vessel| vessel.spilling) {
+            self.trial(h, q, t)
+        } else {
+            self.flow(h, q, t)
+        };
+        let quiet = self.first_event(&next, h, q, t).is_none();
+        if quiet {
+            self.accept(next, h, q, t, watch);
+        }
+        self.damping = None;
+        quiet
+    }
+
+    fn part(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        if self.stiffness(h.value(), t) <= STEP_LIMIT {
+            self.unit(h, q, t, watch);
+            return;
+        }
+        let given = self.damping;
+        let mut done = 0;
+        while done < UNITS {
+            let left = UNITS - done;
+            let stiffness = self.stiffness(h.value(), t);
+            let span = |from: usize, to: usize| {
+                let edge = |k: usize| T::constant(k as f64 / UNITS as f64);
+                let length = h * ((to - from) as f64 / UNITS as f64);
+                let begin = t + h.value() * (from as f64 / UNITS as f64);
+                (length, q.part(edge(from), edge(to)), begin)
+            };
+            // The longest that is short enough, in powers of two.
+            let mut units = 1 << left.ilog2();
+            while units > 1 && stiffness * units as f64 > STEP_LIMIT * UNITS as f64 {
+                units /= 2;
+            }
+            let short = stiffness * units as f64 <= STEP_LIMIT * UNITS as f64;
+            let (length, inflow, begin) = span(done, UNITS);
+            let rates = self.forgetting(begin);
+            let calm = if self.linear.is_some() {
+                // What makes such a part too long is the effects' doing, which its vessels' forgetting does not cover.
+                0
+            } else {
+                self.calm(&rates, length.value(), &inflow, begin, done)
+            };
+            if calm > units || (calm > 0 && !short) {
+                let (length, q, begin) = span(done, done + calm);
+                self.damping = Some(rates);
+                self.unit(length, q, begin, watch);
+                self.damping = given;
+                done += calm;
+                continue;
+            }
+            let (length, q, begin) = span(done, done + units);
+            if short {
+                self.unit(length, q, begin, watch);
+            } else {
+                self.relax(length, q, begin, watch);
+            }
+            done += units;
+        }
+    }
+
+    /// How many of [`UNITS`] the next part may last although a vessel is faster than that, `done` of them over; zero
+    /// where a level moves too far for its forgetting to be one number.
+    fn calm(&self, rates: &[T; MAX_VESSELS], h: f64, q: &Inflow<T>, t: f64, done: usize) -> usize {
+        let left = UNITS - done;
+        let mut longest = left;
+        let mut inflows = [Some(q.start), Some(q.end)];
+        if q.start.value() == q.end.value() {
+            inflows[1] = None;
+        }
+        for q in inflows.into_iter().flatten() {
+            let moves = self.rates(&self.levels, q, t);
+            for i in 0..self.states {
+                let fast = rates[i].value() * h > STEP_LIMIT;
+                let time = if fast { 1.0 / rates[i].value() } else { h };
+                let (level, moves) = (self.levels[i].value(), moves[i].value());
+                // What is empty and gets nothing stays so.
+                let share = if level <= 0.0 && moves <= 0.0 {
+                    0.0
+                } else {
+                    (moves * time / level).abs()
+                };
+                let settled = SETTLED[usize::from(i + 1 == self.vessels.len())];
+                if share.is_nan() || share > SETTLING {
+                    return 0;
+                }
+                if fast && share > settled {
+                    longest = longest.min(done.max(1));
+                }
+            }
+        }
+        longest
+    }
+
+    /// A step that is short enough.
+    fn unit(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        if self.rims {
+            self.step_with_rims(h, q, t, watch);
+            return;
+        }
+        let next = self.flow(h, q, t);
+        self.accept(next, h, q, t, watch);
+    }
+
+    /// One step that cannot overshoot, whatever its length: implicit in each vessel's own level, of order one.
+    fn relax(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        let mut next = self.levels;
+        let mut inflow = q.end;
+        for (i, to) in next.iter_mut().enumerate().take(self.vessels.len()) {
+            let level = self.levels[i];
+            let (outflow, net) = self.balance(i, inflow, &self.levels, t);
+            let slope = self.slope(i, t).max(T::constant(0.0));
+            let damped = T::constant(1.0) / (h * slope + 1.0);
+            let rise = self.rate(i, &level, net) * h * damped;
+            let low = match self.vessels[i].outlet {
+                Outlet::Torricelli => 0.0,
+                Outlet::Linear => f64::NEG_INFINITY,
+            };
+            let rim = self.vessels[i].rim;
+            *to = (level + rise).max(T::constant(low)).min(rim.level);
+            // Nothing is lost: what is not kept has left, by the outlet or over the rim.
+            let kept = net * damped;
+            inflow = outflow + net - kept;
+            if to.value() != (level + rise).value() && rise.value() != 0.0 {
+                let beyond = kept * (T::constant(1.0) - (*to - level) / rise);
+                inflow = if rise.value() > 0.0 {
+                    inflow + beyond * rim.fraction
+                } else {
+                    inflow + beyond
+                };
+            }
+            // A leak takes no more than there is.
+            inflow = inflow.max(T::constant(low));
+        }
+        if let Some(side) = &self.side {
+            let last = self.states - 1;
+            let drawn = h / side.time_constant;
+            next[last] = (next[last] + drawn * next[last - 1]) / (drawn + 1.0);
+        }
+        if let Some(watch) = watch {
+            // The transient is over at once; what is left looks straight.
+            let last = self.vessels.len() - 1;
+            let (before, after) = (self.levels[last], next[last]);
+            let rate = (after - before) / h;
+            watch(&Stretch {
+                h,
+                before,
+                after,
+                rate_before: rate,
+                rate_after: rate,
+            });
+        }
+        self.levels = next;
+    }
+}

@@ -1,0 +1,207 @@
+//! Steps of vessels with rims: which of them spill, and the instant at which a level meets its rim or leaves it, located
+//! so that the step keeps its order and its derivatives.
+
+use crate::{Scalar, inflow::Inflow};
+
+use super::{Levels, Vessels, Watch};
+
+/// Contacts with a rim that are looked for within a step.
+const MOST_EVENTS: usize = 12;
+
+/// What ends a smooth stretch.
+pub(super) enum Event<T> {
+    /// A vessel meets its rim after this part of the step.
+    Rim(usize, T),
+    /// A vessel stops spilling after this part of the step.
+    Release(usize, T),
+}
+
+impl<T: Scalar> Vessels<T> {
+    pub(super) fn step_with_rims(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        let (mut h, mut q, mut t) = (h, q, t);
+        let mut released = None;
+        let whole = self.clock;
+        // Each vessel can meet its rim and leave it a few times within a step; more is chatter.
+        for _ in 0..MOST_EVENTS {
+            self.settle_modes(q.start, t, released);
+            let next = self.trial(h, q, t);
+            let Some(event) = self.first_event(&next, h, q, t) else {
+                self.accept(next, h, q, t, watch);
+                self.clock = whole;
+                return;
+            };
+            let (Event::Rim(_, part) | Event::Release(_, part)) = event;
+            let first = q.part(T::constant(0.0), part);
+            // The instant of the event has derivatives, and with it every time of the step that leads there and the one
+            // from which the rest is counted.
+            let begin = self.time(t);
+            self.clock = Some((begin, h * part));
+            let there = self.trial(h * part, first, t);
+            self.accept(there, h * part, first, t, watch);
+            released = match event {
+                Event::Rim(i, _) => {
+                    self.levels[i] = self.vessels[i].rim.level;
+                    None
+                }
+                Event::Release(i, _) => Some(i),
+            };
+            let instant = begin + h * part;
+            t += (h * part).value();
+            q = q.part(part, T::constant(1.0));
+            h = h - h * part;
+            self.clock = Some((instant, h));
+        }
+        let next = self.trial(h, q, t);
+        self.accept(next, h, q, t, watch);
+        self.clock = whole;
+    }
+
+    /// Which vessels spill: those that stand at their rim with a positive net inflow, but for one that has just stopped.
+    pub(super) fn settle_modes(&mut self, q: T, t: f64, released: Option<usize>) {
+        let mut inflow = q;
+        for i in 0..self.vessels.len() {
+            let (outflow, net) = self.balance(i, inflow, &self.levels, t);
+            let vessel = &mut self.vessels[i];
+            vessel.spilling = self.levels[i].value() >= vessel.rim.level.value()
+                && net.value() > 0.0
+                && released != Some(i);
+            inflow = outflow;
+            if vessel.spilling {
+                inflow = inflow + net * vessel.rim.fraction;
+            }
+        }
+    }
+
+    /// The first thing to happen within the step that would lead to `next`, if anything does.
+    pub(super) fn first_event(
+        &self,
+        next: &Levels<T>,
+        h: T,
+        q: Inflow<T>,
+        t: f64,
+    ) -> Option<Event<T>> {
+        let at = |s: f64| {
+            let part = T::constant(s);
+            let piece = q.part(T::constant(0.0), part);
+            (self.trial(h * part, piece, t), piece.end, t + s * h.value())
+        };
+        let mut first: Option<(f64, usize)> = None;
+        for (i, vessel) in self.vessels.iter().enumerate() {
+            let rim = vessel.rim.level.value();
+            if rim == f64::INFINITY {
+                continue;
+            }
+            // Positive once the event has happened.
+            let past = |levels: &Levels<T>, q: T, t: f64| {
+                if vessel.spilling {
+                    -self.net(i, levels, q, t).value()
+                } else {
+                    levels[i].value() - rim
+                }
+            };
+            let low = past(&self.levels, q.start, t);
+            let (mut end, mut high) = (1.0, past(next, q.end, t + h.value()));
+            if low >= 0.0 {
+                // Just released, or on the rim with a net inflow of nothing.
+                continue;
+            }
+            if high <= 0.0 {
+                if vessel.spilling {
+                    continue;
+                }
+                // Above the rim in between? The top of the cubic through levels and rates says where to look.
+                let Some(top) = self.top(i, next, h, q, t).filter(|&(_, level)| level > rim) else {
+                    continue;
+                };
+                let (levels, q, t) = at(top.0);
+                (end, high) = (top.0, past(&levels, q, t));
+                if high <= 0.0 {
+                    continue;
+                }
+            }
+            let s = crossing((0.0, low), (end, high), |s| {
+                let (levels, q, t) = at(s);
+                past(&levels, q, t)
+            });
+            if first.is_none_or(|(earlier, _)| s < earlier) {
+                first = Some((s, i));
+            }
+        }
+        let (s, i) = first?;
+        // One Newton step in duals gives the instant its derivatives: those of the steps as they are taken, not of the
+        // flow that they approximate, hence the slope by a difference.
+        let spilling = self.vessels[i].spilling;
+        let past = |s: f64| {
+            let (levels, q, t) = at(s);
+            if spilling {
+                -self.net(i, &levels, q, t)
+            } else {
+                levels[i] - self.vessels[i].rim.level
+            }
+        };
+        let slope = (past(s + 1e-4).value() - past(s - 1e-4).value()) * 5e3;
+        if slope <= 0.0 {
+            return None;
+        }
+        let part = (T::constant(s) - past(s) * (1.0 / slope)).max(T::constant(0.0));
+        (part.value() < 1.0).then_some(if spilling {
+            Event::Release(i, part)
+        } else {
+            Event::Rim(i, part)
+        })
+    }
+
+    /// Where within the step, and how high, the level of a vessel is highest; `None` where that is at an end.
+    fn top(&self, i: usize, next: &Levels<T>, h: T, q: Inflow<T>, t: f64) -> Option<(f64, f64)> {
+        let dt = h.value();
+        let begin = self.rates(&self.levels, q.start, t)[i].value() * dt;
+        if begin <= 0.0 {
+            return None;
+        }
+        let end = self.rates(next, q.end, t + dt)[i].value() * dt;
+        if end >= 0.0 {
+            return None;
+        }
+        let before = self.levels[i].value();
+        let rise = next[i].value() - before;
+        // Rates along the cubic: begin + b s + c s^2, from above zero to below: one root within.
+        let b = 6.0 * rise - 4.0 * begin - 2.0 * end;
+        let c = 3.0 * (begin + end - 2.0 * rise);
+        let root = (b * b - 4.0 * begin * c).max(0.0).sqrt();
+        let s = 2.0 * begin / (root - b);
+        let level = before + s * (begin + s * (0.5 * b + s * c / 3.0));
+        (s > 0.0 && s < 1.0).then_some((s, level))
+    }
+}
+
+/// Where a function that is negative at `low` and positive at `high` changes its sign, by regula falsi that does not
+/// stall (Illinois). Nine digits are enough: at a rim a Newton step follows, and a release is flat.
+fn crossing(mut low: (f64, f64), mut high: (f64, f64), f: impl Fn(f64) -> f64) -> f64 {
+    let mut last = f64::NAN;
+    let mut side = 0;
+    for _ in 0..60 {
+        // Not `clamp`, which panics where a bound is not a number.
+        let s = ((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1))
+            .max(low.0)
+            .min(high.0);
+        if (s - last).abs() < 1e-9 || high.0 - low.0 < 1e-9 {
+            return s;
+        }
+        last = s;
+        let value = f(s);
+        if value > 0.0 {
+            high = (s, value);
+            if side == 1 {
+                low.1 *= 0.5;
+            }
+            side = 1;
+        } else {
+            low = (s, value);
+            if side == -1 {
+                high.1 *= 0.5;
+            }
+            side = -1;
+        }
+    }
+    last
+}

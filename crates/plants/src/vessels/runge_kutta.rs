@@ -1,0 +1,122 @@
+//! One Runge-Kutta step of order four in `f64` or duals.
+
+use std::ops::Mul;
+
+use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
+
+use super::{Levels, Vessel, Vessels, torricelli::square_root};
+
+impl<T: Scalar> Vessels<T> {
+    /// One Runge-Kutta step from the present levels, in the present modes.
+    #[inline]
+    pub(super) fn trial(&self, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
+        let dt = h.value();
+        if let Some(rates) = self.damping {
+            self.damped_trial(rates, None, h, q, t)
+        } else if !h.same_derivatives(T::constant(0.0)) {
+            self.trial_by(h, dt, q, t)
+        } else if !self.bare {
+            self.trial_by(dt, dt, q, t)
+        } else if let [only] = &self.vessels[..] {
+            self.bare_trial([only], dt, q)
+        } else if let [upper, lower] = &self.vessels[..] {
+            self.bare_trial([upper, lower], dt, q)
+        } else {
+            self.trial_by(dt, dt, q, t)
+        }
+    }
+
+    /// The same for Torricelli's vessels without effects, in the same order of operations and so with the same bits, for
+    /// a fit spends most of its time here.
+    #[inline]
+    fn bare_trial<const N: usize>(
+        &self,
+        vessels: [&Vessel<T>; N],
+        h: f64,
+        q: Inflow<T>,
+    ) -> Levels<T> {
+        // Loops over places rather than arrays by value, which would be copied about.
+        let zero = T::constant(0.0);
+        let mut next = self.levels;
+        let mut at = self.levels;
+        let stages = [
+            (q.start, 0.0, 1.0),
+            (q.middle, 0.5, 2.0),
+            (q.middle, 0.5, 2.0),
+            (q.end, 1.0, 1.0),
+        ];
+        let mut rates = [zero; MAX_VESSELS];
+        let mut sum = [zero; MAX_VESSELS];
+        for (stage, (q, ahead, weight)) in stages.into_iter().enumerate() {
+            if stage > 0 {
+                for i in 0..N {
+                    at[i] = self.levels[i] + rates[i] * (h * ahead);
+                }
+            }
+            let mut inflow = q;
+            for i in 0..N {
+                let outflow = vessels[i].coefficient * square_root(at[i]);
+                rates[i] = (inflow - outflow) * vessels[i].plain_inverse.unwrap_or(f64::NAN);
+                inflow = outflow;
+                sum[i] = sum[i] + rates[i] * weight;
+            }
+        }
+        let sixth = h * (1.0 / 6.0);
+        for i in 0..N {
+            next[i] = next[i] + sum[i] * sixth;
+        }
+        next
+    }
+
+    /// The same, for a length `h` with or without derivatives.
+    #[inline]
+    fn trial_by<H: Copy + Mul<f64, Output = H>>(
+        &self,
+        h: H,
+        dt: f64,
+        q: Inflow<T>,
+        t: f64,
+    ) -> Levels<T>
+    where
+        T: Mul<H, Output = T>,
+    {
+        let half = h * 0.5;
+        let middle = t + 0.5 * dt;
+        let k1 = self.rates(&self.levels, q.start, t);
+        let k2 = self.rates(&self.moved(&self.levels, &k1, half), q.middle, middle);
+        let k3 = self.rates(&self.moved(&self.levels, &k2, half), q.middle, middle);
+        let k4 = self.rates(&self.moved(&self.levels, &k3, h), q.end, t + dt);
+        self.weighted(&self.levels, h, [&k1, &k2, &k3, &k4])
+    }
+
+    /// `from + by h`.
+    #[inline(always)]
+    pub(super) fn moved<H: Copy>(&self, from: &Levels<T>, by: &Levels<T>, h: H) -> Levels<T>
+    where
+        T: Mul<H, Output = T>,
+    {
+        let mut to = *from;
+        for i in 0..self.states {
+            to[i] = to[i] + by[i] * h;
+        }
+        to
+    }
+
+    #[inline(always)]
+    pub(super) fn weighted<H: Copy + Mul<f64, Output = H>>(
+        &self,
+        from: &Levels<T>,
+        h: H,
+        [k1, k2, k3, k4]: [&Levels<T>; 4],
+    ) -> Levels<T>
+    where
+        T: Mul<H, Output = T>,
+    {
+        let sixth = h * (1.0 / 6.0);
+        let mut next = *from;
+        for i in 0..self.states {
+            next[i] = next[i] + (k1[i] + k2[i] * 2.0 + k3[i] * 2.0 + k4[i]) * sixth;
+        }
+        next
+    }
+}

@@ -1,0 +1,35 @@
+//! Torricelli's root with a finite slope at empty.
+
+use crate::Scalar;
+
+/// Below this level Torricelli's root, whose slope is infinite at zero, gives way to a parabola \[level unit\].
+const NEARLY_EMPTY: f64 = 1e-4;
+/// What stands for an empty vessel where its slope is asked by outflow over content \[level unit\].
+pub(super) const A_LITTLE: f64 = 1e-3 * NEARLY_EMPTY;
+
+/// `sqrt(level)`, zero for an empty vessel, with a finite slope at empty.
+#[inline(always)]
+pub(crate) fn square_root<T: Scalar>(level: T) -> T {
+    let h = level.value();
+    if h >= NEARLY_EMPTY {
+        level.sqrt()
+    } else if h > 0.0 {
+        // Value and slope meet those of the root at the join.
+        let x = level * (1.0 / NEARLY_EMPTY);
+        (x * 1.5 - x * x * 0.5) * NEARLY_EMPTY.sqrt()
+    } else {
+        T::constant(0.0)
+    }
+}
+
+/// The slope of [`square_root`].
+pub(super) fn slope_of_root<T: Scalar>(level: T) -> T {
+    let one = T::constant(1.0);
+    let h = level.value();
+    if h >= NEARLY_EMPTY {
+        one * 0.5 / level.sqrt()
+    } else {
+        let x = level.max(T::constant(0.0)) * (1.0 / NEARLY_EMPTY);
+        (one * 1.5 - x) * (1.0 / NEARLY_EMPTY.sqrt())
+    }
+}

@@ -1,0 +1,232 @@
+//! Records from a closed loop: simulated where the controller is known, warned of where it is not.
+#![allow(clippy::unwrap_used)]
+
+use std::path::PathBuf;
+
+use ct_signals::Signal;
+use ctid::input::Files;
+use ctid_tests::{Drive, Rig};
+use missing_effect::{ControlLoop, Diagnosis, Options, Problem, Verdict, compare, diagnose};
+use plants::controller::Controller;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+fn problem(rig: &Rig, seed: u64) -> Problem {
+    rig.problem(rig.run(&mut ChaCha8Rng::seed_from_u64(seed)))
+}
+
+fn closed(colour: f64) -> Rig {
+    Rig {
+        drive: Drive::Closed,
+        colour,
+        noise: 0.1,
+        ..Rig::single_tank()
+    }
+}
+
+fn compared(problem: &Problem) -> Diagnosis {
+    compare(problem, &Options::default()).unwrap()
+}
+
+fn known(found: &Diagnosis) -> &ControlLoop {
+    found.control_loop.as_ref().unwrap()
+}
+
+/// Without feedback nothing is said of a loop, whatever the noise; with it, the answer says so.
+#[test]
+fn feedback_is_found_where_it_is_and_only_there() {
+    for seed in 0..24 {
+        for rig in [
+            Rig::single_tank(),
+            Rig::cascaded_tanks(),
+            Rig::linear_tank(),
+        ] {
+            let colour = [0.0, 0.9][seed as usize % 2];
+            let rig = Rig {
+                colour,
+                noise: 0.1,
+                ..rig
+            };
+            if seed < 8 {
+                let open = compared(&problem(&rig, seed));
+                assert!(open.control_loop.is_none(), "{:?}", open.control_loop);
+            }
+            if seed < 4 {
+                let rig = Rig {
+                    drive: Drive::Closed,
+                    ..rig
+                };
+                let found = compared(&problem(&rig, seed));
+                let feedback = known(&found);
+                assert!(!feedback.simulated && feedback.feedback_p.unwrap() < 1e-4);
+                let said = found.sentences.join(" ");
+                assert!(said.contains("there is feedback") && said.contains("[controller]"));
+            }
+        }
+    }
+}
+
+/// With the controller the loop is simulated; on the measured command a fit by simulation error, as it is shown of a model
+/// that lacks something, has wider standard errors.
+#[test]
+fn a_known_controller_is_simulated_and_an_unknown_one_widens_the_intervals() {
+    let (mut wider, mut count) = (0.0, 0.0);
+    for seed in 0..3 {
+        for hidden in [vec![], vec![("sensor_lag", 0, vec![15.0])]] {
+            let adequate = hidden.is_empty();
+            let rig = Rig {
+                hidden,
+                ..closed(0.9)
+            };
+            let mut problem = problem(&rig, seed);
+            problem.controller = Some(rig.controller());
+            let simulated = compared(&problem);
+            assert!(known(&simulated).simulated);
+            assert!(known(&simulated).mismatch.unwrap() < 1e-9);
+            assert_eq!(simulated.verdict == Verdict::Adequate, adequate);
+            let said = simulated.sentences.join(" ");
+            assert!(said.contains("The loop is simulated"), "{said}");
+            let on_request = Options {
+                simulate_loop: false,
+                ..Options::default()
+            };
+            let measured = compare(&problem, &on_request).unwrap();
+            assert!(!known(&measured).simulated);
+            assert!(measured.sentences.join(" ").contains("as was asked for"));
+            let error = |found: &Diagnosis| found.steps[0].parameters[0].std_error.unwrap();
+            if !adequate {
+                wider += error(&measured) / error(&simulated);
+                count += 1.0;
+            }
+        }
+    }
+    println!(
+        "standard errors on the measured command: {:.2} times those of the loop",
+        wider / count
+    );
+    assert!(wider / count > 1.1);
+}
+
+/// A lag in a loop with coloured noise is found in the simulated loop, with its size.
+#[test]
+fn an_effect_is_found_in_the_simulated_loop() {
+    let rig = Rig {
+        hidden: vec![("pump_lag", 0, vec![12.0])],
+        ..closed(0.8)
+    };
+    for seed in 1..=4 {
+        let mut problem = problem(&rig, seed);
+        problem.controller = Some(rig.controller());
+        let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
+        assert!(known(&found).simulated);
+        assert_eq!(found.groups.len(), 1, "{seed}: {:?}", found.sentences);
+        assert!(
+            found.groups[0].iter().any(|named| named == "pump_lag"),
+            "{seed}: {:?}",
+            found.groups
+        );
+        let last = found.steps.last().unwrap();
+        let size = last
+            .parameters
+            .iter()
+            .find(|p| p.name.contains("_lag.time") || p.name.contains("delay."))
+            .unwrap();
+        assert!(
+            (size.value - 12.0).abs() < 4.0 * size.std_error.unwrap(),
+            "{seed}: {size:?}"
+        );
+    }
+}
+
+/// What keeps a loop from being simulated is said, with the mend, and the measured command is used.
+#[test]
+fn a_loop_that_cannot_be_simulated_is_not() {
+    let good = {
+        let mut problem = problem(&closed(0.0), 1);
+        problem.controller = Some(closed(0.0).controller());
+        problem
+    };
+    let refused = |problem: &Problem, says: &[&str]| {
+        let found = compared(problem);
+        assert!(!known(&found).simulated);
+        let said = &known(&found).said[0];
+        assert!(found.sentences.contains(said));
+        for words in says {
+            assert!(said.contains(words), "{said}");
+        }
+    };
+    let mut without = good.clone();
+    without.records[0].reference = None;
+    refused(
+        &without,
+        &["rig: the record holds no reference", "[columns]"],
+    );
+    let mut constant = good.clone();
+    constant.records[0].reference = Some(Signal::new("r", "cm", vec![16.0; 1000]));
+    refused(&constant, &["reference stays at 16", "set point changes"]);
+    let mut other = good.clone();
+    other.controller = Some(Controller::pi(0.6, 200.0, (0.0, 10.0)).unwrap());
+    refused(
+        &other,
+        &[
+            "disagrees with the controller",
+            "R/S (r - y), by ",
+            " V rms",
+            "check gain",
+        ],
+    );
+}
+
+/// The price of a coloured noise is said, and that of white noise is not.
+#[test]
+fn the_loss_of_power_in_coloured_noise_is_said() {
+    for (colour, price) in [(0.0, false), (0.95, true)] {
+        let rig = Rig {
+            colour,
+            noise: 0.2,
+            ..Rig::single_tank()
+        };
+        let found = diagnose(&problem(&rig, 3), &Options::default(), &|_| {}).unwrap();
+        assert_eq!(found.verdict, Verdict::Adequate);
+        let said = found.sentences.join(" ");
+        assert_eq!(said.contains("The noise is coloured"), price, "{said}");
+        assert!(said.contains("These data would have shown"), "{said}");
+    }
+}
+
+/// The independent records in closed loop: the controller of the model file on the measured reading gives the measured
+/// command, and the loop is simulated.
+#[test]
+fn controllers_of_independent_records_give_the_measured_commands() {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/blind/public");
+    let Ok(entries) = std::fs::read_dir(&folder) else {
+        println!("skipped: there are no records at {}", folder.display());
+        return;
+    };
+    let mut loops = 0;
+    for path in entries.map(|entry| entry.unwrap().path()) {
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let files = Files {
+            data: vec![path.with_extension("csv")],
+            test: Vec::new(),
+            model: path.clone(),
+        };
+        let problem = files.read().unwrap();
+        let Some(controller) = &problem.controller else {
+            continue;
+        };
+        loops += 1;
+        let replayed = greybox::replay(controller, &problem.records[0]).unwrap();
+        println!(
+            "{}: the measured command differs by {:.5} V rms from the controller's and moves over {:.2} V",
+            path.display(),
+            replayed.rms,
+            replayed.moves
+        );
+        // Converters of 12 bits over 10 V: 0.0007 V rms for each rounding.
+        assert!(replayed.rms < 2e-3);
+    }
+    assert!(loops > 0);
+}

@@ -156,10 +156,15 @@ pub fn diagnose(
     if !confirmed.added.is_empty() && own_base.bic() - own_last.bic() < BIC_MARGIN {
         confirmed = base_noise.clone();
     }
-    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise.
-    let by_clock = confirmed.added.iter().any(|placed| placed.effect.by_clock);
-    if by_clock && remains(&confirmed, &own_last)?.is_some() {
-        confirmed = confirm(without_clock(&confirmed, &noise)?, &noise)?;
+    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, and where the other
+    // effects of the set are called for without them. What is there to mend an imitation is not.
+    if confirmed.added.iter().any(|placed| placed.effect.by_clock) {
+        let others = without_clock(&confirmed, &noise)?;
+        let count = others.added.len();
+        let others = confirm(others, &noise)?;
+        if others.added.len() < count || remains(&confirmed, &own_last)?.is_some() {
+            confirmed = others;
+        }
     }
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;

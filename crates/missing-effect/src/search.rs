@@ -93,8 +93,10 @@ const NEAR: f64 = 25.0;
 const BY_CLOCK: usize = 1;
 /// Sets are one where what they explain differs by less than this part of it.
 const SAME_TAKEN: f64 = 0.15;
-/// Stand-ins that are refitted for each effect, the most promising first.
+/// Stand-ins that are refitted for each effect: so many that a promise favours, and so many that a few steps favour.
 const EXCHANGED: usize = 12;
+/// What is behind by more than this part of an effect's own gain after a few steps does not catch up.
+const OUT_OF_REACH: f64 = 0.5;
 
 /// A child's starts: the parent's vector, with the new effect's parameters on the grid of its starts.
 fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
@@ -381,18 +383,28 @@ pub(crate) fn exchanges<'a>(
 ) -> Result<Vec<Node<'a>>, Error> {
     let lacking = without(node, position, noise)?;
     let own = node.added[position];
-    let proposals: Vec<Proposal> = candidates(&lacking)
+    let mut proposals: Vec<Proposal> = candidates(&lacking)
         .into_par_iter()
         .filter(|placed| *placed != own)
         .filter_map(|placed| propose(&lacking, placed, noise))
         .collect();
-    // A promise is that of a straight line; where a time constant or a threshold bends it, only a few steps show what it is worth.
-    let mut begun: Vec<Node> = proposals
+    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
+    // worth. A few steps are too few where parameters nearly imitate each other, and there the promise holds.
+    let mut begun: Vec<(usize, Node)> = proposals
         .into_par_iter()
-        .filter_map(|proposal| realise(proposal, noise, QUICK))
+        .enumerate()
+        .filter_map(|(promised, proposal)| Some((promised, realise(proposal, noise, QUICK)?)))
         .collect();
-    begun.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
-    begun.truncate(EXCHANGED);
+    begun.sort_by(|a, b| a.1.fit.bic().total_cmp(&b.1.fit.bic()));
+    let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());
+    let begun: Vec<Node> = begun
+        .into_iter()
+        .enumerate()
+        .filter(|(quick, (promised, _))| *quick < EXCHANGED || *promised < EXCHANGED)
+        .map(|(_, (_, begun))| begun)
+        .filter(|begun| node.gain_over(begun) < reach)
+        .collect();
     let mut nodes: Vec<Node> = begun
         .into_par_iter()
         .filter_map(|node| fitted(&node, noise, ROUGH, &[]).ok())

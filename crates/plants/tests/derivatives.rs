@@ -157,6 +157,10 @@ fn vessels_that_are_over_within_a_step_have_the_derivatives_of_their_output() {
                 println!("vessel {vessel}, h/tau {ratio}");
                 failures.extend(check(&case, &[], DRIVES[0], 400, 1e-6, 1e-3));
                 for (i, placed) in placements(plant).into_iter().enumerate() {
+                    if begins_with_a_root(&[placed]) {
+                        // So fast a level rests near where the root begins, and no difference is short enough.
+                        continue;
+                    }
                     let seed = 400 + i as u64;
                     failures.extend(check(&case, &[placed], DRIVES[i % 4], seed, 1e-5, 1e-3));
                 }

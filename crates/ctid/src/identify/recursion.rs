@@ -20,6 +20,10 @@ const P_OUTPUT_ERROR: f64 = 10.0;
 const PLAUSIBLE: [f64; 4] = [2.0, 1.5, 1.25, 1.1];
 const BOUNDS: [f64; 4] = [2.0, 1.5, 1.2, 1.05];
 
+/// The output error keeps every lag above this part of the sampling interval, where the others are those of the start. Less cannot be
+/// seen, and `y_m^(n)`, which is divided by `a_n`, would be so large that the recursion takes itself for sure.
+const SHORTEST_LAG: f64 = 0.05;
+
 /// Where the recursion was.
 #[derive(Debug, Clone)]
 pub(super) struct Point {
@@ -37,6 +41,8 @@ pub(super) struct Point {
 pub(super) struct Path {
     pub order: Order,
     pub points: Vec<Point>,
+    /// Bounds on the parameters have acted in the second half: the scatter of the estimates says nothing of their errors then.
+    pub held: bool,
     pub warnings: Vec<String>,
 }
 
@@ -45,6 +51,7 @@ impl Path {
         Self {
             order,
             points: Vec::new(),
+            held: false,
             warnings: Vec::new(),
         }
     }
@@ -77,8 +84,16 @@ impl Path {
 
 fn untold(order: Order) -> Error {
     Error::Usage(format!(
-        "the record does not tell the parameters of order {order} apart; try a lower order, or a record with more movement in its input"
+        "the record does not tell the parameters of order {order} apart; try {}a record with more movement in its input",
+        or_lower(order)
     ))
+}
+
+/// The first of what to try: `--order 2,0, or `; nothing where there is no lower order.
+pub(super) fn or_lower(order: Order) -> String {
+    order
+        .lower()
+        .map_or_else(String::new, |lower| format!("--order {lower}, or "))
 }
 
 /// Whether the k-th of `count` samples is kept.
@@ -148,7 +163,8 @@ pub(super) fn equation_error(scaled: &Scaled, order: Order) -> Result<Path, Erro
     a.extend(end.theta.iter().take(order.n));
     if !ct_lti::Polynomial::new(a)?.is_hurwitz() {
         return Err(Error::Usage(format!(
-            "the estimates at the end are those of an unstable model; try a lower order than {order}, or --method stabilized-oe, whose model is kept stable"
+            "the estimates at the end are those of an unstable model; try {}--method stabilized-oe, whose model is kept stable",
+            or_lower(order)
         )));
     }
     Ok(path)
@@ -197,11 +213,16 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     }
     let mut estimator = StabilizedOe::new(gain, Filtered::<N>::new(scaled)?)?
         .with_offset()
+        .with_theta_bounds(theta_bounds(scaled, N)?)?
         .with_filter_bounds(bounds)?
         .with_model_state(at_rest(scaled))?;
     let count = scaled.time.len();
+    let mut held_early = 0;
     let following = scaled.steps().skip(1).chain([0.0]);
     for (k, (step, next)) in scaled.steps().zip(following).enumerate() {
+        if 2 * k <= count {
+            held_early = estimator.bounded().theta;
+        }
         // the last sample is not held
         if next > 0.0 {
             let sample = Raw {
@@ -221,6 +242,15 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
         }
     }
     estimator.health()?;
+    let held = estimator.bounded().theta - held_early;
+    if held > 0 {
+        path.held = true;
+        path.warnings.push(format!(
+            "a time constant is too short to be seen: in the second half a bound held a coefficient of A above 0 (steps: {held}), and standard errors \
+             are not known; {}",
+            lower_or_faster(order)
+        ));
+    }
     let unstable = estimator.bounded().unstable;
     if unstable > 0 {
         path.warnings.push(format!(
@@ -229,6 +259,24 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     }
     path.warnings.extend(left_plausible(&path, plausible, &a)?);
     Ok(path)
+}
+
+/// What to try where the model is too fast for the record.
+pub(super) fn lower_or_faster(order: Order) -> String {
+    match order.lower() {
+        None => "sample faster".to_owned(),
+        Some(lower) => format!("try --order {lower}"),
+    }
+}
+
+fn theta_bounds<const P: usize>(scaled: &Scaled, n: usize) -> Result<Bounds<P>, Error> {
+    let mut lower = [f64::NEG_INFINITY; P];
+    let slower = std::iter::once(1.0).chain(lags(n));
+    for (lower, slower) in lower.iter_mut().zip(slower).take(n) {
+        *lower = SHORTEST_LAG * scaled.interval * slower;
+    }
+    let bounds = Bounds::new(lower, [f64::INFINITY; P]);
+    Ok(bounds.map_err(stabilized_oe::Error::from)?)
 }
 
 /// `y` and its derivatives at rest on the first sample.
@@ -340,6 +388,15 @@ mod tests {
         for (a, b) in third.iter().zip([1.0, 1.0 / 3.0, 1.0 / 27.0]) {
             assert!((a - b).abs() < 1e-15);
         }
+    }
+
+    #[test]
+    fn a_lower_order_is_advised_where_there_is_one() {
+        let order = |n, m| Order { n, m };
+        assert_eq!(or_lower(order(3, 3)), "--order 2,2, or ");
+        assert_eq!(or_lower(order(1, 0)), "");
+        assert_eq!(lower_or_faster(order(2, 0)), "try --order 1,0");
+        assert_eq!(lower_or_faster(order(1, 1)), "sample faster");
     }
 
     #[test]

@@ -29,6 +29,8 @@ pub(super) struct Scaled {
     pub hold: Hold,
     /// Time constant of first order, s: the unit of time.
     unit: f64,
+    /// Median step of the time, in the same unit.
+    pub interval: f64,
     /// Time as it is in the record, s.
     pub seconds: Vec<f64>,
     /// Means and standard deviations of input and output.
@@ -94,6 +96,7 @@ impl Scaled {
             y,
             hold,
             unit,
+            interval: step / unit,
             seconds: record.time.clone(),
             input,
             output,

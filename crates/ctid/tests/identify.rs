@@ -215,7 +215,7 @@ fn steps_longer_than_the_time_constant_do_not_become_it() {
         let told = found
             .warnings
             .iter()
-            .any(|w| w.contains("below the sampling interval"));
+            .any(|w| w.contains("below the longest step"));
         (found.parameters[0].value, told)
     };
     // What is left is the output's way between samples, which is not a line: said where it is the larger error.

@@ -405,11 +405,12 @@ fn unsure(parameters: &[Parameter], settings: &Settings) -> Option<String> {
 }
 
 fn too_fast(time_constants: &[f64], record: &Record, order: Order) -> Option<String> {
-    let step = record.sample_interval();
+    let steps = record.time.windows(2).map(|pair| pair[1] - pair[0]);
+    let step = steps.fold(0.0, f64::max);
     let fastest = time_constants.last().filter(|fastest| **fastest < step)?;
     let mend = recursion::lower_or_faster(order);
     Some(format!(
-        "the fastest time constant, {fastest:.2} s, is below the sampling interval of {step} s: it cannot be known from these samples, and the output's way between them biases the estimates \
+        "the fastest time constant, {fastest:.2} s, is below the longest step of {step} s: it cannot be known from these samples, and the output's way between them biases the estimates \
          by more than the standard errors say; {mend}"
     ))
 }

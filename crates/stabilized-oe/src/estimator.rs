@@ -152,8 +152,9 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
         Ok(self)
     }
 
-    /// S_c: bounds on `c^`, inside which `C^/A0 - gamma/(2 c)` should be strictly positive real for every plausible plant `A0`:
-    /// ask [`check_filter_bounds`](Self::check_filter_bounds).
+    /// S_c: bounds on `c^`, inside which `C^/A0 - gamma/(2 c)` should be strictly positive real for every plausible plant `A0`.
+    /// Nothing is checked here, as no plant is known: [`with_filter_bounds_for`](Self::with_filter_bounds_for) says whether they are
+    /// such a set.
     ///
     /// # Errors
     /// [`Error::StartOutside`].

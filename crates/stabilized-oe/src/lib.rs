@@ -10,7 +10,7 @@
 //! | Where do the derivatives come from? | [`Derivatives`]: filters, [`Known`] ones, or the paper's [`LateDifference`] |
 //! | The signals are not measured from their point of rest | [`StabilizedOe::with_offset`] |
 //! | How do I keep the model stable? | it is; closer bounds with [`StabilizedOe::with_theta_bounds`] |
-//! | How do I bound `c^`, and are my bounds of use? | [`StabilizedOe::with_filter_bounds`], [`StabilizedOe::check_filter_bounds`] |
+//! | How do I bound `c^`, and are my bounds of use? | [`StabilizedOe::with_filter_bounds_for`] |
 //! | How does Euler's rule compare? | `BlockDiagonal::<N, P, Euler>` |
 //!
 //! The equations stand at the head of `estimator.rs`. With `default-features = false` an allocator is not needed either; the filters and

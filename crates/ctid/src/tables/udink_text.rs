@@ -163,7 +163,7 @@ fn gains(gains: &Gains, look: Look) -> String {
         lines.push(vec![
             row.variant.gain.name().to_owned(),
             row.variant.rule.name().to_owned(),
-            if row.variant.bounded { "on c" } else { "-" }.to_owned(),
+            row.variant.bounds.name().to_owned(),
             end,
             numbers::significant(row.noisy_error, 2),
             range,
@@ -192,5 +192,10 @@ fn gains(gains: &Gains, look: Look) -> String {
          excludes; with bounds on c it does not.",
         gains.noises
     );
-    text + &look.paragraph("  ", &note)
+    text += &look.paragraph("  ", &note);
+    for checked in &gains.checked {
+        let line = format!("{} bounds: {}.", checked.bounds.name(), checked.says);
+        text += &look.paragraph("  ", &line);
+    }
+    text
 }

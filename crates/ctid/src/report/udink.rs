@@ -53,10 +53,11 @@ fn headline(study: &Study) -> String {
          the same in every table. A cell is inside where the printed figure, give or take its rounding, lies in the \
          5 to 95 % range of the runs; of cells that agree, one in ten lies outside by chance.</p></div>\n\
          <ol class=\"trail apart\">\n{trail}</ol>\n\
-         <details><summary>What the paper does not print, and is assumed</summary><ul>\n{assumptions}</ul></details>\n\
+         <details><summary>What the paper does not print, and is assumed</summary><ul>\n{assumptions}</ul></details>\n<p>The paper\u{2019}s own bounds on c^: {}.</p>\n\
          {NOTICES}</header>\n",
         study.verdict(),
-        study.runs
+        study.runs,
+        escape(&study.filter_bounds)
     )
 }
 

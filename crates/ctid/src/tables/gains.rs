@@ -180,11 +180,7 @@ pub fn variants() -> Vec<Variant> {
     for gain in Kind::ALL {
         for bounds in Limits::ALL {
             for rule in Rule::ALL {
-                variants.push(Variant {
-                    gain,
-                    rule,
-                    bounds,
-                });
+                variants.push(Variant { gain, rule, bounds });
             }
         }
     }
@@ -527,7 +523,10 @@ mod tests {
         let [wide, sure] = &checked[..] else {
             unreachable!()
         };
-        assert!(!wide.hold && wide.says.contains("do not ensure"), "{wide:?}");
+        assert!(
+            !wide.hold && wide.says.contains("do not ensure"),
+            "{wide:?}"
+        );
         assert!(sure.hold, "{sure:?}");
         // nor are the wide ones for the constant gain, and this very plant
         let plant = Bounds::new(FILTER_TRUTH, FILTER_TRUTH).unwrap();

@@ -6,6 +6,7 @@
 pub mod gains;
 pub mod paper_udink;
 pub mod udink;
+mod udink_run;
 pub mod udink_text;
 
 use serde::Serialize;

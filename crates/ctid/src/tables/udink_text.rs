@@ -29,6 +29,9 @@ pub fn text(study: &Study, look: Look) -> String {
         text += &look.paragraph("  - ", sentence);
     }
     text.push('\n');
+    let checked = format!("Its own bounds on c^: {}.", study.filter_bounds);
+    text += &look.paragraph("  ", &checked);
+    text.push('\n');
     text + &larger_p(&study.larger_p, look) + &gains(&study.gains, look)
 }
 

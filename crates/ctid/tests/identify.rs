@@ -444,6 +444,17 @@ fn what_cannot_be_is_refused() {
         "tour.csv --method ct-rls --bandwidth nan",
         &["--bandwidth is NaN"],
     );
+    for bandwidth in ["1e-9", "1e-300", "1e300"] {
+        for method in ["ct-rls", "stabilized-oe"] {
+            bad(
+                &format!("tour.csv --method {method} --bandwidth {bandwidth}"),
+                &["--bandwidth is", "for this record"],
+            );
+        }
+    }
+    let slow = place.succeeds("identify tour.csv --method ct-rls --bandwidth 1e-4");
+    assert!(slow.contains("hides a time constant"), "{slow}");
+    assert!(!slow.contains("NaN"), "{slow}");
     bad(
         "tour.csv --method ct-rls --columns t,u",
         &["three names are needed"],

@@ -8,7 +8,8 @@
 //! dtheta^/dt =  c_p P1 phi_m eps~       dP1/dt = eta1 P1 - gamma1 P1 phi_m phi_m' P1
 //! dc^/dt     = -c_p P2 e1 eps~          dP2/dt = eta2 P2 - gamma2 P2 e1 e1' P2
 //! ```
-//! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run diverges to its bound.
+//! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run of its experiment ends at the bound of `c^`
+//! (`cargo test -p stabilized-oe --test printed_sign`).
 //!
 //! Assumptions: the gain's step holds `phi_m`, `e` and `e1` over a sample, the model's runs the input as the scheme of derivatives says.
 //! `u` excites persistently. Noise on `y` is independent of `u`.

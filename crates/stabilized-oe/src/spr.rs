@@ -60,7 +60,7 @@ impl<const N: usize> core::fmt::Display for FilterBounds<N> {
             Self::PositiveReal => {
                 write!(
                     f,
-                    "the bounds on c keep C/A0 strictly positive real for every plausible plant"
+                    "the bounds on c ensure convergence: C/A0 stays strictly positive real, with the margin that the gain needs, for every plausible plant"
                 )
             }
             Self::NotPositiveReal {
@@ -71,7 +71,7 @@ impl<const N: usize> core::fmt::Display for FilterBounds<N> {
                 above,
             } => write!(
                 f,
-                "the bounds on c do not ensure convergence: with c = {c:?} and a plant a = {a:?}, Re C/A0 is {} at {frequency} rad/s, not above {above}; narrow the bounds on c, or what is plausible",
+                "the bounds on c do not ensure convergence: with c = {c:?} and a plant a = {a:?}, Re C/A0 is {:.3} at {frequency:.3e} rad/s, not above {above}; narrow the bounds on c, or what is plausible",
                 excess + above
             ),
             Self::PlantUnstable { a } => write!(

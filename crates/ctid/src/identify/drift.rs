@@ -149,13 +149,16 @@ pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order)
         });
     let duration = scaled.time.last().copied().unwrap_or(f64::NAN);
     let seen: Vec<&Stretch> = stretches.iter().filter(|s| s.count > 0.0).collect();
-    Some(Drift {
+    let drift = Drift {
         level: seen.iter().map(|s| scaled.output(s.level)).collect(),
         gain: OverLevel::new(&seen, |s| s.gain),
         time_constant: OverLevel::new(&seen, |s| s.time_constant),
         memory_part: 1.0 / (scaled.eta * duration),
         level_part: (high - low) / (range.1 - range.0),
-    })
+    };
+    // one stretch alone, or standard errors of 0: nothing to compare
+    let known = [&drift.gain, &drift.time_constant].map(|over| over.difference.is_finite());
+    (known == [true, true]).then_some(drift)
 }
 
 /// The level that is remembered at every sample, scaled.

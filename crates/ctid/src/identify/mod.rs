@@ -229,6 +229,7 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
     positive("--bandwidth", "1/s", request.bandwidth)?;
 
     let (scaled, mut warnings) = Scaled::new(record, request);
+    scaled.check_bandwidth()?;
     let path = match request.method {
         Method::CtRls => recursion::equation_error(&scaled, order),
         Method::StabilizedOe => recursion::output_error(&scaled, order),

@@ -3,7 +3,9 @@
 use ct_constrained::Bounds;
 use ct_rls::{ContinuousRls, DynamicRls, RecursiveEstimator, Weights};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-use stabilized_oe::{BlockDiagonal, Derivatives, FilterBounds, StabilizedOe, check_filter_bounds};
+use stabilized_oe::{
+    BlockDiagonal, FilterBounds, IoSample, StabilizedOe, StateVariableFilters, check_filter_bounds,
+};
 
 use super::Order;
 use super::scaled::Scaled;
@@ -211,7 +213,8 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
             "no bounds on the error filter make convergence sure for any plants around the start, for n = {N}; compare with --method ct-rls"
         ));
     }
-    let mut estimator = StabilizedOe::new(gain, Filtered::<N>::new(scaled)?)?
+    let filters = StateVariableFilters::<N>::with_input(scaled.bandwidth, scaled.hold)?;
+    let mut estimator = StabilizedOe::new(gain, filters)?
         .with_offset()
         .with_theta_bounds(theta_bounds(scaled, N)?)?
         .with_filter_bounds(bounds)?
@@ -219,16 +222,15 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     let count = scaled.time.len();
     let mut held_early = 0;
     let following = scaled.steps().skip(1).chain([0.0]);
-    for (k, (step, next)) in scaled.steps().zip(following).enumerate() {
+    for (k, next) in following.enumerate() {
         if 2 * k <= count {
             held_early = estimator.bounded().theta;
         }
         // the last sample is not held
         if next > 0.0 {
-            let sample = Raw {
+            let sample = IoSample {
                 u: scaled.u[k],
                 y: scaled.y[k],
-                step,
             };
             estimator.update(&sample, next);
         }
@@ -331,49 +333,6 @@ fn left_plausible<const N: usize>(
                 .to_owned(),
         ),
     })
-}
-
-/// One sample, and the step that led to it.
-#[derive(Debug, Clone, Copy)]
-struct Raw {
-    u: f64,
-    y: f64,
-    step: f64,
-}
-
-/// State variable filters that know what the input does between samples.
-struct Filtered<const N: usize> {
-    u: ct_lti::StateVariableFilter,
-    y: ct_lti::StateVariableFilter,
-}
-
-impl<const N: usize> Filtered<N> {
-    fn new(scaled: &Scaled) -> Result<Self, Error> {
-        let [u, y] = scaled.filters(N)?;
-        Ok(Self { u, y })
-    }
-}
-
-impl<const N: usize> Derivatives<N> for Filtered<N> {
-    type Sample = Raw;
-
-    fn take(&mut self, sample: &Raw, _: f64, inputs: &mut [f64]) -> Option<f64> {
-        let u = self.u.update(sample.u, sample.step).ok()?;
-        let y = self.y.update(sample.y, sample.step).ok()?;
-        for (input, u) in inputs.iter_mut().zip(u) {
-            *input = *u;
-        }
-        y.first().copied()
-    }
-
-    fn error(&mut self, _: f64, model: &[f64; N]) -> [f64; N] {
-        let y = self.y.derivatives();
-        core::array::from_fn(|i| y[i + 1] - model[i])
-    }
-
-    fn smooth_inputs(&self) -> bool {
-        true
-    }
 }
 
 #[cfg(test)]

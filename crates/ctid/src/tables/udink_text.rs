@@ -147,7 +147,7 @@ fn gains(gains: &Gains, look: Look) -> String {
     let heading = [
         "gain",
         "rule",
-        "bounds",
+        "c in",
         "end: a1, a2, b0",
         "error",
         "5 to 95 %",

@@ -3,6 +3,7 @@
 //! A paper prints one run of one noise. It is consistent with a computation where its figures lie among those of many runs; that is all
 //! that can be said without its noise.
 
+mod gain_bounds;
 pub mod gains;
 pub mod paper_udink;
 pub mod udink;

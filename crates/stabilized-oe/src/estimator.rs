@@ -31,8 +31,11 @@ use crate::{Derivatives, Error, Gain};
 /// Halvings of a step that would lose the stability of the model, before it is not made at all.
 const HALVINGS: u32 = 10;
 
-/// By default `a_i` is kept above this times `dt^i`: `y_m^(n)` is divided by `a_n`.
+/// By default `a_i`, `i < n`, is kept above this times `dt^i`.
 const FLOOR: f64 = 1e-3;
+
+/// And the shortest lag, beside the others of the start, above this times `dt`.
+const SHORTEST_LAG: f64 = 0.05;
 
 /// An output of the model beyond this has left any sense.
 const LARGEST: f64 = 1e100;
@@ -78,6 +81,8 @@ pub struct StabilizedOe<const N: usize, const P: usize, G, D> {
     default_bounds: (f64, Bounds<P>),
     /// Of all steps, s.
     shortest: f64,
+    /// `a_{n-1}` of the start, 1 for n = 1.
+    slower: f64,
     filter_bounds: Bounds<N>,
     offset: bool,
     failure: Option<Error>,
@@ -99,9 +104,10 @@ pub struct Bounded {
 impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> StabilizedOe<N, P, G, D> {
     /// An estimator with the start that its gain holds, a model at rest, and no bounds on `c^`.
     ///
-    /// `theta^` is kept where `A^` is Hurwitz, and `a_i` above a thousandth of `dt^i` with the shortest step so far: the model's
-    /// highest derivative is divided by `a_n`. Euler's rule needs more: it loses a model that is faster than a step, so that there
-    /// `a_n >= dt^n` besides, with the step at hand.
+    /// `theta^` is kept where `A^` is Hurwitz, with `a_i` above a thousandth of `dt^i` and `a_n` above `dt^n` or `0.05 dt a_{n-1}(0)`,
+    /// whichever is less, for the shortest step so far. A lag below that cannot be seen; but the model's highest derivative is divided
+    /// by `a_n`, and where that comes near 0 a few samples make `P` so small that `theta^` stays where it is. Euler's rule loses a model
+    /// that is faster than a step: there `a_n >= dt^n`, with the step at hand.
     ///
     /// # Errors
     /// [`Error::StartNotHurwitz`].
@@ -126,6 +132,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
             theta_bounds: None,
             default_bounds: (f64::NAN, Bounds::none()),
             shortest: f64::INFINITY,
+            slower: if N > 1 { theta[N - 2] } else { 1.0 },
             filter_bounds: Bounds::none(),
             offset: false,
             failure: None,
@@ -228,9 +235,10 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
             None => {
                 self.shortest = self.shortest.min(dt);
                 let (step, highest) = if <G::Integrator as ModelRule>::ANY_STEP {
-                    (self.shortest, FLOOR)
+                    let lag = SHORTEST_LAG * self.slower;
+                    (self.shortest, lag * self.shortest)
                 } else {
-                    (dt, 1.0)
+                    (dt, f64::INFINITY)
                 };
                 if self.default_bounds.0 != step {
                     self.default_bounds = (step, default_bounds::<N, P>(step, highest)?);
@@ -287,7 +295,7 @@ fn inside<const K: usize>(
     Ok(())
 }
 
-/// `a_i` above [`FLOOR`] times `dt^i`, and `a_n` above `highest` times `dt^n`.
+/// `a_i` above [`FLOOR`] times `dt^i`, and `a_n` above `dt^n`, or `highest` where that is less.
 fn default_bounds<const N: usize, const P: usize>(
     dt: f64,
     highest: f64,
@@ -296,7 +304,11 @@ fn default_bounds<const N: usize, const P: usize>(
     let mut power = 1.0;
     for (i, lower) in lower.iter_mut().take(N).enumerate() {
         power *= dt;
-        *lower = power * if i + 1 == N { highest } else { FLOOR };
+        *lower = if i + 1 == N {
+            power.min(highest)
+        } else {
+            FLOOR * power
+        };
     }
     Ok(Bounds::new(lower, [f64::INFINITY; P])?)
 }

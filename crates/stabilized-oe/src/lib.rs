@@ -55,8 +55,8 @@
 //! | the same, a penalty of 1e3 | 0.07 (0.03 to 0.11) |
 //! | `[0.9, 3] x [0.7, 2]`, projected | 0.03 (0.02 to 0.09) |
 //!
-//! Without bounds the figure rests on what keeps `A^` alive; the estimates are lost either way. The wide set helps, but is no set that makes
-//! convergence sure: at its corner (0.5, 3) `C^/A0` is not positive real. The last one is, for all plants within 10 % of the true one.
+//! Without bounds the figure rests on what keeps `A^` alive; the estimates are lost either way. The wide set helps, but ensures
+//! nothing: at its corner (0.5, 3) `C^/A0` is not positive real. The last one is, for all plants within 10 % of the true one.
 //! [`check_filter_bounds`] tells them apart.
 //!
 //! The paper's own set, `-20 <= c_1 <= 20` for n = 1, is no such set; `c_1 >= 0` is for the constant gain, `c_1 > a_1/2` for least squares.
@@ -73,7 +73,7 @@
 //! | 20, 30, 1e2, 1e3 .. 1e8 | 50 | 0 |
 //!
 //! A run that does not stop is not a good one for that: with this `eta` and these derivatives the paper's criterion is least at 15 times
-//! `P(0)`, 273 s, and 1320 s from 30 times on.
+//! `P(0)`, 273 s, and above 1300 s from 30 times on.
 #![no_std]
 
 #[cfg(feature = "alloc")]

@@ -23,7 +23,7 @@ use crate::{Derivatives, Error, Gain, StabilizedOe};
 
 /// What the check of bounds on `c^` found. [`Display`](core::fmt::Display) says it in a sentence, which is the warning where it fails.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[must_use = "bounds that are no such set do not make convergence sure: print this, or look at hold()"]
+#[must_use = "bounds that are no such set ensure nothing: print this, or look at hold()"]
 pub enum FilterBounds<const N: usize> {
     /// `C^/A0 - d` is strictly positive real for every `c` and every plausible plant.
     PositiveReal,
@@ -60,7 +60,7 @@ impl<const N: usize> core::fmt::Display for FilterBounds<N> {
             Self::PositiveReal => {
                 write!(
                     f,
-                    "the bounds on c ensure convergence: C/A0 stays strictly positive real, with the margin that the gain needs, for every plausible plant"
+                    "the bounds on c are safe: C/A0 stays strictly positive real, with the margin that the gain needs, for every plausible plant"
                 )
             }
             Self::NotPositiveReal {

@@ -126,7 +126,7 @@ fn unbounded_and_projected() {
 }
 
 #[test]
-fn bounds_that_make_convergence_sure_do_better() {
+fn bounds_inside_which_it_is_positive_real_do_better() {
     let plausible = Bounds::new([0.9, 0.9], [1.1, 1.1]).unwrap();
     let says = |bounds| {
         check_filter_bounds(&bounds, &plausible, 0.5)

@@ -239,7 +239,7 @@ fn gains(gains: &Gains) -> String {
         "gains",
         "The three gains on one experiment of second order",
         "a2 y″ + a1 y′ + y = b0 u with all parameters 1, three sines, derivatives given, started from (2, 2, 0.5) with P(0) = I. \
-         c is free, within wide bounds, or within bounds that make convergence sure.",
+         c is free, within wide bounds, or within bounds inside which C/A − 1/2 is strictly positive real.",
         &content,
     )
 }

@@ -1,4 +1,4 @@
-//! Bounds on c^ in the comparison of the gains, and whether they make convergence sure.
+//! Bounds on c^ in the comparison of the gains, and whether C^/A0 - gamma/(2 c) is strictly positive real inside them.
 
 use ct_constrained::Bounds;
 use serde::Serialize;
@@ -49,7 +49,7 @@ impl Limits {
 pub struct Checked {
     /// Which.
     pub bounds: Limits,
-    /// Whether they make convergence sure for the plausible plants.
+    /// Whether it is, for all plausible plants.
     pub hold: bool,
     /// The same in a sentence, with the place where they fail.
     pub says: String,

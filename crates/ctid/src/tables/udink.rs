@@ -41,7 +41,7 @@ pub struct Study {
     pub settings: Settings,
     /// What the paper leaves open, in words.
     pub assumptions: Vec<String>,
-    /// Whether the paper's bounds on c^ make convergence sure, in a sentence.
+    /// Whether C^/A0 - gamma/(2 c) is strictly positive real inside the paper's bounds on c^, in a sentence.
     pub filter_bounds: String,
     /// With Euler's rule.
     pub euler: Comparison,

@@ -130,9 +130,9 @@ struct Effects {
 
 #[derive(Debug, Args)]
 struct Identify {
-    /// Record (CSV)
-    #[arg(value_name = "DATA.csv")]
-    data: PathBuf,
+    /// Record (CSV), one
+    #[arg(required = true, value_name = "DATA.csv")]
+    data: Vec<PathBuf>,
     /// How the parameters are found
     #[arg(long, value_enum)]
     method: Method,
@@ -389,10 +389,16 @@ impl Identify {
     }
 
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        let [data] = &self.data[..] else {
+            return Err(Error::Usage(format!(
+                "identify works on one record, and {} are given; give the longest, or fit a physical model to all of them with compare",
+                self.data.len()
+            )));
+        };
         let (columns, hold, controller) = self.layout()?;
         let request = self.request(controller)?;
-        let record = read_csv(&self.data, &columns, hold)?;
-        let inputs: Vec<&Path> = [Some(&self.data), self.model.as_ref()]
+        let record = read_csv(data, &columns, hold)?;
+        let inputs: Vec<&Path> = [Some(data), self.model.as_ref()]
             .into_iter()
             .flatten()
             .map(PathBuf::as_path)

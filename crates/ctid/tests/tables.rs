@@ -98,6 +98,16 @@ fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
     assert!(study.exact.inside >= 62, "{:?}", study.exact.outside);
     assert_eq!(study.euler.failed + study.exact.failed, 0);
 
+    // "Larger values lead to numerical difficulties", of P(0): by Euler's rule they do, by the exact step they do not.
+    for row in &study.larger_p {
+        assert_eq!(row.exact_failed, 0, "{row:?}");
+        match row.factor {
+            ..=15.0 => assert_eq!(row.euler_failed, 0, "{row:?}"),
+            20.0.. => assert_eq!(row.euler_failed, row.runs, "{row:?}"),
+            _ => {}
+        }
+    }
+
     // Where it lies beside the checkout: the range for the median of 200 noises of another program, cell by cell.
     let bands =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reproduction/udink-accept.md");

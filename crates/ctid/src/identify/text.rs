@@ -197,7 +197,7 @@ fn drift(found: &Identification, look: Look) -> String {
     for line in table(&sides, &rows) {
         text += &format!("  {line}\n");
     }
-    text += &look.paragraph("  ", drift_verdict(found));
+    text += &look.paragraph("  ", &drift_verdict(found));
     text.push('\n');
     text
 }
@@ -211,16 +211,25 @@ pub(crate) fn time_constant_name(found: &Identification) -> &'static str {
 }
 
 /// What the drift says, nothing where none is known.
-pub(crate) fn drift_verdict(found: &Identification) -> &'static str {
-    match &found.drift {
-        None => "",
-        Some(drift) if drift.gain.moves() || drift.time_constant.moves() => {
-            "The estimates move with the level by more than chance: the process is not linear over this range, or not of this order."
-        }
-        Some(_) => {
-            "The estimates do not move with the level beyond their standard errors; a shorter --memory sees faster changes, less surely."
-        }
+pub(crate) fn drift_verdict(found: &Identification) -> String {
+    let Some(drift) = &found.drift else {
+        return String::new();
+    };
+    if drift.moves() {
+        return "The estimates move with the level by more than chance: the process is not linear over this range, or not of this order."
+            .to_owned();
     }
+    if drift.tells() {
+        return "The estimates do not move with the level beyond their standard errors; a shorter --memory sees faster changes, less surely."
+            .to_owned();
+    }
+    let percent = |part: f64| numbers::significant(100.0 * part, 2);
+    format!(
+        "This record is too short to tell whether the estimates move with the level: the memory is {} % of it, and the level that it \
+         remembers covers {} % of the output's range; record longer, or try a shorter --memory.",
+        percent(drift.memory_part),
+        percent(drift.level_part)
+    )
 }
 
 fn error(found: &Identification, look: Look) -> String {

@@ -214,6 +214,19 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
     place.refuses("tables --record b.csv", &["--record", "tables baysse"]);
 }
 
+#[test]
+fn both_papers_at_once() {
+    let place = Place::empty();
+    // Its own file may be written again.
+    place.write("both.json", "{\"schema\": 1, \"udink\": {}}");
+    let text = place.succeeds("tables all --runs 20 --json both.json");
+    assert!(text.contains("Table 4") && text.contains("Table II"));
+    let both = place.json("both.json");
+    assert!(both["udink"]["euler"]["tables"].is_array());
+    assert!(both["baysse"]["tables"].is_array());
+    place.refuses("tables all --report a.html", &["--report", "one paper"]);
+}
+
 /// docs/hidden-dead-zone.md: what the second paper's table II hides.
 #[test]
 fn the_emulated_rig_misses_its_dead_zone() {

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 fn main() {
     let asked = std::env::args().nth(1).map(|runs| runs.parse::<u64>());
-    let asked = asked.map(|runs| runs.expect("a number of runs").max(1));
+    let asked = asked.map(|runs| runs.unwrap().max(1));
     let (near, far, drifts) = (
         asked.unwrap_or(60),
         asked.unwrap_or(40),

@@ -212,6 +212,91 @@ fn a_slow_transient_is_no_rest() {
     }
 }
 
+/// Means of the record are those of all of it, also for a recursion that is started from its beginning.
+#[test]
+fn the_levels_are_the_same_for_both() {
+    let order = Order { n: 1, m: 0 };
+    let record = record(&first_order(), &controller(), Some(30.0), 1);
+    for levels in [LevelChoice::Mean, LevelChoice::Rest, LevelChoice::Zero] {
+        let of = |method| found(&record, method, order, levels).in_loop.unwrap();
+        let (batch, recursion) = (of(Method::Fcloe), of(Method::RecursiveFcloe));
+        assert_eq!(batch.levels_from, recursion.levels_from);
+        for (batch, recursion) in batch.levels.iter().zip(recursion.levels) {
+            assert!((batch - recursion).abs() < 1e-12, "{levels:?}");
+        }
+    }
+}
+
+/// A plant whose time constant grows steadily, in its loop, in small steps.
+fn drifting(from: f64, to: f64, rows: usize) -> Record {
+    let mut r = vec![0.0; 60];
+    r.extend(excitation::prbs(rows - 60, 20, -1.0, 1.0, 7).unwrap());
+    let (mut y, mut integral) = (0.0, 0.0);
+    let (mut u, mut outputs) = (Vec::new(), Vec::new());
+    let parts = 20;
+    let h = 1.0 / f64::from(parts);
+    for (k, r) in r.iter().enumerate() {
+        let tau = from + (to - from) * k as f64 / rows as f64;
+        outputs.push(20.0 + y);
+        let command = |y: f64, integral: f64| PI.0 * ((r - y) + integral / PI.1);
+        u.push(4.0 + command(y, integral));
+        for _ in 0..parts {
+            let slope = |y: f64, integral: f64| (6.0 * command(y, integral) - y) / tau;
+            let middle = y + 0.5 * h * slope(y, integral);
+            let half = integral + 0.5 * h * (r - y);
+            y += h * slope(middle, half);
+            integral += h * (r - middle);
+        }
+    }
+    Record {
+        name: "drift".into(),
+        time: (0..rows).map(|k| k as f64).collect(),
+        input: Signal::new("u", "V", u),
+        output: Signal::new("y", "cm", outputs),
+        reference: Some(Signal::new("r", "cm", r.iter().map(|r| 20.0 + r).collect())),
+        hold: Hold::Zero,
+    }
+}
+
+/// A drift is followed with a delay of a memory, without asking for it; what is asked for is used.
+#[test]
+fn a_recursion_follows_a_drift() {
+    let (rows, from, to) = (12_000, 110.0, 143.0);
+    let record = drifting(from, to, rows);
+    let request = Request {
+        controller: Some(controller()),
+        ..Request::new(Method::RecursiveFcloe, Order { n: 1, m: 0 })
+    };
+    for (asked, memory) in [(None, 2400.0), (Some(800.0), 800.0)] {
+        let request = Request {
+            memory: asked,
+            ..request.clone()
+        };
+        let found = identify(&record, &request).unwrap();
+        assert_eq!(found.in_loop.unwrap().memory, Some(memory));
+        let behind = (to - found.parameters[0].value) / ((to - from) / rows as f64);
+        assert!(
+            behind > 0.3 * memory && behind < 1.5 * memory,
+            "{behind} s behind with a memory of {memory} s"
+        );
+    }
+}
+
+/// No verdict on the estimates of a recursion that went astray: here it rests by order where nothing is at rest.
+#[test]
+fn no_condition_is_told_of_estimates_that_are_wrong() {
+    let order = Order { n: 1, m: 0 };
+    let record = cut(&record(&first_order(), &controller(), None, 1), 1000);
+    let found = found(&record, Method::RecursiveFcloe, order, LevelChoice::Zero);
+    assert!(
+        found.warnings.iter().any(|w| w.contains("is not told")),
+        "{:?} {:?}",
+        found.warnings,
+        found.parameters
+    );
+    assert!(found.in_loop.unwrap().convergence.is_none());
+}
+
 #[test]
 fn the_condition_of_the_start_is_told() {
     let order = Order { n: 1, m: 0 };

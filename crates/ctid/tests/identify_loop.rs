@@ -282,6 +282,26 @@ fn a_recursion_follows_a_drift() {
     }
 }
 
+/// Where one model of the whole record simulates it much better than the one of its end.
+#[test]
+fn no_condition_is_told_of_estimates_that_are_not_the_record_s() {
+    let request = Request {
+        controller: Some(controller()),
+        memory: Some(300.0),
+        ..Request::new(Method::RecursiveFcloe, Order { n: 1, m: 0 })
+    };
+    let found = identify(&drifting(60.0, 240.0, 6000), &request).unwrap();
+    let said = |w: &String| w.contains("the plant drifts, or the recursion went astray");
+    assert!(
+        found.warnings.iter().any(said),
+        "{:?} {} {:?}",
+        found.warnings,
+        found.fit_percent,
+        found.parameters
+    );
+    assert!(found.in_loop.unwrap().convergence.is_none());
+}
+
 /// No verdict on the estimates of a recursion that went astray: here it rests by order where nothing is at rest.
 #[test]
 fn no_condition_is_told_of_estimates_that_are_wrong() {

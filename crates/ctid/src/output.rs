@@ -78,9 +78,9 @@ impl Found for baysse::Study {
 pub struct Studies {
     /// Version of the JSON.
     pub schema: u32,
-    /// [U], tables 1 to 4.
+    /// `[U]`, tables 1 to 4.
     pub udink: udink::Study,
-    /// [B], tables I and II.
+    /// `[B]`, tables I and II.
     pub baysse: baysse::Study,
 }
 

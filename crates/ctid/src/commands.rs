@@ -148,10 +148,11 @@ struct Identify {
     /// What the input does between samples
     #[arg(long, value_enum, default_value_t = InputHold::Zero)]
     hold: InputHold,
-    /// Memory of the recursion [s]; without it a fifth of the record, at least 10 time constants
+    /// Memory of stabilized-oe, ct-rls and recursive-fcloe [s]; without it a fifth of the record, at least 10 time constants
     #[arg(long, value_name = "S")]
     memory: Option<f64>,
-    /// Bandwidth of the state variable filters [1/s]; without it 3 over the time constant
+    /// Bandwidth of the state variable filters [1/s]: without it 3 over the time constant for stabilized-oe and ct-rls; for ls and iv the
+    /// best of several, from which fcloe and recursive-fcloe start
     #[arg(long, value_name = "L")]
     bandwidth: Option<f64>,
     /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe

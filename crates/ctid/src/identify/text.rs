@@ -350,6 +350,11 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
             ),
         ));
     }
+    if let Some(memory) = in_loop.memory {
+        let memory = numbers::duration(memory);
+        let sentence = format!("{memory}; a drift is followed with as much delay");
+        facts.push(("memory", sentence));
+    }
     if let Some(health) = &in_loop.health {
         facts.push((
             "recursion",
@@ -371,12 +376,14 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
 /// The verdict of condition (14), in words.
 pub(crate) fn condition(condition: &Condition) -> String {
     let verdict = match condition.verdict {
-        Verdict::Holds => "it holds: a recursion that keeps the filter of this start converges",
+        Verdict::Holds => {
+            "it holds if these estimates are the plant: then a recursion that keeps the filter of this start converges"
+        }
         Verdict::Positive => {
-            "it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
+            "if these estimates are the plant it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
         }
         Verdict::Negative => {
-            "it fails, and the real part falls below 0: a recursion that keeps the filter of this start may go the wrong way; renew the filter"
+            "if these estimates are the plant it fails, and the real part falls below 0: a recursion that keeps the filter of this start may go the wrong way; renew the filter"
         }
         Verdict::Unstable => "the loop of the estimates is not stable",
     };

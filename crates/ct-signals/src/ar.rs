@@ -123,7 +123,7 @@ impl ArModel {
         let ladder = burg(segments, max_order.min(n / SAMPLES_PER_COEFFICIENT));
         let mut best: Option<(f64, ArModel)> = None;
         for order in 0..=ladder.len() {
-            let mut model = ArModel::from_reflections(&ladder[..order]);
+            let mut model = ArModel::of_stationary(&ladder[..order]);
             let sum: f64 = segments
                 .iter()
                 .flat_map(|segment| model.whiten(segment))
@@ -143,13 +143,33 @@ impl ArModel {
         Ok(best.map_or_else(|| ArModel::white(0.0), |(_, model)| model))
     }
 
-    fn from_reflections(reflections: &[f64]) -> Self {
+    /// A process with known partial correlations `k_1..k_p`, within -1..1, and innovations of standard deviation
+    /// `sigma` (the signal's unit, `>= 0`).
+    ///
+    /// # Errors
+    /// As of [`ArModel::from_coefficients`].
+    pub fn from_reflections(reflections: &[f64], sigma: f64) -> Result<Self, Error> {
         let coefficients = predictors(reflections).pop().unwrap_or_default();
+        Self::from_coefficients(&coefficients, sigma)
+    }
+
+    /// Of partial correlations that are within -1..1.
+    fn of_stationary(reflections: &[f64]) -> Self {
         ArModel {
             reflections: reflections.to_vec(),
-            coefficients,
+            coefficients: predictors(reflections).pop().unwrap_or_default(),
             sigma: 1.0,
         }
+    }
+
+    /// Partial correlations `k_1..k_p`, each within -1..1.
+    pub fn reflections(&self) -> &[f64] {
+        &self.reflections
+    }
+
+    /// The predictors `a^(0)..a^(p)` of every order up to `p`.
+    pub fn predictors(&self) -> Vec<Vec<f64>> {
+        predictors(&self.reflections)
     }
 
     /// The number of coefficients `p`; 0 is white noise.
@@ -188,7 +208,7 @@ impl ArModel {
             scales[m] = scale;
         }
         Whitener {
-            predictors: predictors(&self.reflections),
+            predictors: self.predictors(),
             coefficients: self.coefficients.clone(),
             scales,
             lanes,

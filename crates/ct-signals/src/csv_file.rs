@@ -282,7 +282,7 @@ impl Numbers<'_> {
             mend: if cell.contains(',') {
                 "write decimals with a point and without separators for thousands"
             } else {
-                "correct the cell, or split the file there and give both parts: they are fitted together"
+                "correct the cell, or split the file there: each part is a record of its own"
             },
         })?;
         if !value.is_finite() {

@@ -143,7 +143,7 @@ pub enum Error {
     },
     /// A cell that is needed is empty.
     #[error(
-        "{file}, row {row}, column \"{column}\": the cell is empty; fill it in, or split the file there and give both parts: they are fitted together"
+        "{file}, row {row}, column \"{column}\": the cell is empty; fill it in, or split the file there: each part is a record of its own"
     )]
     EmptyCell {
         /// The path as it was given.
@@ -169,7 +169,7 @@ pub enum Error {
     },
     /// A cell holds NaN or an infinity.
     #[error(
-        "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or split the file there and give both parts: they are fitted together"
+        "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or split the file there: each part is a record of its own"
     )]
     NotFinite {
         /// The path as it was given.
@@ -215,7 +215,7 @@ pub enum Error {
     },
     /// The time runs backward.
     #[error(
-        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; sort the rows by time, or split the file there and give both parts: they are fitted together"
+        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; sort the rows by time, or split the file there: each part is a record of its own"
     )]
     BackwardTime {
         /// The path as it was given.
@@ -231,7 +231,7 @@ pub enum Error {
     },
     /// Samples are missing.
     #[error(
-        "{file}, row {row}, column \"{column}\": {missing} missing before this row (the time steps from {previous} to {time}, elsewhere by {interval}); split the file there and give both parts: they are fitted together",
+        "{file}, row {row}, column \"{column}\": {missing} missing before this row (the time steps from {previous} to {time}, elsewhere by {interval}); split the file there: each part is a record of its own",
         missing = samples(*.missing)
     )]
     Gap {
@@ -326,7 +326,7 @@ pub enum Error {
     },
     /// The output sits at its limit for much of the record.
     #[error(
-        "{file}, column \"{column}\": {count} of {rows} samples sit exactly at a limit of the output ({limits}), where the sensor no longer sees the process; keep the experiment within the sensor's range, or cut those rows out and give the parts: they are fitted together"
+        "{file}, column \"{column}\": {count} of {rows} samples sit exactly at a limit of the output ({limits}), where the sensor no longer sees the process; keep the experiment within the sensor's range, or cut those rows out: each part that is left is a record of its own"
     )]
     Saturated {
         /// The path as it was given.

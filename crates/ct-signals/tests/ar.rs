@@ -306,3 +306,14 @@ fn from_coefficients_is_the_inverse_of_the_ladder() {
         assert_relative_eq!(*a, b, epsilon = 1e-9);
     }
 }
+
+#[test]
+fn partial_correlations_and_coefficients_invert_each_other() {
+    let k = [0.9, -0.5, 0.3, 0.1];
+    let model = ArModel::from_reflections(&k, 2.0).unwrap();
+    let back = ArModel::from_coefficients(model.coefficients(), model.sigma()).unwrap();
+    for (a, b) in k.iter().zip(back.reflections()) {
+        assert!((a - b).abs() < 1e-12, "{a} {b}");
+    }
+    assert!(ArModel::from_reflections(&[1.0], 1.0).is_err());
+}

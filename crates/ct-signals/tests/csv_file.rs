@@ -489,7 +489,7 @@ fn one_missing_sample_is_a_gap() {
     );
     says(
         &error,
-        &["4 samples are missing", "they are fitted together"],
+        &["4 samples are missing", "each part is a record of its own"],
     );
 }
 

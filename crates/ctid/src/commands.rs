@@ -11,7 +11,7 @@ use crate::identify::{self, LevelChoice, Method, Order, Request};
 use crate::input::Files;
 use crate::look::Look;
 use crate::model_file::ControllerSettings;
-use crate::output::{self, Found, Kind, Output};
+use crate::output::{self, Found, Kind, Output, Studies};
 use crate::progress::Bar;
 use crate::tables::{baysse, baysse_text, udink, udink_text};
 use crate::{Error, catalogue, edit, model_file, terminal, tour};
@@ -130,9 +130,9 @@ struct Effects {
 
 #[derive(Debug, Args)]
 struct Identify {
-    /// Record (CSV)
-    #[arg(value_name = "DATA.csv")]
-    data: PathBuf,
+    /// Record (CSV), one
+    #[arg(required = true, value_name = "DATA.csv")]
+    data: Vec<PathBuf>,
     /// How the parameters are found
     #[arg(long, value_enum)]
     method: Method,
@@ -148,10 +148,11 @@ struct Identify {
     /// What the input does between samples
     #[arg(long, value_enum, default_value_t = InputHold::Zero)]
     hold: InputHold,
-    /// Memory of the recursion [s]; without it a fifth of the record, at least 10 time constants
+    /// Memory of stabilized-oe, ct-rls and recursive-fcloe [s]; without it a fifth of the record, at least 10 time constants
     #[arg(long, value_name = "S")]
     memory: Option<f64>,
-    /// Bandwidth of the state variable filters [1/s]; without it 3 over the time constant
+    /// Bandwidth of the state variable filters [1/s]: without it 3 over the time constant for stabilized-oe and ct-rls; for ls and iv the
+    /// best of several, from which fcloe and recursive-fcloe start
     #[arg(long, value_name = "L")]
     bandwidth: Option<f64>,
     /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe
@@ -213,17 +214,13 @@ enum Paper {
     Udink,
     /// A. Baysse, F. J. Carrillo, A. Habbadi, output error in closed loop: tables I and II
     Baysse,
+    /// Both
+    All,
 }
 
-impl Paper {
-    /// The runs that its bands are for.
-    fn runs(self) -> usize {
-        match self {
-            Self::Udink => 200,
-            Self::Baysse => 100,
-        }
-    }
-}
+/// The runs that the bands of each paper are for.
+const RUNS_UDINK: usize = 200;
+const RUNS_BAYSSE: usize = 100;
 
 /// Does what the command line asks for; what a person reads goes to `out`.
 ///
@@ -389,10 +386,16 @@ impl Identify {
     }
 
     fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        let [data] = &self.data[..] else {
+            return Err(Error::Usage(format!(
+                "identify works on one record, and {} are given; give the longest, or fit a physical model to all of them with compare",
+                self.data.len()
+            )));
+        };
         let (columns, hold, controller) = self.layout()?;
         let request = self.request(controller)?;
-        let record = read_csv(&self.data, &columns, hold)?;
-        let inputs: Vec<&Path> = [Some(&self.data), self.model.as_ref()]
+        let record = read_csv(data, &columns, hold)?;
+        let inputs: Vec<&Path> = [Some(data), self.model.as_ref()]
             .into_iter()
             .flatten()
             .map(PathBuf::as_path)
@@ -420,31 +423,46 @@ impl Tables {
                 "--record is of the rig that `ctid tables baysse` emulates; no other paper has one";
             return Err(Error::Usage(what.to_owned()));
         }
+        if self.results.report.is_some() && matches!(self.paper, Paper::All) {
+            let what = "--report is a page for one paper; run `ctid tables udink` and `ctid tables baysse`";
+            return Err(Error::Usage(what.to_owned()));
+        }
         let record = self.record.as_deref().map(|path| (Kind::Record, path));
         let wanted: Vec<_> = self.results.wanted().chain(record).collect();
         let outputs = output::plan(&wanted, &[])?;
-        let runs = self.runs.unwrap_or(self.paper.runs());
         let bar = Bar::new();
         let progress = |progress| bar.show(progress);
+        let udink = || {
+            let runs = self.runs.unwrap_or(RUNS_UDINK);
+            let study = udink::study(&udink::Settings::default(), runs, self.seed, &progress);
+            bar.clear();
+            study
+        };
+        let baysse = || {
+            let runs = self.runs.unwrap_or(RUNS_BAYSSE);
+            let study = baysse::study(runs, self.seed, &progress);
+            bar.clear();
+            study
+        };
         match self.paper {
             Paper::Udink => {
-                let settings = udink::Settings::default();
-                let study = udink::study(&settings, runs, self.seed, &progress);
-                bar.clear();
-                let study = study?;
+                let study = udink()?;
                 finish(&study, &udink_text::text(&study, look), &outputs, out, look)
             }
             Paper::Baysse => {
-                let study = baysse::study(runs, self.seed, &progress);
-                bar.clear();
-                let study = study?;
-                finish(
-                    &study,
-                    &baysse_text::text(&study, look),
-                    &outputs,
-                    out,
-                    look,
-                )
+                let study = baysse()?;
+                let text = baysse_text::text(&study, look);
+                finish(&study, &text, &outputs, out, look)
+            }
+            Paper::All => {
+                let studies = Studies {
+                    schema: 1,
+                    udink: udink()?,
+                    baysse: baysse()?,
+                };
+                let first = udink_text::text(&studies.udink, look);
+                let text = first + "\n" + &baysse_text::text(&studies.baysse, look);
+                finish(&studies, &text, &outputs, out, look)
             }
         }
     }

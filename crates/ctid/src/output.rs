@@ -15,7 +15,7 @@ use crate::{Error, atomic, report, term_file};
 const HEAD: u64 = 4096;
 
 /// Keys that tell JSON of ctid's from others', beside `schema`: one for each kind of result.
-const KEYS: [&str; 3] = ["verdict", "paper", "method"];
+const KEYS: [&str; 4] = ["verdict", "paper", "method", "udink"];
 
 /// What is in a file that the program writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,8 +32,10 @@ pub enum Kind {
 
 /// What a command finds, which is written as JSON with `schema` and one of the keys that ctid knows its own files by, or as a page.
 pub trait Found: Serialize {
-    /// The page, complete.
-    fn page(&self) -> String;
+    /// The page, complete, where there is one.
+    fn page(&self) -> String {
+        String::new()
+    }
 
     /// The record as CSV, where there is one.
     fn record(&self) -> String {
@@ -70,6 +72,20 @@ impl Found for baysse::Study {
         baysse::csv(&self.second.record)
     }
 }
+
+/// The tables of both papers.
+#[derive(Debug, Serialize)]
+pub struct Studies {
+    /// Version of the JSON.
+    pub schema: u32,
+    /// Udink ten Cate, tables 1 to 4.
+    pub udink: udink::Study,
+    /// Baysse, Carrillo and Habbadi, tables I and II.
+    pub baysse: baysse::Study,
+}
+
+/// Each paper has a page of its own; the program refuses to write one for both.
+impl Found for Studies {}
 
 /// A file that will be written.
 #[derive(Debug, Clone, PartialEq)]

@@ -34,7 +34,7 @@ fn main() {
 }
 
 fn show(rig: &Rig, runs: u64) {
-    let (hits, white, placed) = rig.coverage(runs);
+    let found = rig.coverage(runs);
     let share = |hits: &[usize]| -> String {
         let share = hits
             .iter()
@@ -42,10 +42,14 @@ fn show(rig: &Rig, runs: u64) {
         share.collect::<Vec<_>>().join(" ")
     };
     println!("  {}", rig.name);
-    println!("    with the residual's colour {}", share(&hits));
-    println!("    as if it were white        {}", share(&white));
+    println!("    with the residual's colour {}", share(&found.hits));
+    println!("    as if it were white        {}", share(&found.white));
     println!(
         "    noise placed rightly in    {:6.3}",
-        placed as f64 / runs as f64
+        found.placed as f64 / runs as f64
+    );
+    println!(
+        "    claimed over found variance {:6.2?}",
+        found.variance_ratios
     );
 }

@@ -1,12 +1,12 @@
 //! Fits a plant to records by simulation error: bounds, many starts, exact sensitivities, a noise model,
 //! and uncertainty that is right.
 
-mod ar;
 mod error;
 mod feedback;
 mod fit;
 mod levenberg_marquardt;
 mod marginal;
+mod noise_factor;
 mod reading_step;
 mod sandwich;
 mod setup;

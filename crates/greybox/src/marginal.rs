@@ -20,7 +20,7 @@
 
 use ct_signals::ArModel;
 
-use crate::{Error, Rows, ar};
+use crate::{Error, Rows};
 
 /// The noise model of a residual that was fitted.
 ///
@@ -50,7 +50,7 @@ pub(crate) fn noise(rows: &Rows, columns: &[usize], most: usize) -> Result<ArMod
         });
     }
     let variance = Criterion::of(rows, columns, &model(&z)?).variance;
-    ar::from_reflections(&tanh(&z), variance.sqrt())
+    Ok(ArModel::from_reflections(&tanh(&z), variance.sqrt())?)
 }
 
 /// The degrees of freedom of variances that depend on an estimated noise model (F. E. Satterthwaite, An approximate
@@ -142,10 +142,7 @@ fn cholesky(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
 }
 
 fn coordinates(noise: &ArModel) -> Vec<f64> {
-    ar::reflections(noise.coefficients())
-        .into_iter()
-        .map(f64::atanh)
-        .collect()
+    noise.reflections().iter().map(|k| k.atanh()).collect()
 }
 
 fn tanh(z: &[f64]) -> Vec<f64> {
@@ -153,7 +150,7 @@ fn tanh(z: &[f64]) -> Vec<f64> {
 }
 
 fn model(z: &[f64]) -> Result<ArModel, Error> {
-    ar::from_reflections(&tanh(z), 1.0)
+    Ok(ArModel::from_reflections(&tanh(z), 1.0)?)
 }
 
 struct Criterion {

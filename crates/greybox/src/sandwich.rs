@@ -14,7 +14,7 @@
 
 use ct_signals::ArModel;
 
-use crate::{Error, Fit, Rows, Setup, Triangle, ar::Factor, fit::student, marginal};
+use crate::{Error, Fit, Rows, Setup, Triangle, fit::student, marginal, noise_factor::Factor};
 
 /// The uncertainty of a fit whose residual has another colour than its metric.
 #[derive(Debug, Clone)]

@@ -8,7 +8,8 @@
 //! dtheta^/dt =  c_p P1 phi_m eps~       dP1/dt = eta1 P1 - gamma1 P1 phi_m phi_m' P1
 //! dc^/dt     = -c_p P2 e1 eps~          dP2/dt = eta2 P2 - gamma2 P2 e1 e1' P2
 //! ```
-//! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run diverges to its bound.
+//! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run of its experiment ends at the bound of `c^`
+//! (`cargo test -p stabilized-oe --test printed_sign`).
 //!
 //! Assumptions: the gain's step holds `phi_m`, `e` and `e1` over a sample, the model's runs the input as the scheme of derivatives says.
 //! `u` excites persistently. Noise on `y` is independent of `u`.
@@ -23,6 +24,7 @@ use ct_rls::{Health, Innovation, Outcome, RecursiveEstimator};
 use nalgebra::{SMatrix, SVector};
 
 use crate::hurwitz::is_hurwitz;
+use crate::integrator::sealed::ModelRule;
 use crate::model::Model;
 use crate::{Derivatives, Error, Gain};
 
@@ -31,6 +33,9 @@ const HALVINGS: u32 = 10;
 
 /// By default `a_i`, `i < n`, is kept above this times `dt^i`.
 const FLOOR: f64 = 1e-3;
+
+/// And the shortest lag, beside the others of the start, above this times `dt`.
+const SHORTEST_LAG: f64 = 0.05;
 
 /// An output of the model beyond this has left any sense.
 const LARGEST: f64 = 1e100;
@@ -74,6 +79,10 @@ pub struct StabilizedOe<const N: usize, const P: usize, G, D> {
     theta_bounds: Option<Bounds<P>>,
     /// Of the step they were made for: where none are given.
     default_bounds: (f64, Bounds<P>),
+    /// Of all steps, s.
+    shortest: f64,
+    /// `a_{n-1}` of the start, 1 for n = 1.
+    slower: f64,
     filter_bounds: Bounds<N>,
     offset: bool,
     failure: Option<Error>,
@@ -95,8 +104,10 @@ pub struct Bounded {
 impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> StabilizedOe<N, P, G, D> {
     /// An estimator with the start that its gain holds, a model at rest, and no bounds on `c^`.
     ///
-    /// `theta^` is kept where `A^` is Hurwitz, with `a_n >= dt^n`, so that the model's poles are no faster than the samples in the
-    /// mean, and the other `a_i` above a thousandth of `dt^i`.
+    /// `theta^` is kept where `A^` is Hurwitz, with `a_i` above a thousandth of `dt^i` and `a_n` above `dt^n` or `0.05 dt a_{n-1}(0)`,
+    /// whichever is less, for the shortest step so far. A lag below that cannot be seen; but the model's highest derivative is divided
+    /// by `a_n`, and where that comes near 0 a few samples make `P` so small that `theta^` stays where it is. Euler's rule loses a model
+    /// that is faster than a step: there `a_n >= dt^n`, with the step at hand.
     ///
     /// # Errors
     /// [`Error::StartNotHurwitz`].
@@ -120,6 +131,8 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
             theta,
             theta_bounds: None,
             default_bounds: (f64::NAN, Bounds::none()),
+            shortest: f64::INFINITY,
+            slower: if N > 1 { theta[N - 2] } else { 1.0 },
             filter_bounds: Bounds::none(),
             offset: false,
             failure: None,
@@ -147,8 +160,9 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
         Ok(self)
     }
 
-    /// S_c: bounds on `c^`, inside which `C^/A0 - gamma/(2 c)` should be strictly positive real for every plausible plant `A0`:
-    /// ask [`check_filter_bounds`](Self::check_filter_bounds).
+    /// S_c: bounds on `c^`, inside which `C^/A0 - gamma/(2 c)` should be strictly positive real for every plausible plant `A0`.
+    /// Nothing is checked here, as no plant is known: [`with_filter_bounds_for`](Self::with_filter_bounds_for) says whether they are
+    /// such a set.
     ///
     /// # Errors
     /// [`Error::StartOutside`].
@@ -219,8 +233,15 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
         let theta_bounds = match &self.theta_bounds {
             Some(bounds) => bounds,
             None => {
-                if self.default_bounds.0 != dt {
-                    self.default_bounds = (dt, default_bounds::<N, P>(dt)?);
+                self.shortest = self.shortest.min(dt);
+                let (step, highest) = if <G::Integrator as ModelRule>::ANY_STEP {
+                    let lag = SHORTEST_LAG * self.slower;
+                    (self.shortest, lag * self.shortest)
+                } else {
+                    (dt, f64::INFINITY)
+                };
+                if self.default_bounds.0 != step {
+                    self.default_bounds = (step, default_bounds::<N, P>(step, highest)?);
                 }
                 &self.default_bounds.1
             }
@@ -274,12 +295,20 @@ fn inside<const K: usize>(
     Ok(())
 }
 
-fn default_bounds<const N: usize, const P: usize>(dt: f64) -> Result<Bounds<P>, Error> {
+/// `a_i` above [`FLOOR`] times `dt^i`, and `a_n` above `dt^n`, or `highest` where that is less.
+fn default_bounds<const N: usize, const P: usize>(
+    dt: f64,
+    highest: f64,
+) -> Result<Bounds<P>, Error> {
     let mut lower = [f64::NEG_INFINITY; P];
     let mut power = 1.0;
     for (i, lower) in lower.iter_mut().take(N).enumerate() {
         power *= dt;
-        *lower = if i + 1 == N { power } else { FLOOR * power };
+        *lower = if i + 1 == N {
+            power.min(highest)
+        } else {
+            FLOOR * power
+        };
     }
     Ok(Bounds::new(lower, [f64::INFINITY; P])?)
 }

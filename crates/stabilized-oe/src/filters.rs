@@ -4,7 +4,7 @@
 //! `A y_f = B u_f`, and the filters have the derivatives as their states. The parallel model is driven by `u_f`, so that
 //! `e^(i) = y_f^(i) - y_m^(i)` for `i = 0..n`.
 //!
-//! Assumption: the input is held between samples, the output runs on lines. Noise passes the filter: it no longer is white, and
+//! Assumption: the input is held between samples or runs on lines, the output runs on lines. Noise passes the filter: it no longer is white, and
 //! `c^` goes elsewhere; bounds on it matter all the same.
 //!
 //! Accuracy: of second order in the step for `m < n`. For `m = n` the highest derivative of `u_f` jumps with `u`, and the line that the
@@ -30,9 +30,17 @@ impl<const N: usize> StateVariableFilters<N> {
     /// # Errors
     /// [`Error::Lti`] for a `lambda` that is not above 0 and finite.
     pub fn new(lambda: f64) -> Result<Self, Error> {
+        Self::with_input(lambda, Hold::Zero)
+    }
+
+    /// The same for an input that is held between samples, or that runs on lines as the output does.
+    ///
+    /// # Errors
+    /// As of [`new`](Self::new).
+    pub fn with_input(lambda: f64, input: Hold) -> Result<Self, Error> {
         let filter = |hold| StateVariableFilter::with_bandwidth(N, lambda, hold);
         Ok(Self {
-            u: filter(Hold::Zero)?.starting(Start::Rest),
+            u: filter(input)?.starting(Start::Rest),
             y: filter(Hold::First)?.starting(Start::Rest),
             last_y: 0.0,
         })

@@ -21,12 +21,17 @@ impl Integrator for Euler {}
 
 pub(crate) mod sealed {
     pub trait ModelRule {
+        /// Whether a model that is stable stays so over any step. Otherwise its poles may not be faster than the step.
+        const ANY_STEP: bool;
+
         /// One step of `dt` seconds of the model with the coefficients `a = (a_1, .., a_n)` and the drive from `w0` to `w1`.
         fn advance<const N: usize>(state: &mut [f64; N], a: &[f64; N], w: (f64, f64), dt: f64);
     }
 }
 
 impl sealed::ModelRule for Euler {
+    const ANY_STEP: bool = false;
+
     #[inline]
     fn advance<const N: usize>(state: &mut [f64; N], a: &[f64; N], (w0, _): (f64, f64), dt: f64) {
         let slopes = slopes(state, a, w0);
@@ -37,6 +42,8 @@ impl sealed::ModelRule for Euler {
 }
 
 impl sealed::ModelRule for ExactHold {
+    const ANY_STEP: bool = true;
+
     #[inline]
     fn advance<const N: usize>(state: &mut [f64; N], a: &[f64; N], (w0, w1): (f64, f64), dt: f64) {
         if N == 1 {

@@ -23,6 +23,7 @@ use crate::{Derivatives, Error, Gain, StabilizedOe};
 
 /// What the check of bounds on `c^` found. [`Display`](core::fmt::Display) says it in a sentence, which is the warning where it fails.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use = "bounds that are no such set ensure nothing: print this, or look at hold()"]
 pub enum FilterBounds<const N: usize> {
     /// `C^/A0 - d` is strictly positive real for every `c` and every plausible plant.
     PositiveReal,
@@ -59,7 +60,7 @@ impl<const N: usize> core::fmt::Display for FilterBounds<N> {
             Self::PositiveReal => {
                 write!(
                     f,
-                    "the bounds on c keep C/A0 strictly positive real for every plausible plant"
+                    "the bounds on c are safe: C/A0 stays strictly positive real, with the margin that the gain needs, for every plausible plant"
                 )
             }
             Self::NotPositiveReal {
@@ -70,7 +71,7 @@ impl<const N: usize> core::fmt::Display for FilterBounds<N> {
                 above,
             } => write!(
                 f,
-                "the bounds on c do not ensure convergence: with c = {c:?} and a plant a = {a:?}, Re C/A0 is {} at {frequency} rad/s, not above {above}; narrow the bounds on c, or what is plausible",
+                "the bounds on c do not ensure convergence: with c = {c:?} and a plant a = {a:?}, Re C/A0 is {:.3} at {frequency:.3e} rad/s, not above {above}; narrow the bounds on c, or what is plausible",
                 excess + above
             ),
             Self::PlantUnstable { a } => write!(
@@ -170,5 +171,19 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
             plausible,
             self.gain().positive_above(),
         )
+    }
+
+    /// As [`with_filter_bounds`](Self::with_filter_bounds), with the answer of [`check_filter_bounds`](Self::check_filter_bounds) to it.
+    ///
+    /// # Errors
+    /// [`Error::StartOutside`], [`Error::Plausible`].
+    pub fn with_filter_bounds_for(
+        self,
+        bounds: Bounds<N>,
+        plausible: &Bounds<N>,
+    ) -> Result<(Self, FilterBounds<N>), Error> {
+        let bounded = self.with_filter_bounds(bounds)?;
+        let checked = bounded.check_filter_bounds(plausible)?;
+        Ok((bounded, checked))
     }
 }

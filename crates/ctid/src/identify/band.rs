@@ -38,7 +38,11 @@ pub(super) fn bands(path: &Path, scaled: &Scaled) -> Trajectory {
         trajectory.samples.push(point.sample);
         trajectory.time.push(scaled.seconds[point.sample]);
         let theta = &unscale * &point.theta + &shift;
-        let covariance = covariance(&ends, point, scaled.eta);
+        let covariance = if path.held {
+            None
+        } else {
+            covariance(&ends, point, scaled.eta)
+        };
         for i in 0..p {
             trajectory.values[i].push(theta[i]);
             let variance = covariance.as_ref().map_or(f64::NAN, |covariance| {

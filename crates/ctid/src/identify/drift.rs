@@ -6,6 +6,9 @@
 //! level(t) = int y e^{-eta (t - s)} ds / int e^{-eta (t - s)} ds
 //! ```
 //! The way of the level is cut into equal stretches, and the estimates of each are averaged.
+//!
+//! That they stand still says something only where the level has moved: where the memory is a small part of the record, and what it
+//! remembers covers a good part of the output's range. A shorter record cannot tell.
 
 use serde::Serialize;
 
@@ -18,6 +21,11 @@ const STRETCHES: usize = 8;
 /// The estimates move with the level where the ends of its way are so many standard errors apart.
 const APART: f64 = 3.0;
 
+/// The longest memory, of the record's length, and the least way of the remembered level, of the output's range, with which estimates
+/// that stand still say something. The default memory of a record that is long enough is a fifth of it.
+const LONGEST_MEMORY: f64 = 0.21;
+const LEAST_WAY: f64 = 0.2;
+
 /// Gain and time constant over the level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drift {
@@ -27,6 +35,24 @@ pub struct Drift {
     pub gain: OverLevel,
     /// `a_1`: the time constant for n = 1, otherwise the sum of the time constants, s.
     pub time_constant: OverLevel,
+    /// Memory over the length of the record.
+    pub memory_part: f64,
+    /// Way of the level that is remembered, over the output's range.
+    pub level_part: f64,
+}
+
+impl Drift {
+    /// Whether gain or time constant move more than chance would have it.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.gain.moves() || self.time_constant.moves()
+    }
+
+    /// Whether the level has moved enough for estimates that stand still to say that the process is linear.
+    #[must_use]
+    pub fn tells(&self) -> bool {
+        self.memory_part <= LONGEST_MEMORY && self.level_part >= LEAST_WAY
+    }
 }
 
 /// One parameter over the level.
@@ -115,12 +141,24 @@ pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order)
         let place = (STRETCHES as f64 * (level - low) / (high - low)) as usize;
         stretches[place.min(STRETCHES - 1)].add(level, gain, time_constant);
     }
+    let range = scaled
+        .y
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
+            (low.min(*y), high.max(*y))
+        });
+    let duration = scaled.time.last().copied().unwrap_or(f64::NAN);
     let seen: Vec<&Stretch> = stretches.iter().filter(|s| s.count > 0.0).collect();
-    Some(Drift {
+    let drift = Drift {
         level: seen.iter().map(|s| scaled.output(s.level)).collect(),
         gain: OverLevel::new(&seen, |s| s.gain),
         time_constant: OverLevel::new(&seen, |s| s.time_constant),
-    })
+        memory_part: 1.0 / (scaled.eta * duration),
+        level_part: (high - low) / (range.1 - range.0),
+    };
+    // one stretch alone, or standard errors of 0: nothing to compare
+    let known = [&drift.gain, &drift.time_constant].map(|over| over.difference.is_finite());
+    (known == [true, true]).then_some(drift)
 }
 
 /// The level that is remembered at every sample, scaled.

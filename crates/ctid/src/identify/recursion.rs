@@ -3,7 +3,9 @@
 use ct_constrained::Bounds;
 use ct_rls::{ContinuousRls, DynamicRls, RecursiveEstimator, Weights};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-use stabilized_oe::{BlockDiagonal, Derivatives, FilterBounds, StabilizedOe, check_filter_bounds};
+use stabilized_oe::{
+    BlockDiagonal, FilterBounds, IoSample, StabilizedOe, StateVariableFilters, check_filter_bounds,
+};
 
 use super::Order;
 use super::scaled::Scaled;
@@ -19,6 +21,10 @@ const P_OUTPUT_ERROR: f64 = 10.0;
 /// How far the plausible plants reach about the start, and the bounds on c: factors, the widest that are sure come first.
 const PLAUSIBLE: [f64; 4] = [2.0, 1.5, 1.25, 1.1];
 const BOUNDS: [f64; 4] = [2.0, 1.5, 1.2, 1.05];
+
+/// The output error keeps every lag above this part of the sampling interval, where the others are those of the start. Less cannot be
+/// seen, and `y_m^(n)`, which is divided by `a_n`, would be so large that the recursion takes itself for sure.
+const SHORTEST_LAG: f64 = 0.05;
 
 /// Where the recursion was.
 #[derive(Debug, Clone)]
@@ -37,6 +43,8 @@ pub(super) struct Point {
 pub(super) struct Path {
     pub order: Order,
     pub points: Vec<Point>,
+    /// Bounds on the parameters have acted in the second half: the scatter of the estimates says nothing of their errors then.
+    pub held: bool,
     pub warnings: Vec<String>,
 }
 
@@ -45,6 +53,7 @@ impl Path {
         Self {
             order,
             points: Vec::new(),
+            held: false,
             warnings: Vec::new(),
         }
     }
@@ -77,8 +86,16 @@ impl Path {
 
 fn untold(order: Order) -> Error {
     Error::Usage(format!(
-        "the record does not tell the parameters of order {order} apart; try a lower order, or a record with more movement in its input"
+        "the record does not tell the parameters of order {order} apart; try {}a record with more movement in its input",
+        or_lower(order)
     ))
+}
+
+/// The first of what to try: `--order 2,0, or `; nothing where there is no lower order.
+pub(super) fn or_lower(order: Order) -> String {
+    order
+        .lower()
+        .map_or_else(String::new, |lower| format!("--order {lower}, or "))
 }
 
 /// Whether the k-th of `count` samples is kept.
@@ -148,7 +165,8 @@ pub(super) fn equation_error(scaled: &Scaled, order: Order) -> Result<Path, Erro
     a.extend(end.theta.iter().take(order.n));
     if !ct_lti::Polynomial::new(a)?.is_hurwitz() {
         return Err(Error::Usage(format!(
-            "the estimates at the end are those of an unstable model; try a lower order than {order}, or --method stabilized-oe, whose model is kept stable"
+            "the estimates at the end are those of an unstable model; try {}--method stabilized-oe, whose model is kept stable",
+            or_lower(order)
         )));
     }
     Ok(path)
@@ -195,19 +213,24 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
             "no bounds on the error filter make convergence sure for any plants around the start, for n = {N}; compare with --method ct-rls"
         ));
     }
-    let mut estimator = StabilizedOe::new(gain, Filtered::<N>::new(scaled)?)?
+    let filters = StateVariableFilters::<N>::with_input(scaled.bandwidth, scaled.hold)?;
+    let mut estimator = StabilizedOe::new(gain, filters)?
         .with_offset()
+        .with_theta_bounds(theta_bounds(scaled, N)?)?
         .with_filter_bounds(bounds)?
         .with_model_state(at_rest(scaled))?;
     let count = scaled.time.len();
+    let mut held_early = 0;
     let following = scaled.steps().skip(1).chain([0.0]);
-    for (k, (step, next)) in scaled.steps().zip(following).enumerate() {
+    for (k, next) in following.enumerate() {
+        if 2 * k <= count {
+            held_early = estimator.bounded().theta;
+        }
         // the last sample is not held
         if next > 0.0 {
-            let sample = Raw {
+            let sample = IoSample {
                 u: scaled.u[k],
                 y: scaled.y[k],
-                step,
             };
             estimator.update(&sample, next);
         }
@@ -221,6 +244,15 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
         }
     }
     estimator.health()?;
+    let held = estimator.bounded().theta - held_early;
+    if held > 0 {
+        path.held = true;
+        path.warnings.push(format!(
+            "a time constant is too short to be seen: in the second half a bound held a coefficient of A above 0 (steps: {held}), and standard errors \
+             are not known; {}",
+            lower_or_faster(order)
+        ));
+    }
     let unstable = estimator.bounded().unstable;
     if unstable > 0 {
         path.warnings.push(format!(
@@ -229,6 +261,24 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     }
     path.warnings.extend(left_plausible(&path, plausible, &a)?);
     Ok(path)
+}
+
+/// What to try where the model is too fast for the record.
+pub(super) fn lower_or_faster(order: Order) -> String {
+    match order.lower() {
+        None => "sample faster".to_owned(),
+        Some(lower) => format!("try --order {lower}"),
+    }
+}
+
+fn theta_bounds<const P: usize>(scaled: &Scaled, n: usize) -> Result<Bounds<P>, Error> {
+    let mut lower = [f64::NEG_INFINITY; P];
+    let slower = std::iter::once(1.0).chain(lags(n));
+    for (lower, slower) in lower.iter_mut().zip(slower).take(n) {
+        *lower = SHORTEST_LAG * scaled.interval * slower;
+    }
+    let bounds = Bounds::new(lower, [f64::INFINITY; P]);
+    Ok(bounds.map_err(stabilized_oe::Error::from)?)
 }
 
 /// `y` and its derivatives at rest on the first sample.
@@ -285,49 +335,6 @@ fn left_plausible<const N: usize>(
     })
 }
 
-/// One sample, and the step that led to it.
-#[derive(Debug, Clone, Copy)]
-struct Raw {
-    u: f64,
-    y: f64,
-    step: f64,
-}
-
-/// State variable filters that know what the input does between samples.
-struct Filtered<const N: usize> {
-    u: ct_lti::StateVariableFilter,
-    y: ct_lti::StateVariableFilter,
-}
-
-impl<const N: usize> Filtered<N> {
-    fn new(scaled: &Scaled) -> Result<Self, Error> {
-        let [u, y] = scaled.filters(N)?;
-        Ok(Self { u, y })
-    }
-}
-
-impl<const N: usize> Derivatives<N> for Filtered<N> {
-    type Sample = Raw;
-
-    fn take(&mut self, sample: &Raw, _: f64, inputs: &mut [f64]) -> Option<f64> {
-        let u = self.u.update(sample.u, sample.step).ok()?;
-        let y = self.y.update(sample.y, sample.step).ok()?;
-        for (input, u) in inputs.iter_mut().zip(u) {
-            *input = *u;
-        }
-        y.first().copied()
-    }
-
-    fn error(&mut self, _: f64, model: &[f64; N]) -> [f64; N] {
-        let y = self.y.derivatives();
-        core::array::from_fn(|i| y[i + 1] - model[i])
-    }
-
-    fn smooth_inputs(&self) -> bool {
-        true
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -340,6 +347,15 @@ mod tests {
         for (a, b) in third.iter().zip([1.0, 1.0 / 3.0, 1.0 / 27.0]) {
             assert!((a - b).abs() < 1e-15);
         }
+    }
+
+    #[test]
+    fn a_lower_order_is_advised_where_there_is_one() {
+        let order = |n, m| Order { n, m };
+        assert_eq!(or_lower(order(3, 3)), "--order 2,2, or ");
+        assert_eq!(or_lower(order(1, 0)), "");
+        assert_eq!(lower_or_faster(order(2, 0)), "try --order 1,0");
+        assert_eq!(lower_or_faster(order(1, 1)), "sample faster");
     }
 
     #[test]

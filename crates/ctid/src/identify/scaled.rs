@@ -13,6 +13,12 @@ const GRID: usize = 60;
 /// Bandwidth of the filters, over the inverse of the time constant of first order. Higher lets noise through, lower hides fast dynamics.
 const BANDWIDTH: f64 = 3.0;
 
+/// Below this over the time constant of first order the filters hide what is looked for.
+const LEAST_BANDWIDTH: f64 = 0.1;
+
+/// So many times below that, and above the sampling rate, nothing is left of the signals.
+const WIDEST: f64 = 100.0;
+
 /// The least memory, in time constants.
 const LEAST_MEMORY: f64 = 10.0;
 
@@ -29,6 +35,8 @@ pub(super) struct Scaled {
     pub hold: Hold,
     /// Time constant of first order, s: the unit of time.
     unit: f64,
+    /// Median step of the time, in the same unit.
+    pub interval: f64,
     /// Time as it is in the record, s.
     pub seconds: Vec<f64>,
     /// Means and standard deviations of input and output.
@@ -80,6 +88,13 @@ impl Scaled {
                 "the filters' bandwidth of {bandwidth} 1/s is beyond what samples every {step} s show; take --bandwidth {fastest:.3} at most"
             ));
         }
+        let slowest = LEAST_BANDWIDTH / unit;
+        if bandwidth < slowest {
+            warnings.push(format!(
+                "the filters' bandwidth of {bandwidth} 1/s hides a time constant of {unit:.3} s: nothing is learnt of it, whatever the standard errors say; \
+                 take --bandwidth {slowest:.3e} at least"
+            ));
+        }
         let memory = request
             .memory
             .unwrap_or((MEMORY_PART * duration).max(LEAST_MEMORY * unit));
@@ -94,6 +109,7 @@ impl Scaled {
             y,
             hold,
             unit,
+            interval: step / unit,
             seconds: record.time.clone(),
             input,
             output,
@@ -103,6 +119,19 @@ impl Scaled {
             first_order_error,
         };
         (scaled, warnings)
+    }
+
+    /// A bandwidth with which the filters pass nothing, or nothing but rounding.
+    pub fn check_bandwidth(&self) -> Result<(), Error> {
+        let low = LEAST_BANDWIDTH / WIDEST;
+        let high = WIDEST / self.interval;
+        if (low..=high).contains(&self.bandwidth) {
+            return Ok(());
+        }
+        let [found, low, high] = [self.bandwidth, low, high].map(|b| b / self.unit);
+        Err(Error::Usage(format!(
+            "--bandwidth is {found:e} 1/s, but the filters need one from {low:.1e} to {high:.1e} 1/s for this record; without the option it is found"
+        )))
     }
 
     pub fn settings(&self) -> Settings {

@@ -197,7 +197,7 @@ fn drift(found: &Identification, look: Look) -> String {
     for line in table(&sides, &rows) {
         text += &format!("  {line}\n");
     }
-    text += &look.paragraph("  ", drift_verdict(found));
+    text += &look.paragraph("  ", &drift_verdict(found));
     text.push('\n');
     text
 }
@@ -211,16 +211,25 @@ pub(crate) fn time_constant_name(found: &Identification) -> &'static str {
 }
 
 /// What the drift says, nothing where none is known.
-pub(crate) fn drift_verdict(found: &Identification) -> &'static str {
-    match &found.drift {
-        None => "",
-        Some(drift) if drift.gain.moves() || drift.time_constant.moves() => {
-            "The estimates move with the level by more than chance: the process is not linear over this range, or not of this order."
-        }
-        Some(_) => {
-            "The estimates do not move with the level beyond their standard errors; a shorter --memory sees faster changes, less surely."
-        }
+pub(crate) fn drift_verdict(found: &Identification) -> String {
+    let Some(drift) = &found.drift else {
+        return String::new();
+    };
+    if drift.moves() {
+        return "The estimates move with the level by more than chance: the process is not linear over this range, or not of this order."
+            .to_owned();
     }
+    if drift.tells() {
+        return "The estimates do not move with the level beyond their standard errors; a shorter --memory sees faster changes, less surely."
+            .to_owned();
+    }
+    let percent = |part: f64| numbers::significant(100.0 * part, 2);
+    format!(
+        "This record is too short to tell whether the estimates move with the level: the memory is {} % of it, and the level that it \
+         remembers covers {} % of the output's range; record longer, or try a shorter --memory.",
+        percent(drift.memory_part),
+        percent(drift.level_part)
+    )
 }
 
 fn error(found: &Identification, look: Look) -> String {
@@ -341,6 +350,11 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
             ),
         ));
     }
+    if let Some(memory) = in_loop.memory {
+        let memory = numbers::duration(memory);
+        let sentence = format!("{memory}; a drift is followed with as much delay");
+        facts.push(("memory", sentence));
+    }
     if let Some(health) = &in_loop.health {
         facts.push((
             "recursion",
@@ -362,12 +376,14 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
 /// The verdict of condition (14), in words.
 pub(crate) fn condition(condition: &Condition) -> String {
     let verdict = match condition.verdict {
-        Verdict::Holds => "it holds: a recursion that keeps the filter of this start converges",
+        Verdict::Holds => {
+            "it holds if these estimates are the plant: then a recursion that keeps the filter of this start converges"
+        }
         Verdict::Positive => {
-            "it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
+            "if these estimates are the plant it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
         }
         Verdict::Negative => {
-            "it fails, and the real part falls below 0: a recursion that keeps the filter of this start may go the wrong way; renew the filter"
+            "if these estimates are the plant it fails, and the real part falls below 0: a recursion that keeps the filter of this start may go the wrong way; renew the filter"
         }
         Verdict::Unstable => "the loop of the estimates is not stable",
     };

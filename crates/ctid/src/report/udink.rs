@@ -4,7 +4,7 @@ use super::figures::{self, Colour, Curve, Figure, Panel, Values};
 use super::page::{self, NOTICES, Page, figure, section};
 use super::tables::table;
 use super::text::{escape, significant};
-use crate::tables::gains::{Gains, Kind, Row, TRUTH};
+use crate::tables::gains::{Gains, Kind, Limits, Row, TRUTH};
 use crate::tables::udink::{LargerP, Rule, Study};
 use crate::tables::{Cell, Comparison};
 
@@ -53,10 +53,11 @@ fn headline(study: &Study) -> String {
          the same in every table. A cell is inside where the printed figure, give or take its rounding, lies in the \
          5 to 95 % range of the runs; of cells that agree, one in ten lies outside by chance.</p></div>\n\
          <ol class=\"trail apart\">\n{trail}</ol>\n\
-         <details><summary>What the paper does not print, and is assumed</summary><ul>\n{assumptions}</ul></details>\n\
+         <details><summary>What the paper does not print, and is assumed</summary><ul>\n{assumptions}</ul></details>\n<p>The paper\u{2019}s own bounds on c^: {}.</p>\n\
          {NOTICES}</header>\n",
         study.verdict(),
-        study.runs
+        study.runs,
+        escape(&study.filter_bounds)
     )
 }
 
@@ -193,6 +194,17 @@ fn larger_p(rows: &[LargerP]) -> String {
 }
 
 fn gains(gains: &Gains) -> String {
+    let checked: String = gains
+        .checked
+        .iter()
+        .map(|checked| {
+            format!(
+                "<li>{} bounds: {}.</li>\n",
+                checked.bounds.name(),
+                escape(&checked.says)
+            )
+        })
+        .collect();
     let rows: String = gains
         .rows
         .iter()
@@ -220,13 +232,14 @@ fn gains(gains: &Gains) -> String {
             "Ends at: a1, a2, b0 at 2000 s, step 0.05 s; the truth is (1, 1, 1). Error: of the worst parameter, mean over the last quarter \
              of 1000 s, step 0.1 s, 1 % of noise; median of the noises. The constant gain stays at P(0) = I and does not average the noise out.",
         ),
+        format!("<ul>\n{checked}</ul>\n"),
     ]
     .concat();
     section(
         "gains",
         "The three gains on one experiment of second order",
         "a2 y″ + a1 y′ + y = b0 u with all parameters 1, three sines, derivatives given, started from (2, 2, 0.5) with P(0) = I. \
-         Bounds keep c where C/A is strictly positive real.",
+         c is free, within wide bounds, or within bounds inside which C/A − 1/2 is strictly positive real.",
         &content,
     )
 }
@@ -245,7 +258,7 @@ fn gain_row(row: &Row, noises: usize) -> String {
          <td class=\"number\">{}</td><td class=\"number\">{} to {}</td><td class=\"number\">{lost}</td></tr>\n",
         row.variant.gain.name(),
         row.variant.rule.name(),
-        if row.variant.bounded { "on c" } else { "none" },
+        row.variant.bounds.name(),
         significant(row.noisy_error, 2),
         significant(row.noisy_q05, 2),
         significant(row.noisy_q95, 2),
@@ -362,9 +375,14 @@ fn counterexample_figure(gains: &Gains) -> Figure {
     Figure::over_time("counterexample", 660, panels, curves)
 }
 
-/// Bounds in the upper panel, none in the lower; Euler's rule thin.
+/// A panel for each bounds; Euler's rule thin.
 fn gains_figure(gains: &Gains) -> Figure {
-    let panels = ["error, no bounds", "error, c bounded"].map(|title| Panel {
+    let titles = [
+        "error, no bounds",
+        "error, wide bounds",
+        "error, sure bounds",
+    ];
+    let panels = titles.map(|title| Panel {
         log: true,
         range: Some([-2.3, 1.3]),
         ..Panel::new(title, "")
@@ -373,14 +391,14 @@ fn gains_figure(gains: &Gains) -> Figure {
         let (colour, dash) = look(row.variant.gain);
         let exact = row.variant.rule == Rule::Exact;
         let name = format!("{}, {}", row.variant.gain.name(), row.variant.rule.name());
-        let panel = usize::from(row.variant.bounded);
+        let panel = row.variant.bounds as usize;
         let data = (&row.curve.time[..], &row.curve.values[..]);
         let curve = Curve {
             width: if exact { 2.2 } else { 1.0 },
-            legend: !row.variant.bounded,
+            legend: row.variant.bounds == Limits::None,
             ..Curve::line(&name, panel, colour, data)
         };
         curve.dashed(if exact { "solid" } else { dash })
     });
-    Figure::over_time("gains", 560, panels.into(), curves.collect())
+    Figure::over_time("gains", 760, panels.into(), curves.collect())
 }

@@ -153,12 +153,29 @@ pub(crate) fn notes(study: &Study) -> Vec<String> {
     };
     let counts = &study.first.iterations;
     let [gain, tau] = study.second.tangent;
-    let printed = |of: &str| {
+    let cell = |method: &str, of: &str| {
         let mut cells = study.tables.iter();
-        let cell = cells.find(|cell| cell.method == "Ki = 0.074" && cell.of == of);
-        cell.map_or(String::new(), figure_of)
+        cells.find(|cell| cell.method == method && cell.of == of)
     };
+    let printed = |of: &str| cell("Ki = 0.074", of).map_or(String::new(), figure_of);
     let (printed_k, printed_tau) = (printed("K"), printed("tau"));
+    let tangent = [("K", gain), ("tau", tau)]
+        .into_iter()
+        .filter_map(|(of, truth)| Some((cell("F-CLOE theta", of)?, truth)));
+    let (mut share, mut deviations) = (0.0_f64, 0.0_f64);
+    for (cell, truth) in tangent {
+        let off = (cell.mean - truth).abs();
+        share = share.max(off / truth);
+        deviations = deviations.max(off / cell.sd);
+    }
+    let beyond = match deviations > CHANCE {
+        true => format!(
+            "more than chance: up to {} standard deviations of its figures",
+            numbers::significant(deviations, 2)
+        ),
+        false => "within chance".to_owned(),
+    };
+    let share = numbers::significant(100.0 * share, 1);
     let difference = match study.first.diagonal_difference {
         0.0 => "are the same to the last digit".to_owned(),
         share => format!(
@@ -166,7 +183,7 @@ pub(crate) fn notes(study: &Study) -> Vec<String> {
             numbers::significant(share, 1)
         ),
     };
-    vec![
+    let mut notes = vec![
         format!(
             "With mu diag(J'') the estimates in theta and delta {difference}, and need {} and {} iterations.",
             mean(&counts.plain_diagonal),
@@ -178,14 +195,42 @@ pub(crate) fn notes(study: &Study) -> Vec<String> {
             mean(&study.second.normalised.iterations),
         ),
         format!(
-            "The emulated tank has K = {gain:.3} and tau = {tau:.2} s at its operating point: the output error finds them where it knows the sensor's filter, \
-             instruments on raw levels find the secant, which a dead zone of the pump moves."
+            "The emulated tank has K = {gain:.3} and tau = {tau:.2} s at its operating point: where it knows the sensor's filter, the output error finds them \
+             to {share} %, {beyond}; instruments on raw levels find the secant, which a dead zone of the pump moves."
         ),
         format!(
             "With Ki = 0.074 as printed, in the rig and in the model, it finds K = {printed_k} and tau = {printed_tau} s: not what the paper prints."
         ),
-    ]
+    ];
+    notes.extend(not_reproduced(study));
+    notes
 }
+
+/// What misses the paper by orders of magnitude and has no band that says so.
+fn not_reproduced(study: &Study) -> Option<String> {
+    let misses = |cell: &&Cell| {
+        let ratio = cell.paper.map(|paper| cell.mean / paper);
+        cell.band.is_none() && ratio.is_some_and(|ratio| !(1.0 / FAR..=FAR).contains(&ratio))
+    };
+    let said = |cell: &Cell| {
+        let (paper, here) = (printed(cell), figure_of(cell));
+        format!("{} ({paper} printed, {here} here)", cell.cell)
+    };
+    let missed: Vec<String> = study.tables.iter().filter(misses).map(said).collect();
+    (!missed.is_empty()).then(|| {
+        format!(
+            "Not reproduced, and without a band: {}. They are not among the {} cells.",
+            missed.join(", "),
+            study.of
+        )
+    })
+}
+
+/// So many times more or less is another order of magnitude.
+const FAR: f64 = 10.0;
+
+/// What is further off, in standard deviations, is not chance.
+const CHANCE: f64 = 3.0;
 
 fn figure(study: &Study, look: Look) -> String {
     let shown = &study.second.figure;

@@ -1,14 +1,14 @@
 //! The three gains of the stabilized output error on one experiment of second order: block-diagonal (the paper's), full, and constant;
-//! by Euler's rule and by the exact step; with and without bounds on `c^`.
+//! by Euler's rule and by the exact step; without bounds on `c^`, with wide ones and with sure ones.
 //!
 //! Plant: `a_2 y'' + a_1 y' + y = b_0 u` with all parameters 1, at rest at 0; `u = sum_i sin(w_i t + 0.7 i^2)`, w = 1.4, 2.2, 3.2 rad/s.
 //! Start: `theta^ = (2, 2, 0.5)`, `c^ = (1, 1)`, `P = I`, eta = 0.01 1/s; the constant gain stays at `P(0)`. Derivatives of `y` are given.
-//! Bounds: c_1 in 0.5 to 3 s, c_2 in 0.4 to 3 s^2, inside which C^/A0 is strictly positive real.
+//! Wide bounds: c_1 in 0.5 to 3 s, c_2 in 0.4 to 3 s^2; at their corner (0.5, 3) C^/A0 is not positive real. Sure ones: c_1 in 0.9 to 3 s,
+//! c_2 in 0.7 to 2 s^2, inside which C^/A0 - 1/2 is strictly positive real for all plants within 10 % of this one. Both are checked.
 //! Noise: white noise held over a step through `1/(s/5 + 1)^3`, 1 % of the power of `y`.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use ct_constrained::Bounds;
 use ct_lti::{Hold, StateVariableFilter};
 use ct_rls::{ContinuousRls, Euler, ExactHold, RecursiveEstimator, Weights};
 use ct_signals::noise;
@@ -19,6 +19,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 use stabilized_oe::{BlockDiagonal, Full, Gain, Integrator, Known, KnownSample, StabilizedOe};
 
+use super::gain_bounds::checked;
+pub use super::gain_bounds::{Checked, Limits};
 use super::udink::Rule;
 use super::{median, quantile};
 use crate::Error;
@@ -30,7 +32,6 @@ const FILTER_TRUTH: [f64; 2] = [1.0, 1.0];
 const START: [f64; 3] = [2.0, 2.0, 0.5];
 const FILTER_START: [f64; 2] = [1.0, 1.0];
 const ETA: f64 = 0.01;
-const FILTER_BOUNDS: ([f64; 2], [f64; 2]) = ([0.5, 0.4], [3.0, 3.0]);
 const FREQUENCIES: [f64; 3] = [1.4, 2.2, 3.2];
 
 /// Poles of the noise's filter, rad/s, and its power over that of the output.
@@ -101,21 +102,17 @@ pub struct Variant {
     pub gain: Kind,
     /// The rule.
     pub rule: Rule,
-    /// Whether c^ is kept to its bounds.
-    pub bounded: bool,
+    /// What c^ is kept to.
+    pub bounds: Limits,
 }
 
 /// All of them, the paper's gain first.
 pub fn variants() -> Vec<Variant> {
     let mut variants = Vec::new();
     for gain in Kind::ALL {
-        for bounded in [false, true] {
+        for bounds in Limits::ALL {
             for rule in Rule::ALL {
-                variants.push(Variant {
-                    gain,
-                    rule,
-                    bounded,
-                });
+                variants.push(Variant { gain, rule, bounds });
             }
         }
     }
@@ -157,6 +154,8 @@ pub struct Curve {
 pub struct Gains {
     /// Noises.
     pub noises: usize,
+    /// What the check says of the bounds on c^.
+    pub checked: Vec<Checked>,
     /// One for each variant.
     pub rows: Vec<Row>,
     /// The counterexample to the paper's theorem.
@@ -231,6 +230,7 @@ pub fn compare(seed: u64, progress: &(impl Fn(Progress) + Sync)) -> Result<Gains
         .collect::<Result<_, Error>>()?;
     Ok(Gains {
         noises: NOISES,
+        checked: checked()?,
         rows,
         counterexample: counterexample()?,
     })
@@ -248,7 +248,7 @@ pub fn counterexample() -> Result<Vec<Counterexample>, Error> {
             let variant = Variant {
                 gain,
                 rule: Rule::Exact,
-                bounded: false,
+                bounds: Limits::None,
             };
             let mut found = Counterexample {
                 gain,
@@ -321,7 +321,7 @@ fn run_by<I: Integrator>(
             let theta = ContinuousRls::with_integrator(theta, unit, weights)?;
             let c = ContinuousRls::with_integrator(c, SMatrix::identity(), weights)?;
             let gain: BlockDiagonal<2, 3, I> = BlockDiagonal::new(theta, c);
-            follow(gain, variant.bounded, (samples, grid), apart, watch)
+            follow(gain, variant.bounds, (samples, grid), apart, watch)
         }
         Kind::Full => {
             let [a1, a2, b0] = START;
@@ -332,12 +332,12 @@ fn run_by<I: Integrator>(
             let ([a1, a2, b0], [c1, c2]) = (TRUTH, FILTER_TRUTH);
             let truth = [a1, a2, b0, c1, c2];
             let together = |gain: &Full<2, 3, 5, I>| distance(gain.rls(), truth);
-            follow(gain, variant.bounded, (samples, grid), together, watch)
+            follow(gain, variant.bounds, (samples, grid), together, watch)
         }
         Kind::Constant => {
             let gain: BlockDiagonal<2, 3, I> =
                 BlockDiagonal::constant((theta, unit), (c, SMatrix::identity()), 1.0)?;
-            follow(gain, variant.bounded, (samples, grid), apart, watch)
+            follow(gain, variant.bounds, (samples, grid), apart, watch)
         }
     }
 }
@@ -352,15 +352,13 @@ fn distance<const P: usize, I: Integrator>(rls: &ContinuousRls<P, I>, truth: [f6
 
 fn follow<G: Gain<2, 3>>(
     gain: G,
-    bounded: bool,
+    limits: Limits,
     (samples, grid): (&[Sample], Grid),
     distance: impl Fn(&G) -> f64,
     mut watch: impl Watch,
 ) -> Result<bool, Error> {
     let mut estimator = StabilizedOe::new(gain, Known::<2, 1>::new(true))?;
-    if bounded {
-        let (lower, upper) = FILTER_BOUNDS;
-        let bounds = Bounds::new(lower, upper).map_err(stabilized_oe::Error::from)?;
+    if let Some(bounds) = limits.bounds()? {
         estimator = estimator.with_filter_bounds(bounds)?;
     }
     for (k, sample) in samples.iter().enumerate() {

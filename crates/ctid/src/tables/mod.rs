@@ -5,10 +5,12 @@
 
 pub mod baysse;
 pub mod baysse_text;
+mod gain_bounds;
 pub mod gains;
 pub mod paper_baysse;
 pub mod paper_udink;
 pub mod udink;
+mod udink_run;
 pub mod udink_text;
 
 use serde::Serialize;
@@ -155,10 +157,10 @@ pub struct Outside {
 
 impl Comparison {
     /// Whether so many lie inside as can be expected of figures of the same process: nine of ten, less
-    /// what chance takes.
+    /// what chance takes; and no run was lost, as none of the paper's was.
     #[must_use]
     pub fn consistent(&self) -> bool {
-        self.inside as f64 >= CONSISTENT * self.of as f64
+        self.failed == 0 && self.inside as f64 >= CONSISTENT * self.of as f64
     }
 
     pub(crate) fn new(
@@ -213,6 +215,16 @@ mod tests {
         );
         let none = Cell::new(1, "x", Printed::new(2.0, 1), [f64::NAN].into_iter());
         assert!(!none.inside && none.median.is_nan());
+    }
+
+    #[test]
+    fn lost_runs_are_not_consistent() {
+        let cells = || {
+            let runs = (0..=100).map(f64::from);
+            vec![Cell::new(1, "x", Printed::new(50.0, 0), runs)]
+        };
+        assert!(Comparison::new(cells(), 0, |_| "").consistent());
+        assert!(!Comparison::new(cells(), 1, |_| "").consistent());
     }
 
     #[test]

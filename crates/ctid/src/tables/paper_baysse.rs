@@ -64,10 +64,11 @@ pub const RIG_PLAIN: Measured = [p(6.90, 2), p(107.73, 2), p(1.84e-4, 6), p(0.05
 pub const RIG_NORMALISED: Measured = [p(6.93, 2), p(108.12, 2), p(1.80e-4, 6), p(0.0470, 4)];
 
 /// What cannot be as it is printed, and what is done instead.
-pub const MISPRINTS: [&str; 9] = [
+pub const MISPRINTS: [&str; 10] = [
     "Table II's controller, Ki = 0.074: very probably 0.0074, which 40/tau = lambda = 0.5372 and Kp/Ki = tau give. With 0.074 the fit does not come near the printed gain and time constant.",
     "Table II's filter, zeta = 0.6618 = 1.2 lambda: it is 1.2 times Kp = 0.5515, not 1.2 times 0.5372; the two may be swapped.",
     "(26) has phi^ phi^' in the inverse, which is biased even in open loop; instruments have phi^ phi'. Both are in the table.",
+    "(19) and (20): with u = K1 q the gain would be K0 K2/K1; q = K1 u is right.",
     "(8) has stray transposes; (31) is right.",
     "(6), first line: the gradient step has no length; a unit step sends K to -0.4.",
     "\"A larger mu converges faster\": it is slower, and safer.",

@@ -29,6 +29,9 @@ pub fn text(study: &Study, look: Look) -> String {
         text += &look.paragraph("  - ", sentence);
     }
     text.push('\n');
+    let checked = format!("Its own bounds on c^: {}.", study.filter_bounds);
+    text += &look.paragraph("  ", &checked);
+    text.push('\n');
     text + &larger_p(&study.larger_p, look) + &gains(&study.gains, look)
 }
 
@@ -144,7 +147,7 @@ fn gains(gains: &Gains, look: Look) -> String {
     let heading = [
         "gain",
         "rule",
-        "bounds",
+        "c in",
         "end: a1, a2, b0",
         "error",
         "5 to 95 %",
@@ -163,7 +166,7 @@ fn gains(gains: &Gains, look: Look) -> String {
         lines.push(vec![
             row.variant.gain.name().to_owned(),
             row.variant.rule.name().to_owned(),
-            if row.variant.bounded { "on c" } else { "-" }.to_owned(),
+            row.variant.bounds.name().to_owned(),
             end,
             numbers::significant(row.noisy_error, 2),
             range,
@@ -192,5 +195,10 @@ fn gains(gains: &Gains, look: Look) -> String {
          excludes; with bounds on c it does not.",
         gains.noises
     );
-    text + &look.paragraph("  ", &note)
+    text += &look.paragraph("  ", &note);
+    for checked in &gains.checked {
+        let line = format!("{} bounds: {}.", checked.bounds.name(), checked.says);
+        text += &look.paragraph("  ", &line);
+    }
+    text
 }

@@ -159,37 +159,55 @@ impl Rig {
         (fit.plant.theta().to_vec(), uncertainty)
     }
 
-    /// In how many of `runs` the 95 % interval of each parameter holds the truth; then the same of intervals for a
-    /// white residual, and in how many the noise was placed where it is.
-    pub fn coverage(&self, runs: u64) -> (Vec<usize>, Vec<usize>, usize) {
+    /// Fits of so many runs beside the truth.
+    pub fn coverage(&self, runs: u64) -> Coverage {
         use fcloe::NoisePath;
         use rayon::prelude::*;
 
-        let truth = self.plant.theta();
-        let each: Vec<(Vec<bool>, Vec<bool>, bool)> = (0..runs)
+        let each: Vec<Run> = (0..runs)
             .into_par_iter()
-            .map(|seed| {
-                let (theta, uncertainty) = self.fit(seed);
-                let half = uncertainty.half_widths(0.95).unwrap();
-                let hit = |half: &[f64]| -> Vec<bool> {
-                    (0..truth.len())
-                        .map(|i| (theta[i] - truth[i]).abs() <= half[i])
-                        .collect()
-                };
-                let white: Vec<f64> = uncertainty
-                    .white_std_errors
-                    .iter()
-                    .map(|s| 1.96 * s)
-                    .collect();
-                let placed = (uncertainty.noise.path == NoisePath::Loop) == self.in_loop;
-                (hit(&half), hit(&white), placed)
-            })
+            .map(|seed| self.fit(seed))
             .collect();
-        let count = |of: &dyn Fn(usize) -> usize| (0..truth.len()).map(of).collect();
-        (
-            count(&|i| each.iter().filter(|run| run.0[i]).count()),
-            count(&|i| each.iter().filter(|run| run.1[i]).count()),
-            each.iter().filter(|run| run.2).count(),
-        )
+        let truth = self.plant.theta();
+        let parameters = 0..truth.len();
+        let hits = |half: &dyn Fn(&Uncertainty) -> Vec<f64>| -> Vec<usize> {
+            let halves: Vec<Vec<f64>> = each.iter().map(|(_, known)| half(known)).collect();
+            let hit = |i: usize, run: usize| (each[run].0[i] - truth[i]).abs() <= halves[run][i];
+            let of = |i| (0..each.len()).filter(|run| hit(i, *run)).count();
+            parameters.clone().map(of).collect()
+        };
+        let path = |known: &Uncertainty| (known.noise.path == NoisePath::Loop) == self.in_loop;
+        Coverage {
+            hits: hits(&|known| known.half_widths(0.95).unwrap()),
+            white: hits(&|known| known.white_std_errors.iter().map(|s| 1.96 * s).collect()),
+            placed: each.iter().filter(|(_, known)| path(known)).count(),
+            variance_ratios: parameters
+                .clone()
+                .map(|i| variance_ratio(&each, i))
+                .collect(),
+        }
     }
+}
+
+/// What the fits of many runs say of their intervals.
+#[derive(Debug)]
+pub struct Coverage {
+    /// In how many runs the 95 % interval of each parameter holds the truth.
+    pub hits: Vec<usize>,
+    /// The same of intervals for a white residual.
+    pub white: Vec<usize>,
+    /// In how many runs the noise was placed where it is.
+    pub placed: usize,
+    /// Mean of the variances claimed for each parameter over the variance of its estimates.
+    pub variance_ratios: Vec<f64>,
+}
+
+/// Estimates and what is known of them.
+type Run = (Vec<f64>, Uncertainty);
+
+fn variance_ratio(each: &[Run], i: usize) -> f64 {
+    let mean = |of: &dyn Fn(&Run) -> f64| each.iter().map(of).sum::<f64>() / each.len() as f64;
+    let centre = mean(&|(theta, _)| theta[i]);
+    let scatter = mean(&|(theta, _)| (theta[i] - centre).powi(2));
+    mean(&|(_, known)| known.std_errors[i].powi(2)) / scatter
 }

@@ -2,4 +2,3 @@
 #![allow(dead_code, clippy::unwrap_used)]
 
 pub mod second_order;
-pub mod tables;

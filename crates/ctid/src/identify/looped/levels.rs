@@ -7,10 +7,14 @@ use super::Task;
 use crate::Error;
 use crate::identify::Method;
 
-/// A loop rests in the first rows if there are so many in which the drive stands still, and the output's means over their two halves
-/// are no further apart than this share of its range.
+/// A loop rests in the first rows if there are so many in which the drive stands still, and neither output nor command would go
+/// further than this share of its range at their present pace, in the time that the record itself takes to forget.
 const ROWS_AT_REST: usize = 6;
 const MOVES: f64 = 0.03;
+/// What is less than so many standard errors is noise.
+const NOISE: f64 = 3.0;
+/// Without an integrator, rows for so many times that time are long enough to rest in, whatever the noise.
+const LONG: f64 = 3.0;
 
 /// Where zero of reference, input and output is. The loop has to rest there when the record begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
@@ -48,9 +52,37 @@ impl Task<'_> {
                     self.request.method.id()
                 )));
             }
-            _ if rests(&zero.y, still) => Offsets::FirstRows(still),
+            _ if self.rests(&zero, still) => Offsets::FirstRows(still),
             _ => Offsets::Means,
         })
+    }
+
+    /// Whether output and command stand still too while the drive does. Under an integrator the output stands where the reference
+    /// is. Where nothing says that, the rows have to be enough for a slow transient to be seen.
+    fn rests(&self, record: &LoopRecord, still: usize) -> bool {
+        if still < ROWS_AT_REST || still >= record.len() {
+            return false;
+        }
+        let memory = forgets_after(&record.y) as f64;
+        let stands = |signal: &[f64]| {
+            let (low, high) = crate::plot::limits([signal]);
+            let trend = Trend::new(&signal[..still]);
+            let unseen = NOISE * trend.slope_error * memory;
+            let room = MOVES * (high - low);
+            (trend.slope.abs() * memory <= room + unseen, unseen <= room)
+        };
+        let (y_stands, would_be_seen) = stands(&record.y);
+        let u_stands = record.u.as_deref().is_none_or(|u| stands(u).0);
+        let integrates = self.controller.s().coefficient(0) == 0.0;
+        let at_its_level = match record.r.as_deref() {
+            Some(r) if integrates && !self.controller.is_open_loop() => {
+                let (low, high) = crate::plot::limits([record.y.as_slice()]);
+                let y = Trend::new(&record.y[..still]);
+                (y.mean - r[0]).abs() <= MOVES * (high - low) + NOISE * y.mean_error
+            }
+            _ => would_be_seen || still as f64 >= LONG * memory,
+        };
+        y_stands && u_stands && at_its_level
     }
 
     /// The levels of drive and output that are subtracted.
@@ -64,14 +96,44 @@ impl Task<'_> {
     }
 }
 
-/// Whether the output stands still too while the drive does.
-fn rests(y: &[f64], still: usize) -> bool {
-    let (first, second) = y[..still].split_at(still / 2);
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let (low, high) = crate::plot::limits([y]);
-    still >= ROWS_AT_REST
-        && still < y.len()
-        && (mean(second) - mean(first)).abs() <= MOVES * (high - low)
+/// A line through the first rows of a signal, in rows and in its own unit.
+struct Trend {
+    mean: f64,
+    mean_error: f64,
+    slope: f64,
+    slope_error: f64,
+}
+
+impl Trend {
+    fn new(y: &[f64]) -> Self {
+        let n = y.len() as f64;
+        let (mean, middle) = (y.iter().sum::<f64>() / n, 0.5 * (n - 1.0));
+        let across = n * (n * n - 1.0) / 12.0;
+        let about = |(k, y): (usize, &f64)| (k as f64 - middle) * (y - mean);
+        let slope = y.iter().enumerate().map(about).sum::<f64>() / across;
+        let off = |(k, y): (usize, &f64)| (y - mean - slope * (k as f64 - middle)).powi(2);
+        let variance = y.iter().enumerate().map(off).sum::<f64>() / (n - 2.0);
+        Self {
+            mean,
+            mean_error: (variance / n).sqrt(),
+            slope,
+            slope_error: (variance / across).sqrt(),
+        }
+    }
+}
+
+/// After how many rows a record has forgotten what it was: its correlation with itself is below 1/e; up to a factor 2.
+fn forgets_after(y: &[f64]) -> usize {
+    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+    let together = |lag: usize| {
+        let pairs = y.iter().zip(&y[lag..]);
+        pairs.map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>() / (y.len() - lag) as f64
+    };
+    let own = together(0);
+    let lags = std::iter::successors(Some(1_usize), |lag| lag.checked_mul(2));
+    lags.take_while(|lag| *lag < y.len())
+        .find(|lag| together(*lag) <= own / std::f64::consts::E)
+        .unwrap_or(y.len())
 }
 
 /// Where the levels of a record come from.

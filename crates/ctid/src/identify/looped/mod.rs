@@ -26,6 +26,11 @@ const MISSED: f64 = 0.03;
 /// A command at its limits for more than this share of the rows is said.
 const LIMITED: f64 = 0.01;
 
+/// A simulation error below this share of the output's deviation is not compared with another.
+const SURELY_GOOD: f64 = 0.02;
+/// So many times the simulation error of the batch fit says that the end of a recursion is not the plant of the record.
+const MUCH_WORSE: f64 = 1.5;
+
 /// What a method that has to do with the loop says besides the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InLoop {
@@ -43,9 +48,11 @@ pub struct InLoop {
     pub start: Start,
     /// Of a batch fit.
     pub batch: Option<Batch>,
+    /// Memory of a recursion, `1/eta`, s.
+    pub memory: Option<f64>,
     /// Of a recursion, at its end.
     pub health: Option<LoopHealth>,
-    /// Condition (14) of a recursion with the filter of the start.
+    /// Condition (14) of a recursion with the filter of the start, if the estimates are the plant; not where it is doubtful that they are.
     pub convergence: Option<Convergence>,
 }
 
@@ -102,8 +109,15 @@ struct Found {
     levels_from: LevelChoice,
     start: Start,
     batch: Option<Batch>,
-    recursion: Option<(Trajectory, LoopHealth)>,
+    recursion: Option<Run>,
     warnings: Vec<String>,
+}
+
+/// How a recursion went.
+struct Run {
+    trajectory: Trajectory,
+    health: LoopHealth,
+    memory: f64,
 }
 
 /// Identifies; everything that [`super::identify`] refuses, and what `fcloe` refuses.
@@ -187,11 +201,19 @@ impl Task<'_> {
         warnings.extend(limited(record, self.request.limits));
         warnings.extend(super::doubtful(&parameters, order));
         warnings.extend(super::too_fast(&time_constants, record, order));
+        let doubt = found
+            .recursion
+            .as_ref()
+            .and_then(|run| self.astray(&run.health, rmse, deviation, &record.output.unit));
         let convergence = match self.request.method {
             Method::Ls | Method::Iv => None,
+            _ if doubt.is_some() => None,
             _ => Some(self.convergence(&found.start, &found.plant)?),
         };
-        let (trajectory, health) = found.recursion.unzip();
+        warnings.extend(doubt);
+        let memory = found.recursion.as_ref().map(|run| run.memory);
+        let recursion = found.recursion.map(|run| (run.trajectory, run.health));
+        let (trajectory, health) = recursion.unzip();
         let of = |polynomial: &ct_lti::Polynomial| polynomial.coefficients().to_vec();
         Ok(Identification {
             schema: 1,
@@ -214,6 +236,7 @@ impl Task<'_> {
                 mismatch,
                 start: found.start,
                 batch: found.batch,
+                memory,
                 health,
                 convergence,
             }),
@@ -224,6 +247,33 @@ impl Task<'_> {
                 output: record.output.clone(),
                 simulated,
             },
+        })
+    }
+
+    /// Why the end of a recursion is not to be taken for the plant, if there is a reason: its loop was about to become unstable, or one
+    /// model for the whole record simulates it much better.
+    fn astray(&self, health: &LoopHealth, rmse: f64, deviation: f64, unit: &str) -> Option<String> {
+        let untold = "so condition (14) is not told";
+        if health.refused > 0 {
+            return Some(format!(
+                "{} steps were refused, as the loop would not have been stable: the estimates are not to be trusted, {untold}; compare with --method fcloe",
+                health.refused
+            ));
+        }
+        if rmse <= SURELY_GOOD * deviation {
+            return None;
+        }
+        let centred = self.centred(self.offsets_at_rest().ok()?).ok()?;
+        let batch = self.batch(centred).ok()?;
+        let simulated = self
+            .simulated(&batch.record, &batch.plant, batch.levels)
+            .ok()?;
+        let output = self.record.output.values.iter();
+        let best = rms(output.zip(&simulated).map(|(y, model)| y - model));
+        (rmse > MUCH_WORSE * best).then(|| {
+            format!(
+                "--method fcloe simulates the record with an error of {best:.3} {unit} instead of {rmse:.3}: the plant drifts, or the recursion went astray, {untold}"
+            )
         })
     }
 

@@ -2,16 +2,20 @@
 
 use ct_rls::RecursiveEstimator;
 use fcloe::{
-    ClosedLoop, LoopRecord, LoopSample, Offsets, OperatingPoint, PlantModel, Problem,
-    RecursiveFcloe, RecursiveSettings,
+    LoopRecord, LoopSample, Offsets, OperatingPoint, PlantModel, Problem, RecursiveFcloe,
+    RecursiveSettings,
 };
 
-use super::{Found, LevelChoice, Start, Task};
+use super::levels::chosen;
+use super::{Found, LevelChoice, Run, Start, Task};
 use crate::Error;
 use crate::identify::{Trajectory, rms};
 
 /// The part of the record that a recursion is started from.
 const BEGINNING: f64 = 0.3;
+/// The memory that is not asked for: this part of the record, and so many time constants.
+const MEMORY_PART: f64 = 0.2;
+const MEMORY_TIME_CONSTANTS: f64 = 10.0;
 
 impl Task<'_> {
     /// Sample by sample, from what the beginning of the record gives.
@@ -19,6 +23,15 @@ impl Task<'_> {
         let rows = ((BEGINNING * record.len() as f64) as usize).max(1);
         let part =
             |signal: &Option<Vec<f64>>| signal.as_ref().map(|v| v[..rows.min(v.len())].to_vec());
+        // Levels that are not to be found are those of the whole record: the means of its beginning are others.
+        let levels_from = chosen(&record);
+        let record = match self.finds_levels(&record) {
+            true => record,
+            false => LoopRecord {
+                offsets: Offsets::Known(record.operating_point()),
+                ..record
+            },
+        };
         let beginning = LoopRecord {
             r: part(&record.r),
             u: part(&record.u),
@@ -54,7 +67,8 @@ impl Task<'_> {
             ..record
         };
         let start = begun.plant;
-        let settings = self.recursive_settings(&record, &start, point)?;
+        let memory = self.memory(&record, &start);
+        let settings = self.recursive_settings(&record, memory, point)?;
         let mut estimator = RecursiveFcloe::new(&start, &self.controller, settings)?;
         let parameters = start.theta().len();
         let mut trajectory = Trajectory {
@@ -79,21 +93,33 @@ impl Task<'_> {
             plant: estimator.plant()?,
             std_errors: trajectory.std_errors.iter().map(last).collect(),
             levels: begun.levels,
-            levels_from: begun.levels_from,
+            levels_from: match begun.levels_from {
+                LevelChoice::Estimated => LevelChoice::Estimated,
+                _ => levels_from,
+            },
             start: Start {
                 theta: start.theta().to_vec(),
                 ..begun.start
             },
             batch: None,
-            recursion: Some((trajectory, estimator.loop_health()?)),
+            recursion: Some(Run {
+                trajectory,
+                health: estimator.loop_health()?,
+                memory,
+            }),
             record,
             warnings,
         })
     }
 
+    /// Whether the levels are to be found with the start.
+    fn finds_levels(&self, record: &LoopRecord) -> bool {
+        record.offsets == Offsets::Means && self.request.levels == LevelChoice::Auto
+    }
+
     /// What a recursion starts from: the batch fit where it has to find the levels too, else the best regression.
     fn begun(&self, record: LoopRecord) -> Result<Found, Error> {
-        if record.offsets == Offsets::Means && self.request.levels == LevelChoice::Auto {
+        if self.finds_levels(&record) {
             let mut found = self.batch(record)?;
             found.start.from = "output error of the first rows";
             return Ok(found);
@@ -101,35 +127,35 @@ impl Task<'_> {
         self.regression(record, true)
     }
 
-    /// Those of `fcloe`, for the amplitude and the speed of this loop.
+    /// Those of `fcloe`, for the amplitude of this loop.
     fn recursive_settings(
         &self,
         record: &LoopRecord,
-        start: &PlantModel,
+        memory: f64,
         point: OperatingPoint,
     ) -> Result<RecursiveSettings, Error> {
         let (drive, _) = record.drive(&self.controller)?;
         let mean = drive.iter().sum::<f64>() / drive.len().max(1) as f64;
         let power = rms(drive.iter().map(|v| v - mean)).powi(2);
-        let closed = ClosedLoop::new(start, &self.controller)?;
-        let p = closed.characteristic();
-        let degree = p.degree().unwrap_or(1).max(1) as f64;
-        let pole = (p.coefficient(0) / p.leading()).abs().powf(1.0 / degree);
-        // They were tried on a loop with poles about 0.01 rad/s.
-        let speed = pole / 0.01;
-        let first_order = self.orders.n == 1;
-        let (gain, factor, fading, step_limit) = if first_order {
-            (10.0, 0.98_f64, 300.0, 0.05)
-        } else {
-            (1.0, 0.995, 1000.0, 0.02)
-        };
-        let (forgetting, fading) = match self.request.memory {
-            Some(memory) => (1.0 / memory, f64::INFINITY),
-            None => (-factor.ln() * speed, fading / speed),
+        // They were tried on loops of the first and the second order.
+        let (gain, step_limit) = match self.orders.n {
+            1 => (10.0, 0.05),
+            _ => (1.0, 0.02),
         };
         Ok(RecursiveSettings {
             operating_point: point,
-            ..RecursiveSettings::new(gain / power, forgetting, fading, step_limit)
+            ..RecursiveSettings::new(gain / power, 1.0 / memory, f64::INFINITY, step_limit)
         })
+    }
+
+    /// What was asked for; else a part of the record, and enough of the plant's time constants. It does not fade, as parameters that
+    /// drift are followed by forgetting alone.
+    fn memory(&self, record: &LoopRecord, start: &PlantModel) -> f64 {
+        let n = self.orders.n;
+        let theta = start.theta();
+        let slowest = theta[0].abs().max(theta[n - 1].abs().powf(1.0 / n as f64));
+        let duration = record.step * record.len() as f64;
+        let own = (MEMORY_PART * duration).max(MEMORY_TIME_CONSTANTS * slowest);
+        self.request.memory.unwrap_or(own)
     }
 }

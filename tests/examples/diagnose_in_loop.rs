@@ -1,6 +1,6 @@
 //! Diagnoses in closed loop, on the measured command and in the simulated loop: effects, groups, false claims, seconds.
 //!
-//! `cargo run --release -p ctid-tests --example closed_loop -- 12`; the records of a cell, then the correlation of the
+//! `cargo run --release -p ctid-tests --example diagnose_in_loop -- 12`; the records of a cell, then the correlation of the
 //! coloured noise (0.9) and one plant (all).
 
 use ctid_tests::{Drive, Rig};

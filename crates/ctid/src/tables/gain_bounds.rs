@@ -1,0 +1,97 @@
+//! Bounds on c^ in the comparison of the gains, and whether C^/A0 - gamma/(2 c) is strictly positive real inside them.
+
+use ct_constrained::Bounds;
+use serde::Serialize;
+use stabilized_oe::check_filter_bounds;
+
+use crate::Error;
+
+/// `a_1, a_2` of the plants that the bounds on c are checked for.
+const PLAUSIBLE: ([f64; 2], [f64; 2]) = ([0.9, 0.9], [1.1, 1.1]);
+
+/// Bounds on c^.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Limits {
+    /// None.
+    None,
+    /// Wide ones, which reach to where C^/A0 is not positive real.
+    Wide,
+    /// Inside them C^/A0 - gamma/(2 c) is strictly positive real.
+    Sure,
+}
+
+impl Limits {
+    /// All.
+    pub const ALL: [Self; 3] = [Self::None, Self::Wide, Self::Sure];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Wide => "wide",
+            Self::Sure => "sure",
+        }
+    }
+
+    pub(super) fn bounds(self) -> Result<Option<Bounds<2>>, Error> {
+        let bounds = match self {
+            Self::None => return Ok(None),
+            Self::Wide => Bounds::new([0.5, 0.4], [3.0, 3.0]),
+            Self::Sure => Bounds::new([0.9, 0.7], [3.0, 2.0]),
+        };
+        Ok(Some(bounds.map_err(stabilized_oe::Error::from)?))
+    }
+}
+
+/// What the check says of bounds on c^.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Checked {
+    /// Which.
+    pub bounds: Limits,
+    /// Whether it is, for all plausible plants.
+    pub hold: bool,
+    /// The same in a sentence, with the place where they fail.
+    pub says: String,
+}
+
+/// Asks of the wide and the sure bounds whether `C^/A0 - gamma/(2 c)` is strictly positive real inside them.
+pub(super) fn checked() -> Result<Vec<Checked>, Error> {
+    let plausible = Bounds::new(PLAUSIBLE.0, PLAUSIBLE.1).map_err(stabilized_oe::Error::from)?;
+    let mut all = Vec::new();
+    for limits in Limits::ALL {
+        let Some(bounds) = limits.bounds()? else {
+            continue;
+        };
+        // gamma/(2 c) of the adaptive gains; the constant one asks less, 0
+        let found = check_filter_bounds(&bounds, &plausible, 0.5)?;
+        all.push(Checked {
+            bounds: limits,
+            hold: found.hold(),
+            says: found.to_string(),
+        });
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sure_bounds_are_and_the_wide_ones_are_not() {
+        let checked = checked().unwrap();
+        let [wide, sure] = &checked[..] else {
+            unreachable!()
+        };
+        assert!(
+            !wide.hold && wide.says.contains("do not ensure"),
+            "{wide:?}"
+        );
+        assert!(sure.hold, "{sure:?}");
+        // nor are the wide ones for the constant gain, and this very plant
+        let plant = Bounds::new([1.0; 2], [1.0; 2]).unwrap();
+        let wide = Limits::Wide.bounds().unwrap().unwrap();
+        assert!(!check_filter_bounds(&wide, &plant, 0.0).unwrap().hold());
+    }
+}

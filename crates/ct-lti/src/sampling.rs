@@ -7,7 +7,7 @@
 use alloc::{vec, vec::Vec};
 
 use crate::error::finite;
-use crate::matrix::apply;
+use crate::matrix::{apply, dot};
 use crate::phi::PhiFunctions;
 use crate::{Error, Hold, StateSpace};
 
@@ -33,6 +33,12 @@ pub struct Sampled {
 }
 
 impl Sampled {
+    /// The state after the step, from `x` (n entries) under an input that is held at `u`: [`Hold::Zero`] is taken for granted.
+    pub fn held_step(&self, x: &[f64], u: f64) -> Vec<f64> {
+        let rows = self.phi.chunks_exact(x.len().max(1)).zip(&self.g0);
+        rows.map(|(row, g)| dot(row, x) + g * u).collect()
+    }
+
     fn new(n: usize) -> Self {
         Self {
             phi: vec![0.0; n * n],

@@ -231,11 +231,6 @@ impl<const P: usize> UdFactor<P> {
         SMatrix::from_fn(|i, j| entry(self.u.as_flattened(), &self.d, i, j))
     }
 
-    /// The pivots `D`, all above 0.
-    pub fn pivots(&self) -> &[f64; P] {
-        &self.d
-    }
-
     /// Sum of the diagonal of `U D U'`.
     pub fn trace(&self) -> f64 {
         trace(self.u.as_flattened(), &self.d)
@@ -261,11 +256,5 @@ impl<const P: usize> UdFactor<P> {
     pub fn information_norm(&self, x: &SVector<f64, P>) -> f64 {
         let mut x = x.data.0[0];
         information_norm(self.u.as_flattened(), &self.d, &mut x)
-    }
-
-    /// `1/lambda_max(P)`, the smallest eigenvalue of `P^-1`.
-    pub fn smallest_information(&self) -> f64 {
-        let mut m = self.to_matrix().data.0;
-        1.0 / largest_eigenvalue(m.as_flattened_mut(), P)
     }
 }

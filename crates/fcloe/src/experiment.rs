@@ -158,12 +158,7 @@ impl Held {
     }
 
     fn advance(&mut self, input: f64) {
-        let rows = self.sampled.phi.chunks_exact(self.state.len().max(1));
-        let next = rows.zip(&self.sampled.g0).map(|(row, g)| {
-            let own: f64 = row.iter().zip(&self.state).map(|(a, x)| a * x).sum();
-            own + g * input
-        });
-        self.state = next.collect();
+        self.state = self.sampled.held_step(&self.state, input);
     }
 }
 

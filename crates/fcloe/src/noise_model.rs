@@ -189,7 +189,7 @@ fn filtered(system: &StateSpace, sampled: &Sampled, w: &[f64]) -> Vec<f64> {
     let mut x = vec![0.0; system.order()];
     let output = w.iter().map(|w| {
         let v = system.output(&x, *w);
-        x = advanced(sampled, &x, *w);
+        x = sampled.held_step(&x, *w);
         v
     });
     output.collect()
@@ -200,15 +200,10 @@ fn unfiltered(system: &StateSpace, sampled: &Sampled, v: &[f64]) -> Vec<f64> {
     let mut x = vec![0.0; system.order()];
     let input = v.iter().map(|v| {
         let w = (v - system.output(&x, 0.0)) / system.d();
-        x = advanced(sampled, &x, w);
+        x = sampled.held_step(&x, w);
         w
     });
     input.collect()
-}
-
-fn advanced(sampled: &Sampled, x: &[f64], input: f64) -> Vec<f64> {
-    let rows = sampled.phi.chunks_exact(x.len().max(1)).zip(&sampled.g0);
-    rows.map(|(row, g)| dot(row, x) + g * input).collect()
 }
 
 /// `H` as a system in discrete time with innovations of variance 1, and the autocovariance of its output.

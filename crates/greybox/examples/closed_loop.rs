@@ -7,19 +7,17 @@ use std::collections::BTreeMap;
 use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
 use greybox::{FitOptions, Setup, coloured, fit_from, robust};
 use plants::controller::Controller;
-use plants::{Command, Known, Plant, Scales, Simulator, Structure};
+use plants::{Command, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use support::Rig;
+
+#[path = "../tests/support/mod.rs"]
+mod support;
 
 const SAMPLES: usize = 800;
 const INTERVAL: f64 = 2.0;
-
-struct Rig {
-    plant: Plant,
-    theta: Vec<f64>,
-    levels: Vec<f64>,
-}
 
 /// How the noise comes about: `v = a v + e + c e_before`.
 #[derive(Clone, Copy)]
@@ -29,68 +27,54 @@ struct Colour {
     c: f64,
 }
 
-impl Rig {
-    fn known(&self) -> Known {
-        let area = match self.plant {
-            Plant::SingleTank => [Some(154.0), None],
-            Plant::CascadedTanks => [Some(154.0), Some(154.0)],
-            _ => [None, None],
+/// A record of the rig in the loop.
+fn in_loop(
+    rig: &Rig,
+    controller: &Controller,
+    colour: Colour,
+    sigma: f64,
+    seed: u64,
+) -> Option<Record> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let scales = Scales::from_ranges(
+        (0.0, 10.0),
+        (5.0, 25.0),
+        INTERVAL,
+        INTERVAL * SAMPLES as f64,
+    );
+    let structure = Structure::new(rig.plant, rig.known(), scales);
+    let mut simulator = Simulator::new(&structure, &rig.theta, &rig.levels, 5.0).ok()?;
+    let mut regulator = controller.start(&[5.0]);
+    let level = *rig.levels.last()?;
+    let r = excitation::steps(SAMPLES, 40..=120, 0.9 * level, 1.1 * level, &mut rng).ok()?;
+    let e = noise::white(SAMPLES + 200, 1.0, &mut rng);
+    let mut v = Vec::with_capacity(SAMPLES + 200);
+    for k in 0..e.len() {
+        let before = if k > 0 {
+            (v[k - 1], e[k - 1])
+        } else {
+            (0.0, 0.0)
         };
-        Known {
-            area,
-            tank_height: Some(60.0),
-            input_range: Some(10.0),
-        }
+        v.push(colour.a * before.0 + e[k] + colour.c * before.1);
     }
-
-    fn record(
-        &self,
-        controller: &Controller,
-        colour: Colour,
-        sigma: f64,
-        seed: u64,
-    ) -> Option<Record> {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let scales = Scales::from_ranges(
-            (0.0, 10.0),
-            (5.0, 25.0),
-            INTERVAL,
-            INTERVAL * SAMPLES as f64,
-        );
-        let structure = Structure::new(self.plant, self.known(), scales);
-        let mut simulator = Simulator::new(&structure, &self.theta, &self.levels, 5.0).ok()?;
-        let mut regulator = controller.start(&[5.0]);
-        let level = *self.levels.last()?;
-        let r = excitation::steps(SAMPLES, 40..=120, 0.9 * level, 1.1 * level, &mut rng).ok()?;
-        let e = noise::white(SAMPLES + 200, 1.0, &mut rng);
-        let mut v = Vec::with_capacity(SAMPLES + 200);
-        for k in 0..e.len() {
-            let before = if k > 0 {
-                (v[k - 1], e[k - 1])
-            } else {
-                (0.0, 0.0)
-            };
-            v.push(colour.a * before.0 + e[k] + colour.c * before.1);
-        }
-        let v = &v[200..];
-        let rms = (v.iter().map(|v| v * v).sum::<f64>() / SAMPLES as f64).sqrt();
-        let (mut u, mut y) = (Vec::new(), Vec::new());
-        for k in 0..SAMPLES {
-            let reading = simulator.read() + sigma * v[k] / rms;
-            let command = regulator.command(r[k], reading, INTERVAL);
-            simulator.advance(Command::held(command), INTERVAL);
-            y.push(reading);
-            u.push(command);
-        }
-        Some(Record {
-            name: "rig".into(),
-            time: (0..SAMPLES).map(|k| k as f64 * INTERVAL).collect(),
-            input: Signal::new("u", "V", u),
-            output: Signal::new("y", "cm", y),
-            reference: Some(Signal::new("r", "cm", r)),
-            hold: Hold::Zero,
-        })
+    let v = &v[200..];
+    let rms = (v.iter().map(|v| v * v).sum::<f64>() / SAMPLES as f64).sqrt();
+    let (mut u, mut y) = (Vec::new(), Vec::new());
+    for k in 0..SAMPLES {
+        let reading = simulator.read() + sigma * v[k] / rms;
+        let command = regulator.command(r[k], reading, INTERVAL);
+        simulator.advance(Command::held(command), INTERVAL);
+        y.push(reading);
+        u.push(command);
     }
+    Some(Record {
+        name: "rig".into(),
+        time: (0..SAMPLES).map(|k| k as f64 * INTERVAL).collect(),
+        input: Signal::new("u", "V", u),
+        output: Signal::new("y", "cm", y),
+        reference: Some(Signal::new("r", "cm", r)),
+        hold: Hold::Zero,
+    })
 }
 
 type Estimate = (Vec<f64>, Vec<Option<f64>>);
@@ -140,16 +124,19 @@ fn main() {
             plant: Plant::SingleTankLinear,
             theta: vec![6.4, 100.0, -16.0],
             levels: vec![16.0],
+            ..Rig::single_tank()
         },
         Rig {
             plant: Plant::SingleTank,
             theta: vec![10.0, 12.5],
             levels: vec![16.0],
+            ..Rig::single_tank()
         },
         Rig {
             plant: Plant::CascadedTanks,
             theta: vec![10.0, 18.0, 12.5],
             levels: vec![7.7, 16.0],
+            ..Rig::single_tank()
         },
     ];
     let colours = [
@@ -195,7 +182,7 @@ fn main() {
                     ways(
                         rig,
                         &controller,
-                        rig.record(&controller, colour, 0.3, seed)?,
+                        in_loop(rig, &controller, colour, 0.3, seed)?,
                     )
                 })
                 .collect();

@@ -154,8 +154,7 @@ impl<const N: usize, const P: usize, I: Integrator> Gain<N, P> for BlockDiagonal
     }
 
     fn positive_above(&self) -> f64 {
-        let weights = self.theta.weights();
-        weights.gamma() / (2.0 * weights.c())
+        positive_above(self.theta.weights())
     }
 
     fn health(&self) -> Result<Health, Error> {
@@ -264,13 +263,17 @@ impl<const N: usize, const P: usize, const T: usize, I: Integrator> Gain<N, P>
     }
 
     fn positive_above(&self) -> f64 {
-        let weights = self.rls.weights();
-        weights.gamma() / (2.0 * weights.c())
+        positive_above(self.rls.weights())
     }
 
     fn health(&self) -> Result<Health, Error> {
         Ok(self.rls.health()?)
     }
+}
+
+/// What an adaptive gain asks of the error transfer function: `Re H > gamma/(2 c)`.
+fn positive_above(weights: Weights) -> f64 {
+    weights.gamma() / (2.0 * weights.c())
 }
 
 /// Guards under which a block winds up as the paper's does: no cap below 1e100, and no pause where the regressor is silent.

@@ -128,10 +128,22 @@ fn unbounded_and_projected() {
 #[test]
 fn bounds_inside_which_it_is_positive_real_do_better() {
     let plausible = Bounds::new([0.9, 0.9], [1.1, 1.1]).unwrap();
+    // weights(0.01) ask for more than gamma/(2 c) = 0.5.
     let says = |bounds| {
-        check_filter_bounds(&bounds, &plausible, 0.5)
+        let estimator = StabilizedOe::new(
+            block_diagonal::<ExactHold>(weights(0.01)),
+            Known::<2, 1>::new(true),
+        );
+        let (bounded, found) = estimator
             .unwrap()
-            .hold()
+            .with_filter_bounds_for(bounds, &plausible)
+            .unwrap();
+        assert_eq!(bounded.filter_bounds(), &bounds);
+        assert_eq!(
+            found,
+            check_filter_bounds(&bounds, &plausible, 0.5).unwrap()
+        );
+        found.hold()
     };
     let sure = Bounds::new([0.9, 0.7], [3.0, 2.0]).unwrap();
     assert!(says(sure) && !says(region()));

@@ -10,6 +10,9 @@
 //!   exceeds `x` times with a probability of `(1 + x/nu)^-nu` (the F distribution of 2 and `2 nu` degrees of freedom). An
 //!   autoregressive model would take a line for a resonance, so this test does without it, but for a first-order one.
 //! - **an instant**: windows of 1, 2, 4, ... samples of `w`, whose sums over the root of their length are standard normal.
+//! - **the level**: `w` against functions of what the model read a sample before. A term that is missing from a balance leaves a
+//!   residual that wanders with the level, and is no noise however slow it is. As `w` is white and independent of the past, its
+//!   regression on any past is chi-square, whatever the colour of the regressors.
 //! - **slowness**: the integral of the noise's autocorrelation over positive lags is longer than the slowest time constant
 //!   of the process. Such a noise can stand for anything that the process lacks, so it is no answer.
 //!
@@ -21,8 +24,12 @@ use std::f64::consts::{PI, SQRT_2};
 
 use ct_signals::{ArModel, Record, residual_tests::prewhitened_input_test};
 use greybox::Fit;
+use nalgebra::{DMatrix, DVector};
 use realfft::RealFftPlanner;
-use statrs::function::erf::erfc;
+use statrs::{
+    distribution::{ChiSquared, ContinuousCDF},
+    function::erf::erfc,
+};
 
 use crate::{Error, control_loop::slowest_time_constant, noise_floor::slowness, search::Node};
 
@@ -36,6 +43,11 @@ const NEAREST: usize = 3;
 const FARTHEST: usize = 12;
 const FEWEST: f64 = 4.0;
 
+/// Knots of the functions of the level, evenly over the range that the model visits.
+const KNOTS: usize = 11;
+/// A function counts where its squares sum to so many samples: fewer are as Gaussian as the noise is, and no more.
+const VISITED: f64 = 5.0;
+
 /// Cycles that a period has in the record at least.
 const CYCLES: usize = 3;
 
@@ -48,6 +60,8 @@ pub(crate) enum Remains {
     Period(f64),
     /// Something from an instant on, for a while \[s\].
     Instant(f64, f64),
+    /// The level.
+    Level,
     /// A wander: its correlation time and the process's slowest time constant \[s\].
     Slow(f64, f64),
 }
@@ -91,6 +105,18 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
         if let Some(what) = found {
             return Ok(Some(Left {
                 what,
+                record: Some(k),
+            }));
+        }
+    }
+    let models = match node.setup.simulate_loop(&own.x)? {
+        Some(run) => run.output,
+        None => node.setup.simulate(&own.x)?.output,
+    };
+    for (k, (model, residual)) in models.iter().zip(&residuals).enumerate() {
+        if level_p(model, &standardised(&own.noise, residual)) < level {
+            return Ok(Some(Left {
+                what: Remains::Level,
                 record: Some(k),
             }));
         }
@@ -159,6 +185,40 @@ fn standardised(noise: &ArModel, residual: &[f64]) -> Vec<f64> {
         *w /= rms.max(f64::MIN_POSITIVE);
     }
     white
+}
+
+/// p-value of the test that a whitened residual is independent of what the model read a sample before.
+fn level_p(model: &[f64], white: &[f64]) -> f64 {
+    let (low, high) = model
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
+            (low.min(y), high.max(y))
+        });
+    let width = (high - low) / (KNOTS - 1) as f64;
+    if !(width.is_finite() && width > 0.0) {
+        return 1.0;
+    }
+    // Hats, which sum to one: at a sample two neighbours are not zero.
+    let mut gram = DMatrix::<f64>::zeros(KNOTS, KNOTS);
+    let mut moment = DVector::<f64>::zeros(KNOTS);
+    for (y, w) in model.iter().zip(&white[1..]) {
+        let at = (y - low) / width;
+        let left = (at as usize).min(KNOTS - 2);
+        let hats = [(left, left as f64 + 1.0 - at), (left + 1, at - left as f64)];
+        for (i, a) in hats {
+            moment[i] += a * w;
+            for (j, b) in hats {
+                gram[(i, j)] += a * b;
+            }
+        }
+    }
+    let visited: Vec<usize> = (0..KNOTS).filter(|&i| gram[(i, i)] > VISITED).collect();
+    let gram = gram.select_rows(&visited).select_columns(&visited);
+    let moment = moment.select_rows(&visited);
+    let explained = gram
+        .cholesky()
+        .map_or(0.0, |factor| moment.dot(&factor.solve(&moment)));
+    ChiSquared::new(visited.len() as f64).map_or(1.0, |chi| chi.sf(explained.max(0.0)))
 }
 
 fn instant(record: &Record, white: &[f64], level: f64) -> Option<Remains> {
@@ -248,15 +308,21 @@ mod tests {
         let record = record();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         // At a level of one in a hundred, 600 series: chance exceeds 15 of them once in a thousand.
-        let (mut periods, mut instants) = (0, 0);
+        let (mut periods, mut instants, mut levels) = (0, 0, 0);
+        // A level that wanders, and one that steps and stays.
+        let wander = noise::ar1(SAMPLES, 3.0, 0.99, &mut rng);
+        let steps: Vec<f64> = (0..SAMPLES).map(|k| wander[k / 50 * 50]).collect();
         for run in 0..600 {
             let colour = [0.0, 0.8, 0.95][run % 3];
             let e = noise::ar1(SAMPLES, 0.1, colour, &mut rng);
             let model = ArModel::from_coefficients(&[colour], 1.0).unwrap();
             periods += usize::from(period(&record, &e, 0.01).unwrap().is_some());
-            instants += usize::from(instant(&record, &standardised(&model, &e), 0.01).is_some());
+            let white = standardised(&model, &e);
+            instants += usize::from(instant(&record, &white, 0.01).is_some());
+            levels += usize::from(level_p([&wander, &steps][run % 2], &white) < 0.01);
         }
         assert!(periods <= 15 && instants <= 15, "{periods}, {instants}");
+        assert!((1..=15).contains(&levels), "{levels}");
     }
 
     #[test]
@@ -275,6 +341,19 @@ mod tests {
             // To the width of a line.
             assert!((1.0 / found - 1.0 / wanted).abs() < 1.0 / record.duration());
         }
+    }
+
+    #[test]
+    fn a_function_of_the_level_is_found_under_noise_of_its_own_size() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let level = noise::ar1(SAMPLES, 3.0, 0.99, &mut rng);
+        let mut white = noise::white(SAMPLES, 1.0, &mut rng);
+        assert!(level_p(&level, &white) > 0.01);
+        for k in 1..SAMPLES {
+            white[k] += 0.5 * (2.0 * level[k - 1]).sin();
+        }
+        assert!(level_p(&level, &white) < NOT_NOISE);
+        assert!(level_p(&[2.0; SAMPLES], &white) == 1.0);
     }
 
     #[test]

@@ -68,6 +68,9 @@ fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
                 format!("at {at:.0}")
             }
         ),
+        Remains::Level => format!(
+            "{residual} follows the level, which noise does not: the balance lacks {effect}"
+        ),
         Remains::Slow(wander, process) => format!(
             "{residual} wanders more slowly than the process: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or {effect}",
             if wander < record {

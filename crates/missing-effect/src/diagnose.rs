@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use ct_signals::{ArModel, Record};
 use greybox::coloured;
+use plants::EffectInfo;
 use rayon::prelude::*;
 
 use crate::{
@@ -201,25 +202,34 @@ pub fn diagnose(
     if left.is_some() && !stopped {
         floor = floor.of_what_is_new();
     }
+    let mut last = trail.last().cloned().unwrap_or_else(|| base.clone());
     // What leaves the greater part of the error to something else is a remark, and not the answer.
+    let beside = left.filter(|_| !stopped && !last.added.is_empty());
+    let fair = match beside {
+        Some(found) => explained(&base, &last, found.above(&noise))? >= FAIR_PART,
+        None => true,
+    };
+    let mut groups = Vec::new();
+    if fair {
+        let (metric, per_sample) = if by_simulation || stopped {
+            (&white, slowness(&residual_colour(&last)?))
+        } else {
+            (&noise, 1.0)
+        };
+        groups = self::groups(&refine(&last, metric, &[])?, metric, per_sample)?;
+    }
+    // Nor is, beside something else, what an effect of the clock explains as well: that is some course of time, and
+    // whatever is left may have made it.
+    let by_clock = |id: &String| EffectInfo::find(id).is_some_and(|effect| effect.by_clock);
     let mut remark = None;
-    if let (Some(last), false) = (trail.last(), stopped)
-        && let Some(found) = left
-        && !last.added.is_empty()
-        && explained(&base, last, found.above(&noise))? < FAIR_PART
-    {
-        remark = Some(sentences::of_a_part(last, &problem.records[0].output.unit));
+    if !fair || beside.is_some() && groups.iter().flatten().any(by_clock) {
+        remark = Some(sentences::of_a_part(&last, &problem.records[0].output.unit));
         left = remains(&base, &own_base)?;
         own_of_last = Some(own_base);
         trail.truncate(1);
+        last = trail.last().cloned().unwrap_or_else(|| base.clone());
+        groups.clear();
     }
-    let last = trail.last().cloned().unwrap_or_else(|| base.clone());
-    let (metric, per_sample) = if by_simulation || stopped {
-        (&white, slowness(&residual_colour(&last)?))
-    } else {
-        (&noise, 1.0)
-    };
-    let groups = groups(&refine(&last, metric, &[])?, metric, per_sample)?;
     tell("telling apart", 2, 3);
     let (metric, believed) = if by_simulation {
         (&white, &base)

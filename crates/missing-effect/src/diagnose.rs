@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::{
     ControlLoop, Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step,
     Verdict,
-    confirm::{BIC_MARGIN, beyond_chance, confirm, least_useful},
+    confirm::{BIC_MARGIN, beyond_chance, confirm, improve, least_useful},
     noise_floor::{NOISE_ORDER, bic_in_colour, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
     remains::remains,
@@ -145,6 +145,9 @@ pub fn diagnose(
         if other.fit.bic() < confirmed.fit.bic() {
             confirmed = other;
         }
+    }
+    if !by_simulation {
+        confirmed = improve(confirmed, &noise)?;
     }
     // Each model with the colour of its own residual: what a coloured noise explains needs no effect.
     let own_base = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;

@@ -98,8 +98,8 @@ const EXCHANGED: usize = 12;
 /// What is behind by more than this part of an effect's own gain after a few steps does not catch up.
 const OUT_OF_REACH: f64 = 0.5;
 
-/// A child's starts: the parent's vector, with the new effect's parameters on the grid of its starts.
-fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
+/// A child's starts: the vector of each origin, with the new effect's parameters on the grid of its starts.
+fn grid(origins: &[&Node], child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let parameters = child.structure.effect_parameters(placed);
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
     for parameter in &parameters {
@@ -114,11 +114,12 @@ fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
             })
             .collect();
     }
-    combinations
-        .into_iter()
-        .map(|values| {
-            let mut x = transfer(parent, child);
-            for (parameter, value) in parameters.iter().zip(values) {
+    origins
+        .iter()
+        .flat_map(|origin| combinations.iter().map(move |values| (origin, values)))
+        .map(|(origin, values)| {
+            let mut x = transfer(origin, child);
+            for (parameter, &value) in parameters.iter().zip(values) {
                 let name = format!("{}.{}", placed.effect.id, parameter.name);
                 if let Some(at) = child.names().iter().position(|known| *known == name) {
                     x[at] = value;
@@ -174,10 +175,15 @@ struct Proposal<'a> {
     promise: f64,
 }
 
-fn propose<'a>(parent: &Node<'a>, placed: Placed, noise: &ArModel) -> Option<Proposal<'a>> {
+fn propose<'a>(
+    parent: &Node<'a>,
+    origins: &[&Node<'a>],
+    placed: Placed,
+    noise: &ArModel,
+) -> Option<Proposal<'a>> {
     let structure = parent.setup.structure.with(placed).ok()?;
     let setup = parent.setup.with_structure(structure).ok()?;
-    let mut ranked: Vec<(f64, Vec<f64>)> = grid(parent, &setup, placed)
+    let mut ranked: Vec<(f64, Vec<f64>)> = grid(origins, &setup, placed)
         .into_par_iter()
         .filter_map(|x| Some((promise(&setup, &x, noise)?, x)))
         .collect();
@@ -206,7 +212,7 @@ fn realise<'a>(proposal: Proposal<'a>, noise: &ArModel, stopping: Stopping) -> O
 pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Node<'a>> {
     let mut nodes: Vec<Node> = candidates(parent)
         .into_par_iter()
-        .filter_map(|placed| realise(propose(parent, placed, noise)?, noise, ROUGH))
+        .filter_map(|placed| realise(propose(parent, &[parent], placed, noise)?, noise, ROUGH))
         .collect();
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
@@ -291,7 +297,7 @@ pub(crate) fn grow<'a>(
         }
         let mut proposals: Vec<Proposal> = wanted
             .into_par_iter()
-            .filter_map(|(parent, placed)| propose(parent, placed, noise))
+            .filter_map(|(parent, placed)| propose(parent, &[parent], placed, noise))
             .collect();
         proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
         proposals.truncate(if size <= 2 {
@@ -383,10 +389,11 @@ pub(crate) fn exchanges<'a>(
 ) -> Result<Vec<Node<'a>>, Error> {
     let lacking = without(node, position, noise)?;
     let own = node.added[position];
+    // The other effects bend to mend what was taken out, and from there a stand-in may not find the way back.
     let mut proposals: Vec<Proposal> = candidates(&lacking)
         .into_par_iter()
         .filter(|placed| *placed != own)
-        .filter_map(|placed| propose(&lacking, placed, noise))
+        .filter_map(|placed| propose(&lacking, &[&lacking, node], placed, noise))
         .collect();
     proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
     // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
@@ -432,7 +439,7 @@ pub(crate) fn place<'a>(
     known: &Node<'a>,
     noise: &ArModel,
 ) -> Option<Node<'a>> {
-    let mut proposal = propose(parent, placed, noise)?;
+    let mut proposal = propose(parent, &[parent], placed, noise)?;
     proposal.starts.push(transfer(known, &proposal.setup));
     realise(proposal, noise, FINE)
 }

@@ -2,6 +2,7 @@
 
 use ct_signals::ArModel;
 use greybox::{Fit, fit_from, starts_around};
+use plants::Placed;
 use rayon::prelude::*;
 
 use crate::{
@@ -16,7 +17,7 @@ const MORE_ROUNDS: u64 = 3;
 /// After a rough fit, so many times the least cost is out of reach of its minimum.
 const HOPELESS: f64 = 1.5;
 
-/// The believed model, then one effect after the other, in the order in which the search added them.
+/// The believed model, then one effect after the other, first what lowers the error most.
 pub(crate) fn trail<'a>(
     base: &Node<'a>,
     last: &Node<'a>,
@@ -24,8 +25,17 @@ pub(crate) fn trail<'a>(
 ) -> Result<Vec<Node<'a>>, Error> {
     let mut trail = vec![refine(base, noise, &[])?];
     trail[0].fit = trail[0].fit.clone().continuing(&base.fit);
-    for (k, &placed) in last.added.iter().enumerate() {
-        let Some(mut node) = place(&trail[k], placed, last, noise) else {
+    for k in 0..last.added.len() {
+        let parent = &trail[k];
+        let remaining = last.added.iter().filter(|on| !parent.added.contains(on));
+        let nodes: Vec<Node> = remaining
+            .copied()
+            .collect::<Vec<Placed>>()
+            .into_par_iter()
+            .filter_map(|placed| place(parent, placed, last, noise))
+            .collect();
+        let least = |a: &Node, b: &Node| a.fit.rmse.total_cmp(&b.fit.rmse);
+        let Some(mut node) = nodes.into_iter().min_by(least) else {
             break;
         };
         // The end of the search has no vote: how often its minimum is found is counted over the starts around it.

@@ -102,18 +102,9 @@ pub(crate) fn least_useful<'a>(
         .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())))
 }
 
-/// How many ways the search had to find something where there is nothing: every start of every candidate is one.
+/// How many ways the search had to find something where there is nothing.
 fn candidates(node: &Node) -> f64 {
-    node.setup
-        .structure
-        .candidates()
-        .into_iter()
-        .map(|placed| {
-            let parameters = node.setup.structure.effect_parameters(placed);
-            parameters
-                .iter()
-                .map(|p| p.starts.len() as f64)
-                .product::<f64>()
-        })
-        .sum()
+    let structure = &node.setup.structure;
+    let candidates = structure.candidates();
+    candidates.into_iter().map(|on| structure.ways(on)).sum()
 }

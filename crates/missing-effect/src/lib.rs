@@ -18,6 +18,7 @@ mod remains;
 mod scores;
 mod search;
 mod sentences;
+mod spectral_line;
 mod step;
 mod trail;
 mod unknown;

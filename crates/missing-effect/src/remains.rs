@@ -6,9 +6,7 @@
 //! - **the command**: the past of the command, of its square, and of the size of its moves, against `w` (Haugh's test; a
 //!   square and a move show what is even in the command or hangs on its direction). A whitened residual is independent of
 //!   the past of anything, a controller's output included.
-//! - **a period**: a line of the spectrum against the mean of its `2 nu` neighbours, which a noise of a smooth spectrum
-//!   exceeds `x` times with a probability of `(1 + x/nu)^-nu` (the F distribution of 2 and `2 nu` degrees of freedom). An
-//!   autoregressive model would take a line for a resonance, so this test does without it, but for a first-order one.
+//! - **a period**: a line of the spectrum that stands out of its neighbours (`spectral_line.rs`).
 //! - **an instant**: windows of 1, 2, 4, ... samples of `w`, whose sums over the root of their length are standard normal.
 //! - **the level**: `w` against functions of what the model read a sample before. A term that is missing from a balance leaves a
 //!   residual that wanders with the level, and is no noise however slow it is. As `w` is white and independent of the past, its
@@ -17,39 +15,32 @@
 //!   of the process. Such a noise can stand for anything that the process lacks, so it is no answer.
 //!
 //! **References**: L. D. Haugh, J. American Statistical Association 71 (1976) 378-385; S. A. Billings, W. S. F. Voon,
-//! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244; D. J. Thomson, Spectrum
-//! estimation and harmonic analysis, Proc. IEEE 70 (1982) 1055-1096.
+//! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244.
 
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::SQRT_2;
 
 use ct_signals::{ArModel, Record, residual_tests::prewhitened_input_test};
 use greybox::Fit;
 use nalgebra::{DMatrix, DVector};
-use realfft::RealFftPlanner;
 use statrs::{
     distribution::{ChiSquared, ContinuousCDF},
     function::erf::erfc,
 };
 
-use crate::{Error, control_loop::slowest_time_constant, noise_floor::slowness, search::Node};
+use crate::{
+    Error, control_loop::slowest_time_constant, noise_floor::slowness, search::Node,
+    spectral_line::strongest_line,
+};
 
 /// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
 const NOT_NOISE: f64 = 1e-4;
 /// Longest window that is looked at, as a part of the record.
 const LONGEST_WINDOW: usize = 4;
 
-/// Neighbours of a line, from where its taper ends to where a smooth spectrum may have changed, and the fewest that do.
-const NEAREST: usize = 3;
-const FARTHEST: usize = 12;
-const FEWEST: f64 = 4.0;
-
 /// Knots of the functions of the level, evenly over the range that the model visits.
 const KNOTS: usize = 11;
 /// A function counts where its squares sum to so many samples: fewer are as Gaussian as the noise is, and no more.
 const VISITED: f64 = 5.0;
-
-/// Cycles that a period has in the record at least.
-const CYCLES: usize = 3;
 
 /// What a residual shows that noise does not; the first that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -246,45 +237,16 @@ fn instant(record: &Record, white: &[f64], level: f64) -> Option<Remains> {
 }
 
 fn period(record: &Record, residual: &[f64], level: f64) -> Result<Option<Remains>, Error> {
-    let n = residual.len();
-    // Flat enough for neighbours to be compared, by a filter that has no room for a line.
-    let mut flat = ArModel::fit(&[residual], 1)?.whiten(residual);
-    for (k, value) in flat.iter_mut().enumerate() {
-        *value *= (PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
-    }
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
-    let mut spectrum = transform.make_output_vec();
-    if transform.process(&mut flat, &mut spectrum).is_err() {
-        return Ok(None);
-    }
-    // Without the mean, and without the line at half the sampling rate, which has one degree of freedom.
-    let lines: Vec<f64> = spectrum[1..n.div_ceil(2)]
-        .iter()
-        .map(|line| line.norm_sqr())
-        .collect();
-    // What comes back less often than that is no period but a wander.
-    let least = (CYCLES - 1..lines.len())
-        .filter_map(|at| {
-            let around: Vec<f64> = (at.saturating_sub(FARTHEST)
-                ..lines.len().min(at + FARTHEST + 1))
-                .filter(|j| j.abs_diff(at) >= NEAREST)
-                .map(|j| lines[j])
-                .collect();
-            // The taper ties neighbours to each other: of two lines one counts.
-            let count = 0.5 * around.len() as f64;
-            let mean = around.iter().sum::<f64>() / (2.0 * count);
-            (count >= FEWEST && mean > 0.0)
-                .then(|| (-count * (lines[at] / (mean * count)).ln_1p(), at + 1))
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(least
-        .filter(|(chance, _)| lines.len() as f64 * chance.exp() < level)
-        .map(|(_, cycles)| Remains::Period(record.duration() / cycles as f64)))
+    Ok(strongest_line(residual)?
+        .filter(|line| line.chance < level)
+        .map(|line| Remains::Period(record.duration() / line.cycles as f64)))
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
+    use std::f64::consts::PI;
+
     use super::*;
     use ct_signals::{Hold, Signal, noise};
     use rand::SeedableRng;

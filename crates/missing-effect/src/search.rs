@@ -8,7 +8,7 @@ use greybox::{Fit, Setup, Stopping, fit_from};
 use plants::Placed;
 use rayon::prelude::*;
 
-use crate::Error;
+use crate::{Error, spectral_line::strongest_line};
 
 /// A structure with its fit.
 #[derive(Debug, Clone)]
@@ -181,7 +181,10 @@ fn propose<'a>(
     placed: Placed,
     noise: &ArModel,
 ) -> Option<Proposal<'a>> {
-    let structure = parent.setup.structure.with(placed).ok()?;
+    let mut structure = parent.setup.structure.with(placed).ok()?;
+    if placed.effect.by_clock {
+        structure.scales.period = strongest_period(parent)?;
+    }
     let setup = parent.setup.with_structure(structure).ok()?;
     let mut ranked: Vec<(f64, Vec<f64>)> = grid(origins, &setup, placed)
         .into_par_iter()
@@ -197,6 +200,16 @@ fn propose<'a>(
         starts: ranked.into_iter().take(FOLLOWED).map(|(_, x)| x).collect(),
         promise,
     })
+}
+
+/// The period that shows most in what a node does not explain \[s\].
+fn strongest_period(node: &Node) -> Option<f64> {
+    let residuals = node.setup.disturbance(&node.fit.x).ok()?;
+    let lines = residuals.iter().zip(node.setup.records);
+    let strongest = lines
+        .filter_map(|(residual, record)| Some((strongest_line(residual).ok()??, record.duration())))
+        .min_by(|a, b| a.0.chance.total_cmp(&b.0.chance));
+    Some(strongest.map_or(0.0, |(line, duration)| duration / line.cycles as f64))
 }
 
 fn realise<'a>(proposal: Proposal<'a>, noise: &ArModel, stopping: Stopping) -> Option<Node<'a>> {

@@ -227,17 +227,22 @@ pub(crate) fn of_diagnosis(
                 .zip(diagnosis.steps.iter().skip(1))
                 .enumerate()
             {
-                let size = last
+                let prefix = format!("{effect}.");
+                let sizes: Vec<String> = last
                     .parameters
                     .iter()
-                    .find(|parameter| parameter.name.starts_with(&format!("{effect}.")))
-                    .map_or(String::new(), |p| {
-                        format!(
-                            " ({} = {})",
-                            p.name.trim_start_matches(&format!("{effect}.")),
-                            with_error(p)
-                        )
-                    });
+                    .filter_map(|p| Some((p, p.name.strip_prefix(&prefix)?)))
+                    // Where a lag stood before the record says nothing of the effect.
+                    .filter(|(_, name)| *name != "before")
+                    .enumerate()
+                    .filter(|(k, (p, _))| *k == 0 || p.std_error.is_some())
+                    .map(|(_, (p, name))| format!("{name} = {}", with_error(p)))
+                    .collect();
+                let size = if sizes.is_empty() {
+                    String::new()
+                } else {
+                    format!(" ({})", sizes.join(", "))
+                };
                 let place = step
                     .place
                     .as_ref()

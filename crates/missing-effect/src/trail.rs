@@ -10,6 +10,8 @@ use crate::{
     search::{FINE, Node, ROUGH, place, refine},
 };
 
+/// The parameter that has as many minima as a spectrum has lines.
+const PERIOD: &str = "periodic_disturbance.period";
 /// Further starts of every step: its minimum must not hang on where the search came from.
 const STARTS_AROUND: usize = 12;
 /// Rounds of as many more where the last model's minimum was not found twice.
@@ -54,7 +56,14 @@ pub(crate) fn trail<'a>(
 
 /// The node's minimum against those that starts around it reach.
 fn around(node: &mut Node, noise: &ArModel, seed: u64) -> Result<(), Error> {
-    let starts = starts_around(&node.setup, &node.fit.x, STARTS_AROUND, seed);
+    let mut starts = starts_around(&node.setup, &node.fit.x, STARTS_AROUND, seed);
+    // Every line of a spectrum is a minimum of its own, and the strongest was picked: the starts stay on it.
+    let names = node.setup.names();
+    if let Some(period) = names.iter().position(|name| name == PERIOD) {
+        for start in &mut starts {
+            start[period] = node.fit.x[period];
+        }
+    }
     let rough: Vec<Fit> = starts
         .into_par_iter()
         .filter_map(|start| fit_from(&node.setup, &[start], noise, ROUGH).ok())

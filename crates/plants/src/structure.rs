@@ -24,6 +24,8 @@ pub struct Scales {
     pub area: [f64; MAX_VESSELS],
     /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
     pub reading_step: f64,
+    /// Period of the strongest line in the spectrum of what is not explained so far; zero where none is looked for \[s\].
+    pub period: f64,
     /// Mean throughput \[area x level/s\].
     pub flow: f64,
     /// Median sampling interval \[s\].
@@ -209,6 +211,19 @@ impl Structure {
         }
     }
 
+    /// In how many ways a search can find an effect where there is nothing: every combination of its starts is one, and so is
+    /// every line of the spectrum of which the strongest is a start.
+    #[must_use]
+    pub fn ways(&self, placed: Placed) -> f64 {
+        let parameters = self.effect_parameters(placed);
+        let combinations: f64 = parameters.iter().map(|p| p.starts.len() as f64).product();
+        let picked = parameters
+            .iter()
+            .any(|p| p.unit == crate::Unit::TIME && p.starts.contains(&self.scales.period));
+        let lines = 0.5 * self.scales.duration / self.scales.sample_interval;
+        combinations + if picked { lines } else { 0.0 }
+    }
+
     /// The parameters of one effect here; their starts lie within their bounds, however short or narrow the record.
     #[must_use]
     pub fn effect_parameters(&self, placed: Placed) -> Vec<ParameterInfo> {
@@ -318,6 +333,7 @@ impl Scales {
             operating_level: [middle; MAX_VESSELS],
             area: [1.0; MAX_VESSELS],
             reading_step: 0.0,
+            period: 0.0,
             flow: middle.abs() / (0.1 * duration),
             sample_interval,
             duration,

@@ -16,7 +16,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "R. Isermann, Fault-Diagnosis Systems, 2006: periodic signals of unknown frequency.",
 };
 
-/// Periods in the record, the fewest and the most that are tried, and from one start to the next. Off by one period in the
+/// Periods in the record that are tried beside the strongest line of the spectrum, the fewest and the most that are tried, and from one start to the next. Off by one period in the
 /// record, half of a sinusoid's signature is still there in its slope by the period; off by more, nothing is.
 const PERIODS: (f64, f64, f64) = (2.5, 24.5, 1.0);
 
@@ -34,6 +34,12 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     };
     let (fewest, most, step) = PERIODS;
     let count = ((most - fewest) / step).round() as usize;
+    let mut periods: Vec<f64> = (0..=count)
+        .map(|i| duration / (fewest + step * i as f64))
+        .collect();
+    if site.scales.period > 0.0 {
+        periods.push(site.scales.period);
+    }
     vec![
         amplitude("sine", "flow that goes with the sine", 0.01),
         amplitude("cosine", "flow that goes with the cosine", 0.01),
@@ -45,7 +51,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             lower: (4.0 * site.scales.sample_interval).min(0.1 * duration),
             // What has not come twice is no period: it would fit any slow course of time.
             upper: 0.5 * duration,
-            starts: (0..=count).map(|i| duration / (fewest + step * i as f64)).collect(),
+            starts: periods,
         },
     ]
 }

@@ -12,9 +12,16 @@ use rand_chacha::ChaCha8Rng;
 /// Seconds of processor time of this process so far; not a number where the system does not tell.
 fn processor() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
+    let fields: Vec<&str> = stat
+        .rsplit(')')
+        .next()
+        .unwrap_or("")
+        .split_whitespace()
+        .collect();
     let ticks = |at: usize| fields.get(at).and_then(|field| field.parse::<f64>().ok());
-    ticks(11).zip(ticks(12)).map_or(f64::NAN, |(user, system)| (user + system) / 100.0)
+    ticks(11)
+        .zip(ticks(12))
+        .map_or(f64::NAN, |(user, system)| (user + system) / 100.0)
 }
 
 fn main() -> Result<(), missing_effect::Error> {
@@ -29,7 +36,10 @@ fn main() -> Result<(), missing_effect::Error> {
         (Rig::cascaded_tanks(), "sensor_lag", 0, vec![10.0]),
         (Rig::cascaded_tanks(), "const_leak", 0, vec![3.0]),
     ];
-    println!("{:<42} {:>4} {:>7} {:>7}  found", "cell", "most", "wall", "cpu");
+    println!(
+        "{:<42} {:>4} {:>7} {:>7}  found",
+        "cell", "most", "wall", "cpu"
+    );
     for (rig, effect, vessel, size) in rigs {
         for colour in [0.0, 0.9] {
             let cell = format!("{} {effect} {colour}", rig.plant.id());

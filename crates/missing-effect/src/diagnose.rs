@@ -10,6 +10,7 @@ use crate::{
     ControlLoop, Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step,
     Verdict,
     confirm::{BIC_MARGIN, beyond_chance, confirm, least_useful},
+    exhausted::exhausted,
     noise_floor::{NOISE_ORDER, bic_in_colour, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
     remains::remains,
@@ -121,10 +122,15 @@ pub fn diagnose(
         let fall = || Ok::<_, Error>(bic_in_colour(before)? - bic_in_colour(after)?);
         pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
     };
-    let sizes = grow(&base, &white, breadth, pays_in_colour, &|done, total| {
-        tell("searching sets of effects", done, total)
-    })?;
-    let richest = chosen(&sizes, &base);
+    let mut grown = grow(
+        &base,
+        &white,
+        breadth,
+        pays_in_colour,
+        exhausted,
+        &|done, total| tell("searching sets of effects", done, total),
+    )?;
+    let richest = chosen(&grown.sizes, &base);
     let richest = refine(&richest, &white, &[])?;
     let noise = colour(&richest)?;
 
@@ -137,10 +143,18 @@ pub fn diagnose(
     let by_simulation = wandering && !confirmed.added.is_empty();
     if noise.order() > 0 && !by_simulation {
         // The noise's colour is known now: the search is repeated in its metric.
-        let sizes = grow(&base_noise, &noise, breadth, pays, &|done, total| {
-            tell("searching in the noise's metric", done, total);
-        })?;
-        let other = confirm(refine(&chosen(&sizes, &base_noise), &noise, &[])?, &noise)?;
+        let white = grown.sizes;
+        grown = grow(
+            &base_noise,
+            &noise,
+            breadth,
+            pays,
+            exhausted,
+            &|done, total| tell("searching in the noise's metric", done, total),
+        )?;
+        let best = chosen(&grown.sizes, &base_noise);
+        grown.sizes = white;
+        let other = confirm(refine(&best, &noise, &[])?, &noise)?;
         if other.fit.bic() < confirmed.fit.bic() {
             confirmed = other;
         }
@@ -169,7 +183,7 @@ pub fn diagnose(
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;
     if stopped {
-        confirmed = shortened(confirmed, &sizes, options.max_effects, &noise)?;
+        confirmed = shortened(confirmed, &grown.sizes, options.max_effects, &noise)?;
     }
 
     tell("telling apart", 1, 3);
@@ -221,12 +235,13 @@ pub fn diagnose(
     };
     let groups = groups(&refine(&last, metric, &[])?, metric, per_sample)?;
     tell("telling apart", 2, 3);
-    let (metric, believed) = if by_simulation {
+    // The metric in which single effects were refitted last: a noise that is white has the same one whatever its size.
+    let (metric, believed) = if by_simulation || noise.order() == 0 {
         (&white, &base)
     } else {
         (&noise, &base_noise)
     };
-    let single = singles(believed, metric);
+    let single = grown.singles(metric);
     let scores = scores(believed, &single, metric);
     let price = price_of_colour(&base_noise, &single, &noise);
 

@@ -167,11 +167,12 @@ fn promise(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<f64> {
 }
 
 /// One effect more, at its most promising starts.
-struct Proposal<'a> {
-    setup: Setup<'a>,
+pub(crate) struct Proposal<'a> {
+    pub setup: Setup<'a>,
     added: Vec<Placed>,
     starts: Vec<Vec<f64>>,
-    promise: f64,
+    /// The cost that is promised.
+    pub promise: f64,
 }
 
 fn propose<'a>(parent: &Node<'a>, placed: Placed, noise: &ArModel) -> Option<Proposal<'a>> {
@@ -204,10 +205,32 @@ fn realise<'a>(proposal: Proposal<'a>, noise: &ArModel, stopping: Stopping) -> O
 
 /// All single extensions of a node, refitted, best first.
 pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Node<'a>> {
-    let mut nodes: Vec<Node> = candidates(parent)
+    let proposals = proposals(parent, noise);
+    best_first(realise_all(proposals, noise, ROUGH))
+}
+
+/// All extensions of a node by one effect, not fitted, the most promising first.
+pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Proposal<'a>> {
+    let mut proposals: Vec<Proposal> = candidates(parent)
         .into_par_iter()
-        .filter_map(|placed| realise(propose(parent, placed, noise)?, noise, ROUGH))
+        .filter_map(|placed| propose(parent, placed, noise))
         .collect();
+    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    proposals
+}
+
+fn realise_all<'a>(
+    proposals: Vec<Proposal<'a>>,
+    noise: &ArModel,
+    stopping: Stopping,
+) -> Vec<Node<'a>> {
+    proposals
+        .into_par_iter()
+        .filter_map(|proposal| realise(proposal, noise, stopping))
+        .collect()
+}
+
+fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
 }
@@ -259,70 +282,109 @@ fn squares(values: impl Iterator<Item = f64>) -> f64 {
     values.map(|value| value * value).sum()
 }
 
-/// Grows sets of effects from a base; the best sets of every size, best first within a size.
+/// The sets that were grown from a base.
+pub(crate) struct Grown<'a> {
+    /// The best sets of every size, from the base on, best first within a size.
+    pub sizes: Vec<Vec<Node<'a>>>,
+    /// All single effects that were refitted, and those that were not promising enough for it.
+    refitted: Vec<Node<'a>>,
+    unpromising: Vec<Proposal<'a>>,
+}
+
+impl<'a> Grown<'a> {
+    /// What [`singles`] gives for the base in the metric in which it was grown.
+    pub fn singles(self, noise: &ArModel) -> Vec<Node<'a>> {
+        let mut nodes = self.refitted;
+        nodes.extend(realise_all(self.unpromising, noise, ROUGH));
+        best_first(nodes)
+    }
+}
+
+/// Grows sets of effects from a base.
+///
+/// The growth ends after two sizes that are not `worth` it, and at once where the best set is `exhausted`.
 pub(crate) fn grow<'a>(
     base: &Node<'a>,
     noise: &ArModel,
     breadth: Breadth,
     worth: impl Fn(&Node, &Node) -> bool,
+    exhausted: impl Fn(&Node) -> Result<bool, Error>,
     progress: &(dyn Fn(usize, usize) + Sync),
-) -> Result<Vec<Vec<Node<'a>>>, Error> {
-    let mut sizes: Vec<Vec<Node<'a>>> = vec![vec![base.clone()]];
+) -> Result<Grown<'a>, Error> {
+    let mut grown = Grown {
+        sizes: vec![vec![base.clone()]],
+        refitted: Vec::new(),
+        unpromising: Vec::new(),
+    };
     let mut idle = 0;
     for size in 1..=breadth.most {
         progress(size - 1, breadth.most);
-        let parents = &sizes[size - 1];
-        // The first sizes are searched wider: a pair may pay where neither of its effects does.
-        let width = if size <= 2 {
-            2 * breadth.beam
-        } else {
-            breadth.beam
-        };
-        let mut wanted: Vec<(&Node, Placed)> = Vec::new();
-        let mut seen = std::collections::HashSet::new();
-        for parent in distinct(base, parents, width)? {
-            for placed in candidates(parent) {
-                let mut added = parent.added.clone();
-                added.push(placed);
-                if seen.insert(key(&added)) {
-                    wanted.push((parent, placed));
-                }
-            }
-        }
-        let mut proposals: Vec<Proposal> = wanted
-            .into_par_iter()
-            .filter_map(|(parent, placed)| propose(parent, placed, noise))
-            .collect();
-        proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
-        proposals.truncate(if size <= 2 {
-            2 * breadth.refits
-        } else {
-            breadth.refits
-        });
-        let mut nodes: Vec<Node> = proposals
-            .into_par_iter()
-            .filter_map(|proposal| realise(proposal, noise, ROUGH))
-            .collect();
-        nodes.retain(Node::plausible);
-        nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
-        nodes.truncate(4 * breadth.beam);
-        if nodes.is_empty() {
-            break;
-        }
+        let sizes = &mut grown.sizes;
         let best_before = sizes
             .iter()
             .flatten()
-            .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
-        let pays = best_before.is_some_and(|before| worth(before, &nodes[0]));
-        sizes.push(nodes);
+            .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
+            .unwrap_or(base);
+        if !best_before.added.is_empty() && idle == 0 && exhausted(best_before)? {
+            break;
+        }
+        // The first sizes are searched wider: a pair may pay where neither of its effects does.
+        let factor = if size <= 2 { 2 } else { 1 };
+        let mut proposals = if size == 1 {
+            proposals(base, noise)
+        } else {
+            extensions(base, &sizes[size - 1], factor * breadth.beam, noise)?
+        };
+        let unpromising = proposals.split_off(proposals.len().min(factor * breadth.refits));
+        let mut nodes = realise_all(proposals, noise, ROUGH);
+        if size == 1 {
+            (grown.refitted, grown.unpromising) = (nodes.clone(), unpromising);
+        }
+        nodes.retain(Node::plausible);
+        let mut nodes = best_first(nodes);
+        nodes.truncate(4 * breadth.beam);
+        let Some(best) = nodes.first() else {
+            break;
+        };
         // A pair is looked at even where no single effect pays; after two sizes that do not pay there is no more.
-        idle = if pays { 0 } else { idle + 1 };
+        idle = if worth(best_before, best) {
+            0
+        } else {
+            idle + 1
+        };
+        sizes.push(nodes);
         if idle == 2 {
             break;
         }
     }
     progress(breadth.most, breadth.most);
-    Ok(sizes)
+    Ok(grown)
+}
+
+/// The sets of one size extended by one effect, each set once, the most promising first.
+fn extensions<'a>(
+    base: &Node<'a>,
+    parents: &[Node<'a>],
+    width: usize,
+    noise: &ArModel,
+) -> Result<Vec<Proposal<'a>>, Error> {
+    let mut wanted: Vec<(&Node, Placed)> = Vec::new();
+    let mut seen = std::collections::HashSet::new();
+    for parent in distinct(base, parents, width)? {
+        for placed in candidates(parent) {
+            let mut added = parent.added.clone();
+            added.push(placed);
+            if seen.insert(key(&added)) {
+                wanted.push((parent, placed));
+            }
+        }
+    }
+    let mut proposals: Vec<Proposal> = wanted
+        .into_par_iter()
+        .filter_map(|(parent, placed)| propose(parent, placed, noise))
+        .collect();
+    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    Ok(proposals)
 }
 
 /// Fits a node's structure anew to the end, from where it is and from the given further starts.
@@ -383,12 +445,8 @@ pub(crate) fn exchanges<'a>(
 ) -> Result<Vec<Node<'a>>, Error> {
     let lacking = without(node, position, noise)?;
     let own = node.added[position];
-    let mut proposals: Vec<Proposal> = candidates(&lacking)
-        .into_par_iter()
-        .filter(|placed| *placed != own)
-        .filter_map(|placed| propose(&lacking, placed, noise))
-        .collect();
-    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    let mut proposals = proposals(&lacking, noise);
+    proposals.retain(|proposal| proposal.added.last() != Some(&own));
     // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
     // worth. A few steps are too few where parameters nearly imitate each other, and there the promise holds.
     let mut begun: Vec<(usize, Node)> = proposals

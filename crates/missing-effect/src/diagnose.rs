@@ -228,13 +228,6 @@ pub fn diagnose(
         trail.truncate(1);
     }
     let last = trail.last().cloned().unwrap_or_else(|| base.clone());
-    let (metric, per_sample) = if by_simulation || stopped {
-        (&white, slowness(&residual_colour(&last)?))
-    } else {
-        (&noise, 1.0)
-    };
-    let groups = groups(&refine(&last, metric, &[])?, metric, per_sample)?;
-    tell("telling apart", 2, 3);
     // The metric in which single effects were refitted last: a noise that is white has the same one whatever its size.
     let (metric, believed) = if by_simulation || noise.order() == 0 {
         (&white, &base)
@@ -242,6 +235,22 @@ pub fn diagnose(
         (&noise, &base_noise)
     };
     let single = grown.singles(metric);
+    let groups = {
+        let (metric, per_sample) = if by_simulation || stopped {
+            (&white, slowness(&residual_colour(&last)?))
+        } else {
+            (&noise, 1.0)
+        };
+        let same_metric = by_simulation || !stopped || noise.order() == 0;
+        let last = refine(&last, metric, &[])?;
+        groups(
+            &last,
+            metric,
+            per_sample,
+            same_metric.then_some(single.as_slice()),
+        )?
+    };
+    tell("telling apart", 2, 3);
     let scores = scores(believed, &single, metric);
     let price = price_of_colour(&base_noise, &single, &noise);
 
@@ -350,12 +359,17 @@ fn shortened<'a>(
 }
 
 /// For every added effect, itself and all that fit as well in its place.
-fn groups(last: &Node, metric: &ArModel, per_sample: f64) -> Result<Vec<Vec<String>>, Error> {
+fn groups<'a>(
+    last: &Node<'a>,
+    metric: &ArModel,
+    per_sample: f64,
+    singles: Option<&[Node<'a>]>,
+) -> Result<Vec<Vec<String>>, Error> {
     (0..last.added.len())
         .into_par_iter()
         .map(|position| {
             let mut group = vec![last.added[position].effect.id.to_string()];
-            for node in exchanges(last, position, metric)? {
+            for node in exchanges(last, position, metric, singles)? {
                 let stand_in = node.added.last().map_or("", |placed| placed.effect.id);
                 // In the white metric a coloured residual counts each sample for less than one.
                 let behind = (node.fit.bic() - last.fit.bic()) / per_sample;

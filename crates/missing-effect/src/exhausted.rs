@@ -1,7 +1,6 @@
 //! Whether a set of effects leaves nothing to explain: then larger sets need no search.
 
-use ct_signals::ArModel;
-use greybox::coloured;
+use greybox::{Setup, coloured};
 
 use crate::{
     Error,
@@ -9,7 +8,7 @@ use crate::{
     noise_floor::NOISE_ORDER,
     problem::STOPPING,
     remains::remains,
-    search::{Node, proposals},
+    search::{Node, any_promise},
 };
 
 /// What a set leaves is noise, and in the metric of that noise no effect more promises what it would cost.
@@ -21,14 +20,15 @@ pub(crate) fn exhausted(node: &Node) -> Result<bool, Error> {
     if remains(node, &own)?.is_some() {
         return Ok(false);
     }
-    let noise: ArModel = own.noise.clone();
+    let noise = own.noise.clone();
     let node = Node {
         fit: own,
         ..node.clone()
     };
-    let n = node.setup.samples() as f64;
-    Ok(!proposals(&node, &noise).iter().any(|proposal| {
-        let more = proposal.setup.free().len() as f64 - node.setup.free().len() as f64;
-        n * (node.fit.cost / proposal.promise).ln() - more * n.ln() > BIC_MARGIN
-    }))
+    let (n, cost) = (node.setup.samples() as f64, node.fit.cost);
+    let pays = |setup: &Setup, promise: f64| {
+        let more = setup.free().len() as f64 - node.setup.free().len() as f64;
+        n * (cost / promise).ln() - more * n.ln() > BIC_MARGIN
+    };
+    Ok(!any_promise(&node, &noise, pays))
 }

@@ -167,12 +167,11 @@ fn promise(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<f64> {
 }
 
 /// One effect more, at its most promising starts.
-pub(crate) struct Proposal<'a> {
-    pub setup: Setup<'a>,
+struct Proposal<'a> {
+    setup: Setup<'a>,
     added: Vec<Placed>,
     starts: Vec<Vec<f64>>,
-    /// The cost that is promised.
-    pub promise: f64,
+    promise: f64,
 }
 
 fn propose<'a>(parent: &Node<'a>, placed: Placed, noise: &ArModel) -> Option<Proposal<'a>> {
@@ -210,7 +209,7 @@ pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Node<'a>> {
 }
 
 /// All extensions of a node by one effect, not fitted, the most promising first.
-pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Proposal<'a>> {
+fn proposals<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Proposal<'a>> {
     let mut proposals: Vec<Proposal> = candidates(parent)
         .into_par_iter()
         .filter_map(|placed| propose(parent, placed, noise))
@@ -437,15 +436,57 @@ pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node
     Ok(node)
 }
 
+/// Whether some effect more makes a promise that is `worth` it.
+pub(crate) fn any_promise(
+    parent: &Node,
+    noise: &ArModel,
+    worth: impl Fn(&Setup, f64) -> bool + Sync,
+) -> bool {
+    candidates(parent).into_par_iter().any(|placed| {
+        propose(parent, placed, noise)
+            .is_some_and(|proposal| worth(&proposal.setup, proposal.promise))
+    })
+}
+
 /// The node with one of its effects exchanged for each other candidate, refitted, best first.
+///
+/// `singles`: what [`singles`] gives in the same metric. It holds the exchanges of an only effect.
 pub(crate) fn exchanges<'a>(
     node: &Node<'a>,
     position: usize,
     noise: &ArModel,
+    singles: Option<&[Node<'a>]>,
 ) -> Result<Vec<Node<'a>>, Error> {
     let lacking = without(node, position, noise)?;
     let own = node.added[position];
-    let mut proposals = proposals(&lacking, noise);
+    let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());
+    let begun = match singles {
+        Some(singles) if node.added.len() == 1 => singles
+            .iter()
+            .filter(|single| single.added.last() != Some(&own))
+            .cloned()
+            .collect(),
+        _ => begin_exchanges(&lacking, own, noise),
+    };
+    let nodes = begun
+        .into_par_iter()
+        .filter(|begun| node.gain_over(begun) < reach)
+        .filter_map(|begun| fitted(&begun, noise, ROUGH, &[]).ok())
+        .map(|rough| {
+            // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
+            if rough.fit.bic() - node.fit.bic() < NEAR {
+                refine(&rough, noise, &[]).unwrap_or(rough)
+            } else {
+                rough
+            }
+        })
+        .collect();
+    Ok(best_first(nodes))
+}
+
+/// First fits of what may stand in the place of an effect of which a node is `lacking`.
+fn begin_exchanges<'a>(lacking: &Node<'a>, own: Placed, noise: &ArModel) -> Vec<Node<'a>> {
+    let mut proposals = proposals(lacking, noise);
     proposals.retain(|proposal| proposal.added.last() != Some(&own));
     // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
     // worth. A few steps are too few where parameters nearly imitate each other, and there the promise holds.
@@ -458,28 +499,12 @@ pub(crate) fn exchanges<'a>(
         })
         .collect();
     begun.sort_by(|a, b| a.1.fit.bic().total_cmp(&b.1.fit.bic()));
-    let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());
-    let begun: Vec<Node> = begun
+    begun
         .into_iter()
         .enumerate()
         .filter(|(quick, (promised, _))| *quick < EXCHANGED || *promised < EXCHANGED)
         .map(|(_, (_, begun))| begun)
-        .filter(|begun| node.gain_over(begun) < reach)
-        .collect();
-    let mut nodes: Vec<Node> = begun
-        .into_par_iter()
-        .filter_map(|node| fitted(&node, noise, ROUGH, &[]).ok())
-        .map(|rough| {
-            // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
-            if rough.fit.bic() - node.fit.bic() < NEAR {
-                refine(&rough, noise, &[]).unwrap_or(rough)
-            } else {
-                rough
-            }
-        })
-        .collect();
-    nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
-    Ok(nodes)
+        .collect()
 }
 
 /// The node with one given effect more, fitted to the end; `known` is a fit of a larger set, whose values serve as a

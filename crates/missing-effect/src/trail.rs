@@ -13,8 +13,8 @@ use crate::{
 const STARTS_AROUND: usize = 12;
 /// Rounds of as many more where the last model's minimum was not found twice.
 const MORE_ROUNDS: u64 = 3;
-/// After one rough fit, and after a second one, so many times the least cost is out of reach of its minimum.
-const HOPELESS: [f64; 2] = [1.5, 1.1];
+/// After one rough fit, a second one and a third one, so many times the least cost is out of reach of its minimum.
+const HOPELESS: [f64; 3] = [1.5, 1.15, 1.05];
 
 /// The believed model, then one effect after the other, in the order in which the search added them.
 pub(crate) fn trail<'a>(

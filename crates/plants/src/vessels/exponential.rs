@@ -41,12 +41,12 @@ impl<T: Scalar> Vessels<T> {
         let Some(flow) = &mut self.linear else {
             return self.trial(h, q, t);
         };
-        let whole = flow.whole.advance(&self.levels, h, *q);
+        let whole = flow.whole.advance(&self.levels, h, q);
         if !flow.disturbed {
             return whole;
         }
         let first = q.part(T::constant(0.0), T::constant(0.5));
-        let half = flow.half.advance(&self.levels, h * 0.5, first);
+        let half = flow.half.advance(&self.levels, h * 0.5, &first);
         let handed = (self.vessels.len() == 2 && h.value() > 0.0).then(|| {
             // A drive of the level is an inflow over the area.
             let area = self.vessels[0].area;

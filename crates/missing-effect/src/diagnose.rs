@@ -143,17 +143,18 @@ pub fn diagnose(
     let by_simulation = wandering && !confirmed.added.is_empty();
     if noise.order() > 0 && !by_simulation {
         // The noise's colour is known now: the search is repeated in its metric.
-        let white = grown.sizes;
+        let white = grown;
         grown = grow(
             &base_noise,
             &noise,
             breadth,
             pays,
-            exhausted,
+            // It was exhausted in this colour, which is that of its own residual.
+            |node| Ok(white.exhausted_by(node) || exhausted(node)?),
             &|done, total| tell("searching in the noise's metric", done, total),
         )?;
         let best = chosen(&grown.sizes, &base_noise);
-        grown.sizes = white;
+        grown.sizes = white.sizes;
         let other = confirm(refine(&best, &noise, &[])?, &noise)?;
         if other.fit.bic() < confirmed.fit.bic() {
             confirmed = other;

@@ -288,9 +288,17 @@ pub(crate) struct Grown<'a> {
     /// All single effects that were refitted, and those that were not promising enough for it.
     refitted: Vec<Node<'a>>,
     unpromising: Vec<Proposal<'a>>,
+    /// The set that was exhausted, where the growth ended so.
+    exhausted: Option<Vec<Placed>>,
 }
 
 impl<'a> Grown<'a> {
+    /// Whether the growth ended because this set was exhausted.
+    pub fn exhausted_by(&self, node: &Node) -> bool {
+        let same = |set: &Vec<Placed>| key(set) == key(&node.added);
+        self.exhausted.as_ref().is_some_and(same)
+    }
+
     /// What [`singles`] gives for the base in the metric in which it was grown.
     pub fn singles(self, noise: &ArModel) -> Vec<Node<'a>> {
         let mut nodes = self.refitted;
@@ -314,6 +322,7 @@ pub(crate) fn grow<'a>(
         sizes: vec![vec![base.clone()]],
         refitted: Vec::new(),
         unpromising: Vec::new(),
+        exhausted: None,
     };
     let mut idle = 0;
     for size in 1..=breadth.most {
@@ -325,6 +334,7 @@ pub(crate) fn grow<'a>(
             .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
             .unwrap_or(base);
         if !best_before.added.is_empty() && idle == 0 && exhausted(best_before)? {
+            grown.exhausted = Some(best_before.added.clone());
             break;
         }
         // The first sizes are searched wider: a pair may pay where neither of its effects does.

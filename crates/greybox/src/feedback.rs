@@ -236,19 +236,44 @@ impl Feedback {
             limited: self.controller.linear(self.interval, true),
             levels: vec![0.0; columns * n],
             states: vec![0.0; columns * m],
-            scratch: vec![0.0; n.max(m)],
+            back: vec![0.0; columns],
+            scratch: vec![0.0; columns * n.max(m)],
         }
     }
 }
 
-/// `1 + P0 C` on the columns of rows.
+/// `1 + P0 C` on the columns of rows. Levels and states are kept row by row, a column beside the other, so that all columns
+/// take a step at once.
 pub(crate) struct Inverse {
     plant: Arc<LinearPlant>,
     free: LinearController,
     limited: LinearController,
     levels: Vec<f64>,
     states: Vec<f64>,
+    back: Vec<f64>,
     scratch: Vec<f64>,
+}
+
+/// `to = A x + b e` for every column.
+fn advance<A: AsRef<[f64]>>(
+    to: &mut [f64],
+    a: impl Iterator<Item = A>,
+    x: &[f64],
+    b: &[f64],
+    e: &[f64],
+) {
+    let columns = e.len();
+    for ((to, a), b) in to.chunks_exact_mut(columns).zip(a).zip(b) {
+        to.fill(0.0);
+        for (a, x) in a.as_ref().iter().zip(x.chunks_exact(columns)) {
+            for (to, x) in to.iter_mut().zip(x) {
+                *to += a * x;
+            }
+        }
+        for (to, e) in to.iter_mut().zip(e) {
+            *to += b * e;
+        }
+    }
 }
 
 impl Inverse {
@@ -260,30 +285,34 @@ impl Inverse {
 
     pub(crate) fn push(&mut self, row: &mut [f64], limited: bool) {
         let controller = if limited { &self.limited } else { &self.free };
-        let (n, m) = (self.plant.b.len(), controller.b.len());
-        let product = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
-        for (column, value) in row.iter_mut().enumerate() {
-            let levels = &mut self.levels[column * n..(column + 1) * n];
-            let states = &mut self.states[column * m..(column + 1) * m];
-            let e = *value;
-            let back = product(&controller.c, states) + controller.d * e;
-            *value += levels[n - 1];
-            for (to, (a, b)) in self
-                .scratch
-                .iter_mut()
-                .zip(self.plant.a.iter().zip(&self.plant.b))
-            {
-                *to = product(a, levels) + b * back;
-            }
-            levels.copy_from_slice(&self.scratch[..n]);
-            for (to, (a, b)) in self
-                .scratch
-                .iter_mut()
-                .zip(controller.a.iter().zip(&controller.b))
-            {
-                *to = product(a, states) + b * e;
-            }
-            states.copy_from_slice(&self.scratch[..m]);
+        let columns = row.len();
+        advance(
+            &mut self.back,
+            std::iter::once(&controller.c),
+            &self.states,
+            &[controller.d],
+            row,
+        );
+        advance(
+            &mut self.scratch,
+            controller.a.iter(),
+            &self.states,
+            &controller.b,
+            row,
+        );
+        let states = self.states.len();
+        self.states.copy_from_slice(&self.scratch[..states]);
+        let last = self.levels.len() - columns;
+        for (value, level) in row.iter_mut().zip(&self.levels[last..]) {
+            *value += level;
         }
+        advance(
+            &mut self.scratch,
+            self.plant.a.iter(),
+            &self.levels,
+            &self.plant.b,
+            &self.back,
+        );
+        self.levels.copy_from_slice(&self.scratch[..last + columns]);
     }
 }

@@ -50,7 +50,7 @@ pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a
     while node.added.len() > 1 {
         let mut others: Vec<Node<'a>> = (0..node.added.len())
             .into_par_iter()
-            .map(|position| exchanges(&node, position, noise))
+            .map(|position| exchanges(&node, position, noise, None))
             .collect::<Result<Vec<_>, _>>()?
             .concat();
         others.retain(|other| {

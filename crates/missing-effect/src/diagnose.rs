@@ -11,6 +11,7 @@ use crate::{
     ControlLoop, Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step,
     Verdict,
     confirm::{BIC_MARGIN, beyond_chance, confirm, improve, least_useful},
+    exhausted::exhausted,
     noise_floor::{NOISE_ORDER, bic_in_colour, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
     remains::remains,
@@ -122,10 +123,15 @@ pub fn diagnose(
         let fall = || Ok::<_, Error>(bic_in_colour(before)? - bic_in_colour(after)?);
         pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
     };
-    let sizes = grow(&base, &white, breadth, pays_in_colour, &|done, total| {
-        tell("searching sets of effects", done, total)
-    })?;
-    let richest = chosen(&sizes, &base);
+    let mut grown = grow(
+        &base,
+        &white,
+        breadth,
+        pays_in_colour,
+        exhausted,
+        &|done, total| tell("searching sets of effects", done, total),
+    )?;
+    let richest = chosen(&grown.sizes, &base);
     let richest = refine(&richest, &white, &[])?;
     let noise = colour(&richest)?;
 
@@ -138,10 +144,19 @@ pub fn diagnose(
     let by_simulation = wandering && !confirmed.added.is_empty();
     if noise.order() > 0 && !by_simulation {
         // The noise's colour is known now: the search is repeated in its metric.
-        let sizes = grow(&base_noise, &noise, breadth, pays, &|done, total| {
-            tell("searching in the noise's metric", done, total);
-        })?;
-        let other = confirm(refine(&chosen(&sizes, &base_noise), &noise, &[])?, &noise)?;
+        let white = grown;
+        grown = grow(
+            &base_noise,
+            &noise,
+            breadth,
+            pays,
+            // It was exhausted in this colour, which is that of its own residual.
+            |node| Ok(white.exhausted_by(node) || exhausted(node)?),
+            &|done, total| tell("searching in the noise's metric", done, total),
+        )?;
+        let best = chosen(&grown.sizes, &base_noise);
+        grown.sizes = white.sizes;
+        let other = confirm(refine(&best, &noise, &[])?, &noise)?;
         if other.fit.bic() < confirmed.fit.bic() {
             confirmed = other;
         }
@@ -173,7 +188,7 @@ pub fn diagnose(
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;
     if stopped {
-        confirmed = shortened(confirmed, &sizes, options.max_effects, &noise)?;
+        confirmed = shortened(confirmed, &grown.sizes, options.max_effects, &noise)?;
     }
 
     tell("telling apart", 1, 3);
@@ -212,6 +227,13 @@ pub fn diagnose(
         Some(found) => explained(&base, &last, found.above(&noise))? >= FAIR_PART,
         None => true,
     };
+    // The metric in which single effects were refitted last: a noise that is white has the same one whatever its size.
+    let (metric, believed) = if by_simulation || noise.order() == 0 {
+        (&white, &base)
+    } else {
+        (&noise, &base_noise)
+    };
+    let single = grown.singles(metric);
     let mut groups = Vec::new();
     if fair {
         let (metric, per_sample) = if by_simulation || stopped {
@@ -219,7 +241,9 @@ pub fn diagnose(
         } else {
             (&noise, 1.0)
         };
-        groups = self::groups(&refine(&last, metric, &[])?, metric, per_sample)?;
+        let same_metric = by_simulation || !stopped || noise.order() == 0;
+        let single = same_metric.then_some(single.as_slice());
+        groups = self::groups(&refine(&last, metric, &[])?, metric, per_sample, single)?;
     }
     // Nor is, beside something else, what an effect of the clock explains as well: that is some course of time, and
     // whatever is left may have made it.
@@ -234,12 +258,6 @@ pub fn diagnose(
         groups.clear();
     }
     tell("telling apart", 2, 3);
-    let (metric, believed) = if by_simulation {
-        (&white, &base)
-    } else {
-        (&noise, &base_noise)
-    };
-    let single = singles(believed, metric);
     let scores = scores(believed, &single, metric);
     let price = price_of_colour(&base_noise, &single, &noise);
 
@@ -348,12 +366,17 @@ fn shortened<'a>(
 }
 
 /// For every added effect, itself and all that fit as well in its place.
-fn groups(last: &Node, metric: &ArModel, per_sample: f64) -> Result<Vec<Vec<String>>, Error> {
+fn groups<'a>(
+    last: &Node<'a>,
+    metric: &ArModel,
+    per_sample: f64,
+    singles: Option<&[Node<'a>]>,
+) -> Result<Vec<Vec<String>>, Error> {
     (0..last.added.len())
         .into_par_iter()
         .map(|position| {
             let mut group = vec![last.added[position].effect.id.to_string()];
-            for node in exchanges(last, position, metric)? {
+            for node in exchanges(last, position, metric, singles)? {
                 let stand_in = node.added.last().map_or("", |placed| placed.effect.id);
                 // In the white metric a coloured residual counts each sample for less than one.
                 let behind = (node.fit.bic() - last.fit.bic()) / per_sample;

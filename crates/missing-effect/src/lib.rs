@@ -10,6 +10,7 @@ mod control_loop;
 mod diagnose;
 mod diagnosis;
 mod error;
+mod exhausted;
 mod locate;
 mod noise_floor;
 pub mod numbers;

@@ -16,8 +16,8 @@ const PERIOD: &str = "periodic_disturbance.period";
 const STARTS_AROUND: usize = 12;
 /// Rounds of as many more where the last model's minimum was not found twice.
 const MORE_ROUNDS: u64 = 3;
-/// After a rough fit, so many times the least cost is out of reach of its minimum.
-const HOPELESS: f64 = 1.5;
+/// After one rough fit, a second one and a third one, so many times the least cost is out of reach of its minimum.
+const HOPELESS: [f64; 3] = [1.5, 1.15, 1.05];
 
 /// The believed model, then one effect after the other, first what lowers the error most.
 pub(crate) fn trail<'a>(
@@ -56,29 +56,30 @@ pub(crate) fn trail<'a>(
 
 /// The node's minimum against those that starts around it reach.
 fn around(node: &mut Node, noise: &ArModel, seed: u64) -> Result<(), Error> {
-    let mut starts = starts_around(&node.setup, &node.fit.x, STARTS_AROUND, seed);
+    let mut ends = starts_around(&node.setup, &node.fit.x, STARTS_AROUND, seed);
     // Every line of a spectrum is a minimum of its own, and the strongest was picked: the starts stay on it.
     let names = node.setup.names();
     if let Some(period) = names.iter().position(|name| name == PERIOD) {
-        for start in &mut starts {
+        for start in &mut ends {
             start[period] = node.fit.x[period];
         }
     }
-    let rough: Vec<Fit> = starts
-        .into_par_iter()
-        .filter_map(|start| fit_from(&node.setup, &[start], noise, ROUGH).ok())
-        .collect();
-    // What is far behind by then ends elsewhere.
-    let most = HOPELESS
-        * rough
+    for hopeless in HOPELESS {
+        let rough: Vec<Fit> = ends
+            .into_par_iter()
+            .filter_map(|start| fit_from(&node.setup, &[start], noise, ROUGH).ok())
+            .collect();
+        // What is far behind by then ends elsewhere.
+        let least = rough
             .iter()
             .map(|fit| fit.cost)
             .fold(node.fit.cost, f64::min);
-    let ends: Vec<Vec<f64>> = rough
-        .into_iter()
-        .filter(|fit| fit.cost <= most)
-        .map(|fit| fit.x)
-        .collect();
+        ends = rough
+            .into_iter()
+            .filter(|fit| fit.cost <= hopeless * least)
+            .map(|fit| fit.x)
+            .collect();
+    }
     if ends.is_empty() {
         node.fit.starts += STARTS_AROUND;
         return Ok(());

@@ -20,6 +20,19 @@ pub struct Side<T> {
     pub time_constant: T,
 }
 
+/// What a law changes in the balance of its vessel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Balance {
+    /// [`Law::head`].
+    Head,
+    /// [`Law::outflow`].
+    Outflow,
+    /// [`Law::net`].
+    Net,
+    /// [`Law::area`].
+    Area,
+}
+
 /// An effect with its parameters bound, at its place in the chain. Every method has a default that
 /// changes nothing, so a law says only what it does.
 ///
@@ -50,6 +63,11 @@ pub trait Law<T: Scalar>: Send {
     }
     /// Actuator: by which factor the pump's gain differs at a time from that of the plant.
     fn gain(&self, _t: T) -> Option<T> {
+        None
+    }
+    /// Vessel: which of the next four it has; it is not asked for the others, which would cost a call each at every stage
+    /// of a step.
+    fn changes(&self) -> Option<Balance> {
         None
     }
     /// Vessel: changes the head that drives the outflow, which begins as the level, given the level of the next vessel

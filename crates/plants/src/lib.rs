@@ -48,7 +48,7 @@ mod vessels;
 
 pub use effects::{CATALOGUE, EffectInfo, Place};
 pub use error::Error;
-pub use law::{Law, Rim, Side};
+pub use law::{Balance, Law, Rim, Side};
 pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scalar::{Dual, Scalar};
 pub use simulator::{Command, Simulator};

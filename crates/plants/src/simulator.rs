@@ -213,9 +213,9 @@ impl<T: Scalar> Simulator<T> {
                 let inflow = actuator.inflow(part, signal, gain, now);
                 if sensor.has_lag() {
                     let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
-                    vessels.step(part, inflow, now, &mut Some(&mut follow));
+                    vessels.step(part, &inflow, now, &mut Some(&mut follow));
                 } else {
-                    vessels.step(part, inflow, now, &mut None);
+                    vessels.step(part, &inflow, now, &mut None);
                 }
                 now = now + part;
             }

@@ -12,7 +12,9 @@
 //! comes near to any slow shape in the level. And a scale tells on any other record whether the shape holds there.
 //! [`Fitted::Ordinates`] is for who knows how to deal with that: the estimate of the shape itself.
 
-use crate::{Error, Law, ParameterInfo, Place, Plant, Scalar, Scales, Structure, Unit, effects};
+use crate::{
+    Balance, Error, Law, ParameterInfo, Place, Plant, Scalar, Scales, Structure, Unit, effects,
+};
 
 /// The most knots of a term.
 pub const MOST_KNOTS: usize = 512;
@@ -265,6 +267,9 @@ impl<T: Scalar> TermLaw<T> {
 impl<T: Scalar> Law<T> for TermLaw<T> {
     fn command(&mut self, u: T, t: f64) -> T {
         u + self.value(u, u, T::constant(t))
+    }
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Net)
     }
     fn net(&self, level: &T, net: &mut T, t: &T) {
         *net = *net + self.value(*net, *level, *t);

@@ -1,7 +1,7 @@
 //! `area_varies`: the vessel's surface changes with the level, as in a cone.
 
 use super::{EffectInfo, Place, any_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "area_varies",
@@ -44,6 +44,9 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for AreaVaries<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Area)
+    }
     fn area(&self, level: &T, area: &mut T) {
         let width = self.taper * (*level - self.operating_level) * (1.0 / self.scale) + 1.0;
         // A vessel that has narrowed to a tenth does not narrow further: the surface never vanishes.

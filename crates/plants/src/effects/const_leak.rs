@@ -1,7 +1,7 @@
 //! `const_leak`: a constant flow leaves a vessel unseen.
 
 use super::{EffectInfo, Place, any_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "const_leak",
@@ -37,6 +37,9 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for ConstLeak<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Net)
+    }
     fn net(&self, _level: &T, net: &mut T, _t: &T) {
         *net = *net - self.0;
     }

@@ -2,7 +2,7 @@
 //! the outflow of the upper one.
 
 use super::{EffectInfo, Place};
-use crate::{Law, ParameterInfo, Plant, Scalar, Side, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Plant, Scalar, Side, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "coupled_tank",
@@ -64,6 +64,9 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for CoupledTank<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Head)
+    }
     fn head(&self, head: &mut T, next: &T) {
         if let Self::Backflow(share) = *self {
             *head = *head - share * *next;

@@ -1,7 +1,7 @@
 //! `laminar_outflow`: a part of the outflow grows in proportion to the level.
 
 use super::{EffectInfo, Place, torricelli_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "laminar_outflow",
@@ -36,6 +36,9 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for LaminarOutflow<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Outflow)
+    }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         // A step may look below the bottom, from where nothing flows back.
         *outflow = *outflow + self.0 * level.max(T::constant(0.0));

@@ -1,7 +1,7 @@
 //! `leak_at_height`: a hole in the wall, through which water leaves once the level is above it.
 
 use super::{EffectInfo, Place, any_plant, spread};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "leak_at_height",
@@ -56,6 +56,9 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for LeakAtHeight<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Net)
+    }
     fn net(&self, level: &T, net: &mut T, _t: &T) {
         *net = *net - self.coefficient * square_root(*level - self.height);
     }

@@ -1,7 +1,7 @@
 //! `periodic_disturbance`: somebody draws or adds water periodically.
 
 use super::{EffectInfo, Place, any_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "periodic_disturbance",
@@ -71,6 +71,9 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for PeriodicDisturbance<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Net)
+    }
     fn net(&self, _level: &T, net: &mut T, t: &T) {
         let (sin, cos) = (self.frequency * *t).sin_cos();
         *net = *net + (self.sine * sin + self.cosine * cos);

@@ -1,7 +1,7 @@
 //! `pipe_height`: the outlet pipe leads down, and its height adds to the head that drives the outflow.
 
 use super::{EffectInfo, Place, torricelli_plant};
-use crate::{Law, ParameterInfo, Plant, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Plant, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pipe_height",
@@ -43,6 +43,9 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for PipeHeight<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Outflow)
+    }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         // An empty tank lets nothing out, however long its pipe.
         if level.value() > 0.0 {

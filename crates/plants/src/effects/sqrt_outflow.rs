@@ -1,7 +1,7 @@
 //! `sqrt_outflow`: the outflow of a vessel that is believed linear follows Torricelli's square root.
 
 use super::{EffectInfo, Place, linear_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "sqrt_outflow",
@@ -38,6 +38,9 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for SqrtOutflow<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Outflow)
+    }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         let root = self.operating_level.sqrt();
         // More than the square root bends the outflow down again, from some level on. No outlet does that: what is added

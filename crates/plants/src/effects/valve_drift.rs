@@ -1,7 +1,7 @@
 //! `valve_drift`: the outlet clogs or wears over the record.
 
 use super::{EffectInfo, Place, any_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "valve_drift",
@@ -38,6 +38,9 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for ValveDrift<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Outflow)
+    }
     fn outflow(&self, _head: &T, outflow: &mut T, t: &T) {
         *outflow = *outflow * (self.change * *t * (1.0 / self.duration) + 1.0);
     }

@@ -1,7 +1,7 @@
 //! `valve_step`: the outlet changes at one instant.
 
 use super::{EffectInfo, Place, any_plant, spread};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "valve_step",
@@ -51,6 +51,9 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for ValveStep<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Outflow)
+    }
     fn outflow(&self, _head: &T, outflow: &mut T, _t: &T) {
         if self.past {
             *outflow = *outflow * (self.change + 1.0);

@@ -3,7 +3,7 @@
 use crate::{Outlet, Scalar, Side, structure::MAX_VESSELS};
 
 use super::{
-    Levels, Vessels,
+    Levels, VesselLaws, Vessels,
     parts::STEP_LIMIT,
     torricelli::{A_LITTLE, slope_of_root, square_root},
 };
@@ -40,7 +40,7 @@ impl<T: Scalar> Vessels<T> {
     fn head(&self, i: usize, level: &T, levels: &Levels<T>) -> T {
         let mut head = *level;
         if i + 1 < self.vessels.len() {
-            for &law in &self.vessels[i].laws {
+            for &law in &self.vessels[i].laws.head {
                 self.laws[law].head(&mut head, &levels[i + 1]);
             }
         }
@@ -51,12 +51,12 @@ impl<T: Scalar> Vessels<T> {
     #[inline(always)]
     fn outflow(&self, i: usize, level: &T, levels: &Levels<T>, t: &T) -> T {
         let vessel = &self.vessels[i];
-        if vessel.laws.is_empty() {
+        if vessel.laws.head.is_empty() && vessel.laws.outflow.is_empty() {
             return self.own_outflow(i, level);
         }
         let head = self.head(i, level, levels);
         let mut outflow = self.own_outflow(i, &head);
-        for &law in &vessel.laws {
+        for &law in &vessel.laws.outflow {
             self.laws[law].outflow(&head, &mut outflow, t);
         }
         outflow
@@ -66,14 +66,24 @@ impl<T: Scalar> Vessels<T> {
     #[inline(always)]
     pub(super) fn balance(&self, i: usize, inflow: T, levels: &Levels<T>, t: f64) -> (T, T) {
         let level = &levels[i];
-        if self.vessels[i].laws.is_empty() {
+        if !self.vessels[i].laws.any {
+            let outflow = self.own_outflow(i, level);
+            return (outflow, inflow - outflow);
+        }
+        let laws = &self.vessels[i].laws;
+        if laws.outflow.is_empty()
+            && laws.net.is_empty()
+            && laws.head.is_empty()
+            && self.side.is_none()
+        {
+            // Only its surface changes.
             let outflow = self.own_outflow(i, level);
             return (outflow, inflow - outflow);
         }
         let t = self.time(t);
         let outflow = self.outflow(i, level, levels, &t);
         let mut net = inflow - outflow;
-        for &law in &self.vessels[i].laws {
+        for &law in &self.vessels[i].laws.net {
             self.laws[law].net(level, &mut net, &t);
         }
         if let Some(side) = &self.side {
@@ -93,7 +103,7 @@ impl<T: Scalar> Vessels<T> {
     fn area(&self, i: usize, level: &T) -> T {
         let vessel = &self.vessels[i];
         let mut area = vessel.area;
-        for &law in &vessel.laws {
+        for &law in &vessel.laws.area {
             self.laws[law].area(level, &mut area);
         }
         area
@@ -108,7 +118,7 @@ impl<T: Scalar> Vessels<T> {
             Some(inverse) => net * inverse,
             None => net * vessel.inverse,
         };
-        if vessel.laws.is_empty() {
+        if vessel.laws.area.is_empty() {
             rate
         } else {
             rate * (vessel.area / self.area(i, level))
@@ -119,6 +129,13 @@ impl<T: Scalar> Vessels<T> {
     #[inline]
     pub(super) fn rates(&self, levels: &Levels<T>, q: T, t: f64) -> Levels<T> {
         let mut rates = [T::constant(0.0); MAX_VESSELS];
+        self.rates_into(&mut rates, levels, q, t);
+        rates
+    }
+
+    /// The same in place; a rate that is zero for now is written too.
+    #[inline(always)]
+    pub(super) fn rates_into(&self, rates: &mut Levels<T>, levels: &Levels<T>, q: T, t: f64) {
         let mut inflow = q;
         for (i, vessel) in self.vessels.iter().enumerate() {
             let (outflow, net) = self.balance(i, inflow, levels, t);
@@ -126,6 +143,7 @@ impl<T: Scalar> Vessels<T> {
             if vessel.spilling {
                 // The level stands at the rim, and the net inflow spills; where it turns negative the mode ends.
                 inflow = inflow + net * vessel.rim.fraction;
+                rates[i] = T::constant(0.0);
             } else {
                 rates[i] = self.rate(i, &levels[i], net);
             }
@@ -134,7 +152,6 @@ impl<T: Scalar> Vessels<T> {
             let last = self.states - 1;
             rates[last] = (levels[last - 1] - levels[last]) / side.time_constant;
         }
-        rates
     }
 
     /// Rates of linear vessels without effects, written as in [`Vessels::rates`].
@@ -172,7 +189,7 @@ impl<T: Scalar> Vessels<T> {
             Outlet::Torricelli => vessel.coefficient * slope_of_root(level),
             Outlet::Linear => T::constant(1.0),
         };
-        if vessel.laws.is_empty() {
+        if !vessel.laws.any {
             return own * vessel.inverse;
         }
         let step = 1e-6 * (level.value().abs() + 1e-3);
@@ -214,7 +231,14 @@ impl<T: Scalar> Vessels<T> {
                 // An empty vessel is taken as one with a little in it: its slope is the same, and it may be about to fill.
                 Outlet::Torricelli => {
                     let height = level.value().max(A_LITTLE);
-                    let (outflow, content) = if vessel.laws.is_empty() {
+                    let VesselLaws {
+                        head,
+                        outflow,
+                        area,
+                        ..
+                    } = &vessel.laws;
+                    let nominal = head.is_empty() && outflow.is_empty() && area.is_empty();
+                    let (outflow, content) = if nominal {
                         let outflow = vessel.coefficient.value() * square_root(height);
                         (outflow, height * vessel.area.value())
                     } else {
@@ -230,7 +254,7 @@ impl<T: Scalar> Vessels<T> {
                         most = most.max(0.5 * h * outflow / content);
                     }
                 }
-                Outlet::Linear if vessel.laws.is_empty() => {}
+                Outlet::Linear if !vessel.laws.any => {}
                 // The vessel's own forgetting is exact; here it is what the effects add to it.
                 Outlet::Linear => {
                     let own = 1.0 / vessel.area.value().abs();

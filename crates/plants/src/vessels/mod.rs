@@ -11,7 +11,8 @@ mod runge_kutta;
 mod torricelli;
 
 use crate::{
-    Law, Outlet, Rim, Scalar, Side, inflow::Inflow, linear::Propagators, structure::MAX_VESSELS,
+    Balance, Law, Outlet, Rim, Scalar, Side, inflow::Inflow, linear::Propagators,
+    structure::MAX_VESSELS,
 };
 
 use exponential::LinearFlow;
@@ -34,8 +35,18 @@ struct Vessel<T> {
     coefficient: T,
     rim: Rim<T>,
     spilling: bool,
-    /// Positions of the laws that act here.
-    laws: Vec<usize>,
+    laws: VesselLaws,
+}
+
+/// Positions of the laws that act in a vessel, by what they change.
+#[derive(Default)]
+struct VesselLaws {
+    head: Vec<usize>,
+    outflow: Vec<usize>,
+    net: Vec<usize>,
+    area: Vec<usize>,
+    /// Any of them, or a side tank.
+    any: bool,
 }
 
 /// The vessels in series.
@@ -94,14 +105,22 @@ impl<T: Scalar> Vessels<T> {
                     fraction: T::constant(0.0),
                 },
                 spilling: false,
-                laws: Vec::new(),
+                laws: VesselLaws::default(),
             })
             .collect();
         let mut bound = Vec::with_capacity(laws.len());
         for (vessel, law) in laws {
+            let vessel = &mut vessels[vessel];
             match law.rim() {
-                Some(rim) => vessels[vessel].rim = rim,
-                None => vessels[vessel].laws.push(bound.len()),
+                Some(rim) => vessel.rim = rim,
+                None => vessel.laws.any = true,
+            }
+            match law.changes() {
+                Some(Balance::Head) => vessel.laws.head.push(bound.len()),
+                Some(Balance::Outflow) => vessel.laws.outflow.push(bound.len()),
+                Some(Balance::Net) => vessel.laws.net.push(bound.len()),
+                Some(Balance::Area) => vessel.laws.area.push(bound.len()),
+                None => {}
             }
             bound.push(law);
         }
@@ -126,7 +145,7 @@ impl<T: Scalar> Vessels<T> {
         let linear = linear.then(|| LinearFlow {
             whole: propagators(),
             half: propagators(),
-            disturbed: vessels.iter().any(|v| !v.laws.is_empty()),
+            disturbed: vessels.iter().any(|v| v.laws.any),
         });
         let mut initial = [T::constant(0.0); MAX_VESSELS];
         for (level, given) in initial.iter_mut().zip(levels) {
@@ -166,7 +185,7 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    fn accept(&mut self, next: Levels<T>, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    fn accept(&mut self, next: Levels<T>, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if let Some(watch) = watch {
             let last = self.vessels.len() - 1;
             let before = self.levels;

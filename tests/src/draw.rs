@@ -24,6 +24,8 @@ const MIDDLE: f64 = 5.0;
 const MET: f64 = 0.03;
 /// Rigs that are drawn before an effect is said to show nowhere.
 const DRAWS: usize = 12;
+/// Starts with which the minimum is checked at the end.
+const MORE: usize = 6;
 const STOPPING: Stopping = Stopping {
     evaluations: 60,
     cost: 1e-9,
@@ -144,35 +146,41 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
             near = Some(fit.x);
             Some((with, reached))
         };
-        let (mut low, mut high) = (0.0_f64, 1.0_f64 / 4096.0);
-        let mut found = loop {
-            let (with, reached) = at(high)?;
-            if reached >= ratio {
-                break (with, reached);
-            }
-            if high >= 1.0 {
+        // Outwards until the ratio lies between two sizes, then along the line through their logarithms.
+        let mut below: Option<(f64, f64)> = None;
+        let mut size = 1.0 / 1024.0;
+        let mut found = at(size)?;
+        while found.1 < ratio {
+            if size >= 1.0 {
                 return None;
             }
-            low = high;
-            high = (2.0 * high).min(1.0);
-        };
-        for _ in 0..16 {
+            below = Some((size, found.1));
+            size = (4.0 * size).min(1.0);
+            found = at(size)?;
+        }
+        let mut above = (size, found.1);
+        for step in 0..20 {
             if (found.1 / ratio - 1.0).abs() < MET {
                 break;
             }
-            let middle = 0.5 * (low + high);
-            let next = at(middle)?;
-            if next.1 >= ratio {
-                (high, found) = (middle, next);
-            } else {
-                low = middle;
-                if next.1 > (1.0 - MET) * ratio {
-                    found = next;
+            size = match below {
+                // A threshold may leave nothing on one side: every other step halves the way.
+                Some(below) if step % 2 == 0 && below.1 > 0.0 => {
+                    let part = (ratio / below.1).ln() / (above.1 / below.1).ln();
+                    below.0 * (above.0 / below.0).powf(part.clamp(0.02, 0.98))
                 }
+                Some(below) => (below.0 * above.0).sqrt(),
+                None => 0.25 * above.0,
+            };
+            found = at(size)?;
+            if found.1 < ratio {
+                below = Some((size, found.1));
+            } else {
+                above = (size, found.1);
             }
         }
         let (with, _) = found;
-        let best = misfit(&with, seed, near.as_deref(), 12)?;
+        let best = misfit(&with, seed, near.as_deref(), MORE)?;
         let reached = best.rmse / rig.noise;
         if (reached / ratio - 1.0).abs() < 2.0 * MET {
             return Some(Built {
@@ -206,8 +214,10 @@ fn misfit(rig: &Rig, seed: u64, near: Option<&[f64]>, more: usize) -> Option<Fit
     }
     let setup = Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
     let mut starts = random_starts(&setup, more, seed);
-    starts.push([rig.theta.as_slice(), &rig.levels].concat());
-    starts.extend(near.map(<[f64]>::to_vec));
+    starts.push(near.map_or_else(
+        || [rig.theta.as_slice(), &rig.levels].concat(),
+        <[f64]>::to_vec,
+    ));
     fit_from(&setup, &starts, &ArModel::white(1.0), STOPPING).ok()
 }
 

@@ -20,16 +20,18 @@ pub struct Mark {
     pub truth: f64,
     /// The single effect with which the criterion falls most, and by how much.
     pub best: (&'static str, f64),
+    /// What the criterion falls by with the effect that was named first.
+    pub named: Option<f64>,
 }
 
 impl Mark {
     pub fn as_json(&self) -> Value {
-        json!({ "truth": self.truth, "best": self.best.0, "best_falls": self.best.1 })
+        json!({ "truth": self.truth, "best": self.best.0, "best_falls": self.best.1, "named_falls": self.named })
     }
 }
 
 /// The mark of a record with one effect; `None` where a fit is not possible.
-pub fn mark(rig: &Rig, problem: &Problem) -> Option<Mark> {
+pub fn mark(rig: &Rig, problem: &Problem, named: &[String]) -> Option<Mark> {
     let noise = if rig.colour > 0.0 {
         ArModel::from_coefficients(&[rig.colour], 1.0).ok()?
     } else {
@@ -58,6 +60,7 @@ pub fn mark(rig: &Rig, problem: &Problem) -> Option<Mark> {
         effect: EffectInfo::find(id)?,
         vessel: *vessel,
     };
+    let mut of_named: Option<f64> = None;
     let (mut truth, mut best) = (f64::NEG_INFINITY, ("", f64::NEG_INFINITY));
     for placed in setup.structure.candidates() {
         let Some(mut fit) = with(&setup, &base, placed, &noise, None) else {
@@ -72,11 +75,18 @@ pub fn mark(rig: &Rig, problem: &Problem) -> Option<Mark> {
         if placed == own {
             truth = fall;
         }
+        if named.len() == 1 && named[0] == placed.effect.id {
+            of_named = Some(of_named.map_or(fall, |other| other.max(fall)));
+        }
         if fall > best.1 {
             best = (placed.effect.id, fall);
         }
     }
-    Some(Mark { truth, best })
+    Some(Mark {
+        truth,
+        best,
+        named: of_named,
+    })
 }
 
 /// The base and one effect, from every start of the effect, or from the truth.

@@ -180,7 +180,7 @@ impl Job {
                 if let (true, Self::Effect { effect, .. }) = (wants_mark, self)
                     && answer.group(effect.id).is_none()
                 {
-                    answer.mark = mark::mark(&rig, &problem);
+                    answer.mark = mark::mark(&rig, &problem, &answer.effects);
                 }
                 Outcome {
                     answer: Some(answer),

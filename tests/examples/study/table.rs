@@ -220,14 +220,15 @@ pub fn text(jobs: &[Job], outcomes: &[Outcome]) -> String {
             let answer = outcome.answer.as_ref();
             let _ = writeln!(
                 out,
-                "{} ({}): {:?} {:?}; a refit that knows the colour: truth {:.1}, best {} {:.1}",
+                "{} ({}): {:?} {:?}; a refit that knows the colour: truth {:.1}, best {} {:.1}, named {}",
                 job.name(),
                 answer.map_or("", |a| a.plant),
                 answer.map(|a| a.verdict),
                 answer.map(|a| &a.groups),
                 mark.truth,
                 mark.best.0,
-                mark.best.1
+                mark.best.1,
+                shown(mark.named)
             );
         }
         if let Some(why) = &outcome.refused {

@@ -155,13 +155,7 @@ impl Rig {
         scales.input_range = 10.0;
         let mut structure = Structure::new(self.plant, self.known(), scales);
         let mut theta = self.theta.clone();
-        // A converter stands behind the noise: what it reads are whole steps.
-        let mut step = 0.0;
         for (id, vessel, parameters) in &self.hidden {
-            if *id == "coarse_quantisation" {
-                step = parameters[0];
-                continue;
-            }
             let effect = EffectInfo::find(id).expect("an effect of the catalogue");
             structure = structure
                 .with(Placed {
@@ -202,10 +196,7 @@ impl Rig {
         );
         for k in 0..self.samples {
             let (unseen, misread) = (self.outside)(k as f64 * self.interval);
-            let mut reading = simulator.read() + misread + e[k];
-            if step > 0.0 {
-                reading = step * (reading / step).round();
-            }
+            let reading = simulator.read() + misread + e[k];
             let command = match self.drive {
                 Drive::Open => wanted[k],
                 Drive::Closed => controller.command(wanted[k], reading, self.interval),

@@ -98,8 +98,8 @@ const EXCHANGED: usize = 12;
 /// What is behind by more than this part of an effect's own gain after a few steps does not catch up.
 const OUT_OF_REACH: f64 = 0.5;
 
-/// A child's starts: the parent's vector, with the new effect's parameters on the grid of its starts.
-fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
+/// A child's starts: the vector of a node, with the new effect's parameters on the grid of its starts.
+fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let parameters = child.structure.effect_parameters(placed);
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
     for parameter in &parameters {
@@ -117,7 +117,7 @@ fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     combinations
         .into_iter()
         .map(|values| {
-            let mut x = transfer(parent, child);
+            let mut x = transfer(from, child);
             for (parameter, value) in parameters.iter().zip(values) {
                 let name = format!("{}.{}", placed.effect.id, parameter.name);
                 if let Some(at) = child.names().iter().position(|known| *known == name) {
@@ -175,9 +175,19 @@ struct Proposal<'a> {
 }
 
 fn propose<'a>(parent: &Node<'a>, placed: Placed, noise: &ArModel) -> Option<Proposal<'a>> {
+    propose_from(parent, parent, placed, noise)
+}
+
+/// The same, all other parameters starting where they are in a node of another structure.
+fn propose_from<'a>(
+    parent: &Node<'a>,
+    from: &Node,
+    placed: Placed,
+    noise: &ArModel,
+) -> Option<Proposal<'a>> {
     let structure = parent.setup.structure.with(placed).ok()?;
     let setup = parent.setup.with_structure(structure).ok()?;
-    let mut ranked: Vec<(f64, Vec<f64>)> = grid(parent, &setup, placed)
+    let mut ranked: Vec<(f64, Vec<f64>)> = grid(from, &setup, placed)
         .into_par_iter()
         .filter_map(|x| Some((promise(&setup, &x, noise)?, x)))
         .collect();
@@ -386,7 +396,18 @@ pub(crate) fn exchanges<'a>(
     let mut proposals: Vec<Proposal> = candidates(&lacking)
         .into_par_iter()
         .filter(|placed| *placed != own)
-        .filter_map(|placed| propose(&lacking, placed, noise))
+        .filter_map(|placed| {
+            let mut proposal = propose(&lacking, placed, noise)?;
+            proposal.starts.truncate(1);
+            // The model that lacks the effect has bent the plant's parameters to imitate it, and may have lost its way back.
+            // Beside a true stand-in they are where they are beside the effect itself.
+            if let Some(mut beside) = propose_from(&lacking, node, placed, noise) {
+                beside.starts.truncate(1);
+                proposal.starts.append(&mut beside.starts);
+                proposal.promise = proposal.promise.min(beside.promise);
+            }
+            Some(proposal)
+        })
         .collect();
     proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
     // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
@@ -394,10 +415,7 @@ pub(crate) fn exchanges<'a>(
     let mut begun: Vec<(usize, Node)> = proposals
         .into_par_iter()
         .enumerate()
-        .filter_map(|(promised, mut proposal)| {
-            proposal.starts.truncate(1);
-            Some((promised, realise(proposal, noise, QUICK)?))
-        })
+        .filter_map(|(promised, proposal)| Some((promised, realise(proposal, noise, QUICK)?)))
         .collect();
     begun.sort_by(|a, b| a.1.fit.bic().total_cmp(&b.1.fit.bic()));
     let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());

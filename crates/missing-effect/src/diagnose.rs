@@ -135,8 +135,10 @@ pub fn diagnose(
     let mut confirmed = confirm(richest_noise, &noise)?;
     let wandering = wanders(&richest, &noise);
     let by_simulation = wandering && !confirmed.added.is_empty();
-    if noise.order() > 0 && !by_simulation {
-        // The noise's colour is known now: the search is repeated in its metric.
+    if noise.order() > 0 {
+        // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
+        // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
+        // sets that were grown there.
         let sizes = grow(&base_noise, &noise, breadth, pays, &|done, total| {
             tell("searching in the noise's metric", done, total);
         })?;

@@ -55,6 +55,9 @@ struct Arguments {
     /// Records that are diagnosed at a time, each on one core; all cores where none is given.
     #[arg(long)]
     threads: Option<usize>,
+    /// Only records whose name holds this, as `nothing 83` or `closed, coloured 4`.
+    #[arg(long, default_value = "")]
+    only: String,
     /// Of the records on which the effect is not in the group, also says whether an exhaustive refit that knows the noise's
     /// colour names it.
     #[arg(long)]
@@ -91,6 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for kind in 0..kinds_of_unknown() {
         jobs.extend((0..arguments.unknown).map(|number| Job::Unknown { kind, number }));
     }
+    jobs.retain(|job| job.name().contains(&arguments.only));
     let threads = arguments
         .threads
         .or_else(|| std::thread::available_parallelism().ok().map(usize::from))

@@ -88,17 +88,6 @@ pub fn rig(plant: Plant, drive: Drive, colour: f64, samples: usize, rng: &mut Ch
     }
 }
 
-/// A rig with an effect of a known size in it.
-#[derive(Debug, Clone)]
-pub struct Built {
-    /// The rig, the effect in it.
-    pub rig: Rig,
-    /// The effect and its place.
-    pub placed: Placed,
-    /// Structural error of the believed model over the noise, as it came out.
-    pub ratio: f64,
-}
-
 /// A rig with an effect whose structural error is `ratio` times the noise: the root mean square of what the believed model,
 /// refitted to the record without noise, cannot follow.
 ///
@@ -114,7 +103,7 @@ pub fn with_effect(
     colour: f64,
     samples: usize,
     seed: u64,
-) -> Option<Built> {
+) -> Option<Rig> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let places: Vec<(Plant, usize)> = PLANTS
         .into_iter()
@@ -134,7 +123,7 @@ pub fn with_effect(
     })
 }
 
-fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) -> Option<Built> {
+fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) -> Option<Rig> {
     let path = Path::draw(&rig, placed, seed, rng)?;
     // The minimum from which the next size's is sought; at the end others are looked for.
     let mut near: Option<Vec<f64>> = None;
@@ -183,11 +172,7 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
         let best = misfit(&with, seed, near.as_deref(), MORE)?;
         let reached = best.rmse / rig.noise;
         if (reached / ratio - 1.0).abs() < 2.0 * MET {
-            return Some(Built {
-                rig: with,
-                placed,
-                ratio: reached,
-            });
+            return Some(with);
         }
         near = Some(best.x);
     }

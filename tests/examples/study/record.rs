@@ -202,8 +202,7 @@ impl Job {
                 number,
             } => {
                 let colour = colour(coloured, number);
-                let built = draw::with_effect(effect, ratio, drive, colour, samples, seed)?;
-                Some(built.rig)
+                draw::with_effect(effect, ratio, drive, colour, samples, seed)
             }
             Self::Nothing(number) => {
                 let plant = PLANTS[number as usize % PLANTS.len()];

@@ -25,7 +25,7 @@ struct Count {
     named: usize,
     /// What is hidden is in a group of what is named.
     in_group: usize,
-    /// It is named first.
+    /// It is the one named first in its group.
     first: usize,
     undecided: usize,
     sizes: Vec<usize>,
@@ -199,11 +199,11 @@ pub fn text(jobs: &[Job], outcomes: &[Outcome]) -> String {
             "seconds"
         );
     }
-    for ((_, effect, ratio_, at), c) in &cells {
+    for ((_, effect, hundredths, at), c) in &cells {
         let _ = writeln!(
             out,
             "{effect:<21} {:>5} {:<16} {:>7} {:>6} {:>6} {:>8} {:>5} {:>9} {:>5} {:>7}",
-            ratio(*ratio_),
+            ratio(*hundredths),
             named_condition(*at),
             c.records,
             c.percent(c.seen),

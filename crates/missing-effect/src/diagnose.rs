@@ -144,7 +144,7 @@ pub fn diagnose(
         })?;
         let other = confirm(refine(&chosen(&sizes, &base_noise), &noise, &[])?, &noise)?;
         if other.fit.bic() < confirmed.fit.bic()
-            && !(by_simulation && drifts_off(&confirmed, &other, &noise)?)
+            && !(by_simulation && drifts_off(&confirmed, &other)?)
         {
             confirmed = other;
         }
@@ -314,12 +314,10 @@ fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
         })
 }
 
-/// Whether a set simulates worse than another by more than a noise of this colour brings about: a sample of a slow one
-/// counts for less than one.
-fn drifts_off(before: &Node, after: &Node, noise: &ArModel) -> Result<bool, Error> {
+/// Whether a set simulates clearly worse than another, by the criterion.
+fn drifts_off(before: &Node, after: &Node) -> Result<bool, Error> {
     let white = ArModel::white(1.0);
-    let behind = refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?);
-    Ok(behind / slowness(noise) > BIC_MARGIN)
+    Ok(refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?) > BIC_MARGIN)
 }
 
 /// The part of what stands above the noise floor, in mean square, that a model explains of its base.

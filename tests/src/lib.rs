@@ -1,5 +1,8 @@
 //! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
 
+pub mod draw;
+pub mod outside;
+
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
 use missing_effect::Problem;
 use plants::{
@@ -38,6 +41,10 @@ pub struct Rig {
     pub colour: f64,
     /// How the command comes about.
     pub drive: Drive,
+    /// Fewest and most samples for which a step lasts.
+    pub hold: (usize, usize),
+    /// Gain \[V/cm\] and integral time \[s\] of the controller of [`Drive::Closed`].
+    pub pi: (f64, f64),
     /// Samples.
     pub samples: usize,
     /// Sampling interval \[s\].
@@ -61,6 +68,8 @@ impl Rig {
             noise: 0.05,
             colour: 0.0,
             drive: Drive::Open,
+            hold: (20, 90),
+            pi: (0.4, 120.0),
             samples: 1000,
             interval: 2.0,
             outside: |_| (0.0, 0.0),
@@ -107,11 +116,12 @@ impl Rig {
     /// The controller of [`Drive::Closed`].
     ///
     /// # Panics
-    /// Never: its settings are constants that can work.
+    /// Where its settings cannot work: they are constants of a test, or drawn from what can.
     #[must_use]
     #[allow(clippy::expect_used)]
     pub fn controller(&self) -> Controller {
-        Controller::pi(0.4, 120.0, (0.0, 10.0)).expect("a controller")
+        let (gain, integral_time) = self.pi;
+        Controller::pi(gain, integral_time, (0.0, 10.0)).expect("a controller")
     }
 
     /// The plant without what is hidden, beside one record; the controller is not told.
@@ -177,7 +187,7 @@ impl Rig {
             ),
         };
         let wanted: Result<Vec<f64>, Error> =
-            excitation::steps(self.samples, 20..=90, low, high, rng);
+            excitation::steps(self.samples, self.hold.0..=self.hold.1, low, high, rng);
         let wanted = wanted.expect("an excitation");
         let mut controller = self.controller().start(&[middle]);
         let (mut u, mut y) = (

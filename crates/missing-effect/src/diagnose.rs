@@ -142,29 +142,35 @@ pub fn diagnose(
     let mut confirmed = confirm(richest_noise, &noise)?;
     let wandering = wanders(&richest, &noise);
     let by_simulation = wandering && !confirmed.added.is_empty();
-    if noise.order() > 0 && !by_simulation {
-        // The noise's colour is known now: the search is repeated in its metric.
-        let white = grown;
-        grown = grow(
+    if noise.order() > 0 {
+        // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
+        // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
+        // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken.
+        let coloured = grow(
             &base_noise,
             &noise,
             breadth,
             pays,
             // It was exhausted in this colour, which is that of its own residual.
-            |node| Ok(white.exhausted_by(node) || exhausted(node)?),
+            |node| Ok(grown.exhausted_by(node) || exhausted(node)?),
             &|done, total| tell("searching in the noise's metric", done, total),
         )?;
-        let best = chosen(&grown.sizes, &base_noise);
-        grown.sizes = white.sizes;
+        let best = chosen(&coloured.sizes, &base_noise);
         let other = confirm(refine(&best, &noise, &[])?, &noise)?;
-        if other.fit.bic() < confirmed.fit.bic() {
+        if other.fit.bic() < confirmed.fit.bic()
+            && !(by_simulation && drifts_off(&confirmed, &other)?)
+        {
             confirmed = other;
+        }
+        if !by_simulation {
+            grown = coloured.with_sizes_of(grown);
         }
     }
     if !by_simulation {
         confirmed = improve(confirmed, &noise)?;
     }
-    // Each model with the colour of its own residual: what a coloured noise explains needs no effect.
+    // Each model with the colour of its own residual: what a coloured noise explains needs no effect. The richest model has
+    // taken a part of a slow noise for effects, and the colour that it leaves is too fast: chance is counted here too.
     let own_base = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
     let own_last = coloured(
         &confirmed.setup,
@@ -172,7 +178,14 @@ pub fn diagnose(
         NOISE_ORDER,
         STOPPING,
     )?;
-    if !confirmed.added.is_empty() && own_base.bic() - own_last.bic() < BIC_MARGIN {
+    let freedom = own_last.parameters.saturating_sub(own_base.parameters);
+    let needed_in_colour = own_base.bic() - own_last.bic() >= BIC_MARGIN
+        && beyond_chance(
+            own_base.deviance - own_last.deviance,
+            freedom.max(1) as f64,
+            &base,
+        );
+    if !confirmed.added.is_empty() && !needed_in_colour {
         confirmed = base_noise.clone();
     }
     // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, and where the other
@@ -331,6 +344,12 @@ fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
                 best
             }
         })
+}
+
+/// Whether a set simulates clearly worse than another, by the criterion.
+fn drifts_off(before: &Node, after: &Node) -> Result<bool, Error> {
+    let white = ArModel::white(1.0);
+    Ok(refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?) > BIC_MARGIN)
 }
 
 /// The part of what stands above the noise floor, in mean square, that a model explains of its base.

@@ -318,6 +318,14 @@ impl<'a> Grown<'a> {
         self.exhausted.as_ref().is_some_and(same)
     }
 
+    /// The same growth with the sets of another.
+    pub fn with_sizes_of(self, other: Self) -> Self {
+        Self {
+            sizes: other.sizes,
+            ..self
+        }
+    }
+
     /// What [`singles`] gives for the base in the metric in which it was grown.
     pub fn singles(self, noise: &ArModel) -> Vec<Node<'a>> {
         let mut nodes = self.refitted;

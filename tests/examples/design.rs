@@ -4,7 +4,12 @@
 //!
 //! **The rule**: the rows of `design_cases.rs` are gone through seed by seed; a record is a case where its diagnosis is *undecided*
 //! with the truth in the one group. The experiment is designed between the truth and the best other of the group
-//! that is no twin of it. Where all are twins the record is no case, and is counted apart. The first so many cases are taken.
+//! that is no twin of it, within half to one and a half of the middle command (in a loop: of the level), as long as the record; where the
+//! design says that it has to be longer, up to 8 times, so long. Where all are twins the record is no case, and is counted apart. The first
+//! so many cases are taken.
+//!
+//! **The columns**: `pair`: both records diagnosed together name the truth in their one group, and the other is not in it. `alone`:
+//! nothing else is in the group either. `decides` is what the design had promised.
 
 use ctid_tests::design_cases::{ROWS, SEEDS, answered, proposed, undecided};
 use ctid_tests::Drive;
@@ -18,7 +23,7 @@ fn main() {
     let (mut cases, mut pairs, mut alone, mut looked_at, mut twins) = (0, 0, 0, 0, 0);
     let mut promised = 0.0;
     println!(
-        "case  plant     loop  truth              against            group  experiment               power  decides  pair  alone  then"
+        "case  plant     loop  truth              against            group  experiment               power  decides  min  pair  alone  then"
     );
     'all: for seed in SEEDS {
         // A row's record hangs on nothing but its seed: they are diagnosed side by side.
@@ -61,7 +66,7 @@ fn main() {
             promised += best.power.decides;
             let yes = |is| if is { "yes" } else { "no" };
             println!(
-                "{cases:>4}  {:<9} {:<5} {:<18} {other:<18} {:>5}  {:<24} {:>5.0}  {:>7.2}  {:<4}  {:<5}  {}",
+                "{cases:>4}  {:<9} {:<5} {:<18} {other:<18} {:>5}  {:<24} {:>5.0}  {:>7.2}  {:>3.0}  {:<4}  {:<5}  {}",
                 row.0,
                 if row.1 == Drive::Closed { "yes" } else { "no" },
                 case.truth,
@@ -69,6 +74,7 @@ fn main() {
                 format!("{}, {:.0} s", best.kind.name(), best.clock),
                 best.power.power,
                 best.power.decides,
+                plan.limits.duration / 60.0,
                 yes(pair),
                 yes(single),
                 answer.map_or(String::new(), |answer| format!("{:?}", answer.groups)),

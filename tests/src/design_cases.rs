@@ -15,36 +15,35 @@ pub type Row = (&'static str, Drive, &'static str, usize, &'static [f64]);
 /// show that something is missing, and hardly what.
 pub const ROWS: [Row; 24] = [
     ("single", Drive::Open, "pump_deadzone", 0, &[0.6]),
-    ("linear", Drive::Open, "pump_saturation", 0, &[5.3]),
+    ("linear", Drive::Open, "sqrt_outflow", 0, &[0.4]),
     ("single", Drive::Closed, "const_leak", 0, &[6.0]),
-    ("cascaded", Drive::Open, "overflow", 0, &[22.0, 0.5]),
+    ("cascaded", Drive::Open, "const_leak", 1, &[4.0]),
     ("single", Drive::Open, "laminar_outflow", 0, &[0.8]),
     ("single", Drive::Open, "sensor_lag", 0, &[10.0]),
-    ("linear", Drive::Open, "sqrt_outflow", 0, &[]),
+    ("linear", Drive::Open, "pump_nonlinearity", 0, &[0.6]),
     ("single", Drive::Closed, "pump_deadzone", 0, &[0.6]),
-    ("single", Drive::Open, "sensor_saturation", 0, &[18.0]),
-    ("cascaded", Drive::Open, "const_leak", 1, &[6.0]),
-    ("single", Drive::Open, "valve_drift", 0, &[0.02]),
-    ("linear", Drive::Open, "sensor_saturation", 0, &[18.0]),
+    ("single", Drive::Open, "overflow", 0, &[19.5]),
+    ("cascaded", Drive::Open, "pipe_height", 1, &[3.0]),
+    ("single", Drive::Open, "valve_drift", 0, &[0.006]),
+    ("linear", Drive::Open, "transport_delay", 0, &[5.0]),
     ("single", Drive::Open, "sensor_offset", 0, &[1.5]),
     ("single", Drive::Closed, "sensor_lag", 0, &[8.0]),
-    ("single", Drive::Open, "pump_gain_drift", 0, &[0.02]),
-    ("cascaded", Drive::Open, "pump_deadzone", 0, &[0.6]),
-    ("single", Drive::Open, "overflow", 0, &[18.0]),
-    ("single", Drive::Closed, "sensor_offset", 0, &[1.5]),
+    ("single", Drive::Open, "pump_gain_drift", 0, &[0.006, 2000.0]),
+    ("cascaded", Drive::Open, "pump_lag", 0, &[10.0]),
+    ("single", Drive::Open, "sensor_saturation", 0, &[19.5]),
+    ("single", Drive::Closed, "sensor_offset", 0, &[0.8]),
     ("single", Drive::Open, "pump_lag", 0, &[10.0]),
-    ("linear", Drive::Open, "pump_nonlinearity", 0, &[0.3]),
+    ("linear", Drive::Open, "pump_saturation", 0, &[5.55]),
     ("cascaded", Drive::Open, "laminar_outflow", 1, &[0.8]),
-    ("single", Drive::Open, "const_leak", 0, &[6.0]),
+    ("single", Drive::Open, "pump_nonlinearity", 0, &[-0.3]),
     ("cascaded", Drive::Open, "sensor_drift", 0, &[0.5]),
-    ("single", Drive::Closed, "pump_nonlinearity", 0, &[0.3]),
+    ("single", Drive::Closed, "laminar_outflow", 0, &[0.5]),
 ];
 
 /// Seeds of a row that are looked at.
 pub const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
-/// What the experiment may do: most of the actuator's range, or of the tank's.
-const COMMAND: (f64, f64) = (1.0, 9.0);
-const LEVEL: (f64, f64) = (5.0, 40.0);
+/// What the experiment may do, as parts of the middle command, or in a loop of the level that the tank is held at.
+const RANGE: (f64, f64) = (0.5, 1.5);
 
 /// The rig of a row: its command stays near the middle.
 #[must_use]
@@ -63,6 +62,9 @@ pub fn rig(row: &Row) -> Rig {
         ..rig
     }
 }
+
+/// More than so many times as long as the record is no answer.
+const LONGEST: f64 = 8.0;
 
 /// A record that leaves it open, and who else it may be.
 pub struct Undecided {
@@ -108,19 +110,23 @@ pub fn undecided(row: &Row, seed: u64) -> Option<Undecided> {
     })
 }
 
-/// The experiment between the truth and the best of the others that is no twin of it; `Err` holds the twins where all are.
+/// The experiment between the truth and the best of the others that is no twin of it, made longer where the design says how much
+/// longer it has to be; `Err` holds the twins where all are.
 ///
 /// # Errors
 /// The twins.
 pub fn proposed(case: &Undecided) -> Result<(String, Design), Vec<String>> {
-    let range = match case.rig.drive {
-        Drive::Open => COMMAND,
-        Drive::Closed => LEVEL,
+    let middle = match case.rig.drive {
+        Drive::Open => 0.5 * (case.rig.command.0 + case.rig.command.1),
+        Drive::Closed => case.rig.levels.last().copied().unwrap_or_default(),
     };
     let limits = Limits {
-        range: Some(range),
+        range: Some((RANGE.0 * middle, RANGE.1 * middle)),
         seed: 1,
         ..Limits::default()
+    };
+    let plan = |between, limits: &Limits| {
+        design(&case.problem, between, limits, &Options::default(), &|_| {})
     };
     let mut twins = Vec::new();
     for other in &case.others {
@@ -131,14 +137,17 @@ pub fn proposed(case: &Undecided) -> Result<(String, Design), Vec<String>> {
             effect,
             vessel: None,
         });
-        match design(
-            &case.problem,
-            between,
-            &limits,
-            &Options::default(),
-            &|_| {},
-        ) {
-            Ok(found) if found.prospect != Prospect::Twins => return Ok((other.clone(), found)),
+        match plan(between, &limits) {
+            Ok(found) if found.prospect != Prospect::Twins => {
+                // The design says how long it would have to be.
+                let times = found.times_as_long.filter(|times| *times < LONGEST);
+                let longer = times.map(|times| Limits {
+                    duration: Some(times * found.limits.duration),
+                    ..limits
+                });
+                let longer = longer.and_then(|limits| plan(between, &limits).ok());
+                return Ok((other.clone(), longer.unwrap_or(found)));
+            }
             _ => twins.push(other.clone()),
         }
     }
@@ -147,7 +156,7 @@ pub fn proposed(case: &Undecided) -> Result<(String, Design), Vec<String>> {
 
 /// What both records say.
 pub struct Answer {
-    /// The truth is named or in the group, and the other is not.
+    /// The truth is named or in the one group, the other is not, and nothing else was added.
     pub pair_decided: bool,
     /// The truth is named, alone.
     pub truth_alone: bool,
@@ -166,7 +175,7 @@ pub fn answered(case: &Undecided, other: &str, plan: &Design, seed: u64) -> Opti
     let found = diagnosed(&problem(&case.rig, records)?)?;
     let holds = |id: &str| found.groups.iter().flatten().any(|named| named == id);
     Some(Answer {
-        pair_decided: holds(case.truth) && !holds(other),
+        pair_decided: found.groups.len() == 1 && holds(case.truth) && !holds(other),
         truth_alone: found.verdict == Verdict::Effect && found.effects == [case.truth],
         groups: found.groups,
     })

@@ -141,7 +141,7 @@ impl Rig {
     #[allow(clippy::expect_used)]
     pub fn run(&self, rng: &mut ChaCha8Rng) -> Record {
         let middle = 0.5 * (self.command.0 + self.command.1);
-        let e = self.noises(rng);
+        let e = self.noises(self.samples, rng);
         let (low, high) = match self.drive {
             Drive::Open => self.command,
             Drive::Closed => (
@@ -186,15 +186,15 @@ impl Rig {
             simulator.advance(Command::held(command), self.interval);
         }
         let levels = simulator.levels()[..self.plant.vessels()].to_vec();
-        let e = self.noises(rng);
+        let e = self.noises(wanted.len(), rng);
         self.from(&levels, command, controller, wanted, &e)
     }
 
-    fn noises(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    fn noises(&self, n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
         if self.colour > 0.0 {
-            noise::ar1(self.samples, self.noise, self.colour, rng)
+            noise::ar1(n, self.noise, self.colour, rng)
         } else {
-            noise::white(self.samples, self.noise, rng)
+            noise::white(n, self.noise, rng)
         }
     }
 
@@ -243,10 +243,10 @@ impl Rig {
         let mut simulator =
             Simulator::new(&structure, &theta, levels, before).expect("a simulation");
         let (mut u, mut y) = (
-            Vec::with_capacity(self.samples),
-            Vec::with_capacity(self.samples),
+            Vec::with_capacity(wanted.len()),
+            Vec::with_capacity(wanted.len()),
         );
-        for k in 0..self.samples {
+        for k in 0..wanted.len() {
             let (unseen, misread) = (self.outside)(k as f64 * self.interval);
             let reading = simulator.read() + misread + e[k];
             let command = match self.drive {
@@ -259,7 +259,7 @@ impl Rig {
         }
         Record {
             name: "rig".to_string(),
-            time: (0..self.samples)
+            time: (0..wanted.len())
                 .map(|k| k as f64 * self.interval)
                 .collect(),
             input: Signal::new("u", "V", u),

@@ -63,17 +63,18 @@ fn experiments(design: &Design, look: Look) -> String {
         limits.range_from,
         numbers::duration(limits.duration)
     );
-    let heading = ["", "experiment", "range", "held for", "power", "decides"];
+    let heading = ["", "experiment", "range", "held for", "level", "power", "decides"];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
     for (k, candidate) in design.candidates.iter().take(SHOWN).enumerate() {
-        rows.push(row(&(k + 1).to_string(), candidate, unit));
+        rows.push(row(&(k + 1).to_string(), candidate, design));
     }
-    rows.extend(design.again.iter().map(|again| row("", again, unit)));
+    rows.extend(design.again.iter().map(|again| row("", again, design)));
     let sides = [
         Side::Right,
         Side::Left,
         Side::Left,
         Side::Right,
+        Side::Left,
         Side::Right,
         Side::Right,
     ];
@@ -83,31 +84,34 @@ fn experiments(design: &Design, look: Look) -> String {
     if more > 0 {
         text += &format!("  {}\n", look.faint(format!("and {more} more")));
     }
-    let note = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit)";
+    let note = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to the levels of the records)";
     text += &look.faint(look.paragraph("  ", note).trim_end());
     text + "\n\n"
 }
 
-fn row(number: &str, candidate: &Candidate, unit: &str) -> Vec<String> {
+fn row(number: &str, candidate: &Candidate, design: &Design) -> Vec<String> {
+    let range = |low: f64, high: f64, unit: &str| {
+        let high = with_unit(&numbers::significant(high, 3), unit);
+        format!("{} .. {high}", numbers::significant(low, 3))
+    };
     let mut kind = candidate.kind.name().to_string();
     if let Some(levels) = candidate.levels {
         kind += &format!(", {levels} levels");
     }
-    let range = format!(
-        "{} .. {}",
-        numbers::significant(candidate.low, 3),
-        with_unit(&numbers::significant(candidate.high, 3), unit)
-    );
     let again = candidate.kind == missing_effect::design::Kind::Again;
     vec![
         number.to_string(),
         kind,
-        range,
+        range(candidate.low, candidate.high, &design.experiment.unit),
         if again {
             String::new()
         } else {
             format!("{} s", numbers::significant(candidate.clock, 3))
         },
+        // The last level is the measured one.
+        candidate.reaches.last().map_or(String::new(), |reach| {
+            range(reach.low, reach.high, &design.output_unit)
+        }),
         power(&candidate.power, candidate.refitted),
         format!("{:.2}", candidate.power.decides),
     ]

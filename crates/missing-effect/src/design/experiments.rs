@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{
     limits::{Bounds, Refused},
-    plan::{Candidate, Power, Reach, SecondSensor},
+    plan::{Candidate, Power, Reach, SecondSensor, Wider},
     play::{Loop, Played, play},
     power::power,
     second_sensor,
@@ -19,7 +19,11 @@ use crate::{Error, Problem, Progress, search::Node};
 
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 6;
-const MOST_REFITS: usize = 24;
+const MOST_REFITS: usize = 30;
+/// More power than this is of no use: it decides even where the effect is half as large as the records make it.
+const PLENTY: f64 = 200.0;
+/// Excursions that differ by less than this are one.
+const SAME_EXCURSION: f64 = 0.1;
 
 /// What the search needs to know.
 pub(crate) struct Search<'s, 'a> {
@@ -36,11 +40,12 @@ pub(crate) struct Search<'s, 'a> {
 pub(crate) struct Found {
     pub candidates: Vec<Candidate>,
     pub overfull: usize,
+    pub limited: usize,
     pub best: Candidate,
     /// The best one's sequence.
     pub values: Vec<f64>,
     pub again: Option<Candidate>,
-    pub wider: Option<Candidate>,
+    pub wider: Option<Wider>,
     pub second_sensor: Option<SecondSensor>,
 }
 
@@ -53,6 +58,8 @@ struct Before {
     imagined: [Vec<Record>; 2],
     /// `misfit[i]`: of the other to what `i` imagines.
     misfit: [f64; 2],
+    /// Smallest and largest level of each vessel, by either.
+    levels: Vec<(f64, f64)>,
 }
 
 impl Search<'_, '_> {
@@ -73,7 +80,16 @@ impl Search<'_, '_> {
             misfit_before(&imagined[0], b, self.metric)?,
             misfit_before(&imagined[1], a, self.metric)?,
         ];
+        let levels = [
+            a.setup.simulate(&a.fit.x)?.level,
+            b.setup.simulate(&b.fit.x)?.level,
+        ];
+        let either = |vessel: usize| {
+            let [a, b] = levels.map(|level| level[vessel]);
+            (a.0.min(b.0), a.1.max(b.1))
+        };
         Ok(Before {
+            levels: (0..self.problem.plant.vessels()).map(either).collect(),
             known: [information(a), information(b)],
             imagined,
             misfit,
@@ -102,7 +118,7 @@ impl Search<'_, '_> {
             linear(&played[truth], node, known, self.metric)
         };
         let plant = self.problem.plant;
-        let reaches = (0..plant.vessels())
+        let reaches: Vec<Reach> = (0..plant.vessels())
             .map(|vessel| {
                 let either = played.each_ref().map(|played| played.levels[vessel]);
                 Reach {
@@ -112,7 +128,14 @@ impl Search<'_, '_> {
                 }
             })
             .collect();
+        let beyond = |(reach, &(low, high)): (&Reach, &(f64, f64))| {
+            let outside = (low - reach.low).max(reach.high - high).max(0.0);
+            outside / (high - low).max(f64::MIN_POSITIVE)
+        };
+        let excursions = reaches.iter().zip(&before.levels).map(beyond);
         Some(Candidate {
+            excursion: excursions.fold(0.0, f64::max),
+            at_limit: played.iter().any(|played| played.at_limit),
             kind: sequence.kind,
             low: sequence.low,
             high: sequence.high,
@@ -156,13 +179,14 @@ impl Search<'_, '_> {
         candidate.reaches.iter().any(|reach| reach.high > height)
     }
 
-    /// All sequences within limits, linearised, the best first; and how many would overfill a tank.
+    /// All sequences within limits, linearised, the best first; and how many would overfill a tank, or drive the controller to a
+    /// limit.
     fn promises(
         &self,
         bounds: &Bounds,
         seed: u64,
         before: &Before,
-    ) -> Result<(Vec<Tried>, usize), Error> {
+    ) -> Result<(Vec<Tried>, [usize; 2]), Error> {
         let all = sequences(bounds, self.time_constant, seed)?;
         let (total, done) = (all.len(), AtomicUsize::new(0));
         let mut tried: Vec<Tried> = all
@@ -180,61 +204,51 @@ impl Search<'_, '_> {
         let finite = tried.len();
         tried.retain(|(candidate, _)| !self.overfills(candidate));
         let overfull = finite - tried.len();
+        // At a limit the loop is open, and a fit of the loop only nearly right. Where nothing stays off the limits, so be it.
+        let mut limited = tried.iter().filter(|(tried, _)| tried.at_limit).count();
+        if limited < tried.len() {
+            tried.retain(|(candidate, _)| !candidate.at_limit);
+        } else {
+            limited = 0;
+        }
         sort(&mut tried);
-        Ok((tried, overfull))
+        Ok((tried, [overfull, limited]))
     }
 
-    /// Refits in rounds until no promise is above what a refit has shown.
-    fn refit(&self, tried: &mut [Tried], bounds: &Bounds, before: &Before) {
+    /// Refits in rounds until a refit leads, so that no promise is above what a refit has shown.
+    fn refit(&self, tried: &mut Vec<Tried>, bounds: &Bounds, before: &Before) {
         let mut done = 0;
-        while done < MOST_REFITS {
-            let best = tried
-                .iter()
-                .filter(|(candidate, _)| candidate.refitted)
-                .map(|(candidate, _)| candidate.power.power)
-                .fold(f64::NEG_INFINITY, f64::max);
-            let mut wanted: Vec<usize> = (0..tried.len())
-                .filter(|&i| !tried[i].0.refitted && tried[i].0.power.power > best)
+        while done < MOST_REFITS && tried.first().is_some_and(|(first, _)| !first.refitted) {
+            let wanted: Vec<usize> = (0..tried.len())
+                .filter(|&i| !tried[i].0.refitted)
                 .take(ROUND)
                 .collect();
-            if done == 0 {
-                // Of every kind the most promising, whatever the straight line says of it.
-                for kind in [Kind::Step, Kind::Staircase, Kind::Binary, Kind::MultiLevel] {
-                    wanted.extend(tried.iter().position(|(tried, _)| tried.kind == kind));
-                }
-                wanted.sort_unstable();
-                wanted.dedup();
-            }
-            if wanted.is_empty() {
-                break;
-            }
             done += wanted.len();
             let confirmed: Vec<(usize, Option<Candidate>)> = wanted
                 .into_par_iter()
                 .map(|i| (i, self.confirmed(&tried[i], bounds, before)))
                 .collect();
-            let mut any = false;
-            for (i, candidate) in confirmed {
-                if let Some(candidate) = candidate {
-                    tried[i].0 = candidate;
-                    any = true;
+            // From behind, so that what cannot be refitted can be left out.
+            for (i, candidate) in confirmed.into_iter().rev() {
+                match candidate {
+                    Some(candidate) => tried[i].0 = candidate,
+                    None => drop(tried.remove(i)),
                 }
             }
+            sort(tried);
             (self.progress)(Progress {
                 phase: "confirming by refits",
                 done: done.min(MOST_REFITS),
                 total: MOST_REFITS,
             });
-            if !any {
-                break;
-            }
         }
-        sort(tried);
+        // After so many rounds the best of those that were refitted.
+        tried.sort_by_key(|(candidate, _)| !candidate.refitted);
     }
 
     pub fn run(&self, bounds: &Bounds, seed: u64) -> Result<Found, Error> {
         let before = self.before()?;
-        let (mut tried, overfull) = self.promises(bounds, seed, &before)?;
+        let (mut tried, [overfull, limited]) = self.promises(bounds, seed, &before)?;
         self.refit(&mut tried, bounds, &before);
         let Some((best, sequence)) = tried.first().cloned() else {
             return Err(Refused::Overfull {
@@ -245,24 +259,41 @@ impl Search<'_, '_> {
             .into());
         };
         let again = self.again(bounds, &before);
-        let wider = match bounds.wider(self.problem, matches!(self.into, Loop::Closed(_))) {
-            Some(wider) => {
-                let (promised, _) = self.promises(&wider, seed, &before)?;
-                let first = promised.first();
-                first.and_then(|best| self.confirmed(best, &wider, &before))
-            }
-            None => None,
+        // More than plenty needs no wider range.
+        let wider = if best.power.power < PLENTY {
+            self.wider(bounds, seed, &before)?
+        } else {
+            None
         };
         let second_sensor = self.second_sensor(&sequence, bounds, &before);
         Ok(Found {
             candidates: tried.into_iter().map(|(candidate, _)| candidate).collect(),
             overfull,
+            limited,
             best,
             values: sequence.values,
             again,
-            wider: wider.filter(|wider| wider.power.power > 0.0),
+            wider,
             second_sensor,
         })
+    }
+
+    /// What a wider range would give.
+    fn wider(&self, bounds: &Bounds, seed: u64, before: &Before) -> Result<Option<Wider>, Error> {
+        let in_loop = matches!(self.into, Loop::Closed(_));
+        let Some(wider) = bounds.wider(self.problem, in_loop) else {
+            return Ok(None);
+        };
+        let (mut promised, _) = self.promises(&wider, seed, before)?;
+        promised.sort_by(|(a, _), (b, _)| b.power.power.total_cmp(&a.power.power));
+        let best = promised
+            .first()
+            .and_then(|best| self.confirmed(best, &wider, before));
+        Ok(best.map(|best| Wider {
+            low: wider.low,
+            high: wider.high,
+            best,
+        }))
     }
 
     /// What the longest record played, once more.
@@ -321,11 +352,14 @@ impl Search<'_, '_> {
     }
 }
 
-/// What a refit has shown first, then what is promised; the best first.
+/// The best first: by power as far as it is of use, then by excursion, then by power.
 fn sort(tried: &mut [Tried]) {
+    let useful = |candidate: &Candidate| candidate.power.power.min(PLENTY);
+    let excursion = |candidate: &Candidate| (candidate.excursion / SAME_EXCURSION).floor();
     tried.sort_by(|(a, _), (b, _)| {
-        b.refitted
-            .cmp(&a.refitted)
+        useful(b)
+            .total_cmp(&useful(a))
+            .then(excursion(a).total_cmp(&excursion(b)))
             .then(b.power.power.total_cmp(&a.power.power))
     });
 }

@@ -122,6 +122,8 @@ pub struct Bounds {
     pub low: f64,
     /// Largest value.
     pub high: f64,
+    /// Smallest and largest value in the records.
+    pub visited: (f64, f64),
     /// Where the two come from.
     pub range_from: &'static str,
     /// Largest change in a second, where there is a limit.
@@ -239,6 +241,7 @@ impl Bounds {
         Ok(Self {
             low,
             high,
+            visited: seen,
             range_from,
             slew: limits.slew.filter(|slew| slew.is_finite()),
             duration,

@@ -22,7 +22,7 @@ use ct_signals::ArModel;
 use plants::{EffectInfo, Placed};
 
 pub use limits::{Bounds, Limits, Refused};
-pub use plan::{Candidate, Design, Power, Prospect, Reach, Rival, SecondSensor, Sequence};
+pub use plan::{Candidate, Design, Power, Prospect, Reach, Rival, SecondSensor, Sequence, Wider};
 pub use sequences::Kind;
 
 use crate::{
@@ -113,6 +113,7 @@ pub fn design(
         in_loop,
         candidates: found.candidates,
         overfull: found.overfull,
+        limited: found.limited,
         again: found.again,
         wider: found.wider,
         times_as_long: power::times_as_long(&found.best.power, search.ahead_of_each()),

@@ -67,6 +67,21 @@ pub struct Candidate {
     pub refitted: bool,
     /// Where the levels go.
     pub reaches: Vec<Reach>,
+    /// How far a level leaves what it visited in the records, as a part of that: beyond it neither model is known.
+    pub excursion: f64,
+    /// In a loop: the controller comes to a limit, where the loop is open.
+    pub at_limit: bool,
+}
+
+/// What a wider range would give.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Wider {
+    /// Its lower end.
+    pub low: f64,
+    /// Its upper end.
+    pub high: f64,
+    /// The best experiment within it.
+    pub best: Candidate,
 }
 
 /// What another sensor would give: the other level measured too, with the same noise.
@@ -124,14 +139,16 @@ pub struct Design {
     pub in_loop: bool,
     /// The limits that hold.
     pub limits: Bounds,
-    /// The experiments, the best first.
+    /// The experiments, the best first: of those that have power in plenty the one that stays nearest to what the records visited.
     pub candidates: Vec<Candidate>,
     /// Experiments that were left out because they would overfill a tank.
     pub overfull: usize,
+    /// Experiments that were left out because they would drive the controller to a limit.
+    pub limited: usize,
     /// What the longest record played, once more.
     pub again: Option<Candidate>,
     /// The best of a wider range, where there is one to be had.
-    pub wider: Option<Candidate>,
+    pub wider: Option<Wider>,
     /// So many times as long, the best experiment would decide with a probability of 0.95; `None` where it does already, or never.
     pub times_as_long: Option<f64>,
     /// What a second sensor would give, where the plant has another level.

@@ -21,6 +21,8 @@ pub(crate) struct Played {
     pub record: Record,
     /// Levels when it began.
     pub initial: Vec<f64>,
+    /// A controller came to a limit.
+    pub at_limit: bool,
     /// Smallest and largest level of each vessel.
     pub levels: Vec<(f64, f64)>,
 }
@@ -120,7 +122,7 @@ pub(crate) fn play(
     let mut simulator =
         Simulator::<f64>::new(&setup.structure, theta, &initial, rest.command).ok()?;
     simulator.set_substeps(setup.substeps);
-    let (mut input, mut output) = (Vec::new(), Vec::new());
+    let (mut input, mut output, mut at_limit) = (Vec::new(), Vec::new(), false);
     let mut levels = vec![(f64::INFINITY, f64::NEG_INFINITY); vessels];
     for (k, &value) in values.iter().enumerate() {
         let reading = simulator.read();
@@ -128,7 +130,11 @@ pub(crate) fn play(
             *range = (range.0.min(level), range.1.max(level));
         }
         let command = match &mut rest.regulator {
-            Some(regulator) => Command::held(regulator.command(value, reading, interval)),
+            Some(regulator) => {
+                let command = regulator.command(value, reading, interval);
+                at_limit |= regulator.limited();
+                Command::held(command)
+            }
             None if of.hold == Hold::First => {
                 Command::ramp(value, values.get(k + 1).copied().unwrap_or(value))
             }
@@ -156,6 +162,7 @@ pub(crate) fn play(
             hold: of.hold,
         },
         initial,
+        at_limit,
         levels,
     })
 }

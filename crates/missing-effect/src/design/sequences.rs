@@ -66,11 +66,22 @@ const LONGEST: f64 = 0.25;
 /// Length of the shift register: its sequence is longer than any experiment.
 const REGISTER: u32 = 18;
 
-/// Parts of the range that are tried beside the whole: a threshold or a bend lies in one of them.
-fn parts(bounds: &Bounds) -> [(f64, f64); 3] {
+/// The whole range; its halves, in one of which a threshold or a bend lies; and what the records visited, once and twice as
+/// wide: there the models are known.
+fn parts(bounds: &Bounds) -> Vec<(f64, f64)> {
     let (low, high) = (bounds.low, bounds.high);
     let middle = 0.5 * (low + high);
-    [(low, high), (low, middle), (middle, high)]
+    let mut parts = vec![(low, high), (low, middle), (middle, high)];
+    let (from, to) = bounds.visited;
+    for more in [0.0, 0.5 * (to - from)] {
+        let part = ((from - more).max(low), (to + more).min(high));
+        // What hardly moves shows nothing, and what is hardly narrower is the whole.
+        let share = (part.1 - part.0) / (high - low);
+        if (0.01..0.9).contains(&share) {
+            parts.push(part);
+        }
+    }
+    parts
 }
 
 /// So many bits from anywhere in the register's sequence, not all alike.
@@ -130,9 +141,10 @@ pub(crate) fn sequences(
             push(Kind::Binary, clock, None, None, range, values);
         }
     }
-    let whole = (bounds.low, bounds.high);
-    for count in STAIRCASES {
-        let at = |i: usize| whole.0 + (whole.1 - whole.0) * i as f64 / (count - 1) as f64;
+    let whole = [(bounds.low, bounds.high)];
+    let levels = whole.into_iter().chain(parts(bounds).split_off(3));
+    for (range, count) in levels.flat_map(|range| STAIRCASES.map(|count| (range, count))) {
+        let at = |i: usize| range.0 + (range.1 - range.0) * i as f64 / (count - 1) as f64;
         let rising = (0..count).map(at);
         let falling = (1..count - 1).rev().map(at);
         let ladder: Vec<f64> = rising.chain(falling).collect();
@@ -140,13 +152,13 @@ pub(crate) fn sequences(
         clocks.dedup();
         for clock in clocks {
             let values = excitation::levels(n, clock, &ladder)?;
-            push(Kind::Staircase, clock, Some(count), None, whole, values);
+            push(Kind::Staircase, clock, Some(count), None, range, values);
         }
     }
-    for &clock in &clocks {
-        for draw in 1..=DRAWS {
-            let values = excitation::steps(n, clock..=clock, whole.0, whole.1, &mut rng)?;
-            push(Kind::MultiLevel, clock, None, Some(draw), whole, values);
+    for range in whole.into_iter().chain(parts(bounds).split_off(3)) {
+        for (&clock, draw) in clocks.iter().flat_map(|clock| (1..=DRAWS).map(move |d| (clock, d))) {
+            let values = excitation::steps(n, clock..=clock, range.0, range.1, &mut rng)?;
+            push(Kind::MultiLevel, clock, None, Some(draw), range, values);
         }
     }
     if let Some(slew) = bounds.slew {
@@ -166,6 +178,7 @@ mod tests {
         Bounds {
             low: 2.0,
             high: 7.0,
+            visited: (4.0, 4.5),
             range_from: "",
             slew,
             duration: 1200.0,
@@ -180,7 +193,7 @@ mod tests {
             for time_constant in [0.5, 60.0, 1e4, f64::INFINITY] {
                 let bounds = bounds(slew);
                 let all = sequences(&bounds, time_constant, 3).unwrap();
-                assert!(all.len() > 30);
+                assert!(all.len() > 15);
                 for sequence in &all {
                     assert_eq!(sequence.values.len(), 600, "{:?}", sequence.kind);
                     let within = |u: &f64| (2.0..=7.0).contains(u);

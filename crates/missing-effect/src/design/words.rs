@@ -172,10 +172,19 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     }
     if design.overfull > 0 {
         said.push(format!(
-            "{} were left out: they would lead a level above the tank.",
+            "{} left out: a level would rise above the tank.",
             match design.overfull {
-                1 => "One experiment".to_string(),
-                n => format!("{n} experiments"),
+                1 => "One experiment was".to_string(),
+                n => format!("{n} experiments were"),
+            }
+        ));
+    }
+    if design.limited > 0 {
+        said.push(format!(
+            "{} left out: the controller would come to a limit, where the loop is open.",
+            match design.limited {
+                1 => "One experiment was".to_string(),
+                n => format!("{n} experiments were"),
             }
         ));
     }
@@ -190,7 +199,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             "With --range {} {} the best would give {}.",
             significant(wider.low, 3),
             significant(wider.high, 3),
-            with_power(&wider.power)
+            with_power(&wider.best.power)
         ));
     }
     if let Some(second) = &design.second_sensor {

@@ -28,7 +28,13 @@ pub const ROWS: [Row; 24] = [
     ("linear", Drive::Open, "transport_delay", 0, &[5.0]),
     ("single", Drive::Open, "sensor_offset", 0, &[1.5]),
     ("single", Drive::Closed, "sensor_lag", 0, &[8.0]),
-    ("single", Drive::Open, "pump_gain_drift", 0, &[0.006, 2000.0]),
+    (
+        "single",
+        Drive::Open,
+        "pump_gain_drift",
+        0,
+        &[0.006, 2000.0],
+    ),
     ("cascaded", Drive::Open, "pump_lag", 0, &[10.0]),
     ("single", Drive::Open, "sensor_saturation", 0, &[19.5]),
     ("single", Drive::Closed, "sensor_offset", 0, &[0.8]),
@@ -62,9 +68,6 @@ pub fn rig(row: &Row) -> Rig {
         ..rig
     }
 }
-
-/// More than so many times as long as the record is no answer.
-const LONGEST: f64 = 8.0;
 
 /// A record that leaves it open, and who else it may be.
 pub struct Undecided {
@@ -110,8 +113,7 @@ pub fn undecided(row: &Row, seed: u64) -> Option<Undecided> {
     })
 }
 
-/// The experiment between the truth and the best of the others that is no twin of it, made longer where the design says how much
-/// longer it has to be; `Err` holds the twins where all are.
+/// The experiment between the truth and the best of the others that is no twin of it; `Err` holds the twins where all are.
 ///
 /// # Errors
 /// The twins.
@@ -139,14 +141,7 @@ pub fn proposed(case: &Undecided) -> Result<(String, Design), Vec<String>> {
         });
         match plan(between, &limits) {
             Ok(found) if found.prospect != Prospect::Twins => {
-                // The design says how long it would have to be.
-                let times = found.times_as_long.filter(|times| *times < LONGEST);
-                let longer = times.map(|times| Limits {
-                    duration: Some(times * found.limits.duration),
-                    ..limits
-                });
-                let longer = longer.and_then(|limits| plan(between, &limits).ok());
-                return Ok((other.clone(), longer.unwrap_or(found)));
+                return Ok((other.clone(), found));
             }
             _ => twins.push(other.clone()),
         }
@@ -167,7 +162,9 @@ pub struct Answer {
 /// Plays the experiment to the rig, and diagnoses both records together.
 #[must_use]
 pub fn answered(case: &Undecided, other: &str, plan: &Design, seed: u64) -> Option<Answer> {
-    let values = plan.experiment.values.clone();
+    // The design says how many times it has to be played.
+    let times = plan.times_as_long.unwrap_or(1);
+    let values = plan.experiment.values.repeat(times);
     let mut next = case.rig.play(values, &mut ChaCha8Rng::seed_from_u64(seed));
     next.name = "next".to_string();
     let mut records = case.problem.records.clone();

@@ -128,7 +128,10 @@ fn vessel(plant: Plant, name: &str, place: &str) -> Result<usize, Error> {
             Error::Usage(if plant.vessels() > 1 {
                 format!("{name}: there is no tank \"{place}\"; write upper or lower")
             } else {
-                format!("{name}: {} has one tank; leave out \":{place}\"", plant.id())
+                format!(
+                    "{name}: {} has one tank; leave out \":{place}\"",
+                    plant.id()
+                )
             })
         })
 }

@@ -28,7 +28,11 @@ pub fn design(design: &Design, look: Look) -> String {
 /// The two effects on the records that there are.
 fn rivals(design: &Design, look: Look) -> String {
     let [a, b] = &design.between;
-    let title = format!("{} or {}, on the records that there are", named(a), named(b));
+    let title = format!(
+        "{} or {}, on the records that there are",
+        named(a),
+        named(b)
+    );
     let heading = ["effect", "BIC falls", "error after", "size found"];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
     for rival in [a, b] {
@@ -52,9 +56,16 @@ fn rivals(design: &Design, look: Look) -> String {
 /// The experiments, the best first, and the same once more.
 fn experiments(design: &Design, look: Look) -> String {
     let (unit, limits) = (&design.experiment.unit, &design.limits);
-    let what = if design.in_loop { "reference" } else { "command" };
+    let what = if design.in_loop {
+        "reference"
+    } else {
+        "command"
+    };
     let slew = limits.slew.map_or(String::new(), |slew| {
-        format!(", at most {} a second", with_unit(&numbers::significant(slew, 3), unit))
+        format!(
+            ", at most {} a second",
+            with_unit(&numbers::significant(slew, 3), unit)
+        )
     });
     let title = format!(
         "Experiments with the {what} between {} and {} ({}{slew}), {}",
@@ -63,7 +74,15 @@ fn experiments(design: &Design, look: Look) -> String {
         limits.range_from,
         numbers::duration(limits.duration)
     );
-    let heading = ["", "experiment", "range", "held for", "level", "power", "decides"];
+    let heading = [
+        "",
+        "experiment",
+        "range",
+        "held for",
+        "level",
+        "power",
+        "decides",
+    ];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
     for (k, candidate) in design.candidates.iter().take(SHOWN).enumerate() {
         rows.push(row(&(k + 1).to_string(), candidate, design));

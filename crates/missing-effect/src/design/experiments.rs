@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::{
     limits::{Bounds, Refused},
-    plan::{Candidate, Power, Reach, SecondSensor, Wider},
+    plan::{Candidate, Power, Prospect, Reach, SecondSensor, Wider},
     play::{Loop, Played, play},
-    power::power,
+    power::{power, prospect, times_as_long},
     second_sensor,
     separation::{Metric, imagined, information, linear, misfit_before, refitted},
     sequences::{Kind, Sequence, sequences},
@@ -22,6 +22,10 @@ const ROUND: usize = 6;
 const MOST_REFITS: usize = 30;
 /// More power than this is of no use: it decides even where the effect is half as large as the records make it.
 const PLENTY: f64 = 200.0;
+/// A sequence that drives a controller to a limit is played so that it crosses its range in so many time constants.
+const SLOWER: [f64; 2] = [1.0, 4.0];
+/// Nobody repeats an experiment more often.
+const MOST_TIMES: f64 = 20.0;
 /// Excursions that differ by less than this are one.
 const SAME_EXCURSION: f64 = 0.1;
 
@@ -46,6 +50,7 @@ pub(crate) struct Found {
     pub values: Vec<f64>,
     pub again: Option<Candidate>,
     pub wider: Option<Wider>,
+    pub times_as_long: Option<usize>,
     pub second_sensor: Option<SecondSensor>,
 }
 
@@ -142,10 +147,46 @@ impl Search<'_, '_> {
             clock: sequence.clock,
             levels: sequence.levels,
             draw: sequence.draw,
+            slew: sequence.slew,
             power: power([of(0)?, of(1)?], self.ahead_of_each()),
             refitted: false,
             reaches,
         })
+    }
+
+    /// A sequence, linearised; made slower where it would drive the controller to a limit.
+    fn off_the_limits(
+        &self,
+        sequence: Sequence,
+        bounds: &Bounds,
+        before: &Before,
+    ) -> Option<Tried> {
+        let first = self.tried(&sequence, bounds, before)?;
+        let span = sequence.high - sequence.low;
+        let time_constant = self.time_constant.min(bounds.duration);
+        for slower in SLOWER.into_iter().filter(|_| first.at_limit) {
+            let slew = span / (slower * time_constant);
+            let sequence = sequence.slowed(slew, bounds.interval).ok()?;
+            let candidate = self.tried(&sequence, bounds, before)?;
+            if !candidate.at_limit {
+                return Some((candidate, sequence));
+            }
+        }
+        Some((first, sequence))
+    }
+
+    /// Played how many times over the experiment decides, if it does.
+    fn times_as_long(
+        &self,
+        (best, sequence): &Tried,
+        bounds: &Bounds,
+        before: &Before,
+    ) -> Option<usize> {
+        let times = times_as_long(&best.power, self.ahead_of_each())?.ceil();
+        let times = (times <= MOST_TIMES).then_some(times as usize)?;
+        let longer = sequence.repeated(times, bounds).ok()?;
+        let tried = self.tried(&longer, bounds, before)?;
+        (prospect(&tried.power) == Prospect::Decides && !tried.at_limit).then_some(times)
     }
 
     /// The same, the other refitted.
@@ -192,13 +233,13 @@ impl Search<'_, '_> {
         let mut tried: Vec<Tried> = all
             .into_par_iter()
             .filter_map(|sequence| {
-                let candidate = self.tried(&sequence, bounds, before);
+                let tried = self.off_the_limits(sequence, bounds, before);
                 (self.progress)(Progress {
                     phase: "trying experiments",
                     done: done.fetch_add(1, Ordering::Relaxed) + 1,
                     total,
                 });
-                Some((candidate?, sequence))
+                tried
             })
             .collect();
         let finite = tried.len();
@@ -265,6 +306,7 @@ impl Search<'_, '_> {
         } else {
             None
         };
+        let times_as_long = self.times_as_long(&(best.clone(), sequence.clone()), bounds, &before);
         let second_sensor = self.second_sensor(&sequence, bounds, &before);
         Ok(Found {
             candidates: tried.into_iter().map(|(candidate, _)| candidate).collect(),
@@ -274,6 +316,7 @@ impl Search<'_, '_> {
             values: sequence.values,
             again,
             wider,
+            times_as_long,
             second_sensor,
         })
     }
@@ -310,6 +353,7 @@ impl Search<'_, '_> {
             clock: bounds.interval,
             levels: None,
             draw: None,
+            slew: None,
             low,
             high,
             values: played.values.clone(),

@@ -3,7 +3,14 @@
 use ct_signals::{MIN_ROWS, ROWS_PER_PARAMETER, Record};
 use serde::Serialize;
 
-use crate::Problem;
+use crate::{Problem, numbers::significant};
+
+/// So much, to three digits and not less.
+fn at_least(value: f64) -> String {
+    let digit = 10_f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
+    let rounded = (value / digit - 1e-9).ceil() * digit;
+    format!("{}", significant(rounded, 3).parse().unwrap_or(rounded))
+}
 
 /// What an experiment may do; what is `None` follows from the records.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -29,7 +36,9 @@ pub enum Refused {
         effect: String,
     },
     /// An effect could not be fitted.
-    #[error("{effect} cannot be fitted to these records; `ctid effects {effect}` says what it needs")]
+    #[error(
+        "{effect} cannot be fitted to these records; `ctid effects {effect}` says what it needs"
+    )]
     NoFit {
         /// The effect.
         effect: String,
@@ -57,7 +66,9 @@ pub enum Refused {
         what: &'static str,
     },
     /// What is played never moved, and nobody says how far it may.
-    #[error("the records hold one {what} of {value} alone, which says nothing of where it may go; give --range")]
+    #[error(
+        "the records hold one {what} of {value} alone, which says nothing of where it may go; give --range"
+    )]
     NoRange {
         /// The command, or the reference.
         what: &'static str,
@@ -65,7 +76,7 @@ pub enum Refused {
         value: f64,
     },
     /// Too few samples.
-    #[error("--duration {duration} s holds {samples} samples at one every {interval} s, and {needed} are needed to fit the parameters; give at least {} s", *needed as f64 * interval)]
+    #[error("--duration {duration} s holds {samples} samples at one every {interval} s, and {needed} are needed to fit the parameters; give at least {} s", at_least(*needed as f64 * interval))]
     Duration {
         /// The length \[s\].
         duration: f64,
@@ -77,7 +88,9 @@ pub enum Refused {
         interval: f64,
     },
     /// So many samples that nobody meant it.
-    #[error("--duration {duration} s holds {samples} samples at one every {interval} s, and {most} are the most that are searched; give a shorter one")]
+    #[error(
+        "--duration {duration} s holds {samples} samples at one every {interval} s, and {most} are the most that are searched; give a shorter one"
+    )]
     TooLong {
         /// The length \[s\].
         duration: f64,
@@ -89,7 +102,7 @@ pub enum Refused {
         interval: f64,
     },
     /// Too slow to get anywhere.
-    #[error("--slew {slew} a second moves by {moves} in {duration} s, less than the {span} of the range; give at least {}", span / duration)]
+    #[error("--slew {slew} a second moves by {} in {duration} s, less than the {} of the range; give at least {}", significant(*moves, 3), significant(*span, 3), at_least(span / duration))]
     Slew {
         /// Largest change in a second.
         slew: f64,
@@ -101,7 +114,9 @@ pub enum Refused {
         span: f64,
     },
     /// Everything that was tried would overfill a tank.
-    #[error("every experiment between {low} and {high} would lead above the tank_height of {height}; give a --range that stays lower")]
+    #[error(
+        "every experiment between {low} and {high} would lead above the tank_height of {height}; give a --range that stays lower"
+    )]
     Overfull {
         /// Lower end.
         low: f64,

@@ -116,7 +116,7 @@ pub fn design(
         limited: found.limited,
         again: found.again,
         wider: found.wider,
-        times_as_long: power::times_as_long(&found.best.power, search.ahead_of_each()),
+        times_as_long: found.times_as_long,
         second_sensor: found.second_sensor,
         experiment: Sequence {
             name: of_played.name.clone(),
@@ -173,8 +173,7 @@ fn fitted<'a>(
     let better = usize::from(rough[1].fit.bic() < rough[0].fit.bic());
     let noise = colour(&rough[better])?;
     let refined = |i: usize| -> Result<Node<'a>, Error> {
-        place(&base, rough[i].added[0], &rough[i], &noise)
-            .ok_or_else(|| no_fit(between[i]).into())
+        place(&base, rough[i].added[0], &rough[i], &noise).ok_or_else(|| no_fit(between[i]).into())
     };
     let nodes = [refined(0)?, refined(1)?];
     let variance = if nodes[1].fit.bic() < nodes[0].fit.bic() {

@@ -61,6 +61,9 @@ pub struct Candidate {
     pub levels: Option<usize>,
     /// Which of several draws of a multi-level sequence.
     pub draw: Option<u64>,
+    /// It changes by at most so much in a second, where it was made slower than the limits ask for, to keep a controller off its
+    /// limits.
+    pub slew: Option<f64>,
     /// What it gives.
     pub power: Power,
     /// The power is that of a refit; otherwise that of the models linearised at their fits.
@@ -149,8 +152,8 @@ pub struct Design {
     pub again: Option<Candidate>,
     /// The best of a wider range, where there is one to be had.
     pub wider: Option<Wider>,
-    /// So many times as long, the best experiment would decide with a probability of 0.95; `None` where it does already, or never.
-    pub times_as_long: Option<f64>,
+    /// Played so many times over, the best experiment would decide; `None` where it does already, or would not.
+    pub times_as_long: Option<usize>,
     /// What a second sensor would give, where the plant has another level.
     pub second_sensor: Option<SecondSensor>,
     /// The best experiment.

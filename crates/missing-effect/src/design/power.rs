@@ -45,7 +45,7 @@ pub(crate) fn prospect(power: &Power) -> Prospect {
     }
 }
 
-/// So many times as long would decide with a probability of 0.95: a noncentrality grows as the length.
+/// So many times as long should decide with a probability of 0.95, where a noncentrality grows as the length.
 ///
 /// `lambda + ahead - 6 = 1.645 x 2 sqrt(lambda)`, solved for the root of `lambda`.
 pub(crate) fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
@@ -73,7 +73,10 @@ mod tests {
         assert!((found.decides - Normal::standard().cdf(0.5)).abs() < 1e-12);
         assert_eq!(power([0.0, 0.0], [0.0, 0.0]).decides, 0.0);
         assert_eq!(prospect(&power([0.1, 50.0], [0.0, 0.0])), Prospect::Twins);
-        assert_eq!(prospect(&power([50.0, 60.0], [0.0, 0.0])), Prospect::Decides);
+        assert_eq!(
+            prospect(&power([50.0, 60.0], [0.0, 0.0])),
+            Prospect::Decides
+        );
         assert_eq!(prospect(&power([3.0, 60.0], [0.0, 0.0])), Prospect::Hardly);
     }
 

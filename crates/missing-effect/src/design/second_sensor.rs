@@ -53,7 +53,12 @@ fn rows(setup: &Setup, x: &[f64], truth: &[Vec<f64>], metric: &Metric) -> Option
     let size = structure.scales.largest_level();
     let mut derivatives = Vec::with_capacity(own);
     for &i in free {
-        let step = STEP * if x[i] == 0.0 { size.max(1e-3) } else { x[i].abs() };
+        let step = STEP
+            * if x[i] == 0.0 {
+                size.max(1e-3)
+            } else {
+                x[i].abs()
+            };
         let at = |moved: f64| {
             let mut x = x.to_vec();
             x[i] += moved;
@@ -61,7 +66,10 @@ fn rows(setup: &Setup, x: &[f64], truth: &[Vec<f64>], metric: &Metric) -> Option
         };
         let (above, below) = (at(step)?, at(-step)?);
         let difference = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
-            a.iter().zip(b).map(|(a, b)| (a - b) / (2.0 * step)).collect()
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| (a - b) / (2.0 * step))
+                .collect()
         };
         derivatives.push(above.iter().zip(&below).map(difference).collect::<Vec<_>>());
     }

@@ -49,6 +49,8 @@ pub(crate) struct Sequence {
     pub levels: Option<usize>,
     /// Which of several draws.
     pub draw: Option<u64>,
+    /// It changes by at most so much in a second, where it was made slower than the limits ask for.
+    pub slew: Option<f64>,
     pub low: f64,
     pub high: f64,
     pub values: Vec<f64>,
@@ -119,6 +121,7 @@ pub(crate) fn sequences(
             clock: hold as f64 * bounds.interval,
             levels,
             draw,
+            slew: None,
             low,
             high,
             values,
@@ -156,7 +159,10 @@ pub(crate) fn sequences(
         }
     }
     for range in whole.into_iter().chain(parts(bounds).split_off(3)) {
-        for (&clock, draw) in clocks.iter().flat_map(|clock| (1..=DRAWS).map(move |d| (clock, d))) {
+        for (&clock, draw) in clocks
+            .iter()
+            .flat_map(|clock| (1..=DRAWS).map(move |d| (clock, d)))
+        {
             let values = excitation::steps(n, clock..=clock, range.0, range.1, &mut rng)?;
             push(Kind::MultiLevel, clock, None, Some(draw), range, values);
         }
@@ -167,6 +173,26 @@ pub(crate) fn sequences(
         }
     }
     Ok(all)
+}
+
+impl Sequence {
+    /// The same, changing by at most so much in a second.
+    pub fn slowed(&self, slew: f64, interval: f64) -> Result<Self, Error> {
+        let mut slower = self.clone();
+        slower.slew = Some(slew);
+        excitation::limit_slew(&mut slower.values, slew * interval)?;
+        Ok(slower)
+    }
+
+    /// The same over and over, within the slew of the limits.
+    pub fn repeated(&self, times: usize, bounds: &Bounds) -> Result<Self, Error> {
+        let mut longer = self.clone();
+        longer.values = self.values.repeat(times);
+        let limits = [bounds.slew, self.slew].into_iter().flatten();
+        let slew = limits.fold(f64::INFINITY, f64::min);
+        excitation::limit_slew(&mut longer.values, slew * bounds.interval)?;
+        Ok(longer)
+    }
 }
 
 #[cfg(test)]
@@ -202,9 +228,10 @@ mod tests {
                     let steps = sequence.values.windows(2).map(|w| (w[1] - w[0]).abs());
                     assert!(steps.fold(0.0, f64::max) <= most, "{:?}", sequence.kind);
                     // It moves: an experiment that stands still shows nothing.
-                    let (low, high) = sequence.values.iter().fold((9.0f64, 0.0f64), |(a, b), u| {
-                        (a.min(*u), b.max(*u))
-                    });
+                    let (low, high) = sequence
+                        .values
+                        .iter()
+                        .fold((9.0f64, 0.0f64), |(a, b), u| (a.min(*u), b.max(*u)));
                     assert!(high > low, "{:?} {}", sequence.kind, sequence.clock);
                 }
             }

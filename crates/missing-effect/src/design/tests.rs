@@ -9,9 +9,7 @@ use rayon::prelude::*;
 use super::{
     Bounds, Candidacy, Fitted, Limits, Metric, Prospect, Refused, design, fitted,
     play::{Loop, play},
-    separation::{
-        imagined, information, linear, misfit_before, refitted, unlooped, vector,
-    },
+    separation::{imagined, information, linear, misfit_before, refitted, unlooped, vector},
 };
 use crate::{Error, Options, Problem, search::FINE};
 
@@ -118,7 +116,11 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
             let mut x = unlooped(node);
             x.truncate(node.setup.parameter_count());
             for record in 0..records.len() {
-                x.push(if record == 0 { unlooped(node)[x.len()] } else { played.initial[0] });
+                x.push(if record == 0 {
+                    unlooped(node)[x.len()]
+                } else {
+                    played.initial[0]
+                });
             }
             fit_from(&setup, &[x], &metric.noise, FINE).unwrap().cost
         };
@@ -137,11 +139,17 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
         let variance = ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let error = (variance / n).sqrt();
         println!("promised {promised:.1}, refitted {confirmed:.1}, mean {mean:.1} +- {error:.1}");
-        assert!(promised > 5.0, "an experiment that shows something: {promised}");
+        assert!(
+            promised > 5.0,
+            "an experiment that shows something: {promised}"
+        );
         assert!((mean - confirmed).abs() < 3.0 * error, "{mean} {confirmed}");
         assert!((mean - promised).abs() < 3.0 * error, "{mean} {promised}");
         // Twice the logarithm of a likelihood ratio of two fixed means: variance 4 lambda.
-        assert!((variance / (4.0 * confirmed) - 1.0).abs() < 0.4, "{variance}");
+        assert!(
+            (variance / (4.0 * confirmed) - 1.0).abs() < 0.4,
+            "{variance}"
+        );
     }
 }
 
@@ -187,7 +195,9 @@ fn for_a_small_effect_the_power_is_that_of_the_signatures() {
     let rows = setup.linearise(&x, &fitted.metric.noise).unwrap();
     let of = |name: &str| setup.names().iter().position(|n| n == name).unwrap();
     let signature = of("const_leak.flow");
-    let mut order: Vec<usize> = (0..setup.names().len()).filter(|i| *i != signature).collect();
+    let mut order: Vec<usize> = (0..setup.names().len())
+        .filter(|i| *i != signature)
+        .collect();
     order.push(signature);
     // |p_A|^2 (1 - rho^2): what is left of the column beside the base's and the other's.
     let last = order.len() - 1;
@@ -212,7 +222,11 @@ fn exact_twins_have_no_power() {
     )
     .unwrap();
     assert_eq!(found.prospect, Prospect::Twins);
-    let most = found.candidates.iter().map(|c| c.power.power).fold(0.0, f64::max);
+    let most = found
+        .candidates
+        .iter()
+        .map(|c| c.power.power)
+        .fold(0.0, f64::max);
     assert!(most < 1e-2, "{most}");
     let said = found.sentences.join(" ");
     assert!(said.contains("No experiment within these limits"), "{said}");
@@ -245,11 +259,22 @@ fn what_cannot_be_is_refused() {
         refused(between("overflow", "overflow"), none),
         Refused::SameEffect { .. }
     ));
-    for (low, high) in [(5.0, 5.0), (6.0, 2.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)] {
-        assert!(matches!(refused(pair, range(low, high)), Refused::Range { .. }));
+    for (low, high) in [
+        (5.0, 5.0),
+        (6.0, 2.0),
+        (f64::NAN, 1.0),
+        (1.0, f64::INFINITY),
+    ] {
+        assert!(matches!(
+            refused(pair, range(low, high)),
+            Refused::Range { .. }
+        ));
     }
     for (low, high) in [(-1.0, 5.0), (2.0, 10.5)] {
-        assert!(matches!(refused(pair, range(low, high)), Refused::Beyond { .. }));
+        assert!(matches!(
+            refused(pair, range(low, high)),
+            Refused::Beyond { .. }
+        ));
     }
     for duration in [-5.0, 0.0, 20.0, f64::NAN] {
         let limits = Limits {

@@ -58,7 +58,11 @@ pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
         with_unit(&significant(candidate.high, 3), unit)
     );
     let clock = format!("{} s", significant(candidate.clock, 3));
-    match (candidate.kind, candidate.levels) {
+    let slowly = candidate.slew.map_or(String::new(), |slew| {
+        let slew = with_unit(&significant(slew, 2), unit);
+        format!(", changed by at most {slew} a second")
+    });
+    let sequence = match (candidate.kind, candidate.levels) {
         (Kind::Again, _) => format!("what the record played, {range}"),
         (Kind::Step, _) => format!("steps {range}, one every {clock}"),
         (Kind::Staircase, Some(levels)) => {
@@ -71,7 +75,8 @@ pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
         (Kind::MultiLevel, _) => {
             format!("a sequence of many levels drawn {range}, each held for {clock}")
         }
-    }
+    };
+    sequence + &slowly
 }
 
 /// What the records say already.
@@ -79,7 +84,11 @@ fn so_far(design: &Design) -> Vec<String> {
     let [a, b] = &design.between;
     let mut said = Vec::new();
     let ahead = significant(design.bic_ahead.abs(), 2);
-    let (first, second) = if design.bic_ahead < 0.0 { (b, a) } else { (a, b) };
+    let (first, second) = if design.bic_ahead < 0.0 {
+        (b, a)
+    } else {
+        (a, b)
+    };
     said.push(if design.bic_ahead.abs() > DECIDED {
         format!(
             "The records that there are decide for {}: the criterion of {} is higher by {ahead}.",
@@ -118,7 +127,11 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     let Some(best) = design.candidates.first() else {
         return said;
     };
-    let played = if design.in_loop { "reference" } else { "command" };
+    let played = if design.in_loop {
+        "reference"
+    } else {
+        "command"
+    };
     if design.prospect == Prospect::Twins {
         said.push(format!(
             "No experiment within these limits tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters shows what {} would show.",
@@ -160,14 +173,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             }
         ));
         if let Some(times) = design.times_as_long {
-            said.push(if times < 100.0 {
-                format!(
-                    "About {} times as long it would decide with a probability of 0.95.",
-                    significant(times, 2)
-                )
-            } else {
-                "No experiment of this kind that anyone would wait for decides.".to_string()
-            });
+            said.push(format!("Played {times} times over it would decide."));
         }
     }
     if design.overfull > 0 {
@@ -213,9 +219,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     }
     if design.prospect != Prospect::Decides {
         said.push("Without an experiment, at the plant:".to_string());
-        said.extend(
-            [a, b].map(|rival| format!("{}: {}", rival.effect, rival.confirm)),
-        );
+        said.extend([a, b].map(|rival| format!("{}: {}", rival.effect, rival.confirm)));
     }
     said
 }

@@ -3,9 +3,8 @@
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::plan::{Power, Prospect};
+use crate::diagnose::GROUP_MARGIN;
 
-/// The criterion has to differ by so much for a verdict, as the groups of a diagnosis have it.
-const DECIDED: f64 = 6.0;
 /// A decision as good as certain, as likely, and what the criterion does not notice.
 const SURE: f64 = 0.9;
 const LIKELY: f64 = 0.5;
@@ -13,10 +12,10 @@ const NOTHING: f64 = 1.0;
 /// Quantile of the probability that a longer experiment is to reach.
 const WANTED: f64 = 1.645;
 
-/// The probability that the criterion of the false one ends above that of the true one by more than [`DECIDED`]: their
+/// The probability that the criterion of the false one ends above that of the true one by more than [`GROUP_MARGIN`]: their
 /// difference, `ahead` before, is normal with mean `ahead + lambda` and variance `4 lambda`.
 fn decides(lambda: f64, ahead: f64) -> f64 {
-    let margin = lambda + ahead - DECIDED;
+    let margin = lambda + ahead - GROUP_MARGIN;
     if lambda <= 0.0 {
         return if margin > 0.0 { 1.0 } else { 0.0 };
     }
@@ -53,7 +52,7 @@ pub(crate) fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
         return None;
     }
     let needed = |ahead: f64| {
-        let root = WANTED + (WANTED * WANTED + (DECIDED - ahead)).max(0.0).sqrt();
+        let root = WANTED + (WANTED * WANTED + (GROUP_MARGIN - ahead)).max(0.0).sqrt();
         root * root
     };
     let times = |i: usize| needed(ahead[i]) / power.if_true[i];

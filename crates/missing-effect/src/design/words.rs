@@ -4,10 +4,7 @@ use super::{
     plan::{Candidate, Design, Power, Prospect, Rival},
     sequences::Kind,
 };
-use crate::{numbers::significant, sentences::with_error};
-
-/// A criterion this far ahead has decided.
-const DECIDED: f64 = 6.0;
+use crate::{diagnose::GROUP_MARGIN, numbers::significant, sentences::with_error};
 
 fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
@@ -89,7 +86,7 @@ fn so_far(design: &Design) -> Vec<String> {
     } else {
         (a, b)
     };
-    said.push(if design.bic_ahead.abs() > DECIDED {
+    said.push(if design.bic_ahead.abs() > GROUP_MARGIN {
         format!(
             "The records that there are decide for {}: the criterion of {} is higher by {ahead}.",
             sized(first),
@@ -103,16 +100,20 @@ fn so_far(design: &Design) -> Vec<String> {
         )
     });
     for rival in [a, b] {
-        if rival.bic_gain < DECIDED {
+        if rival.bic_gain < GROUP_MARGIN {
+            let called = if rival.bic_gain < 0.0 {
+                format!("the criterion is higher with it, by {:.0}", -rival.bic_gain)
+            } else {
+                format!("it lowers the criterion by {:.0} alone", rival.bic_gain)
+            };
+            let edge = if rival.at_the_edge {
+                ", and its size ends where its plausible range does"
+            } else {
+                ""
+            };
             said.push(format!(
-                "They do not call for {}: it lowers the criterion of the believed model by {:.0} alone{}.",
-                named(rival),
-                rival.bic_gain,
-                if rival.at_the_edge {
-                    ", and its size ends where its plausible range does"
-                } else {
-                    ""
-                }
+                "They do not call for {}: {called}{edge}. What is hardly there is hardly told from anything.",
+                named(rival)
             ));
         }
     }
@@ -200,7 +201,8 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             with_power(&again.power)
         ));
     }
-    if let Some(wider) = &design.wider {
+    let wider = design.wider.as_ref();
+    if let Some(wider) = wider.filter(|_| design.prospect != Prospect::Decides) {
         said.push(format!(
             "With --range {} {} the best would give {}.",
             significant(wider.low, 3),

@@ -8,12 +8,11 @@ use rayon::prelude::*;
 
 use super::{
     limits::{Bounds, Refused},
-    plan::{Candidate, Power, Prospect, Reach, SecondSensor, Wider},
+    plan::{Candidate, Reach, SecondSensor, Wider},
     play::{Loop, Played, play},
-    power::{power, prospect, times_as_long},
-    second_sensor,
+    power::power,
     separation::{Metric, imagined, information, linear, misfit_before, refitted},
-    sequences::{Kind, Sequence, sequences},
+    sequences::{Sequence, sequences},
 };
 use crate::{Error, Problem, Progress, search::Node};
 
@@ -24,8 +23,6 @@ const MOST_REFITS: usize = 30;
 const PLENTY: f64 = 200.0;
 /// A sequence that drives a controller to a limit is played so that it crosses its range in so many time constants.
 const SLOWER: [f64; 2] = [1.0, 4.0];
-/// Nobody repeats an experiment more often.
-const MOST_TIMES: f64 = 20.0;
 /// Excursions that differ by less than this are one.
 const SAME_EXCURSION: f64 = 0.1;
 
@@ -55,14 +52,14 @@ pub(crate) struct Found {
 }
 
 /// A sequence and what it promises.
-type Tried = (Candidate, Sequence);
+pub(crate) type Tried = (Candidate, Sequence);
 
 /// What each node knows from the records, and how far each is from the other's simulation of them.
-struct Before {
-    known: [Triangle; 2],
+pub(crate) struct Before {
+    pub known: [Triangle; 2],
     imagined: [Vec<Record>; 2],
     /// `misfit[i]`: of the other to what `i` imagines.
-    misfit: [f64; 2],
+    pub misfit: [f64; 2],
     /// Smallest and largest level of each vessel, by either.
     levels: Vec<(f64, f64)>,
 }
@@ -101,7 +98,7 @@ impl Search<'_, '_> {
         })
     }
 
-    fn played(&self, values: &[f64], interval: f64) -> Option<[Played; 2]> {
+    pub fn played(&self, values: &[f64], interval: f64) -> Option<[Played; 2]> {
         let on = |i: usize| {
             play(
                 &self.nodes[i],
@@ -115,7 +112,12 @@ impl Search<'_, '_> {
     }
 
     /// A sequence, linearised.
-    fn tried(&self, sequence: &Sequence, bounds: &Bounds, before: &Before) -> Option<Candidate> {
+    pub fn tried(
+        &self,
+        sequence: &Sequence,
+        bounds: &Bounds,
+        before: &Before,
+    ) -> Option<Candidate> {
         let played = self.played(&sequence.values, bounds.interval)?;
         let of = |truth: usize| {
             let stand_in = 1 - truth;
@@ -175,22 +177,8 @@ impl Search<'_, '_> {
         Some((first, sequence))
     }
 
-    /// Played how many times over the experiment decides, if it does.
-    fn times_as_long(
-        &self,
-        (best, sequence): &Tried,
-        bounds: &Bounds,
-        before: &Before,
-    ) -> Option<usize> {
-        let times = times_as_long(&best.power, self.ahead_of_each())?.ceil();
-        let times = (times <= MOST_TIMES).then_some(times as usize)?;
-        let longer = sequence.repeated(times, bounds).ok()?;
-        let tried = self.tried(&longer, bounds, before)?;
-        (prospect(&tried.power) == Prospect::Decides && !tried.at_limit).then_some(times)
-    }
-
     /// The same, the other refitted.
-    fn confirmed(
+    pub fn confirmed(
         &self,
         (candidate, sequence): &Tried,
         bounds: &Bounds,
@@ -222,7 +210,7 @@ impl Search<'_, '_> {
 
     /// All sequences within limits, linearised, the best first; and how many would overfill a tank, or drive the controller to a
     /// limit.
-    fn promises(
+    pub fn promises(
         &self,
         bounds: &Bounds,
         seed: u64,
@@ -318,80 +306,6 @@ impl Search<'_, '_> {
             wider,
             times_as_long,
             second_sensor,
-        })
-    }
-
-    /// What a wider range would give.
-    fn wider(&self, bounds: &Bounds, seed: u64, before: &Before) -> Result<Option<Wider>, Error> {
-        let in_loop = matches!(self.into, Loop::Closed(_));
-        let Some(wider) = bounds.wider(self.problem, in_loop) else {
-            return Ok(None);
-        };
-        let (mut promised, _) = self.promises(&wider, seed, before)?;
-        promised.sort_by(|(a, _), (b, _)| b.power.power.total_cmp(&a.power.power));
-        let best = promised
-            .first()
-            .and_then(|best| self.confirmed(best, &wider, before));
-        Ok(best.map(|best| Wider {
-            low: wider.low,
-            high: wider.high,
-            best,
-        }))
-    }
-
-    /// What the longest record played, once more.
-    fn again(&self, bounds: &Bounds, before: &Before) -> Option<Candidate> {
-        let records = self.problem.records.iter();
-        let record = records.max_by_key(|record| record.len())?;
-        let played = match (&self.into, &record.reference) {
-            (Loop::Closed(_), Some(reference)) => reference,
-            _ => &record.input,
-        };
-        let (low, high) = played.range();
-        let sequence = Sequence {
-            kind: Kind::Again,
-            clock: bounds.interval,
-            levels: None,
-            draw: None,
-            slew: None,
-            low,
-            high,
-            values: played.values.clone(),
-        };
-        let tried = self.tried(&sequence, bounds, before)?;
-        let tried = (tried, sequence);
-        self.confirmed(&tried, bounds, before).or(Some(tried.0))
-    }
-
-    fn second_sensor(
-        &self,
-        best: &Sequence,
-        bounds: &Bounds,
-        before: &Before,
-    ) -> Option<SecondSensor> {
-        let plant = self.problem.plant;
-        if plant.vessels() < 2 {
-            return None;
-        }
-        let played = self.played(&best.values, bounds.interval)?;
-        let existing = |truth: usize| {
-            let [truth, other] = [&self.nodes[truth], &self.nodes[1 - truth]];
-            second_sensor::in_existing(truth, other, self.metric)
-        };
-        let experiment = |truth: usize| {
-            let (node, other) = (&self.nodes[truth], &self.nodes[1 - truth]);
-            let known = &before.known[1 - truth];
-            second_sensor::in_experiment(&played[truth], node, other, known, self.metric)
-        };
-        // Records that were recorded anew have decided nothing yet: what is ahead is what a parameter costs.
-        let [a, b] = self.nodes.each_ref().map(|node| node.fit.parameters as f64);
-        let fewer = (b - a) * (self.nodes[0].setup.samples() as f64).ln();
-        let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };
-        Some(SecondSensor {
-            level: plant.level_name(0).to_string(),
-            existing_without: fresh(before.misfit.map(|misfit| misfit / self.metric.variance)),
-            existing_with: fresh([existing(0)?, existing(1)?]),
-            best_with: power([experiment(0)?, experiment(1)?], self.ahead_of_each()),
         })
     }
 }

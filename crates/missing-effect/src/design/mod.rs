@@ -3,6 +3,7 @@
 //! Each of the two is fitted to the records. Sequences within the user's limits are then played on either fit, and it is
 //! reckoned how far the other stays behind what they show (`separation.rs`). The most promising are confirmed by refits.
 
+mod alternatives;
 mod experiments;
 mod limits;
 mod plan;

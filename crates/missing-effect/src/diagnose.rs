@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// What stands in for another lies within this of its criterion.
-const GROUP_MARGIN: f64 = 6.0;
+pub(crate) const GROUP_MARGIN: f64 = 6.0;
 /// Sets grown side by side, and refits of a size.
 const BEAM: usize = 3;
 const REFITS: usize = 12;

@@ -254,8 +254,9 @@ pub(crate) fn of_diagnosis(
                 };
                 if group.len() > 1 {
                     said.push(format!(
-                        "It is {}: this data cannot tell them apart; {effect}{place}{size} fits best.{doubt}",
-                        list(group, "or")
+                        "It is {}: this data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
+                        list(group, "or"),
+                        next_experiment(group, diagnosis.effects.len())
                     ));
                 } else {
                     said.push(format!("It is {effect}{place}{size}.{doubt}"));
@@ -281,6 +282,25 @@ pub(crate) fn of_diagnosis(
     }
     said.extend(shaped);
     said
+}
+
+/// The command that proposes what would tell the first two of a group apart.
+fn next_experiment(group: &[String], added: usize) -> String {
+    let [first, second, ..] = group else {
+        return String::new();
+    };
+    // One effect in either tank: the command has to be told which is which.
+    let (a, b) = if first == second {
+        (format!("{first}:upper"), format!("{second}:lower"))
+    } else {
+        (first.clone(), second.clone())
+    };
+    let others = if added > 1 {
+        ", once the other effects are in the model file,"
+    } else {
+        ""
+    };
+    format!(" `ctid design ... --between {a} {b}`{others} proposes the experiment that would.")
 }
 
 /// Where what is missing acts, on what it depends, and what it looks like.

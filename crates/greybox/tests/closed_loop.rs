@@ -41,7 +41,7 @@ fn in_loop(rig: &Rig, controller: &Controller, r: &[f64], noise: &[f64]) -> Reco
         structure = structure.with(placed).unwrap();
     }
     let mut simulator = Simulator::new(&structure, &rig.truth(0), &rig.levels, 5.0).unwrap();
-    let linear = controller.linear(rig.interval, false);
+    let linear = controller.linear(rig.interval);
     // The last state that the command sees: the integral, or the operating point.
     let mut states = vec![0.0; controller.states()];
     let seen = linear.c.iter().rposition(|c| *c != 0.0).unwrap();

@@ -86,7 +86,7 @@ fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64)
             let mut simulator = Simulator::<f64>::new(&structure, &theta, levels, middle).ok()?;
             simulator.set_substeps(node.setup.substeps);
             // All of the command in the state that it sees.
-            let seen = controller.linear(interval, false).c;
+            let seen = controller.linear(interval).c;
             let states: Vec<f64> = seen.iter().map(|c| c * middle).collect();
             let mut regulator = controller.start(&states);
             let mut command = middle;

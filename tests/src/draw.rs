@@ -144,7 +144,7 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
                 return None;
             }
             below = Some((size, found.1));
-            size = (4.0 * size).min(1.0);
+            size = (2.0 * size).min(1.0);
             found = at(size)?;
         }
         let mut above = (size, found.1);

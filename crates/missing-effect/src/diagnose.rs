@@ -30,6 +30,9 @@ const REFITS: usize = 12;
 /// Sets are grown to so many effects where they pay.
 const RICHEST: usize = 6;
 
+/// In the metric of a noise that wanders they are grown to so many.
+const PAIR: usize = 2;
+
 /// Where something remains that is not noise, effects are the answer if they explain this part at least of the mean
 /// square above the noise floor.
 ///
@@ -145,7 +148,12 @@ pub fn diagnose(
     if noise.order() > 0 {
         // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
         // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
-        // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken.
+        // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many
+        // effects it tells little.
+        let breadth = Breadth {
+            most: if by_simulation { PAIR } else { breadth.most },
+            ..breadth
+        };
         let coloured = grow(
             &base_noise,
             &noise,

@@ -561,15 +561,16 @@ fn begin_exchanges<'a>(
         .collect()
 }
 
-/// The node with one given effect more, fitted to the end; `known` is a fit of a larger set, whose values serve as a
+/// The node with one given effect more, fitted so far; `known` is a fit of a larger set, whose values serve as a
 /// further start.
 pub(crate) fn place<'a>(
     parent: &Node<'a>,
     placed: Placed,
     known: &Node<'a>,
     noise: &ArModel,
+    stopping: Stopping,
 ) -> Option<Node<'a>> {
     let mut proposal = propose(parent, parent, placed, noise)?;
     proposal.starts.push(transfer(known, &proposal.setup));
-    realise(proposal, noise, FINE)
+    realise(proposal, noise, stopping)
 }

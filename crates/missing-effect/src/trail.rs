@@ -34,12 +34,13 @@ pub(crate) fn trail<'a>(
             .copied()
             .collect::<Vec<Placed>>()
             .into_par_iter()
-            .filter_map(|placed| place(parent, placed, last, noise))
+            .filter_map(|placed| place(parent, placed, last, noise, ROUGH))
             .collect();
         let least = |a: &Node, b: &Node| a.fit.rmse.total_cmp(&b.fit.rmse);
-        let Some(mut node) = nodes.into_iter().min_by(least) else {
+        let Some(first) = nodes.into_iter().min_by(least) else {
             break;
         };
+        let mut node = refine(&first, noise, &[])?;
         // The end of the search has no vote: how often its minimum is found is counted over the starts around it.
         (node.fit.starts, node.fit.agree) = (0, 0);
         around(&mut node, noise, k as u64)?;

@@ -31,7 +31,7 @@ use crate::{
     control_loop::slowest_time_constant,
     noise_floor::colour,
     problem::base,
-    search::{Node, place, refine},
+    search::{FINE, Node, place, refine},
     step,
 };
 use experiments::Search;
@@ -165,7 +165,7 @@ fn fitted<'a>(
             .filter(|site| candidacy.vessel.is_none_or(|vessel| vessel == *site))
             .filter_map(|vessel| {
                 let effect = candidacy.effect;
-                place(&base, Placed { effect, vessel }, &base, &white)
+                place(&base, Placed { effect, vessel }, &base, &white, FINE)
             })
             .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
             .ok_or_else(|| no_fit(candidacy))
@@ -174,7 +174,8 @@ fn fitted<'a>(
     let better = usize::from(rough[1].fit.bic() < rough[0].fit.bic());
     let noise = colour(&rough[better])?;
     let refined = |i: usize| -> Result<Node<'a>, Error> {
-        place(&base, rough[i].added[0], &rough[i], &noise).ok_or_else(|| no_fit(between[i]).into())
+        place(&base, rough[i].added[0], &rough[i], &noise, FINE)
+            .ok_or_else(|| no_fit(between[i]).into())
     };
     let nodes = [refined(0)?, refined(1)?];
     let variance = if nodes[1].fit.bic() < nodes[0].fit.bic() {

@@ -1,12 +1,20 @@
 //! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
 
+pub mod draw;
+pub mod outside;
+
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
 use missing_effect::Problem;
 use plants::{
     Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term,
-    controller::Controller,
+    controller::{Controller, Regulator},
 };
 use rand_chacha::ChaCha8Rng;
+
+pub mod design_cases;
+
+/// Samples in which a rig comes to rest.
+const SETTLING: usize = 1500;
 
 /// How the command comes about.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +46,10 @@ pub struct Rig {
     pub colour: f64,
     /// How the command comes about.
     pub drive: Drive,
+    /// Fewest and most samples for which a step lasts.
+    pub hold: (usize, usize),
+    /// Gain \[V/cm\] and integral time \[s\] of the controller of [`Drive::Closed`].
+    pub pi: (f64, f64),
     /// Samples.
     pub samples: usize,
     /// Sampling interval \[s\].
@@ -61,6 +73,8 @@ impl Rig {
             noise: 0.05,
             colour: 0.0,
             drive: Drive::Open,
+            hold: (20, 90),
+            pi: (0.4, 120.0),
             samples: 1000,
             interval: 2.0,
             outside: |_| (0.0, 0.0),
@@ -107,11 +121,12 @@ impl Rig {
     /// The controller of [`Drive::Closed`].
     ///
     /// # Panics
-    /// Never: its settings are constants that can work.
+    /// Where its settings cannot work: they are constants of a test, or drawn from what can.
     #[must_use]
     #[allow(clippy::expect_used)]
     pub fn controller(&self) -> Controller {
-        Controller::pi(0.4, 120.0, (0.0, 10.0)).expect("a controller")
+        let (gain, integral_time) = self.pi;
+        Controller::pi(gain, integral_time, (0.0, 10.0)).expect("a controller")
     }
 
     /// The plant without what is hidden, beside one record; the controller is not told.
@@ -135,6 +150,67 @@ impl Rig {
     /// Where the rig is not possible: its settings are constants of a test.
     #[allow(clippy::expect_used)]
     pub fn run(&self, rng: &mut ChaCha8Rng) -> Record {
+        let middle = 0.5 * (self.command.0 + self.command.1);
+        let e = self.noises(self.samples, rng);
+        let (low, high) = match self.drive {
+            Drive::Open => self.command,
+            Drive::Closed => (
+                0.7 * self.levels[self.levels.len() - 1],
+                1.3 * self.levels[self.levels.len() - 1],
+            ),
+        };
+        let wanted: Result<Vec<f64>, Error> =
+            excitation::steps(self.samples, self.hold.0..=self.hold.1, low, high, rng);
+        let wanted = wanted.expect("an excitation");
+        let controller = self.controller().start(&[middle]);
+        self.from(&self.levels, middle, controller, wanted, &e)
+    }
+
+    /// Runs it on a given command, or in the loop on a given set point, from rest at its first value.
+    ///
+    /// # Panics
+    /// Where the rig is not possible, or nothing is given.
+    #[allow(clippy::expect_used)]
+    pub fn play(&self, wanted: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
+        let first = *wanted.first().expect("a value");
+        // What follows the clock begins with the record.
+        let settling = Self {
+            hidden: self
+                .hidden
+                .iter()
+                .filter(|(id, ..)| EffectInfo::find(id).is_some_and(|effect| !effect.by_clock))
+                .cloned()
+                .collect(),
+            ..self.clone()
+        };
+        let (structure, theta) = settling.built();
+        let middle = 0.5 * (self.command.0 + self.command.1);
+        let mut simulator =
+            Simulator::new(&structure, &theta, &self.levels, middle).expect("a simulation");
+        let mut controller = self.controller().start(&[middle]);
+        let mut command = first;
+        for _ in 0..SETTLING {
+            if self.drive == Drive::Closed {
+                command = controller.command(first, simulator.read(), self.interval);
+            }
+            simulator.advance(Command::held(command), self.interval);
+        }
+        let levels = simulator.levels()[..self.plant.vessels()].to_vec();
+        let e = self.noises(wanted.len(), rng);
+        self.from(&levels, command, controller, wanted, &e)
+    }
+
+    fn noises(&self, n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        if self.colour > 0.0 {
+            noise::ar1(n, self.noise, self.colour, rng)
+        } else {
+            noise::white(n, self.noise, rng)
+        }
+    }
+
+    /// The plant with what is hidden in it, and its parameters.
+    #[allow(clippy::expect_used)]
+    fn built(&self) -> (Structure, Vec<f64>) {
         let mut scales = Scales::from_ranges(
             (0.0, 10.0),
             (5.0, 30.0),
@@ -161,30 +237,26 @@ impl Rig {
                 .expect("a term of this plant");
             theta.push(1.0);
         }
-        let middle = 0.5 * (self.command.0 + self.command.1);
+        (structure, theta)
+    }
+
+    #[allow(clippy::expect_used)]
+    fn from(
+        &self,
+        levels: &[f64],
+        before: f64,
+        mut controller: Regulator<f64>,
+        wanted: Vec<f64>,
+        e: &[f64],
+    ) -> Record {
+        let (structure, theta) = self.built();
         let mut simulator =
-            Simulator::new(&structure, &theta, &self.levels, middle).expect("a simulation");
-        let e = if self.colour > 0.0 {
-            noise::ar1(self.samples, self.noise, self.colour, rng)
-        } else {
-            noise::white(self.samples, self.noise, rng)
-        };
-        let (low, high) = match self.drive {
-            Drive::Open => self.command,
-            Drive::Closed => (
-                0.7 * self.levels[self.levels.len() - 1],
-                1.3 * self.levels[self.levels.len() - 1],
-            ),
-        };
-        let wanted: Result<Vec<f64>, Error> =
-            excitation::steps(self.samples, 20..=90, low, high, rng);
-        let wanted = wanted.expect("an excitation");
-        let mut controller = self.controller().start(&[middle]);
+            Simulator::new(&structure, &theta, levels, before).expect("a simulation");
         let (mut u, mut y) = (
-            Vec::with_capacity(self.samples),
-            Vec::with_capacity(self.samples),
+            Vec::with_capacity(wanted.len()),
+            Vec::with_capacity(wanted.len()),
         );
-        for k in 0..self.samples {
+        for k in 0..wanted.len() {
             let (unseen, misread) = (self.outside)(k as f64 * self.interval);
             let reading = simulator.read() + misread + e[k];
             let command = match self.drive {
@@ -197,7 +269,7 @@ impl Rig {
         }
         Record {
             name: "rig".to_string(),
-            time: (0..self.samples)
+            time: (0..wanted.len())
                 .map(|k| k as f64 * self.interval)
                 .collect(),
             input: Signal::new("u", "V", u),

@@ -1,77 +1,27 @@
-//! What the pages in the repository say holds: the worked example of docs/adding-an-effect.md compiles, is the one that
-//! the page shows, and keeps the contract; the model file of the README is the bundled one; links lead somewhere.
+//! What the pages in the repository say holds: docs/adding-an-effect.md shows the effect of the catalogue that it walks through,
+//! the gallery is whole, the model file of the README is the bundled one, and links lead somewhere.
 
 use std::path::Path;
 
-use plants::{
-    Dual, EffectInfo, Law, Outlet, ParameterInfo, Place, Plant, Scalar, Scales, Site, Unit,
-};
-
-/// Compiled as in the catalogue: its parent has what it uses.
-#[path = "../../docs/pipe_height.rs"]
-mod pipe_height;
-
-fn torricelli_plant(plant: Plant) -> bool {
-    plant.outlet() == Outlet::Torricelli
-}
-
-fn scales() -> Scales {
-    Scales::from_ranges((0.0, 10.0), (4.0, 20.0), 2.0, 1000.0)
-}
-
-fn outflow<T: Scalar>(height: T, level: f64, nominal: f64) -> T {
-    let scales = scales();
-    let site = Site {
-        plant: Plant::SingleTank,
-        vessel: 0,
-        scales: &scales,
-    };
-    let mut outflow = T::constant(nominal);
-    pipe_height::bind(&site, &[height]).outflow(&T::constant(level), &mut outflow, 0.0);
-    outflow
-}
+use plants::Plant;
 
 #[test]
 fn the_page_shows_the_file() {
-    let file = include_str!("../../docs/pipe_height.rs");
+    let file = include_str!("../../crates/plants/src/effects/pipe_height.rs");
     let page = include_str!("../../docs/adding-an-effect.md");
     assert!(
         page.contains(&format!("```rust\n{file}```\n")),
-        "docs/adding-an-effect.md does not show docs/pipe_height.rs as it stands"
+        "docs/adding-an-effect.md does not show crates/plants/src/effects/pipe_height.rs as it stands"
     );
 }
 
 #[test]
-fn absent_it_changes_nothing_and_present_it_is_its_equation() {
-    for level in [-1.0, 0.0, 1e-9, 3e-5, 0.7, 12.3] {
-        let nominal = 11.0 * f64::sqrt(level.max(0.0));
-        let absent = outflow(0.0, level, nominal);
-        assert_eq!(absent.to_bits(), nominal.to_bits(), "at a level of {level}");
-    }
-    let present = outflow(3.0, 12.0, 11.0 * 12.0_f64.sqrt());
-    assert!((present - 11.0 * 15.0_f64.sqrt()).abs() < 1e-12);
-}
-
-#[test]
-fn its_derivative_at_absent_is_that_of_the_limit() {
-    let (level, nominal, step) = (9.0, 33.0, 1e-5);
-    let exact = outflow(Dual::<1>::variable(0.0, 0), level, nominal).eps[0];
-    let rise = outflow(step, level, nominal) - outflow(-step, level, nominal);
-    assert!((exact - rise / (2.0 * step)).abs() < 1e-8);
-}
-
-#[test]
-fn its_parameters_have_starts_within_their_bounds() {
-    let scales = scales();
-    let site = Site {
-        plant: Plant::SingleTank,
-        vessel: 0,
-        scales: &scales,
-    };
-    let parameters: Vec<ParameterInfo> = (pipe_height::INFO.parameters)(&site);
-    for p in parameters {
-        assert_eq!(p.unit, Unit::LEVEL);
-        assert!(p.starts.iter().all(|s| (p.lower..=p.upper).contains(s)));
+fn the_gallery_has_every_effect_in_words_and_in_a_picture() {
+    let gallery = include_str!("../../docs/gallery.md");
+    for effect in plants::CATALOGUE {
+        let (row, picture) = (format!("| `{}`", effect.id), format!("### `{}`", effect.id));
+        assert!(gallery.contains(&row), "no row for {}", effect.id);
+        assert!(gallery.contains(&picture), "no picture of {}", effect.id);
     }
 }
 

@@ -85,6 +85,19 @@ struct Header<'a> {
 }
 
 impl Columns {
+    /// The header of the time as a file that goes with these columns has it, with its unit, and the seconds in that; `t [s]`
+    /// where none is named, or its unit is none of the time.
+    #[must_use]
+    pub fn time_header(&self) -> (String, f64) {
+        let named = self.time.as_deref().map(unit::split);
+        let known = named.and_then(|(name, unit)| Some((name, unit, unit::seconds(unit)?)));
+        match known {
+            Some((name, "", seconds)) => (format!("{name} [s]"), seconds),
+            Some((name, unit, seconds)) => (format!("{name} [{unit}]"), seconds),
+            None => ("t [s]".to_string(), 1.0),
+        }
+    }
+
     /// Finds the columns in a header row (`row` is its line number).
     pub(crate) fn resolve(
         &self,

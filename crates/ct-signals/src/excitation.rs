@@ -1,4 +1,4 @@
-//! Inputs for an experiment: random steps, a maximal-length binary sequence, a multisine.
+//! Inputs for an experiment: random steps, a maximal-length binary sequence, a multisine; and a limit on how fast they change.
 
 use std::f64::consts::PI;
 
@@ -199,6 +199,29 @@ pub fn multisine(
         *v = (centre + scale * *v).clamp(low, high);
     }
     Ok(u)
+}
+
+/// Lets a sequence change by at most `most` (`> 0`, the actuator's unit) from one sample to the next: each value goes as
+/// far from the one before towards what it was meant to be as it may. It never leaves the range of the sequence.
+///
+/// # Errors
+/// [`Error::InvalidSetting`] unless `most > 0`.
+pub fn limit_slew(values: &mut [f64], most: f64) -> Result<(), Error> {
+    if most.is_nan() || most <= 0.0 {
+        return Err(Error::InvalidSetting {
+            setting: "most",
+            value: most.to_string(),
+            range: "above 0".into(),
+        });
+    }
+    for k in 1..values.len() {
+        let before = values[k - 1];
+        let wanted = values[k] - before;
+        if wanted.abs() > most {
+            values[k] = before + most.copysign(wanted);
+        }
+    }
+    Ok(())
 }
 
 fn check_limits(low: f64, high: f64) -> Result<(), Error> {

@@ -274,3 +274,16 @@ fn a_record_that_is_wrong_is_refused() {
     reference.reference = Some(Signal::new("r", "cm", vec![1.0]));
     assert!(reference.validate().is_err());
 }
+
+#[test]
+fn a_limited_slew_is_kept_and_the_sequence_followed() {
+    let mut u = vec![0.0, 10.0, 10.0, 10.0, 0.0, 1.0, 1.0];
+    excitation::limit_slew(&mut u, 4.0).unwrap();
+    assert_eq!(u, [0.0, 4.0, 8.0, 10.0, 6.0, 2.0, 1.0]);
+    let slow = u.clone();
+    excitation::limit_slew(&mut u, 100.0).unwrap();
+    assert_eq!(u, slow);
+    for wrong in [0.0, -1.0, f64::NAN] {
+        excitation::limit_slew(&mut u, wrong).unwrap_err();
+    }
+}

@@ -1,9 +1,9 @@
 //! `ctid effects`: the catalogue, and what it knows of one effect.
 
-use plants::{CATALOGUE, EffectInfo, Place, Placed, Plant};
+use plants::{CATALOGUE, EffectInfo, ParameterInfo, Place, Placed, Plant};
 
 use crate::look::{Look, Side, table};
-use crate::{Error, model_file, names, numbers};
+use crate::{Error, model_file, names, numbers, signature};
 
 /// The whole catalogue, by place.
 #[must_use]
@@ -69,6 +69,10 @@ pub fn describe(id: &str, look: Look) -> Result<String, Error> {
     text += &entry("confirm", effect.confirm);
     text += &entry("source", effect.source);
     text.push('\n');
+    if let Some(picture) = signature::picture(effect, look) {
+        text += &picture;
+        text.push('\n');
+    }
     text += &entry(
         "add it",
         &format!("ctid add {} --model MODEL.toml", effect.id),
@@ -76,33 +80,62 @@ pub fn describe(id: &str, look: Look) -> Result<String, Error> {
     Ok(text)
 }
 
-fn applies_to(effect: &EffectInfo) -> impl Iterator<Item = Plant> {
-    Plant::ALL
-        .into_iter()
-        .filter(|&plant| (effect.applies)(plant))
+/// The traces of all effects as a page of Markdown, for `docs/gallery.md`.
+#[must_use]
+pub fn gallery() -> String {
+    let mut text = String::new();
+    for effect in CATALOGUE {
+        if let Some(picture) = signature::picture(effect, Look::plain()) {
+            text += &format!("### `{}`\n\n```text\n{picture}```\n\n", effect.id);
+        }
+    }
+    text
 }
 
-fn place(effect: &EffectInfo) -> String {
+fn applies_to(effect: &'static EffectInfo) -> impl Iterator<Item = Plant> {
+    Plant::ALL
+        .into_iter()
+        .filter(|&plant| effect.sites(plant).next().is_some())
+}
+
+fn place(effect: &'static EffectInfo) -> String {
     match effect.place {
         Place::Actuator => "at the actuator, between the command and the inflow".to_string(),
         Place::Vessel => {
-            "in a vessel's balance; of two vessels either, `ctid add --where upper|lower`"
-                .to_string()
+            let two = applies_to(effect).find(|plant| plant.vessels() > 1);
+            let names: Vec<&str> = two.map_or(Vec::new(), |plant| {
+                let sites = effect.sites(plant);
+                sites
+                    .filter_map(|vessel| plant.vessel_name(vessel))
+                    .collect()
+            });
+            match names[..] {
+                [] => "in the balance of an only vessel".to_string(),
+                [only] => format!("in a vessel's balance; of two vessels the {only} one"),
+                _ => "in a vessel's balance; of two vessels either, `ctid add --where upper|lower`"
+                    .to_string(),
+            }
         }
         Place::Sensor => "at the sensor, between the level and the reading".to_string(),
     }
 }
 
-/// The parameters, on a plant that shows as many of them as there are.
+/// The parameters that it has on any plant, in any vessel.
 fn parameters(effect: &'static EffectInfo, look: Look) -> String {
-    let Some(plant) = applies_to(effect).max_by_key(|plant| plant.vessels()) else {
-        return String::new();
-    };
-    let structure = model_file::any_structure(plant);
-    let placed = Placed { effect, vessel: 0 };
+    let mut all: Vec<ParameterInfo> = Vec::new();
+    for plant in applies_to(effect) {
+        let structure = model_file::any_structure(plant);
+        for vessel in effect.sites(plant) {
+            for info in structure.effect_parameters(Placed { effect, vessel }) {
+                if all.iter().all(|known| known.name != info.name) {
+                    all.push(info);
+                }
+            }
+        }
+    }
     let heading = ["parameter", "unit", "absent at", "meaning"];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
-    for info in structure.effect_parameters(placed) {
+    for info in all {
         let unit = info.unit.label("level", "input", false);
         rows.push(vec![
             info.name.to_string(),

@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use ct_signals::{Columns, Hold, read_csv};
 use missing_effect::Options;
 
+use crate::design;
 use crate::identify::{self, LevelChoice, Method, Order, Request};
 use crate::input::Files;
 use crate::look::Look;
@@ -39,6 +40,8 @@ enum Command {
     Remove(Remove),
     /// List the catalogue of effects, or say all about one
     Effects(Effects),
+    /// Propose the next experiment, which tells two effects apart
+    Design(design::Arguments),
     /// Identify a linear model in continuous time from a record
     Identify(Identify),
     /// Compute the tables of a paper again, with many noises, and say which printed figures agree
@@ -256,6 +259,11 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Effects(Effects {
             effect: Some(effect),
         })) => say(out, &catalogue::describe(&effect, look)?),
+        Some(Command::Design(arguments)) => {
+            let (proposal, outputs) = arguments.run()?;
+            let text = design::text::design(&proposal.design, look);
+            finish(&proposal, &text, &outputs, out, look)
+        }
         Some(Command::Identify(arguments)) => arguments.run(out, look),
         Some(Command::Tables(arguments)) => arguments.run(out, look),
     }

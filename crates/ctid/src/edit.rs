@@ -92,7 +92,7 @@ pub fn with_effect(
         .transpose()?;
     let placed = Placed {
         effect,
-        vessel: vessel.unwrap_or(0),
+        vessel: vessel.unwrap_or(effect.usual_site(model.plant)),
     };
     model_file::any_structure(model.plant)
         .with(placed)

@@ -64,9 +64,13 @@ impl Files {
 
     /// An error of the computation, with the file that is to blame where that is known.
     pub(crate) fn blame(&self, error: missing_effect::Error) -> Error {
-        use missing_effect::Error::{Structure, UnstableLoop};
+        use missing_effect::Error::{Design, Structure, UnstableLoop};
         if matches!(error, UnstableLoop { .. } | Structure(_)) {
             return Error::file(&self.model, error.to_string());
+        }
+        // Its message names the option.
+        if matches!(error, Design(_)) {
+            return error.into();
         }
         let what = error.to_string();
         let named = |path: &PathBuf| {

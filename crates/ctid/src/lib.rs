@@ -6,6 +6,7 @@
 //! | the model file | [`model_file`]; its effects are edited by [`edit`] |
 //! | records and model, read and checked | [`input`] |
 //! | a missing term as a file | [`term_file`] |
+//! | the next experiment | [`mod@design`] |
 //! | the tour | [`tour`] |
 //! | linear models from a record | [`mod@identify`] |
 //! | a paper's tables, computed again | [`tables`] |
@@ -17,6 +18,7 @@
 mod atomic;
 pub mod catalogue;
 mod commands;
+pub mod design;
 pub mod edit;
 mod error;
 pub mod identify;
@@ -28,6 +30,7 @@ pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
+mod signature;
 pub mod tables;
 pub mod term_file;
 pub mod terminal;

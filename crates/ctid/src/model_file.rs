@@ -671,7 +671,7 @@ impl Source<'_> {
     ) -> Result<(), Error> {
         let placed = Placed {
             effect,
-            vessel: setting.vessel.unwrap_or(0),
+            vessel: setting.vessel.unwrap_or(effect.usual_site(plant)),
         };
         let infos = any_structure(plant).effect_parameters(placed);
         let names: Vec<&str> = infos.iter().map(|info| info.name).collect();
@@ -722,7 +722,7 @@ impl Source<'_> {
         let vessel = settings.get(effect.id).and_then(|setting| setting.vessel);
         let placed = Placed {
             effect,
-            vessel: vessel.unwrap_or(0),
+            vessel: vessel.unwrap_or(effect.usual_site(plant)),
         };
         before
             .iter()

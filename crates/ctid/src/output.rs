@@ -15,7 +15,7 @@ use crate::{Error, atomic, report, term_file};
 const HEAD: u64 = 4096;
 
 /// Keys that tell JSON of ctid's from others', beside `schema`: one for each kind of result.
-const KEYS: [&str; 4] = ["verdict", "paper", "method", "udink"];
+const KEYS: [&str; 5] = ["verdict", "paper", "method", "udink", "between"];
 
 /// What is in a file that the program writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -132,6 +132,12 @@ pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, E
 }
 
 impl Output {
+    /// What is in it.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
     /// Where it goes.
     #[must_use]
     pub fn path(&self) -> &Path {
@@ -185,6 +191,15 @@ pub fn free_report(folder: &Path, record: &str) -> Result<Output, Error> {
         }
         number += 1;
     }
+}
+
+/// The first of `STEM.csv`, `STEM-2.csv`, ... in a folder that is free: nothing in a record says who wrote it.
+pub(crate) fn free_record(folder: &Path, stem: &str) -> PathBuf {
+    let first = PathBuf::from(format!("{stem}.csv"));
+    let others = (2_u64..).map(|number| PathBuf::from(format!("{stem}-{number}.csv")));
+    let mut names = std::iter::once(first.clone()).chain(others);
+    let free = names.find(|name| fs::symlink_metadata(folder.join(name)).is_err());
+    free.unwrap_or(first)
 }
 
 /// A report on this record, as its data name it.

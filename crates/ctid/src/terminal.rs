@@ -386,7 +386,7 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
 
     let title = match diagnosis.verdict {
         Verdict::Adequate => "The catalogue, one effect at a time: none is called for",
-        _ => "The catalogue, one effect at a time, each refitted",
+        _ => "The catalogue, one effect at a time, refitted: simulation error on fitted data",
     };
     let mut text = format!("{}\n", look.heading(title));
     for line in lines {

@@ -112,6 +112,53 @@ fn compare_shows_the_error_and_writes_both_files() {
     );
 }
 
+/// An error that is printed says what it is, and of which data: a prediction of one step that is near zero would mean
+/// nothing. So say all lines and headings with the word, of every verdict, in the terminal and on the page.
+#[test]
+fn every_error_is_a_simulation_error_on_data_that_are_named() {
+    let place = Place::new();
+    for (command, tests) in [("compare", true), ("diagnose", true), ("diagnose", false)] {
+        let test = if tests { " --test @tour-test.csv" } else { "" };
+        let text = place
+            .ctid(&format!(
+                "{command} @tour.csv --model @tour.toml --report @out.html{test}"
+            ))
+            .unwrap();
+        // A sentence may be broken over lines.
+        let flat = text.to_lowercase();
+        let flat = flat.split_whitespace().collect::<Vec<_>>().join(" ");
+        let errors = flat.matches("error").count();
+        let explained: usize = [
+            "simulation error",
+            "standard error",
+            "squared error",
+            "error after",
+        ]
+        .iter()
+        .map(|words| flat.matches(words).count())
+        .sum();
+        assert!(errors > 0 && errors == explained, "{command}: {text}");
+        assert!(!flat.contains("prediction"), "{text}");
+        // The table of the steps has a column for each kind of data; that of the catalogue says it above.
+        let table = text
+            .split_once("Simulation error, root mean square\n")
+            .unwrap()
+            .1;
+        let heading = table.lines().next().unwrap();
+        assert!(heading.contains("fitted data"), "{text}");
+        assert_eq!(heading.contains("held-out data"), tests, "{text}");
+        assert_eq!(
+            text.contains("simulation error on fitted data"),
+            command == "diagnose",
+            "{text}"
+        );
+        let page = fs::read_to_string(place.path("out.html")).unwrap();
+        assert!(
+            page.contains("The simulation error is that of a model that runs on the input alone")
+        );
+    }
+}
+
 #[test]
 fn diagnose_names_the_effect_and_add_makes_the_error_fall() {
     let place = Place::new();

@@ -7,11 +7,11 @@
 //! ```text
 //! y - ym = v / (1 + P C),   v = (1 + P C) (y - ym)
 //! ```
-//! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So rows
-//! (derivatives and residual) are filtered by `1 + P0 C`, `P0` the plant linearised once at a first fit: what is left is `v`
-//! itself, of which a noise model is then made. The filter does not move with the parameters and its derivatives hold no
+//! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So what the loop did
+//! is undone: `y - ym + P0 (um - u)`, `P0` the plant linearised once at a first fit, is `v` itself, limits or not, of which a noise
+//! model is then made. Without limits this is the filter `1 + P0 C` of `y - ym`. The derivatives are filtered alike, and hold no
 //! noise: the estimate is the one of an instrumental variable, unbiased whatever the colour of `v` and whatever `P0`, which
-//! only the variance hangs on. The filter's determinant is one, so likelihoods compare.
+//! only the variance hangs on. The determinant of what makes `v` of `y` is one, so likelihoods compare.
 //!
 //! **Assumptions**: `y[k]` is read before `u[k]` acts; the command is held; the reference is not constant; nothing of `v`
 //! is in `r`.
@@ -25,7 +25,7 @@
 use std::sync::Arc;
 
 use ct_signals::{Hold, Record};
-use plants::controller::{Controller, LinearController, MAX_CONTROLLER_STATES};
+use plants::controller::{Controller, MAX_CONTROLLER_STATES};
 use plants::{Dual, MAX_VESSELS, Scalar, Simulator, Structure};
 
 use crate::{Error, Triangle};
@@ -37,8 +37,6 @@ pub struct Replay {
     pub states: Vec<f64>,
     /// The measured command less the controller's \[input unit\].
     pub beside: Vec<f64>,
-    /// Whether the controller was at a limit.
-    pub limited: Vec<bool>,
     /// Root mean square of `beside` \[input unit\].
     pub rms: f64,
     /// Standard deviation of the measured command \[input unit\].
@@ -79,22 +77,21 @@ pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error>
         let mut regulator = controller.start(&duals);
         let mut triangle = Triangle::new(n + 1);
         let mut row = vec![0.0; n + 1];
-        let (mut beside, mut limited) = (Vec::with_capacity(r.len()), Vec::with_capacity(r.len()));
+        let mut beside = Vec::with_capacity(r.len());
         for k in 0..r.len() {
             let given = regulator.command(r[k], Dual::constant(y[k]), step(record, k));
             row[..n].copy_from_slice(&given.eps[..n]);
             row[n] = u[k] - given.re;
             triangle.push(&row);
             beside.push(row[n]);
-            limited.push(regulator.limited());
         }
         triangle.finish();
         let rms = (beside.iter().map(|d| d * d).sum::<f64>() / r.len().max(1) as f64).sqrt();
-        (triangle, beside, limited, rms)
+        (triangle, beside, rms)
     };
     let free: Vec<usize> = (0..n).collect();
     // What it would be at no error, in the state that the command sees.
-    let seen = controller.linear(1.0, false).c;
+    let seen = controller.linear(1.0).c;
     let mut states: Vec<f64> = seen
         .iter()
         .map(|c| {
@@ -106,7 +103,7 @@ pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error>
         let step = best.0.solve(&free, &[], 0.0);
         let moved: Vec<f64> = states.iter().zip(&step).map(|(x, d)| x + d).collect();
         let next = run(&moved);
-        if next.3 >= best.3 || next.3.is_nan() {
+        if next.2 >= best.2 || next.2.is_nan() {
             break;
         }
         (states, best) = (moved, next);
@@ -116,8 +113,7 @@ pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error>
     Ok(Replay {
         states,
         beside: best.1,
-        limited: best.2,
-        rms: best.3,
+        rms: best.2,
         moves,
     })
 }
@@ -174,7 +170,6 @@ pub(crate) struct Feedback {
     /// The controller's initial states are fitted.
     pub released: bool,
     plant: Arc<LinearPlant>,
-    interval: f64,
 }
 
 impl Feedback {
@@ -182,7 +177,6 @@ impl Feedback {
         controller: &Controller,
         records: &[Record],
         plant: LinearPlant,
-        interval: f64,
     ) -> Result<Self, Error> {
         for record in records {
             if let Some(reference) = &record.reference {
@@ -204,7 +198,6 @@ impl Feedback {
             replays: Arc::new(replays),
             released: false,
             plant: Arc::new(plant),
-            interval,
         })
     }
 
@@ -227,63 +220,53 @@ impl Feedback {
             .collect()
     }
 
-    /// The filter `1 + P0 C` for rows of so many columns.
-    pub(crate) fn inverse(&self, columns: usize) -> Inverse {
-        let (n, m) = (self.plant.b.len(), self.controller.states());
-        Inverse {
+    /// What the commands of rows of so many columns do to the plant.
+    pub(crate) fn response(&self, columns: usize) -> Response {
+        Response {
             plant: self.plant.clone(),
-            free: self.controller.linear(self.interval, false),
-            limited: self.controller.linear(self.interval, true),
-            levels: vec![0.0; columns * n],
-            states: vec![0.0; columns * m],
-            scratch: vec![0.0; n.max(m)],
+            levels: vec![0.0; columns * self.plant.b.len()],
+            scratch: vec![0.0; columns * self.plant.b.len()],
         }
     }
 }
 
-/// `1 + P0 C` on the columns of rows.
-pub(crate) struct Inverse {
+/// `P0` on the columns of rows. Levels are kept row by row, a column beside the other, so that all columns take a step at
+/// once.
+pub(crate) struct Response {
     plant: Arc<LinearPlant>,
-    free: LinearController,
-    limited: LinearController,
     levels: Vec<f64>,
-    states: Vec<f64>,
     scratch: Vec<f64>,
 }
 
-impl Inverse {
+impl Response {
     /// A record begins: initial states have columns of their own.
     pub(crate) fn reset(&mut self) {
         self.levels.fill(0.0);
-        self.states.fill(0.0);
     }
 
-    pub(crate) fn push(&mut self, row: &mut [f64], limited: bool) {
-        let controller = if limited { &self.limited } else { &self.free };
-        let (n, m) = (self.plant.b.len(), controller.b.len());
-        let product = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
-        for (column, value) in row.iter_mut().enumerate() {
-            let levels = &mut self.levels[column * n..(column + 1) * n];
-            let states = &mut self.states[column * m..(column + 1) * m];
-            let e = *value;
-            let back = product(&controller.c, states) + controller.d * e;
-            *value += levels[n - 1];
-            for (to, (a, b)) in self
-                .scratch
-                .iter_mut()
-                .zip(self.plant.a.iter().zip(&self.plant.b))
-            {
-                *to = product(a, levels) + b * back;
-            }
-            levels.copy_from_slice(&self.scratch[..n]);
-            for (to, (a, b)) in self
-                .scratch
-                .iter_mut()
-                .zip(controller.a.iter().zip(&controller.b))
-            {
-                *to = product(a, states) + b * e;
-            }
-            states.copy_from_slice(&self.scratch[..m]);
+    /// Adds to a row what its commands so far did.
+    pub(crate) fn add_to(&self, row: &mut [f64]) {
+        let last = self.levels.len() - row.len();
+        for (value, level) in row.iter_mut().zip(&self.levels[last..]) {
+            *value += level;
         }
+    }
+
+    /// A step under the commands of a row.
+    pub(crate) fn advance(&mut self, commands: &[f64]) {
+        let columns = commands.len();
+        let rows = self.scratch.chunks_exact_mut(columns);
+        for ((to, a), b) in rows.zip(&self.plant.a).zip(&self.plant.b) {
+            to.fill(0.0);
+            for (a, x) in a.iter().zip(self.levels.chunks_exact(columns)) {
+                for (to, x) in to.iter_mut().zip(x) {
+                    *to += a * x;
+                }
+            }
+            for (to, u) in to.iter_mut().zip(commands) {
+                *to += b * u;
+            }
+        }
+        std::mem::swap(&mut self.levels, &mut self.scratch);
     }
 }

@@ -7,6 +7,7 @@ mod fit;
 mod levenberg_marquardt;
 mod marginal;
 mod noise_factor;
+mod reading_step;
 mod sandwich;
 mod setup;
 mod starts;

@@ -9,7 +9,8 @@ use plants::{
 
 use crate::{
     Error, LinearPlant, Replay, Triangle,
-    feedback::{Feedback, Inverse, step},
+    feedback::{Feedback, Response, step},
+    reading_step::reading_step,
 };
 
 /// A structure, the records, and which parameters are free.
@@ -113,6 +114,7 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
     if let Some(range) = input_range {
         scales.input_range = range;
     }
+    scales.reading_step = reading_step(records).unwrap_or(0.0);
     Some(scales)
 }
 
@@ -233,8 +235,7 @@ impl<'a> Setup<'a> {
             .flat_map(|record| &record.input.values)
             .fold((0.0, 0.0), |(sum, count), u| (sum + u, count + 1.0));
         let plant = LinearPlant::at(&self.structure, &x[..self.parameter_count()], sum / count)?;
-        let interval = self.structure.scales.sample_interval;
-        let feedback = Feedback::new(controller, self.records, plant, interval)?;
+        let feedback = Feedback::new(controller, self.records, plant)?;
         let mut with = x[..self.parameter_count()].to_vec();
         for (r, replay) in feedback.replays.iter().enumerate() {
             with.extend(&x[self.plant_states_of(r)]);
@@ -506,20 +507,18 @@ impl<'a> Setup<'a> {
         let (Some(feedback), Some(run)) = (&self.feedback, self.simulate_loop(x)?) else {
             return self.residuals(x);
         };
-        let mut inverse = feedback.inverse(1);
-        let series = self
-            .records
-            .iter()
-            .zip(run.output)
-            .zip(feedback.replays.iter());
+        let mut response = feedback.response(1);
+        let series = self.records.iter().zip(run.output).zip(run.command);
         Ok(series
-            .map(|((record, model), replay)| {
-                inverse.reset();
-                let samples = record.output.values.iter().zip(model).zip(&replay.limited);
-                samples
-                    .map(|((y, model), limited)| {
-                        let mut row = [y - model];
-                        inverse.push(&mut row, *limited);
+            .map(|((record, model), command)| {
+                response.reset();
+                let measured = record.output.values.iter().zip(&record.input.values);
+                measured
+                    .zip(model.iter().zip(&command))
+                    .map(|((y, u), (ym, um))| {
+                        let mut row = [y - ym];
+                        response.add_to(&mut row);
+                        response.advance(&[um - u]);
                         row[0]
                     })
                     .collect()
@@ -609,15 +608,18 @@ impl<'a> Setup<'a> {
         let columns = self.free.len() + 1;
         let mut row = vec![0.0; columns];
         let count = self.parameter_count();
-        let mut inverse: Option<Inverse> = self
+        // What the commands of the loop do to the plant: its commands for the derivatives, for the residual what it was given
+        // less that.
+        let mut response: Option<(Response, Vec<f64>)> = self
             .feedback
             .as_ref()
-            .map(|feedback| feedback.inverse(columns));
+            .map(|feedback| (feedback.response(columns), vec![0.0; columns]));
         for (r, record) in self.records.iter().enumerate() {
             let own = self.states_of(r);
             let plant = self.plant_states_of(r);
-            if let Some(inverse) = &mut inverse {
-                inverse.reset();
+            if let Some((response, commands)) = &mut response {
+                response.reset();
+                commands.fill(0.0);
             }
             // Columns of this record: the free parameters and its own initial levels, in lanes of one simulator or,
             // where they are too many, of several that run side by side.
@@ -663,14 +665,21 @@ impl<'a> Setup<'a> {
                         (Some(regulator), Some(feedback)) => {
                             let beside = feedback.replays[r].beside[k];
                             let u = regulator.command_beside(reference(record, k), y, beside, h);
+                            if let Some((_, commands)) = &mut response {
+                                for (lane, &column) in chunk.iter().enumerate() {
+                                    commands[column] = -u.eps[lane];
+                                }
+                                commands[columns - 1] = u.re - record.input.values[k];
+                            }
                             simulator.advance_held(u, h);
                         }
                         _ => simulator.advance(command(record, k), h),
                     }
                 }
                 row[columns - 1] = record.output.values[k] - model;
-                if let (Some(inverse), Some(feedback)) = (&mut inverse, &self.feedback) {
-                    inverse.push(&mut row, feedback.replays[r].limited[k]);
+                if let Some((response, commands)) = &mut response {
+                    response.add_to(&mut row);
+                    response.advance(commands);
                 }
                 if !row.iter().all(|value| value.is_finite()) {
                     return None;

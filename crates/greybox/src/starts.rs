@@ -108,7 +108,7 @@ pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
 }
 
 /// Starts around a vector: the plant's own parameters and the initial levels are scaled by up to a factor of 1.2 either
-/// way, an effect's parameters move by up to a tenth of their plausible range.
+/// way, an effect's parameters move by up to a tenth of their plausible range. What is not fitted stays.
 #[must_use]
 pub fn starts_around(setup: &Setup, x: &[f64], n: usize, seed: u64) -> Vec<Vec<f64>> {
     use rand::SeedableRng;
@@ -130,7 +130,11 @@ pub fn starts_around(setup: &Setup, x: &[f64], n: usize, seed: u64) -> Vec<Vec<f
                     } else {
                         value + 0.1 * (upper - lower) * rng.random_range(-1.0..1.0)
                     };
-                    within(moved, (lower, upper))
+                    if setup.free().contains(&i) {
+                        within(moved, (lower, upper))
+                    } else {
+                        *value
+                    }
                 })
                 .collect()
         })

@@ -41,7 +41,7 @@ fn in_loop(rig: &Rig, controller: &Controller, r: &[f64], noise: &[f64]) -> Reco
         structure = structure.with(placed).unwrap();
     }
     let mut simulator = Simulator::new(&structure, &rig.truth(0), &rig.levels, 5.0).unwrap();
-    let linear = controller.linear(rig.interval, false);
+    let linear = controller.linear(rig.interval);
     // The last state that the command sees: the integral, or the operating point.
     let mut states = vec![0.0; controller.states()];
     let seen = linear.c.iter().rposition(|c| *c != 0.0).unwrap();
@@ -365,5 +365,49 @@ fn coloured_noise_biases_the_measured_command_and_not_the_loop() {
     // White noise that is read before the command acts does no harm either way.
     for (bias, hits) in over_records(&rig, 0.0, false, false) {
         assert!(bias.abs() < 0.35 && hits > 0.91, "{bias} {hits}");
+    }
+}
+
+/// A start-up and steps that drive the command from one limit to the other, for long: the disturbance is still the noise that was
+/// added, and a fit finds the truth.
+#[test]
+fn a_command_at_its_limits_is_no_disturbance() {
+    let rig = Rig {
+        samples: 800,
+        ..Rig::linear_tank()
+    };
+    let controller = Controller::pi(2.0, 60.0, LIMITS).unwrap();
+    let r: Vec<f64> = (0..rig.samples)
+        .map(|k| [16.0, 38.0, 3.0, 30.0][k / 100 % 4])
+        .collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let e = noise::ar1(rig.samples, 0.05, 0.8, &mut rng);
+    let record = in_loop(&rig, &controller, &r, &e);
+    let limited = |u: &&f64| **u <= LIMITS.0 || **u >= LIMITS.1;
+    let at_limit = record.input.values.iter().filter(limited).count();
+    assert!(at_limit > rig.samples / 10, "{at_limit}");
+    let records = [record];
+    let (setup, x) = rig
+        .setup(&records)
+        .in_loop(&controller, &rig.truth(1))
+        .unwrap();
+    let found = &setup.disturbance(&x).unwrap()[0];
+    let worst = |found: &[f64]| {
+        let apart = found.iter().zip(&e).map(|(v, e)| (v - e).abs());
+        apart.fold(0.0, f64::max)
+    };
+    assert!(worst(found) < 1e-8, "{}", worst(found));
+    let away: Vec<f64> = x.iter().map(|value| 1.1 * value).collect();
+    let white = ArModel::white(1.0);
+    let fit = fit_from(&setup, &[away], &white, FitOptions::default().stopping).unwrap();
+    let fit = coloured(&setup, fit, 6, FitOptions::default().stopping).unwrap();
+    for (i, truth) in rig.theta.iter().enumerate() {
+        let half = fit.half_widths(0.9999)[i].unwrap();
+        assert!(
+            (fit.x[i] - truth).abs() < half,
+            "{i}: {} ± {half}",
+            fit.x[i]
+        );
+        assert!(half < 0.02 * truth.abs(), "{i}: {half}");
     }
 }

@@ -7,9 +7,12 @@ use approx::assert_relative_eq;
 use ct_signals::{ArModel, Hold, Record};
 use greybox::Setup;
 use nalgebra::DMatrix;
-use plants::{Placed, Plant};
+use plants::Plant;
 use std::collections::BTreeMap;
 use support::Rig;
+
+/// Effects whose readings are a staircase of some parameter carry the slope of a chord, which a central difference does not show.
+const STEPPED: [&str; 2] = ["stiction_backlash", "coarse_quantisation"];
 
 /// The derivatives of all readings, column by column over the free entries, by central differences.
 fn differences(setup: &Setup, x: &[f64]) -> DMatrix<f64> {
@@ -113,6 +116,9 @@ fn every_effect_on_both_tanks() {
     for rig in [Rig::single_tank(), Rig::cascaded_tanks()] {
         let records = two_records(&rig);
         for placed in rig.setup(&records).structure.candidates() {
+            if STEPPED.contains(&placed.effect.id) {
+                continue;
+            }
             let setup = rig.setup(&records);
             let structure = setup.structure.with(placed).unwrap();
             let setup = setup.with_structure(structure).unwrap();
@@ -156,12 +162,9 @@ fn more_columns_than_lanes() {
             .effects()
             .iter()
             .all(|on| on.effect.id != placed.effect.id);
-        // A sticking sensor has no derivative where it lets go.
-        if once && placed.effect.id != "sensor_hysteresis" {
-            let placed = Placed {
-                vessel: 0,
-                ..placed
-            };
+        // A sensor that sticks has no derivative where it lets go.
+        let sticks = placed.effect.id == "sensor_hysteresis" || STEPPED.contains(&placed.effect.id);
+        if once && !sticks {
             let structure = setup.structure.with(placed).unwrap();
             setup = setup.with_structure(structure).unwrap();
         }
@@ -172,6 +175,7 @@ fn more_columns_than_lanes() {
         match name.as_str() {
             "pump_saturation.limit" => *value = 5.0,
             "overflow.rim" => *value = 4.5,
+            "leak_at_height.height" => *value = 3.0,
             "sensor_saturation.limit" => *value = 13.0,
             "level_upper(0), record 1" | "level_upper(0), record 2" => *value = 4.0,
             // A reading that begins below the sensor's limit.

@@ -6,13 +6,19 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
     Error,
-    search::{Node, without},
+    search::{Node, exchanges, without},
 };
 
 /// An effect is accepted where its criterion falls by more than this ...
 pub(crate) const BIC_MARGIN: f64 = 6.0;
 /// ... and where chance would let so large a fall happen less often than this, counted over all candidates.
 const FALSE_CLAIM: f64 = 0.001;
+/// An exchange is followed where it comes this near, ...
+const NEAR: f64 = 25.0;
+/// ... the best of them; ...
+const EXCHANGES: usize = 6;
+/// ... and one of as many effects is taken where the criterion falls by this.
+const CLEARLY: f64 = 1.0;
 
 /// Whether a fall of the deviance is more than the best of all candidates would bring where there is nothing:
 /// chi-square, corrected (Bonferroni) for every start of every candidate of the `lacking` model.
@@ -34,6 +40,54 @@ pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a
     Ok(node)
 }
 
+/// Exchanges effects for others while that makes another one superfluous, or the whole better.
+///
+/// Of sets that take the same out of a residual the search follows one, and a stand-in that is nearly right calls for a
+/// further effect that mends it: on the emulated rig of a closed loop a raised outlet stood for the pump's dead zone, and a bent
+/// pump for the difference. With the dead zone in its place the bend is not needed.
+pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+    // Every round ends with fewer effects, or with a lower criterion of as many.
+    while node.added.len() > 1 {
+        let mut others: Vec<Node<'a>> = (0..node.added.len())
+            .into_par_iter()
+            .map(|position| exchanges(&node, position, noise, None))
+            .collect::<Result<Vec<_>, _>>()?
+            .concat();
+        others.retain(|other| {
+            other.gain_over(&node) > -NEAR
+                && !other.added.iter().any(|placed| other.at_the_edge(*placed))
+        });
+        others.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+        others.truncate(EXCHANGES);
+        let others = others
+            .into_par_iter()
+            .map(|other| confirm(other, noise))
+            .collect::<Result<Vec<_>, _>>()?;
+        let better = |other: &Node| {
+            let margin = if other.added.len() < node.added.len() {
+                BIC_MARGIN
+            } else {
+                -CLEARLY
+            };
+            other.fit.bic() - node.fit.bic() < margin
+        };
+        let Some(best) = others
+            .into_iter()
+            .filter(|other| other.added.len() <= node.added.len() && better(other))
+            .min_by(|a, b| {
+                let key = |node: &Node| (node.added.len(), node.fit.bic());
+                key(a)
+                    .partial_cmp(&key(b))
+                    .unwrap_or(std::cmp::Ordering::Equal)
+            })
+        else {
+            break;
+        };
+        node = best;
+    }
+    Ok(node)
+}
+
 /// The node without the effect whose loss costs least; `None` where it has none.
 pub(crate) fn least_useful<'a>(
     node: &Node<'a>,
@@ -48,18 +102,9 @@ pub(crate) fn least_useful<'a>(
         .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())))
 }
 
-/// How many ways the search had to find something where there is nothing: every start of every candidate is one.
+/// How many ways the search had to find something where there is nothing.
 fn candidates(node: &Node) -> f64 {
-    node.setup
-        .structure
-        .candidates()
-        .into_iter()
-        .map(|placed| {
-            let parameters = node.setup.structure.effect_parameters(placed);
-            parameters
-                .iter()
-                .map(|p| p.starts.len() as f64)
-                .product::<f64>()
-        })
-        .sum()
+    let structure = &node.setup.structure;
+    let candidates = structure.candidates();
+    candidates.into_iter().map(|on| structure.ways(on)).sum()
 }

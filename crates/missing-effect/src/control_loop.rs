@@ -16,7 +16,7 @@ const GROWTH: f64 = 1.0;
 pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), Error> {
     let setup = &node.setup;
     let plant = linearised(node)?;
-    let own = controller.linear(setup.structure.scales.sample_interval, false);
+    let own = controller.linear(setup.structure.scales.sample_interval);
     let (n, m) = (plant.b.len(), own.b.len());
     // Levels x, then the controller's states z: e = -x_last, u = c z + d e.
     let mut a = DMatrix::<f64>::zeros(n + m, n + m);

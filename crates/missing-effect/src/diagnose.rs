@@ -4,29 +4,34 @@ use std::time::Instant;
 
 use ct_signals::{ArModel, Record};
 use greybox::coloured;
+use plants::EffectInfo;
 use rayon::prelude::*;
 
 use crate::{
     ControlLoop, Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step,
     Verdict,
-    confirm::{BIC_MARGIN, beyond_chance, confirm, least_useful},
-    noise_floor::{NOISE_ORDER, colour, residual_colour, slowness, wanders},
+    confirm::{BIC_MARGIN, beyond_chance, confirm, improve, least_useful},
+    exhausted::exhausted,
+    noise_floor::{NOISE_ORDER, bic_in_colour, colour, residual_colour, slowness, wanders},
     problem::{STOPPING, base},
     remains::remains,
     scores::{price_of_colour, scores},
-    search::{Breadth, Node, exchanges, grow, refine, singles},
+    search::{Breadth, Node, exchanges, grow, refine, singles, without_clock},
     sentences, step,
     trail::trail,
     unknown::unknown,
 };
 
 /// What stands in for another lies within this of its criterion.
-const GROUP_MARGIN: f64 = 6.0;
+pub(crate) const GROUP_MARGIN: f64 = 6.0;
 /// Sets grown side by side, and refits of a size.
 const BEAM: usize = 3;
 const REFITS: usize = 12;
 /// Sets are grown to so many effects where they pay.
 const RICHEST: usize = 6;
+
+/// In the metric of a noise that wanders they are grown to so many.
+const PAIR: usize = 2;
 
 /// Where something remains that is not noise, effects are the answer if they explain this part at least of the mean
 /// square above the noise floor.
@@ -115,10 +120,21 @@ pub fn diagnose(
 
     // The richest model in play, by simulation error; its residual gives the noise.
     let white = ArModel::white(1.0);
-    let sizes = grow(&base, &white, breadth, pays, &|done, total| {
-        tell("searching sets of effects", done, total)
-    });
-    let richest = chosen(&sizes, &base);
+    // While the colour is not known, a coloured noise would pay for one effect after the other: what counts is what remains of
+    // the gain where each model has the colour of its own residual.
+    let pays_in_colour = |before: &Node, after: &Node| {
+        let fall = || Ok::<_, Error>(bic_in_colour(before)? - bic_in_colour(after)?);
+        pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
+    };
+    let mut grown = grow(
+        &base,
+        &white,
+        breadth,
+        pays_in_colour,
+        exhausted,
+        &|done, total| tell("searching sets of effects", done, total),
+    )?;
+    let richest = chosen(&grown.sizes, &base);
     let richest = refine(&richest, &white, &[])?;
     let noise = colour(&richest)?;
 
@@ -129,17 +145,40 @@ pub fn diagnose(
     let mut confirmed = confirm(richest_noise, &noise)?;
     let wandering = wanders(&richest, &noise);
     let by_simulation = wandering && !confirmed.added.is_empty();
-    if noise.order() > 0 && !by_simulation {
-        // The noise's colour is known now: the search is repeated in its metric.
-        let sizes = grow(&base_noise, &noise, breadth, pays, &|done, total| {
-            tell("searching in the noise's metric", done, total);
-        });
-        let other = confirm(refine(&chosen(&sizes, &base_noise), &noise, &[])?, &noise)?;
-        if other.fit.bic() < confirmed.fit.bic() {
+    if noise.order() > 0 {
+        // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
+        // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
+        // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many
+        // effects it tells little.
+        let breadth = Breadth {
+            most: if by_simulation { PAIR } else { breadth.most },
+            ..breadth
+        };
+        let coloured = grow(
+            &base_noise,
+            &noise,
+            breadth,
+            pays,
+            // It was exhausted in this colour, which is that of its own residual.
+            |node| Ok(grown.exhausted_by(node) || exhausted(node)?),
+            &|done, total| tell("searching in the noise's metric", done, total),
+        )?;
+        let best = chosen(&coloured.sizes, &base_noise);
+        let other = confirm(refine(&best, &noise, &[])?, &noise)?;
+        if other.fit.bic() < confirmed.fit.bic()
+            && !(by_simulation && drifts_off(&confirmed, &other)?)
+        {
             confirmed = other;
         }
+        if !by_simulation {
+            grown = coloured.with_sizes_of(grown);
+        }
     }
-    // Each model with the colour of its own residual: what a coloured noise explains needs no effect.
+    if !by_simulation {
+        confirmed = improve(confirmed, &noise)?;
+    }
+    // Each model with the colour of its own residual: what a coloured noise explains needs no effect. The richest model has
+    // taken a part of a slow noise for effects, and the colour that it leaves is too fast: chance is counted here too.
     let own_base = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
     let own_last = coloured(
         &confirmed.setup,
@@ -147,13 +186,30 @@ pub fn diagnose(
         NOISE_ORDER,
         STOPPING,
     )?;
-    if !confirmed.added.is_empty() && own_base.bic() - own_last.bic() < BIC_MARGIN {
+    let freedom = own_last.parameters.saturating_sub(own_base.parameters);
+    let needed_in_colour = own_base.bic() - own_last.bic() >= BIC_MARGIN
+        && beyond_chance(
+            own_base.deviance - own_last.deviance,
+            freedom.max(1) as f64,
+            &base,
+        );
+    if !confirmed.added.is_empty() && !needed_in_colour {
         confirmed = base_noise.clone();
+    }
+    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, and where the other
+    // effects of the set are called for without them. What is there to mend an imitation is not.
+    if confirmed.added.iter().any(|placed| placed.effect.by_clock) {
+        let others = without_clock(&confirmed, &noise)?;
+        let count = others.added.len();
+        let others = confirm(others, &noise)?;
+        if others.added.len() < count || remains(&confirmed, &own_last)?.is_some() {
+            confirmed = others;
+        }
     }
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;
     if stopped {
-        confirmed = shortened(confirmed, &sizes, options.max_effects, &noise)?;
+        confirmed = shortened(confirmed, &grown.sizes, options.max_effects, &noise)?;
     }
 
     tell("telling apart", 1, 3);
@@ -185,32 +241,44 @@ pub fn diagnose(
     if left.is_some() && !stopped {
         floor = floor.of_what_is_new();
     }
+    let mut last = trail.last().cloned().unwrap_or_else(|| base.clone());
     // What leaves the greater part of the error to something else is a remark, and not the answer.
-    let mut remark = None;
-    if let (Some(last), false) = (trail.last(), stopped)
-        && let Some(found) = left
-        && !last.added.is_empty()
-        && explained(&base, last, found.above(&noise))? < FAIR_PART
-    {
-        remark = Some(sentences::of_a_part(last, &problem.records[0].output.unit));
-        left = remains(&base, &own_base)?;
-        own_of_last = Some(own_base);
-        trail.truncate(1);
-    }
-    let last = trail.last().cloned().unwrap_or_else(|| base.clone());
-    let (metric, per_sample) = if by_simulation || stopped {
-        (&white, slowness(&residual_colour(&last)?))
-    } else {
-        (&noise, 1.0)
+    let beside = left.filter(|_| !stopped && !last.added.is_empty());
+    let fair = match beside {
+        Some(found) => explained(&base, &last, found.above(&noise))? >= FAIR_PART,
+        None => true,
     };
-    let groups = groups(&refine(&last, metric, &[])?, metric, per_sample)?;
-    tell("telling apart", 2, 3);
-    let (metric, believed) = if by_simulation {
+    // The metric in which single effects were refitted last: a noise that is white has the same one whatever its size.
+    let (metric, believed) = if by_simulation || noise.order() == 0 {
         (&white, &base)
     } else {
         (&noise, &base_noise)
     };
-    let single = singles(believed, metric);
+    let single = grown.singles(metric);
+    let mut groups = Vec::new();
+    if fair {
+        let (metric, per_sample) = if by_simulation || stopped {
+            (&white, slowness(&residual_colour(&last)?))
+        } else {
+            (&noise, 1.0)
+        };
+        let same_metric = by_simulation || !stopped || noise.order() == 0;
+        let single = same_metric.then_some(single.as_slice());
+        groups = self::groups(&refine(&last, metric, &[])?, metric, per_sample, single)?;
+    }
+    // Nor is, beside something else, what an effect of the clock explains as well: that is some course of time, and
+    // whatever is left may have made it.
+    let by_clock = |id: &String| EffectInfo::find(id).is_some_and(|effect| effect.by_clock);
+    let mut remark = None;
+    if !fair || beside.is_some() && groups.iter().flatten().any(by_clock) {
+        remark = Some(sentences::of_a_part(&last, &problem.records[0].output.unit));
+        left = remains(&base, &own_base)?;
+        own_of_last = Some(own_base);
+        trail.truncate(1);
+        last = trail.last().cloned().unwrap_or_else(|| base.clone());
+        groups.clear();
+    }
+    tell("telling apart", 2, 3);
     let scores = scores(believed, &single, metric);
     let price = price_of_colour(&base_noise, &single, &noise);
 
@@ -286,6 +354,12 @@ fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
         })
 }
 
+/// Whether a set simulates clearly worse than another, by the criterion.
+fn drifts_off(before: &Node, after: &Node) -> Result<bool, Error> {
+    let white = ArModel::white(1.0);
+    Ok(refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?) > BIC_MARGIN)
+}
+
 /// The part of what stands above the noise floor, in mean square, that a model explains of its base.
 fn explained(base: &Node, last: &Node, floor: f64) -> Result<f64, Error> {
     let mean_square = |node: &Node| -> Result<f64, Error> {
@@ -319,12 +393,17 @@ fn shortened<'a>(
 }
 
 /// For every added effect, itself and all that fit as well in its place.
-fn groups(last: &Node, metric: &ArModel, per_sample: f64) -> Result<Vec<Vec<String>>, Error> {
+fn groups<'a>(
+    last: &Node<'a>,
+    metric: &ArModel,
+    per_sample: f64,
+    singles: Option<&[Node<'a>]>,
+) -> Result<Vec<Vec<String>>, Error> {
     (0..last.added.len())
         .into_par_iter()
         .map(|position| {
             let mut group = vec![last.added[position].effect.id.to_string()];
-            for node in exchanges(last, position, metric)? {
+            for node in exchanges(last, position, metric, singles)? {
                 let stand_in = node.added.last().map_or("", |placed| placed.effect.id);
                 // In the white metric a coloured residual counts each sample for less than one.
                 let behind = (node.fit.bic() - last.fit.bic()) / per_sample;

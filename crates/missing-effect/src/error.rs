@@ -13,6 +13,9 @@ pub enum Error {
     /// The fit.
     #[error(transparent)]
     Fit(#[from] greybox::Error),
+    /// An experiment that cannot be proposed.
+    #[error(transparent)]
+    Design(#[from] crate::design::Refused),
     /// The controller and the fitted plant do not make a stable loop.
     #[error(
         "controller: the loop of {controller} and the fitted plant is unstable (an oscillation or drift grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",

@@ -2,14 +2,16 @@
 //!
 //! [`compare`] fits the believed model and says where it fails. [`diagnose`] then searches the catalogue for sets
 //! of effects that explain the failure, confirms each of them, groups what the data cannot tell apart, and returns
-//! the trail of the falling error.
+//! the trail of the falling error. [`design()`](design::design) proposes the experiment that tells two of them apart.
 
 mod closed_loop;
 mod confirm;
 mod control_loop;
+pub mod design;
 mod diagnose;
 mod diagnosis;
 mod error;
+mod exhausted;
 mod locate;
 mod noise_floor;
 pub mod numbers;
@@ -18,6 +20,7 @@ mod remains;
 mod scores;
 mod search;
 mod sentences;
+mod spectral_line;
 mod step;
 mod trail;
 mod unknown;

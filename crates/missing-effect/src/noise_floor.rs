@@ -20,6 +20,22 @@ pub(crate) fn residual_colour(node: &Node) -> Result<ArModel, Error> {
     Ok(ArModel::fit(&segments, NOISE_ORDER)?)
 }
 
+/// The criterion of a node as it is fitted, its residual whitened by an autoregressive model of its own: that of the fit in
+/// that metric is a little lower.
+pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
+    let residuals = node.setup.residuals(&node.fit.x)?;
+    let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    let noise = ArModel::fit(&segments, NOISE_ORDER)?;
+    let n = node.setup.samples() as f64;
+    let (mut cost, mut log_det) = (0.0_f64, 0.0);
+    for segment in segments {
+        cost += noise.whiten(segment).iter().map(|w| w * w).sum::<f64>();
+        log_det += noise.log_det(segment.len());
+    }
+    let parameters = (node.setup.free().len() + 1 + noise.order()) as f64;
+    Ok(n * (cost / n).max(f64::MIN_POSITIVE).ln() + log_det + parameters * n.ln())
+}
+
 /// The noise's spectrum at frequency zero over its mean: by how much slow parameters are less certain than under
 /// white noise of the same size.
 pub(crate) fn slowness(noise: &ArModel) -> f64 {

@@ -6,38 +6,41 @@
 //! - **the command**: the past of the command, of its square, and of the size of its moves, against `w` (Haugh's test; a
 //!   square and a move show what is even in the command or hangs on its direction). A whitened residual is independent of
 //!   the past of anything, a controller's output included.
-//! - **a period**: a line of the spectrum against the mean of its `2 nu` neighbours, which a noise of a smooth spectrum
-//!   exceeds `x` times with a probability of `(1 + x/nu)^-nu` (the F distribution of 2 and `2 nu` degrees of freedom). An
-//!   autoregressive model would take a line for a resonance, so this test does without it, but for a first-order one.
+//! - **a period**: a line of the spectrum that stands out of its neighbours (`spectral_line.rs`).
 //! - **an instant**: windows of 1, 2, 4, ... samples of `w`, whose sums over the root of their length are standard normal.
+//! - **the level**: `w` against functions of what the model read a sample before. A term that is missing from a balance leaves a
+//!   residual that wanders with the level, and is no noise however slow it is. As `w` is white and independent of the past, its
+//!   regression on any past is chi-square, whatever the colour of the regressors.
 //! - **slowness**: the integral of the noise's autocorrelation over positive lags is longer than the slowest time constant
 //!   of the process. Such a noise can stand for anything that the process lacks, so it is no answer.
 //!
 //! **References**: L. D. Haugh, J. American Statistical Association 71 (1976) 378-385; S. A. Billings, W. S. F. Voon,
-//! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244; D. J. Thomson, Spectrum
-//! estimation and harmonic analysis, Proc. IEEE 70 (1982) 1055-1096.
+//! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244.
 
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::SQRT_2;
 
 use ct_signals::{ArModel, Record, residual_tests::prewhitened_input_test};
 use greybox::Fit;
-use realfft::RealFftPlanner;
-use statrs::function::erf::erfc;
+use nalgebra::{DMatrix, DVector};
+use statrs::{
+    distribution::{ChiSquared, ContinuousCDF},
+    function::erf::erfc,
+};
 
-use crate::{Error, control_loop::slowest_time_constant, noise_floor::slowness, search::Node};
+use crate::{
+    Error, control_loop::slowest_time_constant, noise_floor::slowness, search::Node,
+    spectral_line::strongest_line,
+};
 
 /// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
 const NOT_NOISE: f64 = 1e-4;
 /// Longest window that is looked at, as a part of the record.
 const LONGEST_WINDOW: usize = 4;
 
-/// Neighbours of a line, from where its taper ends to where a smooth spectrum may have changed, and the fewest that do.
-const NEAREST: usize = 3;
-const FARTHEST: usize = 12;
-const FEWEST: f64 = 4.0;
-
-/// Cycles that a period has in the record at least.
-const CYCLES: usize = 3;
+/// Knots of the functions of the level, evenly over the range that the model visits.
+const KNOTS: usize = 11;
+/// A function counts where its squares sum to so many samples: fewer are as Gaussian as the noise is, and no more.
+const VISITED: f64 = 5.0;
 
 /// What a residual shows that noise does not; the first that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +51,8 @@ pub(crate) enum Remains {
     Period(f64),
     /// Something from an instant on, for a while \[s\].
     Instant(f64, f64),
+    /// The level.
+    Level,
     /// A wander: its correlation time and the process's slowest time constant \[s\].
     Slow(f64, f64),
 }
@@ -91,6 +96,18 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
         if let Some(what) = found {
             return Ok(Some(Left {
                 what,
+                record: Some(k),
+            }));
+        }
+    }
+    let models = match node.setup.simulate_loop(&own.x)? {
+        Some(run) => run.output,
+        None => node.setup.simulate(&own.x)?.output,
+    };
+    for (k, (model, residual)) in models.iter().zip(&residuals).enumerate() {
+        if level_p(model, &standardised(&own.noise, residual)) < level {
+            return Ok(Some(Left {
+                what: Remains::Level,
                 record: Some(k),
             }));
         }
@@ -161,6 +178,40 @@ fn standardised(noise: &ArModel, residual: &[f64]) -> Vec<f64> {
     white
 }
 
+/// p-value of the test that a whitened residual is independent of what the model read a sample before.
+fn level_p(model: &[f64], white: &[f64]) -> f64 {
+    let (low, high) = model
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
+            (low.min(y), high.max(y))
+        });
+    let width = (high - low) / (KNOTS - 1) as f64;
+    if !(width.is_finite() && width > 0.0) {
+        return 1.0;
+    }
+    // Hats, which sum to one: at a sample two neighbours are not zero.
+    let mut gram = DMatrix::<f64>::zeros(KNOTS, KNOTS);
+    let mut moment = DVector::<f64>::zeros(KNOTS);
+    for (y, w) in model.iter().zip(&white[1..]) {
+        let at = (y - low) / width;
+        let left = (at as usize).min(KNOTS - 2);
+        let hats = [(left, left as f64 + 1.0 - at), (left + 1, at - left as f64)];
+        for (i, a) in hats {
+            moment[i] += a * w;
+            for (j, b) in hats {
+                gram[(i, j)] += a * b;
+            }
+        }
+    }
+    let visited: Vec<usize> = (0..KNOTS).filter(|&i| gram[(i, i)] > VISITED).collect();
+    let gram = gram.select_rows(&visited).select_columns(&visited);
+    let moment = moment.select_rows(&visited);
+    let explained = gram
+        .cholesky()
+        .map_or(0.0, |factor| moment.dot(&factor.solve(&moment)));
+    ChiSquared::new(visited.len() as f64).map_or(1.0, |chi| chi.sf(explained.max(0.0)))
+}
+
 fn instant(record: &Record, white: &[f64], level: f64) -> Option<Remains> {
     let n = white.len();
     let lengths =
@@ -186,45 +237,16 @@ fn instant(record: &Record, white: &[f64], level: f64) -> Option<Remains> {
 }
 
 fn period(record: &Record, residual: &[f64], level: f64) -> Result<Option<Remains>, Error> {
-    let n = residual.len();
-    // Flat enough for neighbours to be compared, by a filter that has no room for a line.
-    let mut flat = ArModel::fit(&[residual], 1)?.whiten(residual);
-    for (k, value) in flat.iter_mut().enumerate() {
-        *value *= (PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
-    }
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
-    let mut spectrum = transform.make_output_vec();
-    if transform.process(&mut flat, &mut spectrum).is_err() {
-        return Ok(None);
-    }
-    // Without the mean, and without the line at half the sampling rate, which has one degree of freedom.
-    let lines: Vec<f64> = spectrum[1..n.div_ceil(2)]
-        .iter()
-        .map(|line| line.norm_sqr())
-        .collect();
-    // What comes back less often than that is no period but a wander.
-    let least = (CYCLES - 1..lines.len())
-        .filter_map(|at| {
-            let around: Vec<f64> = (at.saturating_sub(FARTHEST)
-                ..lines.len().min(at + FARTHEST + 1))
-                .filter(|j| j.abs_diff(at) >= NEAREST)
-                .map(|j| lines[j])
-                .collect();
-            // The taper ties neighbours to each other: of two lines one counts.
-            let count = 0.5 * around.len() as f64;
-            let mean = around.iter().sum::<f64>() / (2.0 * count);
-            (count >= FEWEST && mean > 0.0)
-                .then(|| (-count * (lines[at] / (mean * count)).ln_1p(), at + 1))
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(least
-        .filter(|(chance, _)| lines.len() as f64 * chance.exp() < level)
-        .map(|(_, cycles)| Remains::Period(record.duration() / cycles as f64)))
+    Ok(strongest_line(residual)?
+        .filter(|line| line.chance < level)
+        .map(|line| Remains::Period(record.duration() / line.cycles as f64)))
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
+    use std::f64::consts::PI;
+
     use super::*;
     use ct_signals::{Hold, Signal, noise};
     use rand::SeedableRng;
@@ -248,15 +270,21 @@ mod tests {
         let record = record();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         // At a level of one in a hundred, 600 series: chance exceeds 15 of them once in a thousand.
-        let (mut periods, mut instants) = (0, 0);
+        let (mut periods, mut instants, mut levels) = (0, 0, 0);
+        // A level that wanders, and one that steps and stays.
+        let wander = noise::ar1(SAMPLES, 3.0, 0.99, &mut rng);
+        let steps: Vec<f64> = (0..SAMPLES).map(|k| wander[k / 50 * 50]).collect();
         for run in 0..600 {
             let colour = [0.0, 0.8, 0.95][run % 3];
             let e = noise::ar1(SAMPLES, 0.1, colour, &mut rng);
             let model = ArModel::from_coefficients(&[colour], 1.0).unwrap();
             periods += usize::from(period(&record, &e, 0.01).unwrap().is_some());
-            instants += usize::from(instant(&record, &standardised(&model, &e), 0.01).is_some());
+            let white = standardised(&model, &e);
+            instants += usize::from(instant(&record, &white, 0.01).is_some());
+            levels += usize::from(level_p([&wander, &steps][run % 2], &white) < 0.01);
         }
         assert!(periods <= 15 && instants <= 15, "{periods}, {instants}");
+        assert!((1..=15).contains(&levels), "{levels}");
     }
 
     #[test]
@@ -275,6 +303,19 @@ mod tests {
             // To the width of a line.
             assert!((1.0 / found - 1.0 / wanted).abs() < 1.0 / record.duration());
         }
+    }
+
+    #[test]
+    fn a_function_of_the_level_is_found_under_noise_of_its_own_size() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let level = noise::ar1(SAMPLES, 3.0, 0.99, &mut rng);
+        let mut white = noise::white(SAMPLES, 1.0, &mut rng);
+        assert!(level_p(&level, &white) > 0.01);
+        for k in 1..SAMPLES {
+            white[k] += 0.5 * (2.0 * level[k - 1]).sin();
+        }
+        assert!(level_p(&level, &white) < NOT_NOISE);
+        assert!(level_p(&[2.0; SAMPLES], &white) == 1.0);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use greybox::{Fit, Setup, Stopping, fit_from};
 use plants::Placed;
 use rayon::prelude::*;
 
-use crate::Error;
+use crate::{Error, spectral_line::strongest_line};
 
 /// A structure with its fit.
 #[derive(Debug, Clone)]
@@ -67,8 +67,13 @@ pub(crate) struct Breadth {
 }
 
 /// A first fit needs no more than this: its rank is sought, not its digits.
-const ROUGH: Stopping = Stopping {
+pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 20,
+    cost: 1e-3,
+};
+/// Which of many are worth a first fit.
+const QUICK: Stopping = Stopping {
+    evaluations: 5,
     cost: 1e-3,
 };
 /// What a fit is taken to once its structure has a name.
@@ -76,16 +81,25 @@ pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
+/// Damping of the step that a promise takes, against what the data do not determine.
+const PROMISE_DAMPING: f64 = 1e-6;
 /// Starts of a new effect that are followed down, the most promising of its grid.
 const FOLLOWED: usize = 2;
 
 /// A rough fit this near in the criterion may come within a group's margin.
 const NEAR: f64 = 25.0;
-/// Stand-ins that are refitted for each effect, the most promising first.
-const EXCHANGED: usize = 6;
+/// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
+/// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
+const BY_CLOCK: usize = 1;
+/// Sets are one where what they explain differs by less than this part of it.
+const SAME_TAKEN: f64 = 0.15;
+/// Stand-ins that are refitted for each effect: so many that a promise favours, and so many that a few steps favour.
+const EXCHANGED: usize = 12;
+/// What is behind by more than this part of an effect's own gain after a few steps does not catch up.
+const OUT_OF_REACH: f64 = 0.5;
 
-/// A child's starts: the parent's vector, with the new effect's parameters on the grid of its starts.
-fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
+/// A child's starts: the vector of a node, with the new effect's parameters on the grid of its starts.
+fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let parameters = child.structure.effect_parameters(placed);
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
     for parameter in &parameters {
@@ -103,7 +117,7 @@ fn grid(parent: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     combinations
         .into_iter()
         .map(|values| {
-            let mut x = transfer(parent, child);
+            let mut x = transfer(from, child);
             for (parameter, value) in parameters.iter().zip(values) {
                 let name = format!("{}.{}", placed.effect.id, parameter.name);
                 if let Some(at) = child.names().iter().position(|known| *known == name) {
@@ -131,12 +145,15 @@ fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
         .collect()
 }
 
-/// The cost after one damped step from a start, as the linearised model predicts it.
+/// The cost after one step from a start, as the linearised model predicts it.
+///
+/// The step is hardly damped: an effect that the other parameters nearly imitate takes long steps in both, and a damped one would
+/// leave the start's own error in the promise.
 fn promise(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<f64> {
     let triangle = setup.linearise(x, noise)?;
     let free: Vec<usize> = (0..setup.free().len()).collect();
     let scale: Vec<f64> = free.iter().map(|&j| triangle.column_norm(j)).collect();
-    let mut step = triangle.solve(&free, &scale, 1e-2);
+    let mut step = triangle.solve(&free, &scale, PROMISE_DAMPING);
     for (d, &i) in step.iter_mut().zip(setup.free()) {
         let (lower, upper) = setup.bounds()[i];
         let lower = if lower > 0.0 {
@@ -157,10 +174,19 @@ struct Proposal<'a> {
     promise: f64,
 }
 
-fn propose<'a>(parent: &Node<'a>, placed: Placed, noise: &ArModel) -> Option<Proposal<'a>> {
-    let structure = parent.setup.structure.with(placed).ok()?;
+/// `from`: where all other parameters start, the parent or a node of another structure.
+fn propose<'a>(
+    parent: &Node<'a>,
+    from: &Node<'a>,
+    placed: Placed,
+    noise: &ArModel,
+) -> Option<Proposal<'a>> {
+    let mut structure = parent.setup.structure.with(placed).ok()?;
+    if placed.effect.by_clock {
+        structure.scales.period = strongest_period(parent)?;
+    }
     let setup = parent.setup.with_structure(structure).ok()?;
-    let mut ranked: Vec<(f64, Vec<f64>)> = grid(parent, &setup, placed)
+    let mut ranked: Vec<(f64, Vec<f64>)> = grid(from, &setup, placed)
         .into_par_iter()
         .filter_map(|x| Some((promise(&setup, &x, noise)?, x)))
         .collect();
@@ -176,6 +202,16 @@ fn propose<'a>(parent: &Node<'a>, placed: Placed, noise: &ArModel) -> Option<Pro
     })
 }
 
+/// The period that shows most in what a node does not explain \[s\].
+fn strongest_period(node: &Node) -> Option<f64> {
+    let residuals = node.setup.disturbance(&node.fit.x).ok()?;
+    let lines = residuals.iter().zip(node.setup.records);
+    let strongest = lines
+        .filter_map(|(residual, record)| Some((strongest_line(residual).ok()??, record.duration())))
+        .min_by(|a, b| a.0.chance.total_cmp(&b.0.chance));
+    Some(strongest.map_or(0.0, |(line, duration)| duration / line.cycles as f64))
+}
+
 fn realise<'a>(proposal: Proposal<'a>, noise: &ArModel, stopping: Stopping) -> Option<Node<'a>> {
     let fit = fit_from(&proposal.setup, &proposal.starts, noise, stopping).ok()?;
     Some(Node {
@@ -187,81 +223,204 @@ fn realise<'a>(proposal: Proposal<'a>, noise: &ArModel, stopping: Stopping) -> O
 
 /// All single extensions of a node, refitted, best first.
 pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Node<'a>> {
-    let mut nodes: Vec<Node> = parent
-        .setup
-        .structure
-        .candidates()
+    let proposals = proposals(parent, noise);
+    best_first(realise_all(proposals, noise, ROUGH))
+}
+
+/// All extensions of a node by one effect, not fitted, the most promising first.
+fn proposals<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Proposal<'a>> {
+    let mut proposals: Vec<Proposal> = candidates(parent)
         .into_par_iter()
-        .filter_map(|placed| realise(propose(parent, placed, noise)?, noise, ROUGH))
+        .filter_map(|placed| propose(parent, parent, placed, noise))
         .collect();
+    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    proposals
+}
+
+fn realise_all<'a>(
+    proposals: Vec<Proposal<'a>>,
+    noise: &ArModel,
+    stopping: Stopping,
+) -> Vec<Node<'a>> {
+    proposals
+        .into_par_iter()
+        .filter_map(|proposal| realise(proposal, noise, stopping))
+        .collect()
+}
+
+fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
 }
 
-/// Grows sets of effects from a base; the best sets of every size, best first within a size.
+/// What may be added to a set.
+fn candidates(parent: &Node) -> Vec<Placed> {
+    let mut candidates = parent.setup.structure.candidates();
+    let on = parent.setup.structure.effects().iter();
+    if on.filter(|placed| placed.effect.by_clock).count() >= BY_CLOCK {
+        candidates.retain(|placed| !placed.effect.by_clock);
+    }
+    candidates
+}
+
+/// The best sets that say different things, best first.
+///
+/// Two sets that take nearly the same out of the base's residual are one under two names (a dead zone and a leak, say), and
+/// what is added to the one makes what is added to the other. Grown side by side they would fill the beam.
+fn distinct<'n, 'a>(
+    base: &Node<'a>,
+    nodes: &'n [Node<'a>],
+    most: usize,
+) -> Result<Vec<&'n Node<'a>>, Error> {
+    let residual = |node: &Node| Ok::<_, Error>(node.setup.residuals(&node.fit.x)?.concat());
+    let before = residual(base)?;
+    let mut chosen: Vec<(&Node, Vec<f64>)> = Vec::new();
+    for node in nodes {
+        let taken: Vec<f64> = residual(node)?
+            .iter()
+            .zip(&before)
+            .map(|(after, before)| before - after)
+            .collect();
+        let size = squares(taken.iter().copied());
+        let named = chosen.iter().any(|(_, other)| {
+            let apart = squares(taken.iter().zip(other).map(|(a, b)| a - b));
+            apart < SAME_TAKEN.powi(2) * size
+        });
+        if !named {
+            chosen.push((node, taken));
+        }
+        if chosen.len() == most {
+            break;
+        }
+    }
+    Ok(chosen.into_iter().map(|(node, _)| node).collect())
+}
+
+fn squares(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(|value| value * value).sum()
+}
+
+/// The sets that were grown from a base.
+pub(crate) struct Grown<'a> {
+    /// The best sets of every size, from the base on, best first within a size.
+    pub sizes: Vec<Vec<Node<'a>>>,
+    /// All single effects that were refitted, and those that were not promising enough for it.
+    refitted: Vec<Node<'a>>,
+    unpromising: Vec<Proposal<'a>>,
+    /// The set that was exhausted, where the growth ended so.
+    exhausted: Option<Vec<Placed>>,
+}
+
+impl<'a> Grown<'a> {
+    /// Whether the growth ended because this set was exhausted.
+    pub fn exhausted_by(&self, node: &Node) -> bool {
+        let same = |set: &Vec<Placed>| key(set) == key(&node.added);
+        self.exhausted.as_ref().is_some_and(same)
+    }
+
+    /// The same growth with the sets of another.
+    pub fn with_sizes_of(self, other: Self) -> Self {
+        Self {
+            sizes: other.sizes,
+            ..self
+        }
+    }
+
+    /// What [`singles`] gives for the base in the metric in which it was grown.
+    pub fn singles(self, noise: &ArModel) -> Vec<Node<'a>> {
+        let mut nodes = self.refitted;
+        nodes.extend(realise_all(self.unpromising, noise, ROUGH));
+        best_first(nodes)
+    }
+}
+
+/// Grows sets of effects from a base.
+///
+/// The growth ends after two sizes that are not `worth` it, and at once where the best set is `exhausted`.
 pub(crate) fn grow<'a>(
     base: &Node<'a>,
     noise: &ArModel,
     breadth: Breadth,
     worth: impl Fn(&Node, &Node) -> bool,
+    exhausted: impl Fn(&Node) -> Result<bool, Error>,
     progress: &(dyn Fn(usize, usize) + Sync),
-) -> Vec<Vec<Node<'a>>> {
-    let mut sizes: Vec<Vec<Node<'a>>> = vec![vec![base.clone()]];
+) -> Result<Grown<'a>, Error> {
+    let mut grown = Grown {
+        sizes: vec![vec![base.clone()]],
+        refitted: Vec::new(),
+        unpromising: Vec::new(),
+        exhausted: None,
+    };
     let mut idle = 0;
     for size in 1..=breadth.most {
         progress(size - 1, breadth.most);
-        let parents = &sizes[size - 1];
-        // The first sizes are searched wider: a pair may pay where neither of its effects does.
-        let width = if size <= 2 {
-            2 * breadth.beam
-        } else {
-            breadth.beam
-        };
-        let mut wanted: Vec<(&Node, Placed)> = Vec::new();
-        let mut seen = std::collections::HashSet::new();
-        for parent in parents.iter().take(width) {
-            for placed in parent.setup.structure.candidates() {
-                let mut added = parent.added.clone();
-                added.push(placed);
-                if seen.insert(key(&added)) {
-                    wanted.push((parent, placed));
-                }
-            }
-        }
-        let mut proposals: Vec<Proposal> = wanted
-            .into_par_iter()
-            .filter_map(|(parent, placed)| propose(parent, placed, noise))
-            .collect();
-        proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
-        proposals.truncate(if size <= 2 {
-            2 * breadth.refits
-        } else {
-            breadth.refits
-        });
-        let mut nodes: Vec<Node> = proposals
-            .into_par_iter()
-            .filter_map(|proposal| realise(proposal, noise, ROUGH))
-            .collect();
-        nodes.retain(Node::plausible);
-        nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
-        nodes.truncate(4 * breadth.beam);
-        if nodes.is_empty() {
-            break;
-        }
+        let sizes = &mut grown.sizes;
         let best_before = sizes
             .iter()
             .flatten()
-            .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
-        let pays = best_before.is_some_and(|before| worth(before, &nodes[0]));
-        sizes.push(nodes);
+            .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
+            .unwrap_or(base);
+        if !best_before.added.is_empty() && idle == 0 && exhausted(best_before)? {
+            grown.exhausted = Some(best_before.added.clone());
+            break;
+        }
+        // The first sizes are searched wider: a pair may pay where neither of its effects does.
+        let factor = if size <= 2 { 2 } else { 1 };
+        let mut proposals = if size == 1 {
+            proposals(base, noise)
+        } else {
+            extensions(base, &sizes[size - 1], factor * breadth.beam, noise)?
+        };
+        let unpromising = proposals.split_off(proposals.len().min(factor * breadth.refits));
+        let mut nodes = realise_all(proposals, noise, ROUGH);
+        if size == 1 {
+            (grown.refitted, grown.unpromising) = (nodes.clone(), unpromising);
+        }
+        nodes.retain(Node::plausible);
+        let mut nodes = best_first(nodes);
+        nodes.truncate(4 * breadth.beam);
+        let Some(best) = nodes.first() else {
+            break;
+        };
         // A pair is looked at even where no single effect pays; after two sizes that do not pay there is no more.
-        idle = if pays { 0 } else { idle + 1 };
+        idle = if worth(best_before, best) {
+            0
+        } else {
+            idle + 1
+        };
+        sizes.push(nodes);
         if idle == 2 {
             break;
         }
     }
     progress(breadth.most, breadth.most);
-    sizes
+    Ok(grown)
+}
+
+/// The sets of one size extended by one effect, each set once, the most promising first.
+fn extensions<'a>(
+    base: &Node<'a>,
+    parents: &[Node<'a>],
+    width: usize,
+    noise: &ArModel,
+) -> Result<Vec<Proposal<'a>>, Error> {
+    let mut wanted: Vec<(&Node, Placed)> = Vec::new();
+    let mut seen = std::collections::HashSet::new();
+    for parent in distinct(base, parents, width)? {
+        for placed in candidates(parent) {
+            let mut added = parent.added.clone();
+            added.push(placed);
+            if seen.insert(key(&added)) {
+                wanted.push((parent, placed));
+            }
+        }
+    }
+    let mut proposals: Vec<Proposal> = wanted
+        .into_par_iter()
+        .filter_map(|(parent, placed)| propose(parent, parent, placed, noise))
+        .collect();
+    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    Ok(proposals)
 }
 
 /// Fits a node's structure anew to the end, from where it is and from the given further starts.
@@ -270,9 +429,18 @@ pub(crate) fn refine<'a>(
     noise: &ArModel,
     more: &[Vec<f64>],
 ) -> Result<Node<'a>, Error> {
+    fitted(node, noise, FINE, more)
+}
+
+fn fitted<'a>(
+    node: &Node<'a>,
+    noise: &ArModel,
+    stopping: Stopping,
+    more: &[Vec<f64>],
+) -> Result<Node<'a>, Error> {
     let mut starts = vec![node.fit.x.clone()];
     starts.extend_from_slice(more);
-    let fit = fit_from(&node.setup, &starts, noise, FINE)?;
+    let fit = fit_from(&node.setup, &starts, noise, stopping)?;
     Ok(Node {
         setup: node.setup.clone(),
         fit,
@@ -296,27 +464,51 @@ pub(crate) fn without<'a>(
     Ok(Node { setup, fit, added })
 }
 
+/// The node without its effects that follow the clock alone, refitted from where it was.
+pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+    let mut node = node.clone();
+    while let Some(position) = node.added.iter().position(|placed| placed.effect.by_clock) {
+        node = without(&node, position, noise)?;
+    }
+    Ok(node)
+}
+
+/// Whether some effect more makes a promise that is `worth` it.
+pub(crate) fn any_promise(
+    parent: &Node,
+    noise: &ArModel,
+    worth: impl Fn(&Setup, f64) -> bool + Sync,
+) -> bool {
+    candidates(parent).into_par_iter().any(|placed| {
+        propose(parent, parent, placed, noise)
+            .is_some_and(|proposal| worth(&proposal.setup, proposal.promise))
+    })
+}
+
 /// The node with one of its effects exchanged for each other candidate, refitted, best first.
+///
+/// `singles`: what [`singles`] gives in the same metric. It holds the exchanges of an only effect.
 pub(crate) fn exchanges<'a>(
     node: &Node<'a>,
     position: usize,
     noise: &ArModel,
+    singles: Option<&[Node<'a>]>,
 ) -> Result<Vec<Node<'a>>, Error> {
     let lacking = without(node, position, noise)?;
     let own = node.added[position];
-    let mut proposals: Vec<Proposal> = lacking
-        .setup
-        .structure
-        .candidates()
+    let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());
+    let begun = match singles {
+        Some(singles) if node.added.len() == 1 => singles
+            .iter()
+            .filter(|single| single.added.last() != Some(&own))
+            .cloned()
+            .collect(),
+        _ => begin_exchanges(&lacking, node, own, noise),
+    };
+    let nodes = begun
         .into_par_iter()
-        .filter(|placed| *placed != own)
-        .filter_map(|placed| propose(&lacking, placed, noise))
-        .collect();
-    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
-    proposals.truncate(EXCHANGED);
-    let mut nodes: Vec<Node> = proposals
-        .into_par_iter()
-        .filter_map(|proposal| realise(proposal, noise, ROUGH))
+        .filter(|begun| node.gain_over(begun) < reach)
+        .filter_map(|begun| fitted(&begun, noise, ROUGH, &[]).ok())
         .map(|rough| {
             // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
             if rough.fit.bic() - node.fit.bic() < NEAR {
@@ -326,19 +518,59 @@ pub(crate) fn exchanges<'a>(
             }
         })
         .collect();
-    nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
-    Ok(nodes)
+    Ok(best_first(nodes))
 }
 
-/// The node with one given effect more, fitted to the end; `known` is a fit of a larger set, whose values serve as a
+/// First fits of what may stand in the place of an effect of a node, of which another is `lacking`.
+fn begin_exchanges<'a>(
+    lacking: &Node<'a>,
+    node: &Node<'a>,
+    own: Placed,
+    noise: &ArModel,
+) -> Vec<Node<'a>> {
+    let mut proposals: Vec<Proposal> = candidates(lacking)
+        .into_par_iter()
+        .filter(|placed| *placed != own)
+        .filter_map(|placed| {
+            let mut proposal = propose(lacking, lacking, placed, noise)?;
+            proposal.starts.truncate(1);
+            // The model that lacks the effect has bent the other parameters to imitate it, and may have lost its way back.
+            // Beside a true stand-in they are where they are beside the effect itself.
+            if let Some(mut beside) = propose(lacking, node, placed, noise) {
+                beside.starts.truncate(1);
+                proposal.starts.append(&mut beside.starts);
+                proposal.promise = proposal.promise.min(beside.promise);
+            }
+            Some(proposal)
+        })
+        .collect();
+    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
+    // worth. A few steps are too few where parameters nearly imitate each other, and there the promise holds.
+    let mut begun: Vec<(usize, Node)> = proposals
+        .into_par_iter()
+        .enumerate()
+        .filter_map(|(promised, proposal)| Some((promised, realise(proposal, noise, QUICK)?)))
+        .collect();
+    begun.sort_by(|a, b| a.1.fit.bic().total_cmp(&b.1.fit.bic()));
+    begun
+        .into_iter()
+        .enumerate()
+        .filter(|(quick, (promised, _))| *quick < EXCHANGED || *promised < EXCHANGED)
+        .map(|(_, (_, begun))| begun)
+        .collect()
+}
+
+/// The node with one given effect more, fitted so far; `known` is a fit of a larger set, whose values serve as a
 /// further start.
 pub(crate) fn place<'a>(
     parent: &Node<'a>,
     placed: Placed,
     known: &Node<'a>,
     noise: &ArModel,
+    stopping: Stopping,
 ) -> Option<Node<'a>> {
-    let mut proposal = propose(parent, placed, noise)?;
+    let mut proposal = propose(parent, parent, placed, noise)?;
     proposal.starts.push(transfer(known, &proposal.setup));
-    realise(proposal, noise, FINE)
+    realise(proposal, noise, stopping)
 }

@@ -68,6 +68,9 @@ fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
                 format!("at {at:.0}")
             }
         ),
+        Remains::Level => format!(
+            "{residual} follows the level, which noise does not: the balance lacks {effect}"
+        ),
         Remains::Slow(wander, process) => format!(
             "{residual} wanders more slowly than the process: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or {effect}",
             if wander < record {
@@ -224,17 +227,22 @@ pub(crate) fn of_diagnosis(
                 .zip(diagnosis.steps.iter().skip(1))
                 .enumerate()
             {
-                let size = last
+                let prefix = format!("{effect}.");
+                let sizes: Vec<String> = last
                     .parameters
                     .iter()
-                    .find(|parameter| parameter.name.starts_with(&format!("{effect}.")))
-                    .map_or(String::new(), |p| {
-                        format!(
-                            " ({} = {})",
-                            p.name.trim_start_matches(&format!("{effect}.")),
-                            with_error(p)
-                        )
-                    });
+                    .filter_map(|p| Some((p, p.name.strip_prefix(&prefix)?)))
+                    // Where a lag stood before the record says nothing of the effect.
+                    .filter(|(_, name)| *name != "before")
+                    .enumerate()
+                    .filter(|(k, (p, _))| *k == 0 || p.std_error.is_some())
+                    .map(|(_, (p, name))| format!("{name} = {}", with_error(p)))
+                    .collect();
+                let size = if sizes.is_empty() {
+                    String::new()
+                } else {
+                    format!(" ({})", sizes.join(", "))
+                };
                 let place = step
                     .place
                     .as_ref()
@@ -246,8 +254,9 @@ pub(crate) fn of_diagnosis(
                 };
                 if group.len() > 1 {
                     said.push(format!(
-                        "It is {}: this data cannot tell them apart; {effect}{place}{size} fits best.{doubt}",
-                        list(group, "or")
+                        "It is {}: this data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
+                        list(group, "or"),
+                        next_experiment(group, diagnosis.effects.len())
                     ));
                 } else {
                     said.push(format!("It is {effect}{place}{size}.{doubt}"));
@@ -273,6 +282,25 @@ pub(crate) fn of_diagnosis(
     }
     said.extend(shaped);
     said
+}
+
+/// The command that proposes what would tell the first two of a group apart.
+fn next_experiment(group: &[String], added: usize) -> String {
+    let [first, second, ..] = group else {
+        return String::new();
+    };
+    // One effect in either tank: the command has to be told which is which.
+    let (a, b) = if first == second {
+        (format!("{first}:upper"), format!("{second}:lower"))
+    } else {
+        (first.clone(), second.clone())
+    };
+    let others = if added > 1 {
+        ", once the other effects are in the model file,"
+    } else {
+        ""
+    };
+    format!(" `ctid design ... --between {a} {b}`{others} proposes the experiment that would.")
 }
 
 /// Where what is missing acts, on what it depends, and what it looks like.

@@ -84,6 +84,8 @@ pub(crate) struct Actuator<T: Scalar> {
     corners: Vec<T>,
     /// Where the last step ended: the command after delay, for the lag's jump.
     last: T,
+    /// The pump's gain changes with time.
+    drifts: bool,
 }
 
 impl<T: Scalar> Actuator<T> {
@@ -92,6 +94,7 @@ impl<T: Scalar> Actuator<T> {
         let delay = laws.iter().find_map(|law| law.delay());
         let lag = laws.iter().find_map(|law| law.actuator_lag());
         let zero = T::constant(0.0);
+        let drifts = laws.iter().any(|law| law.gain(zero).is_some());
         let mut actuator = Self {
             laws,
             delay,
@@ -100,8 +103,10 @@ impl<T: Scalar> Actuator<T> {
             past: VecDeque::new(),
             corners: Vec::new(),
             last: zero,
+            drifts,
         };
-        actuator.last = actuator.effective(T::constant(at_rest), start);
+        let at_rest = actuator.position(T::constant(at_rest));
+        actuator.last = actuator.effective(at_rest, start);
         if delay.is_some() {
             actuator.past.push_back(Piece {
                 time: f64::NEG_INFINITY,
@@ -119,12 +124,18 @@ impl<T: Scalar> Actuator<T> {
         }
     }
 
+    /// Where the actuator stands at a recorded command.
+    fn position(&mut self, u: T) -> T {
+        let moved = self.laws.iter_mut().find_map(|law| law.position(u));
+        moved.unwrap_or(u)
+    }
+
     fn effective(&mut self, u: T, t: f64) -> T {
         self.laws.iter_mut().fold(u, |u, law| law.command(u, t))
     }
 
     /// Finds where a ramp has corners after the static laws: zero, the corners, one.
-    fn find_corners(&mut self, from: f64, to: f64, t: f64, h: f64) {
+    fn find_corners(&mut self, from: T, to: T, t: f64, h: f64) {
         self.corners.clear();
         self.corners.extend([T::constant(0.0), T::constant(1.0)]);
         for i in 0..self.laws.len() {
@@ -136,7 +147,7 @@ impl<T: Scalar> Actuator<T> {
                         let time = t + s.value() * h;
                         self.laws[..i]
                             .iter_mut()
-                            .fold(s * (to - from) + from, |u, law| law.command(u, time))
+                            .fold((to - from) * s + from, |u, law| law.command(u, time))
                     };
                     let (a, b) = (before(low) - corner, before(high) - corner);
                     if a.value() * b.value() < 0.0 {
@@ -155,11 +166,11 @@ impl<T: Scalar> Actuator<T> {
     }
 
     /// The smooth stretch between two shares of a ramp's interval.
-    fn stretch(&mut self, ramp: (f64, f64), t: f64, h: f64, low: T, high: T) -> Signal<T> {
+    fn stretch(&mut self, ramp: (T, T), t: f64, h: f64, low: T, high: T) -> Signal<T> {
         let (from, to) = ramp;
         let mut at = |share: f64| {
             let s = low + (high - low) * share;
-            self.effective(s * (to - from) + from, t + s.value() * h)
+            self.effective((to - from) * s + from, t + s.value() * h)
         };
         // Strictly inside: at a corner itself the derivatives could be those of the neighbour.
         let (first, middle, last) = (at(0.25), at(0.5), at(0.75));
@@ -191,7 +202,8 @@ impl<T: Scalar> Actuator<T> {
     ) {
         let length = T::constant(h);
         let zero = T::constant(0.0);
-        let commanded = match to {
+        let from = self.position(from);
+        let commanded = match to.map(|to| self.position(T::constant(to))) {
             None => {
                 let signal = Signal::held(self.effective(from, t));
                 if self.delay.is_none() {
@@ -205,7 +217,7 @@ impl<T: Scalar> Actuator<T> {
                 });
                 None
             }
-            Some(to) => Some((from.value(), to)),
+            Some(to) => Some((from, to)),
         };
         if let Some(ramp) = commanded {
             self.find_corners(ramp.0, ramp.1, t, h);
@@ -253,9 +265,22 @@ impl<T: Scalar> Actuator<T> {
         }
     }
 
-    /// The inflow over a stretch of length `h`: the signal behind the lag, times the pump's gain.
+    /// The inflow over a stretch of length `h` from time `start` on: the signal behind the lag, times the pump's gain.
     #[inline]
-    pub(crate) fn inflow(&mut self, h: T, command: Signal<T>, gain: T) -> Inflow<T> {
+    pub(crate) fn inflow(&mut self, h: T, command: Signal<T>, gain: T, start: T) -> Inflow<T> {
+        if self.drifts {
+            let ahead = self.lagged(h, command);
+            let gain = |share: f64| {
+                let t = start + h * share;
+                let factors = self.laws.iter().filter_map(|law| law.gain(t));
+                factors.fold(gain, |gain, factor| gain * factor)
+            };
+            return Inflow {
+                start: gain(0.0) * ahead.start,
+                middle: gain(0.5) * ahead.middle,
+                end: gain(1.0) * ahead.end,
+            };
+        }
         if command.held && self.lag.is_none() {
             return Inflow::held(gain * command.value);
         }

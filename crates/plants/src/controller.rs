@@ -233,10 +233,9 @@ impl Controller {
         }
     }
 
-    /// The linear controller over steps of `h` seconds; where the command is `limited` it answers to nothing, and its
-    /// states move on as they do then.
+    /// The linear controller over steps of `h` seconds, where the command is not limited.
     #[must_use]
-    pub fn linear(&self, h: f64, limited: bool) -> LinearController {
+    pub fn linear(&self, h: f64) -> LinearController {
         let n = self.states();
         let mut a = vec![vec![0.0; n]; n];
         let mut b = vec![0.0; n];
@@ -248,9 +247,7 @@ impl Controller {
             } => {
                 a[0][0] = 1.0;
                 c[0] = 1.0;
-                if !limited {
-                    b[0] = gain * h / integral_time;
-                }
+                b[0] = gain * h / integral_time;
             }
             Kind::Sampled {
                 r,
@@ -263,10 +260,8 @@ impl Controller {
                     if i + 1 < order {
                         a[i][i + 1] = 1.0;
                     }
-                    if !limited {
-                        a[i][0] -= s[i + 1];
-                        b[i] -= s[i + 1] * r[0];
-                    }
+                    a[i][0] -= s[i + 1];
+                    b[i] -= s[i + 1] * r[0];
                 }
                 if order > 0 {
                     c[0] = 1.0;
@@ -280,8 +275,8 @@ impl Controller {
         LinearController {
             a,
             b,
-            c: if limited { vec![0.0; n] } else { c },
-            d: if limited { 0.0 } else { self.direct() },
+            c,
+            d: self.direct(),
         }
     }
 }
@@ -481,7 +476,7 @@ mod tests {
             Controller::sampled(&[1.0, -0.8], &[1.0, -0.3, 0.1], wide).unwrap(),
             Controller::sampled(&[2.0], &[1.0], wide).unwrap(),
         ] {
-            let linear = controller.linear(2.0, false);
+            let linear = controller.linear(2.0);
             let mut x: Vec<f64> = (0..controller.states()).map(|i| 1.0 + i as f64).collect();
             let mut regulator = controller.start(&x);
             for k in 0..30 {

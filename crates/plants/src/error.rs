@@ -36,8 +36,10 @@ pub enum Error {
         /// The plant.
         plant: &'static str,
     },
-    /// The plant has no such vessel.
-    #[error("effect `{effect}` cannot act there: plant `{plant}` has no such vessel")]
+    /// The plant has no such vessel, or nothing could be seen of the effect in it.
+    #[error(
+        "effect `{effect}` cannot act there: plant `{plant}` has no such vessel, or the effect makes no difference in it"
+    )]
     NoSuchVessel {
         /// The effect.
         effect: &'static str,

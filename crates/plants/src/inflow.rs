@@ -28,14 +28,15 @@ impl<T: Scalar> Inflow<T> {
     }
 
     /// Coefficients of `a + b s + c s^2`, `s` from 0 to 1 over the step.
-    pub(crate) fn coefficients(self) -> [T; 3] {
+    #[inline]
+    pub(crate) fn coefficients(&self) -> [T; 3] {
         let b = self.middle * 4.0 - self.start * 3.0 - self.end;
         let c = (self.start + self.end) * 2.0 - self.middle * 4.0;
         [self.start, b, c]
     }
 
     /// The part from `from` to `to`, both in `[0, 1]`.
-    pub(crate) fn part(self, from: T, to: T) -> Self {
+    pub(crate) fn part(&self, from: T, to: T) -> Self {
         let [a, b, c] = self.coefficients();
         let at = |s: T| a + (b + c * s) * s;
         Self {

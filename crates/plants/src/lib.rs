@@ -24,7 +24,7 @@
 //! parts that double, each an exponential Runge-Kutta step (ETDRK4): S. M. Cox, P. C. Matthews, J. Computational Physics
 //! 176 (2002) 430-455; A.-K. Kassam, L. N. Trefethen, SIAM J. Scientific Computing 26 (2005) 1214-1233. A vessel that has
 //! settled takes one part. With one step a sample of 1.6 to 45 time constants, any single effect and levels from 4 to 20,
-//! the output errs by at most 0.0003 (linear vessels; those without an effect in them are exact) and 0.004 (Torricelli):
+//! the output errs by at most 0.0003 (linear vessels; those without an effect in them are exact) and 0.006 (Torricelli):
 //! `cargo test -p plants --test fast_vessels -- --nocapture`. A level that moves too far within the shortest part, 1/32 of
 //! a step, for its forgetting to be one number goes by an implicit part of order one that keeps the balance of mass.
 
@@ -48,7 +48,7 @@ mod vessels;
 
 pub use effects::{CATALOGUE, EffectInfo, Place};
 pub use error::Error;
-pub use law::{Law, Rim};
+pub use law::{Balance, Law, Rim, Side};
 pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scalar::{Dual, Scalar};
 pub use simulator::{Command, Simulator};

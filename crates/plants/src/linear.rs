@@ -33,7 +33,7 @@ impl<T: Scalar> Propagators<T> {
         &mut self,
         levels: &[T; MAX_VESSELS],
         h: T,
-        q: Inflow<T>,
+        q: &Inflow<T>,
     ) -> [T; MAX_VESSELS] {
         let n = self.vessels.len();
         if h.value() == 0.0 {

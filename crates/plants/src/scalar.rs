@@ -26,6 +26,8 @@ pub trait Scalar:
     fn sqrt(self) -> Self;
     /// Exponential function.
     fn exp(self) -> Self;
+    /// Sine and cosine of an angle in radians.
+    fn sin_cos(self) -> (Self, Self);
     /// Whether both have the same derivatives.
     fn same_derivatives(self, other: Self) -> bool;
 
@@ -63,6 +65,10 @@ impl Scalar for f64 {
     #[inline]
     fn exp(self) -> Self {
         f64::exp(self)
+    }
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        f64::sin_cos(self)
     }
     #[inline]
     fn same_derivatives(self, _other: Self) -> bool {
@@ -121,6 +127,11 @@ impl<const N: usize> Scalar for Dual<N> {
     fn exp(self) -> Self {
         let e = self.re.exp();
         self.chain(e, e)
+    }
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.re.sin_cos();
+        (self.chain(sin, cos), self.chain(cos, -sin))
     }
     #[inline]
     fn same_derivatives(self, other: Self) -> bool {
@@ -213,7 +224,8 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn function<T: Scalar>(x: T, y: T) -> T {
-        (x * y + 2.0).sqrt() / (y - x * 0.5) - (-x).exp() * 3.0
+        let (sin, cos) = (x * y).sin_cos();
+        (x * y + 2.0).sqrt() / (y - x * 0.5) - (-x).exp() * 3.0 + sin * x - cos * y
     }
 
     #[test]

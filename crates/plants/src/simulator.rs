@@ -36,8 +36,8 @@ impl Command {
 ///
 /// Linear plants without effects in their vessels are propagated exactly (matrix exponential); others by
 /// Runge-Kutta of order four in [`Simulator::set_substeps`] equal parts of the sampling interval, cut where the
-/// input jumps behind a dead time and where a level meets its rim. Parts that are longer than a vessel's time constant
-/// are exponential Runge-Kutta steps (see the [front page](crate#steps-that-are-longer-than-a-time-constant)). Nothing is allocated per step,
+/// input jumps behind a dead time, where a level meets its rim and where a law jumps. Parts that are longer than a vessel's
+/// time constant are exponential Runge-Kutta steps (see the [front page](crate#steps-that-are-longer-than-a-time-constant)). Nothing is allocated per step,
 /// but for the first step of a new length of a linear plant, and the queue behind a dead time while it fills.
 pub struct Simulator<T: Scalar> {
     actuator: Actuator<T>,
@@ -198,7 +198,7 @@ impl<T: Scalar> Simulator<T> {
             ..
         } = self;
         let gain = *pump_gain;
-        let mut now = *time;
+        let mut now = T::constant(*time);
         actuator.pieces(from, to, *time, h, |actuator, length, signal| {
             // A short piece needs no more parts than its share of the interval.
             let parts = *substeps as f64 * length.value() / h;
@@ -210,14 +210,14 @@ impl<T: Scalar> Simulator<T> {
             };
             for i in 0..parts {
                 let signal = signal.from(part * i as f64);
-                let inflow = actuator.inflow(part, signal, gain);
+                let inflow = actuator.inflow(part, signal, gain, now);
                 if sensor.has_lag() {
                     let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
-                    vessels.step(part, inflow, now, &mut Some(&mut follow));
+                    vessels.step(part, &inflow, now, &mut Some(&mut follow));
                 } else {
-                    vessels.step(part, inflow, now, &mut None);
+                    vessels.step(part, &inflow, now, &mut None);
                 }
-                now += part.value();
+                now = now + part;
             }
         });
         *time += h;

@@ -22,6 +22,10 @@ pub struct Scales {
     pub operating_level: [f64; MAX_VESSELS],
     /// Area of each vessel, one where it is not known.
     pub area: [f64; MAX_VESSELS],
+    /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
+    pub reading_step: f64,
+    /// Period of the strongest line in the spectrum of what is not explained so far; zero where none is looked for \[s\].
+    pub period: f64,
     /// Mean throughput \[area x level/s\].
     pub flow: f64,
     /// Median sampling interval \[s\].
@@ -93,6 +97,11 @@ impl Site<'_> {
     pub fn operating_level(&self) -> f64 {
         self.scales.operating_level[self.vessel]
     }
+    /// Length of the record \[s\].
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.scales.duration.max(f64::MIN_POSITIVE)
+    }
     /// Smallest and largest level of the measured vessel.
     #[must_use]
     pub fn measured_level(&self) -> (f64, f64) {
@@ -145,19 +154,19 @@ impl Structure {
     /// The same structure with one more effect.
     ///
     /// # Errors
-    /// Where the effect is on already, does not act on this plant, or the vessel does not exist.
+    /// Where the effect is on already, does not act on this plant, or not in this vessel.
     pub fn with(&self, placed: Placed) -> Result<Self, Error> {
         let Placed { effect, vessel } = placed;
         if self.effects.iter().any(|on| on.effect.id == effect.id) {
             return Err(Error::EffectTwice { effect: effect.id });
         }
-        if !(effect.applies)(self.plant) {
+        if effect.sites(self.plant).next().is_none() {
             return Err(Error::EffectDoesNotApply {
                 effect: effect.id,
                 plant: self.plant.id(),
             });
         }
-        if vessel >= self.plant.vessels() || (effect.place != Place::Vessel && vessel != 0) {
+        if effect.sites(self.plant).all(|site| site != vessel) {
             return Err(Error::NoSuchVessel {
                 effect: effect.id,
                 plant: self.plant.id(),
@@ -183,15 +192,11 @@ impl Structure {
     pub fn candidates(&self) -> Vec<Placed> {
         effects::CATALOGUE
             .iter()
-            .filter(|effect| (effect.applies)(self.plant))
             .filter(|effect| self.effects.iter().all(|on| on.effect.id != effect.id))
             .flat_map(|&effect| {
-                let places = if effect.place == Place::Vessel {
-                    self.plant.vessels()
-                } else {
-                    1
-                };
-                (0..places).map(move |vessel| Placed { effect, vessel })
+                effect
+                    .sites(self.plant)
+                    .map(move |vessel| Placed { effect, vessel })
             })
             .collect()
     }
@@ -204,6 +209,19 @@ impl Structure {
             vessel: placed.vessel,
             scales: &self.scales,
         }
+    }
+
+    /// In how many ways a search can find an effect where there is nothing: every combination of its starts is one, and so is
+    /// every line of the spectrum of which the strongest is a start.
+    #[must_use]
+    pub fn ways(&self, placed: Placed) -> f64 {
+        let parameters = self.effect_parameters(placed);
+        let combinations: f64 = parameters.iter().map(|p| p.starts.len() as f64).product();
+        let picked = parameters
+            .iter()
+            .any(|p| p.unit == crate::Unit::TIME && p.starts.contains(&self.scales.period));
+        let lines = 0.5 * self.scales.duration / self.scales.sample_interval;
+        combinations + if picked { lines } else { 0.0 }
     }
 
     /// The parameters of one effect here; their starts lie within their bounds, however short or narrow the record.
@@ -314,6 +332,8 @@ impl Scales {
             level: [output; MAX_VESSELS],
             operating_level: [middle; MAX_VESSELS],
             area: [1.0; MAX_VESSELS],
+            reading_step: 0.0,
+            period: 0.0,
             flow: middle.abs() / (0.1 * duration),
             sample_interval,
             duration,

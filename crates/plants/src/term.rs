@@ -12,7 +12,9 @@
 //! comes near to any slow shape in the level. And a scale tells on any other record whether the shape holds there.
 //! [`Fitted::Ordinates`] is for who knows how to deal with that: the estimate of the shape itself.
 
-use crate::{Error, Law, ParameterInfo, Place, Plant, Scalar, Scales, Structure, Unit, effects};
+use crate::{
+    Balance, Error, Law, ParameterInfo, Place, Plant, Scalar, Scales, Structure, Unit, effects,
+};
 
 /// The most knots of a term.
 pub const MOST_KNOTS: usize = 512;
@@ -252,11 +254,11 @@ pub(crate) fn bind<T: Scalar>(term: &Term, parameters: &[T]) -> Box<dyn Law<T>> 
 
 impl<T: Scalar> TermLaw<T> {
     /// `own` is what the term is added to.
-    fn value(&self, own: T, level: T, t: f64) -> T {
+    fn value(&self, own: T, level: T, t: T) -> T {
         let at = match self.variable {
             Variable::Level => level,
             Variable::Rate | Variable::Input => own,
-            Variable::Time => T::constant(t),
+            Variable::Time => t,
         };
         polyline(&self.knots, &self.ordinates, at)
     }
@@ -264,13 +266,16 @@ impl<T: Scalar> TermLaw<T> {
 
 impl<T: Scalar> Law<T> for TermLaw<T> {
     fn command(&mut self, u: T, t: f64) -> T {
-        u + self.value(u, u, t)
+        u + self.value(u, u, T::constant(t))
     }
-    fn net(&self, level: &T, net: &mut T, t: f64) {
-        *net = *net + self.value(*net, *level, t);
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Net)
+    }
+    fn net(&self, level: &T, net: &mut T, t: &T) {
+        *net = *net + self.value(*net, *level, *t);
     }
     fn reading(&mut self, y: T, t: f64) -> T {
-        y + self.value(y, y, t)
+        y + self.value(y, y, T::constant(t))
     }
 }
 

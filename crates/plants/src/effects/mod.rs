@@ -33,12 +33,14 @@ pub struct EffectInfo {
     pub id: &'static str,
     /// Where it acts.
     pub place: Place,
+    /// It follows the time alone, whatever the command and the level do. Such effects fit courses of any origin.
+    pub by_clock: bool,
     /// Its physics in a sentence.
     pub physics: &'static str,
     /// Its equation.
     pub equation: &'static str,
-    /// The plants it makes sense on.
-    pub applies: fn(Plant) -> bool,
+    /// The plants, and their vessels, it makes sense in; actuator and sensor ask for vessel zero.
+    pub applies: fn(Plant, usize) -> bool,
     /// Its parameters at a place: the leading one, whose absent value switches the effect off, comes first.
     pub parameters: fn(&Site) -> Vec<ParameterInfo>,
     /// Effects that data of this kind can hardly tell from it.
@@ -54,6 +56,23 @@ impl EffectInfo {
     #[must_use]
     pub fn find(id: &str) -> Option<&'static Self> {
         CATALOGUE.iter().copied().find(|effect| effect.id == id)
+    }
+
+    /// The vessel that it acts in where nobody says which.
+    #[must_use]
+    pub fn usual_site(&'static self, plant: Plant) -> usize {
+        self.sites(plant).next().unwrap_or(0)
+    }
+
+    /// The vessels of a plant that it may act in: zero alone for one at the actuator or the sensor, none where it makes no
+    /// sense.
+    pub fn sites(&'static self, plant: Plant) -> impl Iterator<Item = usize> {
+        let places = if self.place == Place::Vessel {
+            plant.vessels()
+        } else {
+            1
+        };
+        (0..places).filter(move |&vessel| (self.applies)(plant, vessel))
     }
 }
 
@@ -76,22 +95,33 @@ macro_rules! catalogue {
 
 catalogue![
     // actuator
+    stiction_backlash,
     transport_delay,
     pump_deadzone,
     pump_saturation,
     pump_nonlinearity,
+    pump_gain_drift,
     pump_lag,
     // vessel
+    coupled_tank,
     sqrt_outflow,
+    pipe_height,
     laminar_outflow,
+    valve_drift,
+    valve_step,
     const_leak,
+    leak_at_height,
+    periodic_disturbance,
     area_varies,
     overflow,
     // sensor
     sensor_lag,
+    sensor_nonlinearity,
     sensor_offset,
+    sensor_drift,
     sensor_hysteresis,
     sensor_saturation,
+    coarse_quantisation,
 ];
 
 /// Position of an effect in the chain.
@@ -103,17 +133,17 @@ pub(crate) fn chain_position(effect: &EffectInfo) -> usize {
 }
 
 /// Every plant.
-fn any_plant(_: Plant) -> bool {
+fn any_plant(_: Plant, _: usize) -> bool {
     true
 }
 
 /// Plants whose believed outflow follows a square root.
-fn torricelli_plant(plant: Plant) -> bool {
+fn torricelli_plant(plant: Plant, _: usize) -> bool {
     plant.outlet() == crate::Outlet::Torricelli
 }
 
 /// Plants whose believed outflow is linear.
-fn linear_plant(plant: Plant) -> bool {
+fn linear_plant(plant: Plant, _: usize) -> bool {
     plant.outlet() == crate::Outlet::Linear
 }
 

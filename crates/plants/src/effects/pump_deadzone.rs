@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pump_deadzone",
     place: Place::Actuator,
+    by_clock: false,
     physics: "The pump delivers nothing below a threshold of the command: it must first overcome friction and head.",
     equation: "q = k max(u - u_dz, 0)   (odd in u)",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pump_lag",
     place: Place::Actuator,
+    by_clock: false,
     physics: "The inflow follows the command with a time constant: the pump has to spin up.",
     equation: "T dq/dt = k u - q",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pump_nonlinearity",
     place: Place::Actuator,
+    by_clock: false,
     physics: "The inflow bends away from proportional to the command; it is right at both ends of the range.",
     equation: "q = k (u + b u (u - u_range)/u_range)",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pump_saturation",
     place: Place::Actuator,
+    by_clock: false,
     physics: "The pump delivers no more above a limit of the command, which lies below the largest recorded one.",
     equation: "q = k min(u, u_max)",
     applies: any_plant,

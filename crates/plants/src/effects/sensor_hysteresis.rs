@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "sensor_hysteresis",
     place: Place::Sensor,
+    by_clock: false,
     physics: "After the level has been high the reading sticks too high by a step, and drops back when the level falls.",
     equation: "y = H + step s; s rises from 0 at `drop` to 1 at `stick` with the highest level since the last drop",
     applies: any_plant,

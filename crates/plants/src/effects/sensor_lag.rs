@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "sensor_lag",
     place: Place::Sensor,
+    by_clock: false,
     physics: "The reading follows the level with a time constant: a filter in the transmitter, or a stilling tube.",
     equation: "T dy/dt = H - y",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "sensor_offset",
     place: Place::Sensor,
+    by_clock: false,
     physics: "The reading is shifted: the sensor's zero is not the level of the outlet.",
     equation: "y = H + b",
     applies: any_plant,

@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "sensor_saturation",
     place: Place::Sensor,
+    by_clock: false,
     physics: "The reading does not rise above a limit: the end of the sensor's or the converter's range.",
     equation: "y = min(H, y_max)",
     applies: any_plant,

@@ -1,11 +1,12 @@
 //! `sqrt_outflow`: the outflow of a vessel that is believed linear follows Torricelli's square root.
 
 use super::{EffectInfo, Place, linear_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "sqrt_outflow",
     place: Place::Vessel,
+    by_clock: false,
     physics: "The outflow grows with the square root of the level (Torricelli), where the model has it grow in proportion.",
     equation: "Q_out = Q_lin + c (2 sqrt(H_op) (sqrt(H) - sqrt(H_op)) - (H - H_op)); c = 1 is the square root",
     applies: linear_plant,
@@ -37,7 +38,10 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 }
 
 impl<T: Scalar> Law<T> for SqrtOutflow<T> {
-    fn outflow(&self, level: &T, outflow: &mut T, _t: f64) {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Outflow)
+    }
+    fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         let root = self.operating_level.sqrt();
         // More than the square root bends the outflow down again, from some level on. No outlet does that: what is added
         // stays what it was there, and what it is at empty below.

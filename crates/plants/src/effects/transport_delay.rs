@@ -6,6 +6,7 @@ use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "transport_delay",
     place: Place::Actuator,
+    by_clock: false,
     physics: "The inflow follows the command after a dead time: the water takes time to run through the pipe.",
     equation: "q(t) = k u(t - delay)",
     applies: any_plant,

@@ -1,14 +1,30 @@
 //! The vessels' balance equations: rates, and how fast each vessel is.
 
-use crate::{Outlet, Scalar, structure::MAX_VESSELS};
+use crate::{Outlet, Scalar, Side, structure::MAX_VESSELS};
 
 use super::{
-    Levels, Vessels,
+    Levels, VesselLaws, Vessels,
     parts::STEP_LIMIT,
     torricelli::{A_LITTLE, slope_of_root, square_root},
 };
 
 impl<T: Scalar> Vessels<T> {
+    /// A time within the present step, with its derivatives.
+    #[inline]
+    pub(super) fn time(&self, t: f64) -> T {
+        let Some((start, length)) = self.clock else {
+            return T::constant(t);
+        };
+        let share = if length.value() == 0.0 {
+            0.0
+        } else {
+            (t - start.value()) / length.value()
+        };
+        // The value is `t` to the last bit, as it is where there are no derivatives.
+        let moved = start + length * share;
+        moved - moved.value() + t
+    }
+
     /// What vessel `i` alone lets out at a level.
     #[inline(always)]
     fn own_outflow(&self, i: usize, level: &T) -> T {
@@ -19,26 +35,67 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    /// What flows out of vessel `i` to the next one at a level.
+    /// The head that drives the outflow of vessel `i` at a level, the other levels being `levels`.
     #[inline(always)]
-    pub(super) fn outflow(&self, i: usize, level: &T, t: f64) -> T {
+    fn head(&self, i: usize, level: &T, levels: &Levels<T>) -> T {
+        let mut head = *level;
+        if i + 1 < self.vessels.len() {
+            for &law in &self.vessels[i].laws.head {
+                self.laws[law].head(&mut head, &levels[i + 1]);
+            }
+        }
+        head
+    }
+
+    /// What flows out of vessel `i` to the next one at a level, the other levels being `levels`.
+    #[inline(always)]
+    fn outflow(&self, i: usize, level: &T, levels: &Levels<T>, t: &T) -> T {
         let vessel = &self.vessels[i];
-        let mut outflow = self.own_outflow(i, level);
-        for &law in &vessel.laws {
-            self.laws[law].outflow(level, &mut outflow, t);
+        if vessel.laws.head.is_empty() && vessel.laws.outflow.is_empty() {
+            return self.own_outflow(i, level);
+        }
+        let head = self.head(i, level, levels);
+        let mut outflow = self.own_outflow(i, &head);
+        for &law in &vessel.laws.outflow {
+            self.laws[law].outflow(&head, &mut outflow, t);
         }
         outflow
     }
 
-    /// What flows out of vessel `i` to the next one, and its net inflow, at a level.
+    /// What flows out of vessel `i` to the next one, and its net inflow.
     #[inline(always)]
-    pub(super) fn balance(&self, i: usize, level: &T, inflow: T, t: f64) -> (T, T) {
-        let outflow = self.outflow(i, level, t);
+    pub(super) fn balance(&self, i: usize, inflow: T, levels: &Levels<T>, t: f64) -> (T, T) {
+        let level = &levels[i];
+        if !self.vessels[i].laws.any {
+            let outflow = self.own_outflow(i, level);
+            return (outflow, inflow - outflow);
+        }
+        let laws = &self.vessels[i].laws;
+        if laws.outflow.is_empty()
+            && laws.net.is_empty()
+            && laws.head.is_empty()
+            && self.side.is_none()
+        {
+            // Only its surface changes.
+            let outflow = self.own_outflow(i, level);
+            return (outflow, inflow - outflow);
+        }
+        let t = self.time(t);
+        let outflow = self.outflow(i, level, levels, &t);
         let mut net = inflow - outflow;
-        for &law in &self.vessels[i].laws {
-            self.laws[law].net(level, &mut net, t);
+        for &law in &self.vessels[i].laws.net {
+            self.laws[law].net(level, &mut net, &t);
+        }
+        if let Some(side) = &self.side {
+            net = net - self.exchange(side) * (*level - levels[i + 1]);
         }
         (outflow, net)
+    }
+
+    /// What flows to a side tank for each unit of level that it stands below its vessel.
+    #[inline]
+    fn exchange(&self, side: &Side<T>) -> T {
+        self.vessels[0].area * side.share / side.time_constant
     }
 
     /// Surface of vessel `i` at a level.
@@ -46,7 +103,7 @@ impl<T: Scalar> Vessels<T> {
     fn area(&self, i: usize, level: &T) -> T {
         let vessel = &self.vessels[i];
         let mut area = vessel.area;
-        for &law in &vessel.laws {
+        for &law in &vessel.laws.area {
             self.laws[law].area(level, &mut area);
         }
         area
@@ -61,7 +118,7 @@ impl<T: Scalar> Vessels<T> {
             Some(inverse) => net * inverse,
             None => net * vessel.inverse,
         };
-        if vessel.laws.is_empty() {
+        if vessel.laws.area.is_empty() {
             rate
         } else {
             rate * (vessel.area / self.area(i, level))
@@ -72,19 +129,29 @@ impl<T: Scalar> Vessels<T> {
     #[inline]
     pub(super) fn rates(&self, levels: &Levels<T>, q: T, t: f64) -> Levels<T> {
         let mut rates = [T::constant(0.0); MAX_VESSELS];
+        self.rates_into(&mut rates, levels, q, t);
+        rates
+    }
+
+    /// The same in place; a rate that is zero for now is written too.
+    #[inline(always)]
+    pub(super) fn rates_into(&self, rates: &mut Levels<T>, levels: &Levels<T>, q: T, t: f64) {
         let mut inflow = q;
         for (i, vessel) in self.vessels.iter().enumerate() {
-            let level = &levels[i];
-            let (outflow, net) = self.balance(i, level, inflow, t);
+            let (outflow, net) = self.balance(i, inflow, levels, t);
             inflow = outflow;
             if vessel.spilling {
                 // The level stands at the rim, and the net inflow spills; where it turns negative the mode ends.
                 inflow = inflow + net * vessel.rim.fraction;
+                rates[i] = T::constant(0.0);
             } else {
-                rates[i] = self.rate(i, level, net);
+                rates[i] = self.rate(i, &levels[i], net);
             }
         }
-        rates
+        if let Some(side) = &self.side {
+            let last = self.states - 1;
+            rates[last] = (levels[last - 1] - levels[last]) / side.time_constant;
+        }
     }
 
     /// Rates of linear vessels without effects, written as in [`Vessels::rates`].
@@ -104,13 +171,13 @@ impl<T: Scalar> Vessels<T> {
     pub(super) fn net(&self, i: usize, levels: &Levels<T>, q: T, t: f64) -> T {
         let mut inflow = q;
         for (k, vessel) in self.vessels.iter().enumerate().take(i) {
-            let (outflow, net) = self.balance(k, &levels[k], inflow, t);
+            let (outflow, net) = self.balance(k, inflow, levels, t);
             inflow = outflow;
             if vessel.spilling {
                 inflow = inflow + net * vessel.rim.fraction;
             }
         }
-        self.balance(i, &levels[i], inflow, t).1
+        self.balance(i, inflow, levels, t).1
     }
 
     /// By how much a higher level slows its own rise \[1/s\]: what the effects add to it by a difference, so that it
@@ -122,12 +189,17 @@ impl<T: Scalar> Vessels<T> {
             Outlet::Torricelli => vessel.coefficient * slope_of_root(level),
             Outlet::Linear => T::constant(1.0),
         };
-        if vessel.laws.is_empty() {
+        if !vessel.laws.any {
             return own * vessel.inverse;
         }
         let step = 1e-6 * (level.value().abs() + 1e-3);
-        let added = |level: &T| self.outflow(i, level, t) - self.own_outflow(i, level);
-        let slope = own + (added(&(level + step)) - added(&level)) * (1.0 / step);
+        let t = self.time(t);
+        let added =
+            |level: &T| self.outflow(i, level, &self.levels, &t) - self.own_outflow(i, level);
+        let mut slope = own + (added(&(level + step)) - added(&level)) * (1.0 / step);
+        if let Some(side) = &self.side {
+            slope = slope + self.exchange(side);
+        }
         slope * vessel.inverse * (vessel.area / self.area(i, &level))
     }
 
@@ -140,6 +212,9 @@ impl<T: Scalar> Vessels<T> {
                 Some(_) => self.vessels[i].inverse,
                 None => self.slope(i, t).max(T::constant(0.0)),
             };
+        }
+        if let Some(side) = &self.side {
+            rates[self.states - 1] = T::constant(1.0) / side.time_constant;
         }
         rates
     }
@@ -156,20 +231,30 @@ impl<T: Scalar> Vessels<T> {
                 // An empty vessel is taken as one with a little in it: its slope is the same, and it may be about to fill.
                 Outlet::Torricelli => {
                     let height = level.value().max(A_LITTLE);
-                    let (outflow, content) = if vessel.laws.is_empty() {
+                    let VesselLaws {
+                        head,
+                        outflow,
+                        area,
+                        ..
+                    } = &vessel.laws;
+                    let nominal = head.is_empty() && outflow.is_empty() && area.is_empty();
+                    let (outflow, content) = if nominal {
                         let outflow = vessel.coefficient.value() * square_root(height);
                         (outflow, height * vessel.area.value())
                     } else {
                         let level = T::constant(height);
-                        let outflow = self.outflow(i, &level, t).value();
-                        (outflow, height * self.area(i, &level).value())
+                        let now = T::constant(t);
+                        let outflow = self.outflow(i, &level, &self.levels, &now).value();
+                        // What pushes back leaves a smaller head, of the same slope.
+                        let head = self.head(i, &level, &self.levels).value().max(A_LITTLE);
+                        (outflow, head * self.area(i, &level).value())
                     };
                     // Without the division in the common case.
                     if h * outflow > 2.0 * STEP_LIMIT * content {
                         most = most.max(0.5 * h * outflow / content);
                     }
                 }
-                Outlet::Linear if vessel.laws.is_empty() => {}
+                Outlet::Linear if !vessel.laws.any => {}
                 // The vessel's own forgetting is exact; here it is what the effects add to it.
                 Outlet::Linear => {
                     let own = 1.0 / vessel.area.value().abs();
@@ -182,6 +267,9 @@ impl<T: Scalar> Vessels<T> {
                     most = most.max(0.5 * h * added);
                 }
             }
+        }
+        if let Some(side) = &self.side {
+            most = most.max(h * (1.0 + side.share.value()) / side.time_constant.value());
         }
         most
     }

@@ -37,7 +37,7 @@ struct Handed<T> {
 
 impl<T: Scalar> Vessels<T> {
     /// The levels after a step without events.
-    pub(super) fn flow(&mut self, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
+    pub(super) fn flow(&mut self, h: T, q: &Inflow<T>, t: f64) -> Levels<T> {
         let Some(flow) = &mut self.linear else {
             return self.trial(h, q, t);
         };
@@ -46,7 +46,7 @@ impl<T: Scalar> Vessels<T> {
             return whole;
         }
         let first = q.part(T::constant(0.0), T::constant(0.5));
-        let half = flow.half.advance(&self.levels, h * 0.5, first);
+        let half = flow.half.advance(&self.levels, h * 0.5, &first);
         let handed = (self.vessels.len() == 2 && h.value() > 0.0).then(|| {
             // A drive of the level is an inflow over the area.
             let area = self.vessels[0].area;
@@ -67,7 +67,7 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// One step of linear vessels: their exact flow, and beside it Runge-Kutta on what the effects add.
-    fn linear_trial(&self, flow: &Flow<T>, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
+    fn linear_trial(&self, flow: &Flow<T>, h: T, q: &Inflow<T>, t: f64) -> Levels<T> {
         let (whole, half) = (flow.whole, flow.half);
         let dt = h.value();
         if let Some(rates) = self.damping {
@@ -104,10 +104,10 @@ impl<T: Scalar> Vessels<T> {
         rates: [T; MAX_VESSELS],
         flow: Option<&Flow<T>>,
         h: T,
-        q: Inflow<T>,
+        q: &Inflow<T>,
         t: f64,
     ) -> Levels<T> {
-        let n = self.vessels.len();
+        let n = self.states;
         let zero = [T::constant(0.0); MAX_VESSELS];
         let damped: [Damped<T>; MAX_VESSELS] = std::array::from_fn(|i| Damped::new(rates[i], h));
         let [begin, half, whole] = match flow {
@@ -128,7 +128,7 @@ impl<T: Scalar> Vessels<T> {
                 for (drive, own) in drive.iter_mut().zip(self.linear_rates(at, q)) {
                     *drive = *drive - own;
                 }
-                for i in 1..n {
+                for i in 1..self.vessels.len() {
                     drive[i] = drive[i] - deviation[i - 1] * self.vessels[i].inverse;
                 }
             }

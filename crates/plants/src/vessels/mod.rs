@@ -11,7 +11,8 @@ mod runge_kutta;
 mod torricelli;
 
 use crate::{
-    Law, Outlet, Rim, Scalar, inflow::Inflow, linear::Propagators, structure::MAX_VESSELS,
+    Balance, Law, Outlet, Rim, Scalar, Side, inflow::Inflow, linear::Propagators,
+    structure::MAX_VESSELS,
 };
 
 use exponential::LinearFlow;
@@ -34,8 +35,18 @@ struct Vessel<T> {
     coefficient: T,
     rim: Rim<T>,
     spilling: bool,
-    /// Positions of the laws that act here.
-    laws: Vec<usize>,
+    laws: VesselLaws,
+}
+
+/// Positions of the laws that act in a vessel, by what they change.
+#[derive(Default)]
+struct VesselLaws {
+    head: Vec<usize>,
+    outflow: Vec<usize>,
+    net: Vec<usize>,
+    area: Vec<usize>,
+    /// Any of them, or a side tank.
+    any: bool,
 }
 
 /// The vessels in series.
@@ -45,6 +56,14 @@ pub(crate) struct Vessels<T: Scalar> {
     pub(crate) levels: Levels<T>,
     /// For linear vessels.
     linear: Option<LinearFlow<T>>,
+    /// A side tank of an only vessel; its level follows the vessel's in `levels`.
+    side: Option<Side<T>>,
+    /// Levels that move: the vessels' and the side tank's.
+    states: usize,
+    /// Laws that switch over at an instant that is still to come.
+    switches: Vec<usize>,
+    /// Beginning and length of the present step, where they have derivatives.
+    clock: Option<(T, T)>,
     /// How fast every vessel forgets, where a part is long against that \[1/s\]: then it is taken exponentially.
     damping: Option<[T; MAX_VESSELS]>,
     /// Some vessel has a rim.
@@ -86,17 +105,29 @@ impl<T: Scalar> Vessels<T> {
                     fraction: T::constant(0.0),
                 },
                 spilling: false,
-                laws: Vec::new(),
+                laws: VesselLaws::default(),
             })
             .collect();
         let mut bound = Vec::with_capacity(laws.len());
         for (vessel, law) in laws {
+            let vessel = &mut vessels[vessel];
             match law.rim() {
-                Some(rim) => vessels[vessel].rim = rim,
-                None => vessels[vessel].laws.push(bound.len()),
+                Some(rim) => vessel.rim = rim,
+                None => vessel.laws.any = true,
+            }
+            match law.changes() {
+                Some(Balance::Head) => vessel.laws.head.push(bound.len()),
+                Some(Balance::Outflow) => vessel.laws.outflow.push(bound.len()),
+                Some(Balance::Net) => vessel.laws.net.push(bound.len()),
+                Some(Balance::Area) => vessel.laws.area.push(bound.len()),
+                None => {}
             }
             bound.push(law);
         }
+        let side = bound.iter().find_map(|law| law.side());
+        let states = vessels.len() + usize::from(side.is_some());
+        let switches = (0..bound.len()).filter(|&law| bound[law].switch().is_some());
+        let switches = switches.collect();
         let rims = vessels.iter().any(|v| v.rim.level.value() != f64::INFINITY);
         let bare = bound.is_empty()
             && vessels
@@ -114,7 +145,7 @@ impl<T: Scalar> Vessels<T> {
         let linear = linear.then(|| LinearFlow {
             whole: propagators(),
             half: propagators(),
-            disturbed: vessels.iter().any(|v| !v.laws.is_empty()),
+            disturbed: vessels.iter().any(|v| v.laws.any),
         });
         let mut initial = [T::constant(0.0); MAX_VESSELS];
         for (level, given) in initial.iter_mut().zip(levels) {
@@ -125,12 +156,20 @@ impl<T: Scalar> Vessels<T> {
             laws: bound,
             levels: initial,
             linear,
+            side,
+            states,
+            switches,
+            clock: None,
             rims,
             bare,
             damping: None,
             fastest,
         };
         all.keep_within();
+        if states > all.vessels.len() {
+            // At rest a side tank stands as high as its vessel.
+            all.levels[states - 1] = all.levels[0];
+        }
         all
     }
 
@@ -146,7 +185,7 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    fn accept(&mut self, next: Levels<T>, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    fn accept(&mut self, next: Levels<T>, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if let Some(watch) = watch {
             let last = self.vessels.len() - 1;
             let before = self.levels;

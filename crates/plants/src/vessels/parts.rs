@@ -24,8 +24,44 @@ const SETTLING: f64 = 0.2;
 const SETTLED: [f64; 2] = [1e-4, 1e-2];
 
 impl<T: Scalar> Vessels<T> {
-    /// Moves on by `h` from time `t`; `watch` sees every smooth stretch of the measured level in turn.
-    pub(crate) fn step(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    /// Moves on by `h` from time `start`; `watch` sees every smooth stretch of the measured level in turn.
+    pub(crate) fn step(&mut self, h: T, q: &Inflow<T>, start: T, watch: &mut Watch<T>) {
+        if self.switches.is_empty() {
+            self.stretch(h, q, start, watch);
+            return;
+        }
+        let (mut h, mut q, mut start) = (h, *q, start);
+        while let Some((law, at)) = self.next_switch(&start, &h) {
+            let (begin, whole) = (start, h);
+            let first = at - begin;
+            if first.value() >= 0.0 {
+                let share = first / whole;
+                self.stretch(first, &q.part(T::constant(0.0), share), begin, watch);
+                (h, start) = (whole - first, at);
+                q = q.part(share, T::constant(1.0));
+            }
+            self.laws[law].switch_over();
+            self.switches.retain(|&waiting| waiting != law);
+        }
+        self.stretch(h, &q, start, watch);
+    }
+
+    /// The first law to switch over before the end of a step, and when.
+    fn next_switch(&self, start: &T, h: &T) -> Option<(usize, T)> {
+        let end = start.value() + h.value();
+        self.switches
+            .iter()
+            .filter_map(|&law| Some((law, self.laws[law].switch()?)))
+            .filter(|(_, at)| at.value() < end)
+            .min_by(|a, b| a.1.value().total_cmp(&b.1.value()))
+    }
+
+    /// A step within which no law switches over.
+    fn stretch(&mut self, h: T, q: &Inflow<T>, start: T, watch: &mut Watch<T>) {
+        let zero = T::constant(0.0);
+        let plain = h.same_derivatives(zero) && start.same_derivatives(zero);
+        self.clock = (!plain && !self.laws.is_empty()).then_some((start, h));
+        let t = start.value();
         let wanted = self.fastest * h.value();
         if wanted > STEP_LIMIT {
             self.fast_linear_step(wanted, h, q, t, watch);
@@ -36,28 +72,28 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    fn equal_parts(&mut self, wanted: f64, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    fn equal_parts(&mut self, wanted: f64, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
         let share = 1.0 / parts as f64;
         let each = h * share;
         for k in 0..parts {
             let edge = |k: usize| T::constant(k as f64 * share);
             let begin = t + k as f64 * each.value();
-            self.part(each, q.part(edge(k), edge(k + 1)), begin, watch);
+            self.part(each, &q.part(edge(k), edge(k + 1)), begin, watch);
         }
     }
 
     /// A step of linear vessels that is longer than a time constant, in parts that double: what a jump of the input sets
     /// off is over when they are long. Their lengths do not depend on effects, so that one at its absent value sees
     /// the parts of the base model.
-    fn fast_linear_step(&mut self, wanted: f64, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    fn fast_linear_step(&mut self, wanted: f64, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
         let share = 1.0 / parts as f64;
         let (mut done, mut length) = (0, 1);
         while done < parts {
             let (from, to) = (done as f64 * share, (done + length) as f64 * share);
             let part = h * (length as f64 * share);
-            let q = q.part(T::constant(from), T::constant(to));
+            let q = &q.part(T::constant(from), T::constant(to));
             let begin = t + h.value() * from;
             let quiet = !self.rims || self.quiet_part(part, q, begin, watch);
             if !self.rims {
@@ -75,7 +111,7 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// A part of linear vessels with rims, in one piece: `false`, and nothing is done, where something happens at a rim.
-    fn quiet_part(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) -> bool {
+    fn quiet_part(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) -> bool {
         if self.stiffness(h.value(), t) > STEP_LIMIT {
             return false;
         }
@@ -95,7 +131,7 @@ impl<T: Scalar> Vessels<T> {
         quiet
     }
 
-    fn part(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    fn part(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if self.stiffness(h.value(), t) <= STEP_LIMIT {
             self.unit(h, q, t, watch);
             return;
@@ -128,16 +164,16 @@ impl<T: Scalar> Vessels<T> {
             if calm > units || (calm > 0 && !short) {
                 let (length, q, begin) = span(done, done + calm);
                 self.damping = Some(rates);
-                self.unit(length, q, begin, watch);
+                self.unit(length, &q, begin, watch);
                 self.damping = given;
                 done += calm;
                 continue;
             }
             let (length, q, begin) = span(done, done + units);
             if short {
-                self.unit(length, q, begin, watch);
+                self.unit(length, &q, begin, watch);
             } else {
-                self.relax(length, q, begin, watch);
+                self.relax(length, &q, begin, watch);
             }
             done += units;
         }
@@ -154,7 +190,7 @@ impl<T: Scalar> Vessels<T> {
         }
         for q in inflows.into_iter().flatten() {
             let moves = self.rates(&self.levels, q, t);
-            for i in 0..self.vessels.len() {
+            for i in 0..self.states {
                 let fast = rates[i].value() * h > STEP_LIMIT;
                 let time = if fast { 1.0 / rates[i].value() } else { h };
                 let (level, moves) = (self.levels[i].value(), moves[i].value());
@@ -177,7 +213,7 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// A step that is short enough.
-    fn unit(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    fn unit(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if self.rims {
             self.step_with_rims(h, q, t, watch);
             return;
@@ -187,12 +223,12 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// One step that cannot overshoot, whatever its length: implicit in each vessel's own level, of order one.
-    fn relax(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    fn relax(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let mut next = self.levels;
         let mut inflow = q.end;
         for (i, to) in next.iter_mut().enumerate().take(self.vessels.len()) {
             let level = self.levels[i];
-            let (outflow, net) = self.balance(i, &level, inflow, t);
+            let (outflow, net) = self.balance(i, inflow, &self.levels, t);
             let slope = self.slope(i, t).max(T::constant(0.0));
             let damped = T::constant(1.0) / (h * slope + 1.0);
             let rise = self.rate(i, &level, net) * h * damped;
@@ -215,6 +251,11 @@ impl<T: Scalar> Vessels<T> {
             }
             // A leak takes no more than there is.
             inflow = inflow.max(T::constant(low));
+        }
+        if let Some(side) = &self.side {
+            let last = self.states - 1;
+            let drawn = h / side.time_constant;
+            next[last] = (next[last] + drawn * next[last - 1]) / (drawn + 1.0);
         }
         if let Some(watch) = watch {
             // The transient is over at once; what is left looks straight.

@@ -3,7 +3,7 @@
 
 use crate::{Scalar, inflow::Inflow};
 
-use super::{Levels, Vessels, Watch};
+use super::{Levels, Vessel, Vessels, Watch};
 
 /// Contacts with a rim that are looked for within a step.
 const MOST_EVENTS: usize = 12;
@@ -17,19 +17,25 @@ pub(super) enum Event<T> {
 }
 
 impl<T: Scalar> Vessels<T> {
-    pub(super) fn step_with_rims(&mut self, h: T, q: Inflow<T>, t: f64, watch: &mut Watch<T>) {
-        let (mut h, mut q, mut t) = (h, q, t);
+    pub(super) fn step_with_rims(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        let (mut h, mut q, mut t) = (h, *q, t);
         let mut released = None;
+        let whole = self.clock;
         // Each vessel can meet its rim and leave it a few times within a step; more is chatter.
         for _ in 0..MOST_EVENTS {
             self.settle_modes(q.start, t, released);
-            let next = self.trial(h, q, t);
-            let Some(event) = self.first_event(&next, h, q, t) else {
-                self.accept(next, h, q, t, watch);
+            let next = self.trial(h, &q, t);
+            let Some(event) = self.first_event(&next, h, &q, t) else {
+                self.accept(next, h, &q, t, watch);
+                self.clock = whole;
                 return;
             };
             let (Event::Rim(_, part) | Event::Release(_, part)) = event;
-            let first = q.part(T::constant(0.0), part);
+            let first = &q.part(T::constant(0.0), part);
+            // The instant of the event has derivatives, and with it every time of the step that leads there and the one
+            // from which the rest is counted.
+            let begin = self.time(t);
+            self.clock = Some((begin, h * part));
             let there = self.trial(h * part, first, t);
             self.accept(there, h * part, first, t, watch);
             released = match event {
@@ -39,19 +45,29 @@ impl<T: Scalar> Vessels<T> {
                 }
                 Event::Release(i, _) => Some(i),
             };
+            let instant = begin + h * part;
             t += (h * part).value();
             q = q.part(part, T::constant(1.0));
             h = h - h * part;
+            self.clock = Some((instant, h));
         }
-        let next = self.trial(h, q, t);
-        self.accept(next, h, q, t, watch);
+        let next = self.trial(h, &q, t);
+        self.accept(next, h, &q, t, watch);
+        self.clock = whole;
     }
 
     /// Which vessels spill: those that stand at their rim with a positive net inflow, but for one that has just stopped.
     pub(super) fn settle_modes(&mut self, q: T, t: f64, released: Option<usize>) {
+        for vessel in &mut self.vessels {
+            vessel.spilling = false;
+        }
+        let below = |(vessel, level): (&Vessel<T>, &T)| level.value() < vessel.rim.level.value();
+        if self.vessels.iter().zip(&self.levels).all(below) {
+            return;
+        }
         let mut inflow = q;
         for i in 0..self.vessels.len() {
-            let (outflow, net) = self.balance(i, &self.levels[i], inflow, t);
+            let (outflow, net) = self.balance(i, inflow, &self.levels, t);
             let vessel = &mut self.vessels[i];
             vessel.spilling = self.levels[i].value() >= vessel.rim.level.value()
                 && net.value() > 0.0
@@ -68,13 +84,17 @@ impl<T: Scalar> Vessels<T> {
         &self,
         next: &Levels<T>,
         h: T,
-        q: Inflow<T>,
+        q: &Inflow<T>,
         t: f64,
     ) -> Option<Event<T>> {
         let at = |s: f64| {
             let part = T::constant(s);
             let piece = q.part(T::constant(0.0), part);
-            (self.trial(h * part, piece, t), piece.end, t + s * h.value())
+            (
+                self.trial(h * part, &piece, t),
+                piece.end,
+                t + s * h.value(),
+            )
         };
         let mut first: Option<(f64, usize)> = None;
         for (i, vessel) in self.vessels.iter().enumerate() {
@@ -143,7 +163,7 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// Where within the step, and how high, the level of a vessel is highest; `None` where that is at an end.
-    fn top(&self, i: usize, next: &Levels<T>, h: T, q: Inflow<T>, t: f64) -> Option<(f64, f64)> {
+    fn top(&self, i: usize, next: &Levels<T>, h: T, q: &Inflow<T>, t: f64) -> Option<(f64, f64)> {
         let dt = h.value();
         let begin = self.rates(&self.levels, q.start, t)[i].value() * dt;
         if begin <= 0.0 {

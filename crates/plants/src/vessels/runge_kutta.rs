@@ -9,7 +9,7 @@ use super::{Levels, Vessel, Vessels, torricelli::square_root};
 impl<T: Scalar> Vessels<T> {
     /// One Runge-Kutta step from the present levels, in the present modes.
     #[inline]
-    pub(super) fn trial(&self, h: T, q: Inflow<T>, t: f64) -> Levels<T> {
+    pub(super) fn trial(&self, h: T, q: &Inflow<T>, t: f64) -> Levels<T> {
         let dt = h.value();
         if let Some(rates) = self.damping {
             self.damped_trial(rates, None, h, q, t)
@@ -33,7 +33,7 @@ impl<T: Scalar> Vessels<T> {
         &self,
         vessels: [&Vessel<T>; N],
         h: f64,
-        q: Inflow<T>,
+        q: &Inflow<T>,
     ) -> Levels<T> {
         // Loops over places rather than arrays by value, which would be copied about.
         let zero = T::constant(0.0);
@@ -74,19 +74,41 @@ impl<T: Scalar> Vessels<T> {
         &self,
         h: H,
         dt: f64,
-        q: Inflow<T>,
+        q: &Inflow<T>,
         t: f64,
     ) -> Levels<T>
     where
         T: Mul<H, Output = T>,
     {
+        let zero = T::constant(0.0);
         let half = h * 0.5;
         let middle = t + 0.5 * dt;
-        let k1 = self.rates(&self.levels, q.start, t);
-        let k2 = self.rates(&self.moved(&self.levels, &k1, half), q.middle, middle);
-        let k3 = self.rates(&self.moved(&self.levels, &k2, half), q.middle, middle);
-        let k4 = self.rates(&self.moved(&self.levels, &k3, h), q.end, t + dt);
-        self.weighted(&self.levels, h, [&k1, &k2, &k3, &k4])
+        let mut next = self.levels;
+        let mut at = self.levels;
+        let stages = [
+            (h, q.start, t, 1.0),
+            (half, q.middle, middle, 2.0),
+            (half, q.middle, middle, 2.0),
+            (h, q.end, t + dt, 1.0),
+        ];
+        let mut rates = [zero; MAX_VESSELS];
+        let mut sum = [zero; MAX_VESSELS];
+        for (stage, (ahead, q, t, weight)) in stages.into_iter().enumerate() {
+            if stage > 0 {
+                for i in 0..self.states {
+                    at[i] = self.levels[i] + rates[i] * ahead;
+                }
+            }
+            self.rates_into(&mut rates, &at, q, t);
+            for i in 0..self.states {
+                sum[i] = sum[i] + rates[i] * weight;
+            }
+        }
+        let sixth = h * (1.0 / 6.0);
+        for i in 0..self.states {
+            next[i] = next[i] + sum[i] * sixth;
+        }
+        next
     }
 
     /// `from + by h`.
@@ -96,7 +118,7 @@ impl<T: Scalar> Vessels<T> {
         T: Mul<H, Output = T>,
     {
         let mut to = *from;
-        for i in 0..self.vessels.len() {
+        for i in 0..self.states {
             to[i] = to[i] + by[i] * h;
         }
         to
@@ -114,7 +136,7 @@ impl<T: Scalar> Vessels<T> {
     {
         let sixth = h * (1.0 / 6.0);
         let mut next = *from;
-        for i in 0..self.vessels.len() {
+        for i in 0..self.states {
             next[i] = next[i] + (k1[i] + k2[i] * 2.0 + k3[i] * 2.0 + k4[i]) * sixth;
         }
         next

@@ -4,7 +4,7 @@
 pub mod reference;
 
 use plants::{
-    CATALOGUE, Command, Dual, Known, Outlet, ParameterInfo, Place, Placed, Plant, Scalar, Scales,
+    CATALOGUE, Command, Dual, Known, Outlet, ParameterInfo, Placed, Plant, Scalar, Scales,
     Simulator, Structure,
 };
 use rand::{RngExt, SeedableRng};
@@ -82,16 +82,20 @@ pub fn fast(plant: Plant, vessel: usize, ratio: f64) -> Case {
 pub fn placements(plant: Plant) -> Vec<Placed> {
     CATALOGUE
         .iter()
-        .filter(|effect| (effect.applies)(plant))
         .flat_map(|&effect| {
-            let places = if effect.place == Place::Vessel {
-                plant.vessels()
-            } else {
-                1
-            };
-            (0..places).map(move |vessel| Placed { effect, vessel })
+            let sites = effect.sites(plant);
+            sites.map(move |vessel| Placed { effect, vessel })
         })
         .collect()
+}
+
+/// Effects whose output is a staircase of some parameter: its slope at a point says nothing, so they carry that of a chord.
+pub const STEPPED: [&str; 2] = ["stiction_backlash", "coarse_quantisation"];
+
+/// An effect that begins with a root at a level: a Runge-Kutta step across it is of order one and a half, and a difference
+/// across it is no derivative.
+pub fn begins_with_a_root(effects: &[Placed]) -> bool {
+    effects.iter().any(|p| p.effect.id == "leak_at_height")
 }
 
 pub fn label(placed: &[Placed], plant: Plant) -> String {
@@ -123,6 +127,24 @@ pub fn interior(case: &Case, placed: Placed, info: &ParameterInfo) -> f64 {
         ("sensor_hysteresis", "drop") => 9.05,
         ("sensor_hysteresis", _) => 2.1,
         ("sensor_saturation", _) => 12.3,
+        ("stiction_backlash", "width") => 0.61,
+        ("stiction_backlash", _) => 0.43,
+        ("pump_gain_drift", "change") => 0.17,
+        ("pump_gain_drift", _) => 93.0 * h,
+        ("pipe_height", _) => 1.9,
+        ("valve_drift", _) => 0.23,
+        ("valve_step", "change") => -0.12,
+        ("valve_step", _) => 41.37 * h,
+        ("coupled_tank", "time_constant") => 23.0 * h,
+        ("coupled_tank", _) => 0.31,
+        ("leak_at_height", "coefficient") => 0.05 * flow,
+        ("leak_at_height", _) => 9.4,
+        ("periodic_disturbance", "sine") => 0.11 * flow,
+        ("periodic_disturbance", "cosine") => -0.06 * flow,
+        ("periodic_disturbance", _) => 37.3 * h,
+        ("sensor_drift", _) => 1.3,
+        ("sensor_nonlinearity", _) => 0.21,
+        ("coarse_quantisation", _) => 0.83,
         _ => info.starts[0],
     }
 }

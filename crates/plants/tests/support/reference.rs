@@ -20,6 +20,21 @@ struct Equations {
     leak: [f64; 2],
     laminar: [f64; 2],
     curvature: [f64; 2],
+    pipe: [f64; 2],
+    drift: [f64; 2],
+    /// Change and instant.
+    step: [(f64, f64); 2],
+    backflow: f64,
+    /// Share of the surface and time constant.
+    side: Option<[f64; 2]>,
+    hole: [(f64, f64); 2],
+    /// Sine, cosine, period.
+    swing: [[f64; 3]; 2],
+    /// Change and time constant.
+    warm_up: (f64, f64),
+    /// Width and jump.
+    sticks: (f64, f64),
+    duration: f64,
     taper: [f64; 2],
     operating: [f64; 2],
     rim: [f64; 2],
@@ -32,6 +47,10 @@ struct Equations {
     pump_lag: Option<f64>,
     sensor_lag: Option<f64>,
     offset: f64,
+    sensor_drift: f64,
+    sensor_bend: f64,
+    sensor_range: f64,
+    quantum: f64,
     hysteresis: Option<[f64; 4]>,
     largest_reading: f64,
     at_rest: f64,
@@ -52,6 +71,9 @@ impl Equations {
             limit: f64::INFINITY,
             largest_reading: f64::INFINITY,
             input_range: scales.input_range,
+            duration: scales.duration,
+            warm_up: (0.0, 1.0),
+            swing: [[0.0, 0.0, 1.0]; 2],
             at_rest: case.at_rest,
             ..Self::default()
         };
@@ -70,6 +92,7 @@ impl Equations {
             placed.map_or(0, |p| p.vessel)
         };
         let (low, high) = scales.level[e.n - 1];
+        e.sensor_range = high;
         let own = structure.plant.parameters(scales).len();
         for (name, &value) in names.iter().zip(theta).skip(own) {
             let (id, parameter) = name.split_once('.').expect("effect.parameter");
@@ -96,6 +119,25 @@ impl Equations {
                 }
                 ("sensor_hysteresis", _) => e.hysteresis.as_mut().expect("step first")[2] = value,
                 ("sensor_saturation", _) => e.largest_reading = value,
+                ("stiction_backlash", "width") => e.sticks.0 = value,
+                ("stiction_backlash", _) => e.sticks.1 = value,
+                ("pump_gain_drift", "change") => e.warm_up.0 = value,
+                ("pump_gain_drift", _) => e.warm_up.1 = value,
+                ("pipe_height", _) => e.pipe[v] = value,
+                ("valve_drift", _) => e.drift[v] = value,
+                ("valve_step", "change") => e.step[v].0 = value,
+                ("valve_step", _) => e.step[v].1 = value,
+                ("coupled_tank", "backflow") => e.backflow = value,
+                ("coupled_tank", "share") => e.side = Some([value, 1.0]),
+                ("coupled_tank", _) => e.side.as_mut().expect("share first")[1] = value,
+                ("leak_at_height", "coefficient") => e.hole[v].0 = value,
+                ("leak_at_height", _) => e.hole[v].1 = value,
+                ("periodic_disturbance", "sine") => e.swing[v][0] = value,
+                ("periodic_disturbance", "cosine") => e.swing[v][1] = value,
+                ("periodic_disturbance", _) => e.swing[v][2] = value,
+                ("sensor_drift", _) => e.sensor_drift = value,
+                ("sensor_nonlinearity", _) => e.sensor_bend = value,
+                ("coarse_quantisation", _) => e.quantum = value,
                 _ => panic!("`{name}` has no reference: write its equation here"),
             }
         }
@@ -113,11 +155,14 @@ impl Equations {
         limited + self.bend * limited * (limited - self.input_range) / self.input_range
     }
 
-    fn outflow(&self, i: usize, level: f64) -> f64 {
+    /// The outflow of vessel `i` at a time, its level and the next vessel's given; `late`: after the step of its valve.
+    fn outflow(&self, i: usize, levels: &[f64], t: f64, late: bool) -> f64 {
+        let feels = if i + 1 < self.n { self.backflow } else { 0.0 };
+        let level = levels[i] - feels * levels[i + 1];
         let own = if self.linear {
             level - self.outlet[i]
         } else {
-            self.outlet[i] * level.max(0.0).sqrt()
+            self.outlet[i] * (level + self.pipe[i]).max(0.0).sqrt()
         };
         let root = self.operating[i].sqrt();
         let curved = if self.curvature[i] == 0.0 {
@@ -125,12 +170,45 @@ impl Equations {
         } else {
             2.0 * root * (level.sqrt() - root) - (level - self.operating[i])
         };
-        own + self.laminar[i] * level + self.curvature[i] * curved
+        let step = if late { self.step[i].0 } else { 0.0 };
+        let valve = (1.0 + self.drift[i] * t / self.duration) * (1.0 + step);
+        // Linear and curved part are one outflow.
+        valve * (own + self.laminar[i] * level + self.curvature[i] * curved)
+    }
+
+    fn gain(&self, t: f64) -> f64 {
+        let (change, settle) = self.warm_up;
+        let done = |t: f64| 1.0 - (-t / settle).exp();
+        self.gain * (1.0 + change * done(t) / done(self.duration))
+    }
+
+    /// The commands that act behind what sticks.
+    fn moved(&self, input: &[(Command, f64)]) -> Vec<(Command, f64)> {
+        let (width, jump) = self.sticks;
+        let (breaks, left) = (0.5 * width * (1.0 + jump), 0.5 * width * (1.0 - jump));
+        let mut position = self.at_rest;
+        let mut follow = |u: f64| {
+            if u > position + breaks {
+                position = u - left;
+            } else if u < position - breaks {
+                position = u + left;
+            }
+            position
+        };
+        input
+            .iter()
+            .map(|&(command, h)| {
+                let from = follow(command.from);
+                let to = command.to.map(&mut follow);
+                (Command { from, to }, h)
+            })
+            .collect()
     }
 
     /// Rates of (levels, pump's state, sensor's state) for the command that arrives, and each vessel's net inflow.
-    fn rates(&self, x: &[f64], arriving: f64, spilling: [bool; 2]) -> ([f64; 4], [f64; 2]) {
-        let mut dx = [0.0; 4];
+    fn rates(&self, x: &[f64], arriving: f64, at: Instant) -> ([f64; 5], [f64; 2]) {
+        let Instant { t, late, spilling } = at;
+        let mut dx = [0.0; 5];
         let mut net = [0.0; 2];
         let acting = match self.pump_lag {
             Some(lag) => {
@@ -139,10 +217,19 @@ impl Equations {
             }
             None => arriving,
         };
-        let mut inflow = self.gain * acting;
+        let mut inflow = self.gain(t) * acting;
         for i in 0..self.n {
-            let out = self.outflow(i, x[i]);
-            net[i] = inflow - out - self.leak[i];
+            let out = self.outflow(i, x, t, late[i]);
+            let (hole, height) = self.hole[i];
+            let [sine, cosine, period] = self.swing[i];
+            let angle = 2.0 * std::f64::consts::PI * t / period;
+            net[i] = inflow - out - self.leak[i] - hole * (x[i] - height).max(0.0).sqrt()
+                + sine * angle.sin()
+                + cosine * angle.cos();
+            if let Some([share, time_constant]) = self.side {
+                net[i] -= share * self.area[i] * (x[i] - x[4]) / time_constant;
+                dx[4] = (x[i] - x[4]) / time_constant;
+            }
             let width = 1.0 + self.taper[i] * (x[i] - self.operating[i]) / self.operating[i];
             assert!(width > 0.1, "the reference has no narrowest width");
             inflow = out;
@@ -157,6 +244,14 @@ impl Equations {
         }
         (dx, net)
     }
+}
+
+/// What a rate depends on beside the state: the time, whether each valve has made its step, whether each vessel spills.
+#[derive(Clone, Copy)]
+struct Instant {
+    t: f64,
+    late: [bool; 2],
+    spilling: [bool; 2],
 }
 
 /// The command as a function of time, delayed and shaped, with its corners.
@@ -182,7 +277,12 @@ impl Signal<'_> {
     /// Times at which what arrives jumps or has a corner.
     fn corners(&self) -> Vec<f64> {
         let e = self.equations;
-        let mut all = Vec::new();
+        let mut all = vec![0.0];
+        for (change, instant) in e.step {
+            if change != 0.0 {
+                all.push(instant);
+            }
+        }
         for &(begin, h, command) in &self.pieces {
             all.push(begin);
             all.push(begin + e.delay);
@@ -210,6 +310,8 @@ impl Signal<'_> {
 struct Stretch<'a, 'b> {
     signal: &'a Signal<'b>,
     piece: Option<usize>,
+    /// Each valve has made its step.
+    late: [bool; 2],
 }
 
 impl Stretch<'_, '_> {
@@ -217,14 +319,17 @@ impl Stretch<'_, '_> {
         let e = self.signal.equations;
         e.command(self.signal.raw(self.piece, t - e.delay))
     }
+
+    fn rates(&self, x: &[f64], t: f64, spilling: [bool; 2]) -> ([f64; 5], [f64; 2]) {
+        let late = self.late;
+        let at = Instant { t, late, spilling };
+        self.signal.equations.rates(x, self.arriving(t), at)
+    }
 }
 
 impl System<f64, DVector<f64>> for Stretch<'_, '_> {
     fn system(&self, t: f64, x: &DVector<f64>, dx: &mut DVector<f64>) {
-        let (rates, _) = self
-            .signal
-            .equations
-            .rates(x.as_slice(), self.arriving(t), [false; 2]);
+        let (rates, _) = self.rates(x.as_slice(), t, [false; 2]);
         dx.copy_from_slice(&rates);
     }
 }
@@ -235,7 +340,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
     let e = &equations;
     let mut t = 0.0;
     let mut pieces = Vec::new();
-    for &(command, h) in input {
+    for (command, h) in e.moved(input) {
         pieces.push((t, h, command));
         t += h;
     }
@@ -244,7 +349,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
         equations: e,
         pieces,
     };
-    let mut x = [0.0; 4];
+    let mut x = [0.0; 5];
     let (levels, before) = case.levels.split_at(e.n);
     for (i, (to, &level)) in x.iter_mut().zip(levels).enumerate() {
         *to = level.min(e.rim[i]);
@@ -257,6 +362,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
     for ((i, lag), before) in lags.zip(before) {
         x[i] += before * (-case.structure.scales.sample_interval / lag).exp();
     }
+    x[4] = x[0];
     let mut corners = signal.corners();
     corners.push(end);
     let mut readings = Vec::new();
@@ -272,6 +378,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
             let stretch = Stretch {
                 signal: &signal,
                 piece: signal.piece(0.5 * (from + corner)),
+                late: e.step.map(|(_, instant)| 0.5 * (from + corner) > instant),
             };
             x = if overflows {
                 bisected(e, &stretch, x, from, corner)
@@ -286,27 +393,31 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
             } else {
                 x[e.n - 1]
             };
-            let mut y = behind + e.offset;
+            let bent = behind + e.sensor_bend * behind * (behind / e.sensor_range - 1.0);
+            let t = signal.pieces[sample].0;
+            let mut y = bent + e.offset + e.sensor_drift * t / e.duration;
             if let Some([step, drop, rise, width]) = e.hysteresis {
                 let up = ((y - drop) / rise).clamp(0.0, 1.0);
                 let down = ((y - drop) / width).clamp(0.0, 1.0);
                 stuck = stuck.max(up).min(down.max(up));
                 y += step * stuck;
             }
-            readings.push(y.min(e.largest_reading));
+            let limited = y.min(e.largest_reading);
+            readings.push(if e.quantum > 0.0 {
+                e.quantum * (limited / e.quantum).round()
+            } else {
+                limited
+            });
             sample += 1;
         }
     }
     readings
 }
 
-fn smooth(stretch: Stretch, x: [f64; 4], from: f64, to: f64) -> [f64; 4] {
+fn smooth(stretch: Stretch, x: [f64; 5], from: f64, to: f64) -> [f64; 5] {
     if to - from < 1e-9 {
         // Two corners that rounding has parted: one Euler step is exact here.
-        let (rates, _) = stretch
-            .signal
-            .equations
-            .rates(&x, stretch.arriving(from), [false; 2]);
+        let (rates, _) = stretch.rates(&x, from, [false; 2]);
         return std::array::from_fn(|i| x[i] + rates[i] * (to - from));
     }
     let mut solver = Dopri5::new(
@@ -326,27 +437,27 @@ fn smooth(stretch: Stretch, x: [f64; 4], from: f64, to: f64) -> [f64; 4] {
 }
 
 /// Fine Runge-Kutta steps; where a level meets a rim or a net inflow changes sign at one, the instant is bisected.
-fn bisected(e: &Equations, stretch: &Stretch, mut x: [f64; 4], from: f64, to: f64) -> [f64; 4] {
-    let step = |x: [f64; 4], t: f64, h: f64, spilling: [bool; 2]| -> [f64; 4] {
-        let f = |x: [f64; 4], t: f64| e.rates(&x, stretch.arriving(t), spilling).0;
-        let add = |x: [f64; 4], k: [f64; 4], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
+fn bisected(e: &Equations, stretch: &Stretch, mut x: [f64; 5], from: f64, to: f64) -> [f64; 5] {
+    let step = |x: [f64; 5], t: f64, h: f64, spilling: [bool; 2]| -> [f64; 5] {
+        let f = |x: [f64; 5], t: f64| stretch.rates(&x, t, spilling).0;
+        let add = |x: [f64; 5], k: [f64; 5], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
         let k1 = f(x, t);
         let k2 = f(add(x, k1, 0.5 * h), t + 0.5 * h);
         let k3 = f(add(x, k2, 0.5 * h), t + 0.5 * h);
         let k4 = f(add(x, k3, h), t + h);
         std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
     };
-    let modes = |x: [f64; 4], t: f64| -> [bool; 2] {
+    let modes = |x: [f64; 5], t: f64| -> [bool; 2] {
         let mut spilling = [false; 2];
         for i in 0..e.n {
-            let net = e.rates(&x, stretch.arriving(t), spilling).1;
+            let net = stretch.rates(&x, t, spilling).1;
             spilling[i] = x[i] >= e.rim[i] && net[i] > 0.0;
         }
         spilling
     };
     // Whether the modes have been left by a state.
-    let left = |x: [f64; 4], t: f64, spilling: [bool; 2]| {
-        let net = e.rates(&x, stretch.arriving(t), spilling).1;
+    let left = |x: [f64; 5], t: f64, spilling: [bool; 2]| {
+        let net = stretch.rates(&x, t, spilling).1;
         (0..e.n).any(|i| {
             if spilling[i] {
                 net[i] < 0.0

@@ -1,19 +1,25 @@
 //! `pipe_height`: the outlet pipe leads down, and its height adds to the head that drives the outflow.
 
 use super::{EffectInfo, Place, torricelli_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use crate::{Balance, Law, ParameterInfo, Plant, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pipe_height",
     place: Place::Vessel,
+    by_clock: false,
     physics: "The outlet pipe leads down: its height adds to the level that drives the outflow.",
     equation: "Q_out = alpha sqrt(H + h_pipe)",
-    applies: torricelli_plant,
+    applies: measured_vessel,
     parameters,
     confused_with: &["sensor_offset", "laminar_outflow", "const_leak"],
     confirm: "Measure from the bottom of the tank down to the open end of the pipe.",
     source: "E. Torricelli, De motu gravium, 1643.",
 };
+
+/// In a vessel whose level is not measured the height only shifts the level, and no data can show it.
+fn measured_vessel(plant: Plant, vessel: usize) -> bool {
+    torricelli_plant(plant, vessel) && vessel + 1 == plant.vessels()
+}
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.level();
@@ -37,7 +43,10 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 }
 
 impl<T: Scalar> Law<T> for PipeHeight<T> {
-    fn outflow(&self, level: &T, outflow: &mut T, _t: f64) {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Outflow)
+    }
+    fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         // An empty tank lets nothing out, however long its pipe.
         if level.value() > 0.0 {
             // alpha sqrt(H) sqrt(1 + h/H): at h = 0 a factor of exactly one.

@@ -1,0 +1,193 @@
+//! `ctid design`: the next experiment, which tells two effects apart.
+
+pub mod text;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use ct_signals::Columns;
+use missing_effect::design::{Candidacy, Design, Limits, Prospect};
+use missing_effect::{Options, Problem};
+use plants::Plant;
+use serde::Serialize;
+
+use crate::input::Files;
+use crate::model_file::{self, ModelFile};
+use crate::output::{self, Found, Kind, Output};
+use crate::progress::Bar;
+use crate::{Error, names};
+
+/// What may be typed.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Records (CSV) that leave it undecided; several are fitted together
+    #[arg(required = true, value_name = "DATA.csv")]
+    data: Vec<PathBuf>,
+    /// Model file; neither of the two effects is in it
+    #[arg(long, value_name = "M.toml")]
+    model: PathBuf,
+    /// The two effects, as `ctid effects` lists them; of two tanks `overflow:upper` says which
+    #[arg(long, num_args = 2, required = true, value_names = ["A", "B"])]
+    between: Vec<String>,
+    /// Smallest and largest command, or reference in a loop; without it what the records visited
+    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true)]
+    range: Option<Vec<f64>>,
+    /// Largest change of the command, or reference, in a second
+    #[arg(long, value_name = "MAX", allow_negative_numbers = true)]
+    slew: Option<f64>,
+    /// Length [s]; without it that of the longest record
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    duration: Option<f64>,
+    /// What sequences are drawn from
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Where the experiment goes as CSV; without it next.csv, or next-2.csv where that is there
+    #[arg(long, value_name = "F.csv")]
+    out: Option<PathBuf>,
+    /// Write the result as JSON
+    #[arg(long, value_name = "F")]
+    json: Option<PathBuf>,
+}
+
+/// A design, and in what unit of time its CSV is written.
+#[derive(Debug, Serialize)]
+pub struct Proposal {
+    /// The design.
+    #[serde(flatten)]
+    pub design: Design,
+    /// Header of the column of the time.
+    #[serde(skip)]
+    time: String,
+    /// Seconds in its unit.
+    #[serde(skip)]
+    seconds: f64,
+}
+
+impl Proposal {
+    /// A design, its time written as these columns have it.
+    #[must_use]
+    pub fn new(design: Design, columns: &Columns) -> Self {
+        let (time, seconds) = columns.time_header();
+        Self {
+            design,
+            time,
+            seconds,
+        }
+    }
+}
+
+/// Nine digits, without zeros at the end.
+fn digits(value: f64) -> String {
+    format!("{value:.9e}")
+        .parse::<f64>()
+        .unwrap_or(value)
+        .to_string()
+}
+
+impl Found for Proposal {
+    fn record(&self) -> String {
+        let sequence = &self.design.experiment;
+        let mut header = sequence.name.clone();
+        if !sequence.unit.is_empty() {
+            header += &format!(" [{}]", sequence.unit);
+        }
+        let mut text = format!("{},{header}\n", self.time);
+        for (time, value) in sequence.time.iter().zip(&sequence.values) {
+            text += &format!("{},{}\n", digits(time / self.seconds), digits(*value));
+        }
+        text
+    }
+}
+
+/// The effect of one of the two names, and the tank that it is to act in.
+fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
+    let (id, place) = match name.split_once(':') {
+        Some((id, place)) => (id, Some(place)),
+        None => (name, None),
+    };
+    let effect = names::effect(id)?;
+    if model.effects.iter().any(|on| on.effect.id == id) {
+        return Err(Error::file(
+            file,
+            format!(
+                "{id} is in the model already, so that there is nothing to decide; `ctid remove {id} --model {}` takes it out",
+                file.display()
+            ),
+        ));
+    }
+    let vessel = place
+        .map(|place| vessel(model.plant, name, place))
+        .transpose()?;
+    Ok(Candidacy { effect, vessel })
+}
+
+fn vessel(plant: Plant, name: &str, place: &str) -> Result<usize, Error> {
+    (0..plant.vessels())
+        .find(|&vessel| plant.vessel_name(vessel) == Some(place))
+        .ok_or_else(|| {
+            Error::Usage(if plant.vessels() > 1 {
+                format!("{name}: there is no tank \"{place}\"; write upper or lower")
+            } else {
+                format!(
+                    "{name}: {} has one tank; leave out \":{place}\"",
+                    plant.id()
+                )
+            })
+        })
+}
+
+impl Arguments {
+    fn limits(&self) -> Limits {
+        Limits {
+            range: self.range.as_deref().and_then(|range| match range {
+                [low, high] => Some((*low, *high)),
+                _ => None,
+            }),
+            slew: self.slew,
+            duration: self.duration,
+            seed: self.seed,
+        }
+    }
+
+    fn outputs(&self, inputs: &[&Path]) -> Result<Vec<Output>, Error> {
+        let free = output::free_record(Path::new("."), "next");
+        let out = self.out.as_deref().unwrap_or(&free);
+        let json = self.json.as_deref().map(|path| (Kind::Json, path));
+        let wanted: Vec<_> = json.into_iter().chain([(Kind::Record, out)]).collect();
+        output::plan(&wanted, inputs)
+    }
+
+    /// The design, and where it goes.
+    pub(crate) fn run(&self) -> Result<(Proposal, Vec<Output>), Error> {
+        let files = Files {
+            data: self.data.clone(),
+            test: Vec::new(),
+            model: self.model.clone(),
+        };
+        let model = model_file::read(&self.model)?;
+        let mut between = Vec::with_capacity(2);
+        for name in &self.between {
+            between.push(candidacy(&model, &self.model, name)?);
+        }
+        let &[first, second] = &between[..] else {
+            return Err(Error::Usage("--between takes two effects".to_owned()));
+        };
+        let problem: Problem = files.read()?;
+        let mut outputs = self.outputs(&files.all())?;
+        let bar = Bar::new();
+        let design = missing_effect::design::design(
+            &problem,
+            [first, second],
+            &self.limits(),
+            &Options::default(),
+            &|progress| bar.show(progress),
+        );
+        bar.clear();
+        let design = design.map_err(|error| files.blame(error))?;
+        // What tells nothing apart is not worth playing.
+        if design.prospect == Prospect::Twins {
+            outputs.retain(|output| output.kind() != Kind::Record);
+        }
+        Ok((Proposal::new(design, &model.columns), outputs))
+    }
+}

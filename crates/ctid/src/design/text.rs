@@ -1,0 +1,160 @@
+//! What a person reads of a design; all of it is derived from the struct that `--json` writes.
+
+use missing_effect::design::{Candidate, Design, Power, Rival};
+
+use crate::look::{Look, Side, table};
+use crate::numbers;
+
+/// How many experiments the table shows.
+const SHOWN: usize = 10;
+
+fn with_unit(number: &str, unit: &str) -> String {
+    format!("{number} {unit}").trim_end().to_string()
+}
+
+fn named(rival: &Rival) -> String {
+    match &rival.place {
+        Some(place) => format!("{} ({place})", rival.effect),
+        None => rival.effect.clone(),
+    }
+}
+
+/// What `ctid design` prints.
+#[must_use]
+pub fn design(design: &Design, look: Look) -> String {
+    rivals(design, look) + &experiments(design, look) + &findings(design, look)
+}
+
+/// The two effects on the records that there are.
+fn rivals(design: &Design, look: Look) -> String {
+    let [a, b] = &design.between;
+    let title = format!(
+        "{} or {}, on the records that there are",
+        named(a),
+        named(b)
+    );
+    let heading = ["effect", "BIC falls", "error after", "size found"];
+    let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
+    for rival in [a, b] {
+        let size = rival.size.as_ref().map_or(String::new(), |size| {
+            let name = size.name.rsplit('.').next().unwrap_or_default();
+            let (value, error) = numbers::value_and_error(size.value, size.std_error);
+            let error = error.map_or(String::new(), |error| format!(" ± {error}"));
+            with_unit(&format!("{name} {value}{error}"), &size.unit)
+        });
+        rows.push(vec![
+            named(rival),
+            numbers::whole(rival.bic_gain),
+            with_unit(&numbers::significant(rival.rmse, 3), &design.output_unit),
+            size,
+        ]);
+    }
+    let sides = [Side::Left, Side::Right, Side::Right, Side::Left];
+    lines(&look.heading(&title), &sides, &rows)
+}
+
+/// The experiments, the best first, and the same once more.
+fn experiments(design: &Design, look: Look) -> String {
+    let (unit, limits) = (&design.experiment.unit, &design.limits);
+    let what = if design.in_loop {
+        "reference"
+    } else {
+        "command"
+    };
+    let slew = limits.slew.map_or(String::new(), |slew| {
+        format!(
+            ", at most {} a second",
+            with_unit(&numbers::significant(slew, 3), unit)
+        )
+    });
+    let title = format!(
+        "Experiments with the {what} between {} and {} ({}{slew}), {}",
+        numbers::significant(limits.low, 3),
+        with_unit(&numbers::significant(limits.high, 3), unit),
+        limits.range_from,
+        numbers::duration(limits.duration)
+    );
+    let heading = [
+        "",
+        "experiment",
+        "range",
+        "held for",
+        "level",
+        "power",
+        "decides",
+    ];
+    let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
+    for (k, candidate) in design.candidates.iter().take(SHOWN).enumerate() {
+        rows.push(row(&(k + 1).to_string(), candidate, design));
+    }
+    rows.extend(design.again.iter().map(|again| row("", again, design)));
+    let sides = [
+        Side::Right,
+        Side::Left,
+        Side::Left,
+        Side::Right,
+        Side::Left,
+        Side::Right,
+        Side::Right,
+    ];
+    let mut text = lines(&look.heading(&title), &sides, &rows);
+    text.pop();
+    let more = design.candidates.len().saturating_sub(SHOWN);
+    if more > 0 {
+        text += &format!("  {}\n", look.faint(format!("and {more} more")));
+    }
+    let note = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to the levels of the records)";
+    text += &look.faint(look.paragraph("  ", note).trim_end());
+    text + "\n\n"
+}
+
+fn row(number: &str, candidate: &Candidate, design: &Design) -> Vec<String> {
+    let range = |low: f64, high: f64, unit: &str| {
+        let high = with_unit(&numbers::significant(high, 3), unit);
+        format!("{} .. {high}", numbers::significant(low, 3))
+    };
+    let mut kind = candidate.kind.name().to_string();
+    if let Some(levels) = candidate.levels {
+        kind += &format!(", {levels} levels");
+    }
+    let again = candidate.kind == missing_effect::design::Kind::Again;
+    vec![
+        number.to_string(),
+        kind,
+        range(candidate.low, candidate.high, &design.experiment.unit),
+        if again {
+            String::new()
+        } else {
+            format!("{} s", numbers::significant(candidate.clock, 3))
+        },
+        // The last level is the measured one.
+        candidate.reaches.last().map_or(String::new(), |reach| {
+            range(reach.low, reach.high, &design.output_unit)
+        }),
+        power(&candidate.power, candidate.refitted),
+        format!("{:.2}", candidate.power.decides),
+    ]
+}
+
+/// What is below a thousandth is nothing.
+fn power(power: &Power, refitted: bool) -> String {
+    let mark = if refitted { "" } else { "~" };
+    let shown = if power.power < 1e-3 { 0.0 } else { power.power };
+    format!("{mark}{}", numbers::significant(shown, 2))
+}
+
+fn findings(design: &Design, look: Look) -> String {
+    let mut text = format!("{}\n", look.heading("The next experiment"));
+    for sentence in &design.sentences {
+        text += &look.paragraph("  ", sentence);
+    }
+    text
+}
+
+fn lines(heading: &str, sides: &[Side], rows: &[Vec<String>]) -> String {
+    let mut text = format!("{heading}\n");
+    for line in table(sides, rows) {
+        text += &format!("  {line}\n");
+    }
+    text + "\n"
+}

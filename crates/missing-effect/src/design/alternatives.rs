@@ -1,0 +1,110 @@
+//! What could be done instead: the same again, over and over, over a wider range, or with a second sensor.
+
+use super::{
+    experiments::{Before, Search, Tried},
+    limits::Bounds,
+    plan::{Candidate, Power, Prospect, SecondSensor, Wider},
+    play::Loop,
+    power::{power, prospect, times_as_long},
+    second_sensor,
+    sequences::{Kind, Sequence},
+};
+use crate::Error;
+
+/// Nobody repeats an experiment more often.
+const MOST_TIMES: f64 = 20.0;
+
+impl Search<'_, '_> {
+    /// Played how many times over the experiment decides, if it does.
+    pub fn times_as_long(
+        &self,
+        (best, sequence): &Tried,
+        bounds: &Bounds,
+        before: &Before,
+    ) -> Option<usize> {
+        let times = times_as_long(&best.power, self.ahead_of_each())?.ceil();
+        let times = (times <= MOST_TIMES).then_some(times as usize)?;
+        let longer = sequence.repeated(times, bounds).ok()?;
+        let tried = self.tried(&longer, bounds, before)?;
+        (prospect(&tried.power) == Prospect::Decides && !tried.at_limit).then_some(times)
+    }
+
+    /// What a wider range would give.
+    pub fn wider(
+        &self,
+        bounds: &Bounds,
+        seed: u64,
+        before: &Before,
+    ) -> Result<Option<Wider>, Error> {
+        let in_loop = matches!(self.into, Loop::Closed(_));
+        let Some(wider) = bounds.wider(self.problem, in_loop) else {
+            return Ok(None);
+        };
+        let (mut promised, _) = self.promises(&wider, seed, before)?;
+        promised.sort_by(|(a, _), (b, _)| b.power.power.total_cmp(&a.power.power));
+        let best = promised
+            .first()
+            .and_then(|best| self.confirmed(best, &wider, before));
+        Ok(best.map(|best| Wider {
+            low: wider.low,
+            high: wider.high,
+            best,
+        }))
+    }
+
+    /// What the longest record played, once more.
+    pub fn again(&self, bounds: &Bounds, before: &Before) -> Option<Candidate> {
+        let records = self.problem.records.iter();
+        let record = records.max_by_key(|record| record.len())?;
+        let played = match (&self.into, &record.reference) {
+            (Loop::Closed(_), Some(reference)) => reference,
+            _ => &record.input,
+        };
+        let (low, high) = played.range();
+        let sequence = Sequence {
+            kind: Kind::Again,
+            clock: bounds.interval,
+            levels: None,
+            draw: None,
+            slew: None,
+            low,
+            high,
+            values: played.values.clone(),
+        };
+        let tried = self.tried(&sequence, bounds, before)?;
+        let tried = (tried, sequence);
+        self.confirmed(&tried, bounds, before).or(Some(tried.0))
+    }
+
+    pub fn second_sensor(
+        &self,
+        best: &Sequence,
+        bounds: &Bounds,
+        before: &Before,
+    ) -> Option<SecondSensor> {
+        let plant = self.problem.plant;
+        if plant.vessels() < 2 {
+            return None;
+        }
+        let played = self.played(&best.values, bounds.interval)?;
+        let existing = |truth: usize| {
+            let [truth, other] = [&self.nodes[truth], &self.nodes[1 - truth]];
+            second_sensor::in_existing(truth, other, self.metric)
+        };
+        let experiment = |truth: usize| {
+            let (node, other) = (&self.nodes[truth], &self.nodes[1 - truth]);
+            let known = &before.known[1 - truth];
+            second_sensor::in_experiment(&played[truth], node, other, known, self.metric)
+        };
+        // Records that were recorded anew have decided nothing yet: what is ahead is what a parameter costs.
+        let [a, b] = self.nodes.each_ref().map(|node| node.fit.parameters as f64);
+        let fewer = (b - a) * (self.nodes[0].setup.samples() as f64).ln();
+        let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };
+        Some(SecondSensor {
+            level: plant.level_name(0).to_string(),
+            existing_without: fresh(before.misfit.map(|misfit| misfit / self.metric.variance)),
+            existing_with: fresh([existing(0)?, existing(1)?]),
+            best_with: power([experiment(0)?, experiment(1)?], self.ahead_of_each()),
+        })
+    }
+}

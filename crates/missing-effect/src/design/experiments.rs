@@ -1,0 +1,323 @@
+//! The search among the sequences: all of them linearised, the most promising refitted.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use ct_signals::Record;
+use greybox::Triangle;
+use rayon::prelude::*;
+
+use super::{
+    limits::{Bounds, Refused},
+    plan::{Candidate, Reach, SecondSensor, Wider},
+    play::{Loop, Played, play},
+    power::power,
+    separation::{Metric, imagined, information, linear, misfit_before, refitted},
+    sequences::{Sequence, sequences},
+};
+use crate::{Error, Problem, Progress, search::Node};
+
+/// Experiments of a round of refits, and the most in all.
+const ROUND: usize = 6;
+const MOST_REFITS: usize = 30;
+/// More power than this is of no use: it decides even where the effect is half as large as the records make it.
+const PLENTY: f64 = 200.0;
+/// A sequence that drives a controller to a limit is played so that it crosses its range in so many time constants.
+const SLOWER: [f64; 2] = [1.0, 4.0];
+/// Excursions that differ by less than this are one.
+const SAME_EXCURSION: f64 = 0.1;
+
+/// What the search needs to know.
+pub(crate) struct Search<'s, 'a> {
+    pub problem: &'s Problem,
+    pub nodes: &'s [Node<'a>; 2],
+    pub metric: &'s Metric,
+    pub into: Loop<'s>,
+    /// The slowest of the plant \[s\].
+    pub time_constant: f64,
+    pub progress: &'s (dyn Fn(Progress) + Sync),
+}
+
+/// What it finds.
+pub(crate) struct Found {
+    pub candidates: Vec<Candidate>,
+    pub overfull: usize,
+    pub limited: usize,
+    pub best: Candidate,
+    /// The best one's sequence.
+    pub values: Vec<f64>,
+    pub again: Option<Candidate>,
+    pub wider: Option<Wider>,
+    pub times_as_long: Option<usize>,
+    pub second_sensor: Option<SecondSensor>,
+}
+
+/// A sequence and what it promises.
+pub(crate) type Tried = (Candidate, Sequence);
+
+/// What each node knows from the records, and how far each is from the other's simulation of them.
+pub(crate) struct Before {
+    pub known: [Triangle; 2],
+    imagined: [Vec<Record>; 2],
+    /// `misfit[i]`: of the other to what `i` imagines.
+    pub misfit: [f64; 2],
+    /// Smallest and largest level of each vessel, by either.
+    levels: Vec<(f64, f64)>,
+}
+
+impl Search<'_, '_> {
+    /// By how much the criterion of the second is above that of the first.
+    pub fn ahead(&self) -> f64 {
+        self.nodes[0].gain_over(&self.nodes[1])
+    }
+
+    /// By how much each is ahead of the other.
+    pub fn ahead_of_each(&self) -> [f64; 2] {
+        [self.ahead(), -self.ahead()]
+    }
+
+    fn before(&self) -> Result<Before, Error> {
+        let [a, b] = self.nodes;
+        let imagined = [imagined(a)?, imagined(b)?];
+        let misfit = [
+            misfit_before(&imagined[0], b, self.metric)?,
+            misfit_before(&imagined[1], a, self.metric)?,
+        ];
+        let levels = [
+            a.setup.simulate(&a.fit.x)?.level,
+            b.setup.simulate(&b.fit.x)?.level,
+        ];
+        let either = |vessel: usize| {
+            let [a, b] = levels.map(|level| level[vessel]);
+            (a.0.min(b.0), a.1.max(b.1))
+        };
+        Ok(Before {
+            levels: (0..self.problem.plant.vessels()).map(either).collect(),
+            known: [information(a), information(b)],
+            imagined,
+            misfit,
+        })
+    }
+
+    pub fn played(&self, values: &[f64], interval: f64) -> Option<[Played; 2]> {
+        let on = |i: usize| {
+            play(
+                &self.nodes[i],
+                &self.into,
+                values,
+                interval,
+                self.time_constant,
+            )
+        };
+        Some([on(0)?, on(1)?])
+    }
+
+    /// A sequence, linearised.
+    pub fn tried(
+        &self,
+        sequence: &Sequence,
+        bounds: &Bounds,
+        before: &Before,
+    ) -> Option<Candidate> {
+        let played = self.played(&sequence.values, bounds.interval)?;
+        let of = |truth: usize| {
+            let stand_in = 1 - truth;
+            let (node, known) = (&self.nodes[stand_in], &before.known[stand_in]);
+            linear(&played[truth], node, known, self.metric)
+        };
+        let plant = self.problem.plant;
+        let reaches: Vec<Reach> = (0..plant.vessels())
+            .map(|vessel| {
+                let either = played.each_ref().map(|played| played.levels[vessel]);
+                Reach {
+                    level: plant.level_name(vessel).to_string(),
+                    low: either[0].0.min(either[1].0),
+                    high: either[0].1.max(either[1].1),
+                }
+            })
+            .collect();
+        let beyond = |(reach, &(low, high)): (&Reach, &(f64, f64))| {
+            let outside = (low - reach.low).max(reach.high - high).max(0.0);
+            outside / (high - low).max(f64::MIN_POSITIVE)
+        };
+        let excursions = reaches.iter().zip(&before.levels).map(beyond);
+        Some(Candidate {
+            excursion: excursions.fold(0.0, f64::max),
+            at_limit: played.iter().any(|played| played.at_limit),
+            kind: sequence.kind,
+            low: sequence.low,
+            high: sequence.high,
+            clock: sequence.clock,
+            levels: sequence.levels,
+            draw: sequence.draw,
+            slew: sequence.slew,
+            power: power([of(0)?, of(1)?], self.ahead_of_each()),
+            refitted: false,
+            reaches,
+        })
+    }
+
+    /// A sequence, linearised; made slower where it would drive the controller to a limit.
+    fn off_the_limits(
+        &self,
+        sequence: Sequence,
+        bounds: &Bounds,
+        before: &Before,
+    ) -> Option<Tried> {
+        let first = self.tried(&sequence, bounds, before)?;
+        let span = sequence.high - sequence.low;
+        let time_constant = self.time_constant.min(bounds.duration);
+        for slower in SLOWER.into_iter().filter(|_| first.at_limit) {
+            let slew = span / (slower * time_constant);
+            let sequence = sequence.slowed(slew, bounds.interval).ok()?;
+            let candidate = self.tried(&sequence, bounds, before)?;
+            if !candidate.at_limit {
+                return Some((candidate, sequence));
+            }
+        }
+        Some((first, sequence))
+    }
+
+    /// The same, the other refitted.
+    pub fn confirmed(
+        &self,
+        (candidate, sequence): &Tried,
+        bounds: &Bounds,
+        before: &Before,
+    ) -> Option<Candidate> {
+        let played = self.played(&sequence.values, bounds.interval)?;
+        let of = |truth: usize| {
+            refitted(
+                &before.imagined[truth],
+                &played[truth],
+                &self.nodes[1 - truth],
+                before.misfit[truth],
+                self.metric,
+            )
+            .ok()
+        };
+        Some(Candidate {
+            power: power([of(0)?, of(1)?], self.ahead_of_each()),
+            refitted: true,
+            ..candidate.clone()
+        })
+    }
+
+    /// It would lead a level above the tank.
+    fn overfills(&self, candidate: &Candidate) -> bool {
+        let height = self.problem.known.tank_height.unwrap_or(f64::INFINITY);
+        candidate.reaches.iter().any(|reach| reach.high > height)
+    }
+
+    /// All sequences within limits, linearised, the best first; and how many would overfill a tank, or drive the controller to a
+    /// limit.
+    pub fn promises(
+        &self,
+        bounds: &Bounds,
+        seed: u64,
+        before: &Before,
+    ) -> Result<(Vec<Tried>, [usize; 2]), Error> {
+        let all = sequences(bounds, self.time_constant, seed)?;
+        let (total, done) = (all.len(), AtomicUsize::new(0));
+        let mut tried: Vec<Tried> = all
+            .into_par_iter()
+            .filter_map(|sequence| {
+                let tried = self.off_the_limits(sequence, bounds, before);
+                (self.progress)(Progress {
+                    phase: "trying experiments",
+                    done: done.fetch_add(1, Ordering::Relaxed) + 1,
+                    total,
+                });
+                tried
+            })
+            .collect();
+        let finite = tried.len();
+        tried.retain(|(candidate, _)| !self.overfills(candidate));
+        let overfull = finite - tried.len();
+        // At a limit the loop is open, and a fit of the loop only nearly right. Where nothing stays off the limits, so be it.
+        let mut limited = tried.iter().filter(|(tried, _)| tried.at_limit).count();
+        if limited < tried.len() {
+            tried.retain(|(candidate, _)| !candidate.at_limit);
+        } else {
+            limited = 0;
+        }
+        sort(&mut tried);
+        Ok((tried, [overfull, limited]))
+    }
+
+    /// Refits in rounds until a refit leads, so that no promise is above what a refit has shown.
+    fn refit(&self, tried: &mut Vec<Tried>, bounds: &Bounds, before: &Before) {
+        let mut done = 0;
+        while done < MOST_REFITS && tried.first().is_some_and(|(first, _)| !first.refitted) {
+            let wanted: Vec<usize> = (0..tried.len())
+                .filter(|&i| !tried[i].0.refitted)
+                .take(ROUND)
+                .collect();
+            done += wanted.len();
+            let confirmed: Vec<(usize, Option<Candidate>)> = wanted
+                .into_par_iter()
+                .map(|i| (i, self.confirmed(&tried[i], bounds, before)))
+                .collect();
+            // From behind, so that what cannot be refitted can be left out.
+            for (i, candidate) in confirmed.into_iter().rev() {
+                match candidate {
+                    Some(candidate) => tried[i].0 = candidate,
+                    None => drop(tried.remove(i)),
+                }
+            }
+            sort(tried);
+            (self.progress)(Progress {
+                phase: "confirming by refits",
+                done: done.min(MOST_REFITS),
+                total: MOST_REFITS,
+            });
+        }
+        // After so many rounds the best of those that were refitted.
+        tried.sort_by_key(|(candidate, _)| !candidate.refitted);
+    }
+
+    pub fn run(&self, bounds: &Bounds, seed: u64) -> Result<Found, Error> {
+        let before = self.before()?;
+        let (mut tried, [overfull, limited]) = self.promises(bounds, seed, &before)?;
+        self.refit(&mut tried, bounds, &before);
+        let Some((best, sequence)) = tried.first().cloned() else {
+            return Err(Refused::Overfull {
+                low: bounds.low,
+                high: bounds.high,
+                height: self.problem.known.tank_height.unwrap_or(f64::INFINITY),
+            }
+            .into());
+        };
+        let again = self.again(bounds, &before);
+        // More than plenty needs no wider range.
+        let wider = if best.power.power < PLENTY {
+            self.wider(bounds, seed, &before)?
+        } else {
+            None
+        };
+        let times_as_long = self.times_as_long(&(best.clone(), sequence.clone()), bounds, &before);
+        let second_sensor = self.second_sensor(&sequence, bounds, &before);
+        Ok(Found {
+            candidates: tried.into_iter().map(|(candidate, _)| candidate).collect(),
+            overfull,
+            limited,
+            best,
+            values: sequence.values,
+            again,
+            wider,
+            times_as_long,
+            second_sensor,
+        })
+    }
+}
+
+/// The best first: by power as far as it is of use, then by excursion, then by power.
+fn sort(tried: &mut [Tried]) {
+    let useful = |candidate: &Candidate| candidate.power.power.min(PLENTY);
+    let excursion = |candidate: &Candidate| (candidate.excursion / SAME_EXCURSION).floor();
+    tried.sort_by(|(a, _), (b, _)| {
+        useful(b)
+            .total_cmp(&useful(a))
+            .then(excursion(a).total_cmp(&excursion(b)))
+            .then(b.power.power.total_cmp(&a.power.power))
+    });
+}

@@ -1,0 +1,291 @@
+//! What the user allows an experiment to do, checked against the record and the plant.
+
+use ct_signals::{MIN_ROWS, ROWS_PER_PARAMETER, Record};
+use serde::Serialize;
+
+use crate::{Problem, numbers::significant};
+
+/// So much, to three digits and not less.
+fn at_least(value: f64) -> String {
+    let digit = 10_f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
+    let rounded = (value / digit - 1e-9).ceil() * digit;
+    format!("{}", significant(rounded, 3).parse().unwrap_or(rounded))
+}
+
+/// What an experiment may do; what is `None` follows from the records.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Limits {
+    /// Smallest and largest value of what is played: the command, or in a loop the reference. Without it what the records visited.
+    pub range: Option<(f64, f64)>,
+    /// Largest change of what is played in a second. Without it there is none.
+    pub slew: Option<f64>,
+    /// Length \[s\]. Without it that of the longest record.
+    pub duration: Option<f64>,
+    /// Seed of the sequences that are drawn.
+    pub seed: u64,
+}
+
+/// An experiment that cannot be proposed. The messages name the options of `ctid design`.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refused {
+    /// One effect twice.
+    #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
+    SameEffect {
+        /// The effect.
+        effect: String,
+    },
+    /// An effect could not be fitted.
+    #[error(
+        "{effect} cannot be fitted to these records; `ctid effects {effect}` says what it needs"
+    )]
+    NoFit {
+        /// The effect.
+        effect: String,
+    },
+    /// The range's ends are exchanged, equal or no numbers.
+    #[error("--range {low} {high}: the smaller value comes first, and they have to differ")]
+    Range {
+        /// First end.
+        low: f64,
+        /// Second end.
+        high: f64,
+    },
+    /// The range leaves what the plant can do.
+    #[error("--range {low} {high} leaves {from} .. {to}, {what}; stay within it")]
+    Beyond {
+        /// First end.
+        low: f64,
+        /// Second end.
+        high: f64,
+        /// Lower end of what is possible.
+        from: f64,
+        /// Upper end of what is possible.
+        to: f64,
+        /// What bounds it.
+        what: &'static str,
+    },
+    /// What is played never moved, and nobody says how far it may.
+    #[error(
+        "the records hold one {what} of {value} alone, which says nothing of where it may go; give --range"
+    )]
+    NoRange {
+        /// The command, or the reference.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// Too few samples.
+    #[error("--duration {duration} s holds {samples} samples at one every {interval} s, and {needed} are needed to fit the parameters; give at least {} s", at_least(*needed as f64 * interval))]
+    Duration {
+        /// The length \[s\].
+        duration: f64,
+        /// Samples in it.
+        samples: usize,
+        /// Samples that are needed.
+        needed: usize,
+        /// The sampling interval \[s\].
+        interval: f64,
+    },
+    /// So many samples that nobody meant it.
+    #[error(
+        "--duration {duration} s holds {samples} samples at one every {interval} s, and {most} are the most that are searched; give a shorter one"
+    )]
+    TooLong {
+        /// The length \[s\].
+        duration: f64,
+        /// Samples in it.
+        samples: usize,
+        /// The most.
+        most: usize,
+        /// The sampling interval \[s\].
+        interval: f64,
+    },
+    /// Too slow to get anywhere.
+    #[error("--slew {slew} a second moves by {} in {duration} s, less than the {} of the range; give at least {}", significant(*moves, 3), significant(*span, 3), at_least(span / duration))]
+    Slew {
+        /// Largest change in a second.
+        slew: f64,
+        /// How far that leads.
+        moves: f64,
+        /// The length \[s\].
+        duration: f64,
+        /// The range's width.
+        span: f64,
+    },
+    /// Everything that was tried would overfill a tank.
+    #[error(
+        "every experiment between {low} and {high} would lead above the tank_height of {height}; give a --range that stays lower"
+    )]
+    Overfull {
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+        /// Height of the tank.
+        height: f64,
+    },
+}
+
+/// The most samples of an experiment: a week at one a second is too many to search among.
+const MOST_SAMPLES: usize = 200_000;
+
+/// The limits as they hold, in seconds and the units of what is played.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bounds {
+    /// Smallest value.
+    pub low: f64,
+    /// Largest value.
+    pub high: f64,
+    /// Smallest and largest value in the records.
+    pub visited: (f64, f64),
+    /// Where the two come from.
+    pub range_from: &'static str,
+    /// Largest change in a second, where there is a limit.
+    pub slew: Option<f64>,
+    /// Length \[s\].
+    pub duration: f64,
+    /// Sampling interval \[s\].
+    pub interval: f64,
+    /// Samples.
+    pub samples: usize,
+}
+
+/// What the records visited of what is played.
+fn visited(records: &[Record], looped: bool) -> (f64, f64) {
+    let played = |record: &Record| match (&record.reference, looped) {
+        (Some(reference), true) => reference.range(),
+        _ => record.input_range(),
+    };
+    records
+        .iter()
+        .map(played)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| {
+            (a.0.min(b.0), a.1.max(b.1))
+        })
+}
+
+/// The limits of what can be played at all, and what sets them.
+fn possible(problem: &Problem, looped: bool) -> Option<(f64, f64, &'static str)> {
+    if looped {
+        let height = problem.known.tank_height?;
+        return Some((0.0, height, "the tank_height of the model file"));
+    }
+    let most = problem.known.input_range?;
+    // A command that has been negative may be so again.
+    let low = visited(&problem.records, false).0.min(0.0);
+    Some((low, most, "the input_range of the model file"))
+}
+
+impl Bounds {
+    /// The limits for the records of a problem; `parameters` are fitted to the experiment alone.
+    pub(crate) fn new(
+        problem: &Problem,
+        limits: &Limits,
+        looped: bool,
+        parameters: usize,
+    ) -> Result<Self, Refused> {
+        let seen = visited(&problem.records, looped);
+        let ((low, high), range_from) = match limits.range {
+            Some(range) => (range, "as given"),
+            None => (seen, "what the records visited"),
+        };
+        if !(low.is_finite() && high.is_finite() && low < high) {
+            return Err(match limits.range {
+                Some((low, high)) => Refused::Range { low, high },
+                None => Refused::NoRange {
+                    what: if looped { "reference" } else { "command" },
+                    value: low,
+                },
+            });
+        }
+        if let (Some((from, to, what)), Some(_)) = (possible(problem, looped), limits.range)
+            && (low < from || high > to)
+        {
+            return Err(Refused::Beyond {
+                low,
+                high,
+                from,
+                to,
+                what,
+            });
+        }
+        let longest = |of: fn(&Record) -> f64| problem.records.iter().map(of).fold(0.0, f64::max);
+        let interval = problem
+            .records
+            .iter()
+            .map(Record::sample_interval)
+            .fold(f64::INFINITY, f64::min);
+        let duration = limits
+            .duration
+            .unwrap_or_else(|| longest(Record::duration) + interval);
+        let samples = (duration / interval + 1e-9).floor();
+        let samples = if samples.is_finite() && samples > 0.0 {
+            samples as usize
+        } else {
+            0
+        };
+        let needed = MIN_ROWS.max(parameters * ROWS_PER_PARAMETER);
+        if samples < needed {
+            return Err(Refused::Duration {
+                duration,
+                samples,
+                needed,
+                interval,
+            });
+        }
+        if samples > MOST_SAMPLES {
+            return Err(Refused::TooLong {
+                duration,
+                samples,
+                most: MOST_SAMPLES,
+                interval,
+            });
+        }
+        if let Some(slew) = limits.slew {
+            let moves = slew * duration;
+            if slew.is_nan() || moves < high - low {
+                return Err(Refused::Slew {
+                    slew,
+                    moves,
+                    duration,
+                    span: high - low,
+                });
+            }
+        }
+        Ok(Self {
+            low,
+            high,
+            visited: seen,
+            range_from,
+            slew: limits.slew.filter(|slew| slew.is_finite()),
+            duration,
+            interval,
+            samples,
+        })
+    }
+
+    /// A wider range that the user might allow: all that is possible, or half as far again either way.
+    pub(crate) fn wider(&self, problem: &Problem, looped: bool) -> Option<Self> {
+        let (low, high) = match possible(problem, looped) {
+            Some((from, to, _)) if !looped => (from, to),
+            other => {
+                let more = 0.25 * (self.high - self.low);
+                let (from, to) = other.map_or((f64::NEG_INFINITY, f64::INFINITY), |p| (p.0, p.1));
+                // What has never been negative stays so.
+                let from = if self.low >= 0.0 { from.max(0.0) } else { from };
+                ((self.low - more).max(from), (self.high + more).min(to))
+            }
+        };
+        // What the slew cannot cross is no wider range.
+        let reaches = self
+            .slew
+            .is_none_or(|slew| slew * self.duration >= high - low);
+        (high - low > 1.01 * (self.high - self.low) && reaches).then(|| Self {
+            low,
+            high,
+            range_from: "a wider range",
+            ..self.clone()
+        })
+    }
+}

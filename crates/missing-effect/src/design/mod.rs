@@ -1,0 +1,213 @@
+//! The next experiment: the one that tells two effects apart which the records leave undecided.
+//!
+//! Each of the two is fitted to the records. Sequences within the user's limits are then played on either fit, and it is
+//! reckoned how far the other stays behind what they show (`separation.rs`). The most promising are confirmed by refits.
+
+mod alternatives;
+mod experiments;
+mod limits;
+mod plan;
+mod play;
+mod power;
+mod second_sensor;
+mod separation;
+mod sequences;
+mod words;
+
+#[cfg(test)]
+mod tests;
+
+use std::time::Instant;
+
+use ct_signals::ArModel;
+use plants::{EffectInfo, Placed};
+
+pub use limits::{Bounds, Limits, Refused};
+pub use plan::{Candidate, Design, Power, Prospect, Reach, Rival, SecondSensor, Sequence, Wider};
+pub use sequences::Kind;
+
+use crate::{
+    Error, Options, Problem, Progress,
+    control_loop::slowest_time_constant,
+    noise_floor::colour,
+    problem::base,
+    search::{FINE, Node, place, refine},
+    step,
+};
+use experiments::Search;
+use play::Loop;
+use separation::Metric;
+
+/// An effect, and the vessel it is to act in; `None`: the one in which it explains the records best.
+#[derive(Debug, Clone, Copy)]
+pub struct Candidacy {
+    /// The effect.
+    pub effect: &'static EffectInfo,
+    /// The vessel.
+    pub vessel: Option<usize>,
+}
+
+impl Candidacy {
+    fn is_that_of(self, other: Self) -> bool {
+        let same_place = self.vessel.is_none() || other.vessel.is_none();
+        self.effect.id == other.effect.id && (same_place || self.vessel == other.vessel)
+    }
+}
+
+/// Both rivals on the records, and the metric in which they are compared.
+struct Fitted<'a> {
+    nodes: [Node<'a>; 2],
+    base: Node<'a>,
+    metric: Metric,
+}
+
+/// Proposes the next experiment.
+///
+/// # Errors
+/// [`Error::Design`] where the limits or the effects do not allow one; else where the records, the plant or the fit do not allow it.
+pub fn design(
+    problem: &Problem,
+    between: [Candidacy; 2],
+    limits: &Limits,
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Design, Error> {
+    let begun = Instant::now();
+    if between[0].is_that_of(between[1]) {
+        let effect = between[0].effect.id.to_string();
+        return Err(Refused::SameEffect { effect }.into());
+    }
+    // What is wrong with the limits is said before anything is computed, as far as it can be.
+    let looped = problem.controller.is_some() && options.simulate_loop;
+    let has_reference = problem.records.iter().all(|r| r.reference.is_some());
+    Bounds::new(problem, limits, looped && has_reference, 0)?;
+    progress(Progress {
+        phase: "fitting both effects",
+        done: 0,
+        total: 1,
+    });
+    let fitted = fitted(problem, between, options)?;
+    let in_loop = !fitted.base.setup.replays().is_empty();
+    let parameters = fitted.nodes.iter().map(|node| node.setup.free().len());
+    let bounds = Bounds::new(problem, limits, in_loop, parameters.max().unwrap_or(0))?;
+    let search = Search {
+        problem,
+        nodes: &fitted.nodes,
+        metric: &fitted.metric,
+        into: match &problem.controller {
+            Some(controller) if in_loop => Loop::Closed(controller),
+            _ => Loop::Open,
+        },
+        time_constant: slowest_time_constant(fitted.best())?,
+        progress,
+    };
+    let found = search.run(&bounds, limits.seed)?;
+    let of_played = match (&problem.records[0].reference, in_loop) {
+        (Some(reference), true) => reference,
+        _ => &problem.records[0].input,
+    };
+    let mut design = Design {
+        schema: 1,
+        between: [0, 1].map(|i| rival(&fitted, i)),
+        bic_ahead: search.ahead(),
+        prospect: power::prospect(&found.best.power),
+        in_loop,
+        candidates: found.candidates,
+        overfull: found.overfull,
+        limited: found.limited,
+        again: found.again,
+        wider: found.wider,
+        times_as_long: found.times_as_long,
+        second_sensor: found.second_sensor,
+        experiment: Sequence {
+            name: of_played.name.clone(),
+            unit: of_played.unit.clone(),
+            time: (0..found.values.len())
+                .map(|k| k as f64 * bounds.interval)
+                .collect(),
+            values: found.values,
+        },
+        limits: bounds,
+        noise_floor: fitted.metric.noise.stationary_std() / fitted.metric.noise.sigma()
+            * fitted.metric.variance.sqrt(),
+        sentences: Vec::new(),
+        plant: problem.plant.id().to_string(),
+        output_unit: problem.records[0].output.unit.clone(),
+        seconds: 0.0,
+    };
+    design.sentences = words::of(&design);
+    design.seconds = begun.elapsed().as_secs_f64();
+    Ok(design)
+}
+
+impl<'a> Fitted<'a> {
+    fn best(&self) -> &Node<'a> {
+        let [a, b] = &self.nodes;
+        if b.fit.bic() < a.fit.bic() { b } else { a }
+    }
+}
+
+/// Both effects fitted to the records, in the metric of the noise that the better of them leaves.
+fn fitted<'a>(
+    problem: &'a Problem,
+    between: [Candidacy; 2],
+    options: &Options,
+) -> Result<Fitted<'a>, Error> {
+    let (base, _) = base(problem, options)?;
+    for Candidacy { effect, vessel } in between {
+        let vessel = vessel.unwrap_or_else(|| effect.usual_site(problem.plant));
+        base.setup.structure.with(Placed { effect, vessel })?;
+    }
+    let white = ArModel::white(1.0);
+    let fits = |candidacy: Candidacy| {
+        let sites = candidacy.effect.sites(problem.plant);
+        sites
+            .filter(|site| candidacy.vessel.is_none_or(|vessel| vessel == *site))
+            .filter_map(|vessel| {
+                let effect = candidacy.effect;
+                place(&base, Placed { effect, vessel }, &base, &white, FINE)
+            })
+            .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
+            .ok_or_else(|| no_fit(candidacy))
+    };
+    let rough = [fits(between[0])?, fits(between[1])?];
+    let better = usize::from(rough[1].fit.bic() < rough[0].fit.bic());
+    let noise = colour(&rough[better])?;
+    let refined = |i: usize| -> Result<Node<'a>, Error> {
+        place(&base, rough[i].added[0], &rough[i], &noise, FINE)
+            .ok_or_else(|| no_fit(between[i]).into())
+    };
+    let nodes = [refined(0)?, refined(1)?];
+    let variance = if nodes[1].fit.bic() < nodes[0].fit.bic() {
+        nodes[1].fit.variance()
+    } else {
+        nodes[0].fit.variance()
+    };
+    Ok(Fitted {
+        nodes,
+        base: refine(&base, &noise, &[])?,
+        metric: Metric { noise, variance },
+    })
+}
+
+fn no_fit(candidacy: Candidacy) -> Refused {
+    Refused::NoFit {
+        effect: candidacy.effect.id.to_string(),
+    }
+}
+
+fn rival(fitted: &Fitted, i: usize) -> Rival {
+    let node = &fitted.nodes[i];
+    let placed = node.added[0];
+    let parameters = step::parameters(&node.setup, &node.fit, &node.fit.std_errors());
+    let own = format!("{}.", placed.effect.id);
+    Rival {
+        effect: placed.effect.id.to_string(),
+        place: step::place_name(node, placed),
+        size: parameters.into_iter().find(|p| p.name.starts_with(&own)),
+        at_the_edge: node.at_the_edge(placed),
+        rmse: node.fit.rmse,
+        bic_gain: node.gain_over(&fitted.base),
+        confirm: placed.effect.confirm.to_string(),
+    }
+}

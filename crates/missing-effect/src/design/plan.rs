@@ -1,0 +1,171 @@
+//! The result of a design: plain structs, written as JSON as they stand; everything that is printed is derived from them.
+
+use serde::Serialize;
+
+use super::{limits::Bounds, sequences::Kind};
+use crate::Parameter;
+
+/// One of the two effects that are to be told apart.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rival {
+    /// The effect.
+    pub effect: String,
+    /// The vessel it acts in, where the plant has more than one: `upper` or `lower`.
+    pub place: Option<String>,
+    /// The size that the records give it.
+    pub size: Option<Parameter>,
+    /// The size ends at the edge of what is plausible.
+    pub at_the_edge: bool,
+    /// Root mean square of the simulation error with it on the records, in the output's unit.
+    pub rmse: f64,
+    /// By how much it lowers the criterion of the believed model.
+    pub bic_gain: f64,
+    /// How a person confirms it at the plant.
+    pub confirm: String,
+}
+
+/// How far an experiment takes the two apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Power {
+    /// The smaller of the two below.
+    pub power: f64,
+    /// By how much the deviance of the other is above that of the true one on average, were the first true, were the second true.
+    pub if_true: [f64; 2],
+    /// Probability that all records together then decide for the true one, by more than 6 in the criterion; the smaller of the two.
+    pub decides: f64,
+}
+
+/// From where to where a level moves in an experiment, by either model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reach {
+    /// Its name: `level`, or `level_upper` and `level_lower`.
+    pub level: String,
+    /// Lowest, in the output's unit.
+    pub low: f64,
+    /// Highest, in the output's unit.
+    pub high: f64,
+}
+
+/// One experiment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Kind of the sequence.
+    pub kind: Kind,
+    /// Its smallest value.
+    pub low: f64,
+    /// Its largest value.
+    pub high: f64,
+    /// How long a level is held \[s\].
+    pub clock: f64,
+    /// Levels of a staircase.
+    pub levels: Option<usize>,
+    /// Which of several draws of a multi-level sequence.
+    pub draw: Option<u64>,
+    /// It changes by at most so much in a second, where it was made slower than the limits ask for, to keep a controller off its
+    /// limits.
+    pub slew: Option<f64>,
+    /// What it gives.
+    pub power: Power,
+    /// The power is that of a refit; otherwise that of the models linearised at their fits.
+    pub refitted: bool,
+    /// Where the levels go.
+    pub reaches: Vec<Reach>,
+    /// How far a level leaves what it visited in the records, as a part of that: beyond it neither model is known.
+    pub excursion: f64,
+    /// In a loop: the controller comes to a limit, where the loop is open.
+    pub at_limit: bool,
+}
+
+/// What a wider range would give.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Wider {
+    /// Its lower end.
+    pub low: f64,
+    /// Its upper end.
+    pub high: f64,
+    /// The best experiment within it.
+    pub best: Candidate,
+}
+
+/// What another sensor would give: the other level measured too, with the same noise.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SecondSensor {
+    /// The level that is not measured.
+    pub level: String,
+    /// In records like those that there are, the one level measured that is.
+    pub existing_without: Power,
+    /// In records like those that there are, both levels measured.
+    pub existing_with: Power,
+    /// In the best experiment, both levels measured there.
+    pub best_with: Power,
+}
+
+/// What a person plays to the plant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sequence {
+    /// Name of what is played: that of the command, or in a loop that of the reference.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Instants \[s\].
+    pub time: Vec<f64>,
+    /// Values, each held until the next instant as the model file has it.
+    pub values: Vec<f64>,
+}
+
+/// What can be hoped for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Prospect {
+    /// The best experiment will very probably decide.
+    Decides,
+    /// It may.
+    May,
+    /// It will hardly, within these limits.
+    Hardly,
+    /// The two show the same in every experiment that was tried.
+    Twins,
+}
+
+/// The next experiment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Design {
+    /// Version of this layout.
+    pub schema: u32,
+    /// The two effects.
+    pub between: [Rival; 2],
+    /// By how much the criterion of the second is above that of the first on the records that there are.
+    pub bic_ahead: f64,
+    /// What the best experiment can be expected to do.
+    pub prospect: Prospect,
+    /// The reference of the loop is played, not the command.
+    pub in_loop: bool,
+    /// The limits that hold.
+    pub limits: Bounds,
+    /// The experiments, the best first: of those that have power in plenty the one that stays nearest to what the records visited.
+    pub candidates: Vec<Candidate>,
+    /// Experiments that were left out because they would overfill a tank.
+    pub overfull: usize,
+    /// Experiments that were left out because they would drive the controller to a limit.
+    pub limited: usize,
+    /// What the longest record played, once more.
+    pub again: Option<Candidate>,
+    /// The best of a wider range, where there is one to be had.
+    pub wider: Option<Wider>,
+    /// Played so many times over, the best experiment would decide; `None` where it does already, or would not.
+    pub times_as_long: Option<usize>,
+    /// What a second sensor would give, where the plant has another level.
+    pub second_sensor: Option<SecondSensor>,
+    /// The best experiment.
+    pub experiment: Sequence,
+    /// Standard deviation of the noise, in the output's unit.
+    pub noise_floor: f64,
+    /// The findings in words.
+    pub sentences: Vec<String>,
+    /// The plant, as the model file names it.
+    pub plant: String,
+    /// Unit of the output.
+    pub output_unit: String,
+    /// How long it took \[s\].
+    pub seconds: f64,
+}

@@ -1,0 +1,168 @@
+//! An experiment played on a fitted model: without noise, from rest, in the loop where there is one.
+
+use ct_signals::{Hold, Record, Signal};
+use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller};
+
+use crate::search::Node;
+
+/// What the experiment is played into.
+#[derive(Debug, Clone)]
+pub(crate) enum Loop<'a> {
+    /// The command itself.
+    Open,
+    /// The reference of this controller.
+    Closed(&'a Controller),
+}
+
+/// What came out.
+#[derive(Debug, Clone)]
+pub(crate) struct Played {
+    /// The record that the experiment would give, free of noise.
+    pub record: Record,
+    /// Levels when it began.
+    pub initial: Vec<f64>,
+    /// A controller came to a limit.
+    pub at_limit: bool,
+    /// Smallest and largest level of each vessel.
+    pub levels: Vec<(f64, f64)>,
+}
+
+/// Time constants for which the plant is left to settle, and the most samples that this takes in a loop.
+const SETTLE: f64 = 12.0;
+const MOST_SETTLING: usize = 20_000;
+/// Parts of a time constant in which a plant without a loop settles.
+const PARTS: f64 = 4.0;
+
+/// Where it settles under the first value: levels, and the command.
+struct Rest {
+    levels: [f64; MAX_VESSELS],
+    command: f64,
+    /// The controller's states are those of this regulator.
+    regulator: Option<plants::controller::Regulator<f64>>,
+}
+
+/// The structure in which the plant settles, and its parameters: what follows the clock begins with the record, and has not
+/// run before.
+fn settling(node: &Node) -> (Structure, Vec<f64>) {
+    let setup = &node.setup;
+    let mut structure = setup.structure.clone();
+    for placed in setup.structure.effects() {
+        if placed.effect.by_clock {
+            structure = structure.without(placed.effect);
+        }
+    }
+    let names = setup.names();
+    let theta = structure
+        .parameter_names()
+        .iter()
+        .filter_map(|name| names.iter().position(|known| known == name))
+        .map(|at| node.fit.x[at])
+        .collect();
+    (structure, theta)
+}
+
+fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64) -> Option<Rest> {
+    let (structure, theta) = settling(node);
+    let scales = &structure.scales;
+    let vessels = structure.plant.vessels();
+    let levels = &scales.operating_level[..vessels];
+    let middle = 0.5 * (scales.input.0 + scales.input.1);
+    let slowest = time_constant.min(scales.duration);
+    match into {
+        Loop::Open => {
+            let mut simulator = Simulator::<f64>::new(&structure, &theta, levels, first).ok()?;
+            simulator.set_substeps(node.setup.substeps);
+            let step = (slowest / PARTS).max(interval);
+            for _ in 0..(SETTLE * PARTS) as usize {
+                simulator.advance(Command::held(first), step);
+            }
+            Some(Rest {
+                levels: simulator.levels(),
+                command: first,
+                regulator: None,
+            })
+        }
+        Loop::Closed(controller) => {
+            let mut simulator = Simulator::<f64>::new(&structure, &theta, levels, middle).ok()?;
+            simulator.set_substeps(node.setup.substeps);
+            // All of the command in the state that it sees.
+            let seen = controller.linear(interval).c;
+            let states: Vec<f64> = seen.iter().map(|c| c * middle).collect();
+            let mut regulator = controller.start(&states);
+            let mut command = middle;
+            let steps = (SETTLE * slowest / interval) as usize;
+            for _ in 0..steps.clamp(1, MOST_SETTLING) {
+                command = regulator.command(first, simulator.read(), interval);
+                simulator.advance(Command::held(command), interval);
+            }
+            Some(Rest {
+                levels: simulator.levels(),
+                command,
+                regulator: Some(regulator),
+            })
+        }
+    }
+}
+
+/// Plays a sequence; `None` where the simulation does not stay finite.
+pub(crate) fn play(
+    node: &Node,
+    into: &Loop,
+    values: &[f64],
+    interval: f64,
+    time_constant: f64,
+) -> Option<Played> {
+    let setup = &node.setup;
+    let of = &setup.records[0];
+    let first = *values.first()?;
+    let mut rest = rest(node, into, first, interval, time_constant)?;
+    let vessels = setup.structure.plant.vessels();
+    let initial = rest.levels[..vessels].to_vec();
+    let theta = &node.fit.x[..setup.parameter_count()];
+    let mut simulator =
+        Simulator::<f64>::new(&setup.structure, theta, &initial, rest.command).ok()?;
+    simulator.set_substeps(setup.substeps);
+    let (mut input, mut output, mut at_limit) = (Vec::new(), Vec::new(), false);
+    let mut levels = vec![(f64::INFINITY, f64::NEG_INFINITY); vessels];
+    for (k, &value) in values.iter().enumerate() {
+        let reading = simulator.read();
+        for (range, level) in levels.iter_mut().zip(simulator.levels()) {
+            *range = (range.0.min(level), range.1.max(level));
+        }
+        let command = match &mut rest.regulator {
+            Some(regulator) => {
+                let command = regulator.command(value, reading, interval);
+                at_limit |= regulator.limited();
+                Command::held(command)
+            }
+            None if of.hold == Hold::First => {
+                Command::ramp(value, values.get(k + 1).copied().unwrap_or(value))
+            }
+            None => Command::held(value),
+        };
+        simulator.advance(command, interval);
+        input.push(command.from);
+        output.push(reading);
+    }
+    let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+    if !(finite(&input) && finite(&output) && finite(&initial)) {
+        return None;
+    }
+    let signal = |of: &Signal, values| Signal::new(of.name.clone(), of.unit.clone(), values);
+    Some(Played {
+        record: Record {
+            name: "the experiment".to_string(),
+            time: (0..values.len()).map(|k| k as f64 * interval).collect(),
+            input: signal(&of.input, input),
+            output: signal(&of.output, output),
+            reference: match (into, &of.reference) {
+                (Loop::Closed(_), Some(reference)) => Some(signal(reference, values.to_vec())),
+                _ => None,
+            },
+            hold: of.hold,
+        },
+        initial,
+        at_limit,
+        levels,
+    })
+}

@@ -1,0 +1,90 @@
+//! From a separation to what may be hoped for.
+
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::plan::{Power, Prospect};
+use crate::diagnose::GROUP_MARGIN;
+
+/// A decision as good as certain, as likely, and what the criterion does not notice.
+const SURE: f64 = 0.9;
+const LIKELY: f64 = 0.5;
+const NOTHING: f64 = 1.0;
+/// Quantile of the probability that a longer experiment is to reach.
+const WANTED: f64 = 1.645;
+
+/// The probability that the criterion of the false one ends above that of the true one by more than [`GROUP_MARGIN`]: their
+/// difference, `ahead` before, is normal with mean `ahead + lambda` and variance `4 lambda`.
+fn decides(lambda: f64, ahead: f64) -> f64 {
+    let margin = lambda + ahead - GROUP_MARGIN;
+    if lambda <= 0.0 {
+        return if margin > 0.0 { 1.0 } else { 0.0 };
+    }
+    Normal::standard().cdf(margin / (2.0 * lambda.sqrt()))
+}
+
+/// From the noncentralities, were the first true and were the second, and by how much each is ahead before.
+pub(crate) fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
+    let [a, b] = if_true;
+    Power {
+        power: a.min(b),
+        if_true,
+        decides: decides(a, ahead[0]).min(decides(b, ahead[1])),
+    }
+}
+
+pub(crate) fn prospect(power: &Power) -> Prospect {
+    if power.power < NOTHING {
+        Prospect::Twins
+    } else if power.decides >= SURE {
+        Prospect::Decides
+    } else if power.decides >= LIKELY {
+        Prospect::May
+    } else {
+        Prospect::Hardly
+    }
+}
+
+/// So many times as long should decide with a probability of 0.95, where a noncentrality grows as the length.
+///
+/// `lambda + ahead - 6 = 1.645 x 2 sqrt(lambda)`, solved for the root of `lambda`.
+pub(crate) fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
+    if prospect(power) == Prospect::Decides || prospect(power) == Prospect::Twins {
+        return None;
+    }
+    let needed = |ahead: f64| {
+        let root = WANTED + (WANTED * WANTED + (GROUP_MARGIN - ahead)).max(0.0).sqrt();
+        root * root
+    };
+    let times = |i: usize| needed(ahead[i]) / power.if_true[i];
+    Some(times(0).max(times(1))).filter(|times| times.is_finite() && *times > 1.0)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn probabilities_follow_the_noncentrality() {
+        // Mean 6 + 2, deviation 4: more than 6 in 0.6915 of the cases.
+        let found = power([4.0, 9.0], [4.0, 4.0]);
+        assert_eq!(found.power, 4.0);
+        assert!((found.decides - Normal::standard().cdf(0.5)).abs() < 1e-12);
+        assert_eq!(power([0.0, 0.0], [0.0, 0.0]).decides, 0.0);
+        assert_eq!(prospect(&power([0.1, 50.0], [0.0, 0.0])), Prospect::Twins);
+        assert_eq!(
+            prospect(&power([50.0, 60.0], [0.0, 0.0])),
+            Prospect::Decides
+        );
+        assert_eq!(prospect(&power([3.0, 60.0], [0.0, 0.0])), Prospect::Hardly);
+    }
+
+    #[test]
+    fn so_many_times_as_long_decides() {
+        let ahead = [1.0, -1.0];
+        let found = power([3.0, 5.0], ahead);
+        let times = times_as_long(&found, ahead).unwrap();
+        let longer = power(found.if_true.map(|lambda| times * lambda), ahead);
+        assert!((longer.decides - 0.95).abs() < 1e-3, "{}", longer.decides);
+    }
+}

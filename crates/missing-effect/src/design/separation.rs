@@ -1,0 +1,159 @@
+//! How far apart an experiment takes two models: the least misfit of the one to what the other would show.
+//!
+//! Let A be true. The experiment shows `y_A + v`. Model B answers with the parameters that imitate `y_A` best, but it still has
+//! to fit the existing record, and its initial levels are free. In the metric of the noise, linearised at B's fit:
+//! ```text
+//! lambda_A = min over d, l of  ( |y_A - y_B - J d - L l|^2 + |R d|^2 ) / sigma^2
+//! ```
+//! `J` the derivatives with respect to B's parameters, `L` to its initial states in the experiment, `R'R` the information of
+//! the existing record on the parameters, its own initial states eliminated. `lambda` is a noncentrality: by so much the deviance of
+//! B is above that of A on average, and its standard deviation is `2 sqrt(lambda)`, as twice the logarithm of a likelihood ratio
+//! of two fixed means has it.
+//!
+//! **The local form** of the literature is `c^2 |p_A|^2 (1 - rho^2) / sigma^2`, `p` the signature of an effect at its absent value beside
+//! what the base's parameters imitate, `rho` the cosine of the two. It follows from the above where the size `c` is small (then `y_A` less
+//! the base is `c j_A`, and B's own derivative is `j_B`) and where no record is there before (`R = 0`): projecting `c j_A` off the
+//! base's columns leaves `c p_A`, and off `p_B` as well `c^2 |p_A|^2 (1 - rho^2)`.
+//!
+//! **In a loop** the command is the one that the controller gives to A without noise, and B answers to it. Simulating B's loop from the
+//! reference and filtering by `1 + P C`, as the fits do, comes to the same: `(1 + P_B C)(y_A - y_B) = y_A - P_B u_A` for
+//! `y_B = P_B C (r - y_B)` and `u_A = C (r - y_A)`.
+//!
+//! **The refit** does without the straight line: B is fitted to A's simulation of the existing records and of the experiment, both free of
+//! noise; from its misfit the one to the existing records alone is taken off.
+
+use ct_signals::{ArModel, Record};
+use greybox::{Setup, Triangle, fit_from, starts_around};
+
+use super::play::Played;
+use crate::{
+    Error,
+    search::{FINE, Node},
+};
+
+/// Starts around B's fit beside itself.
+const STARTS_AROUND: usize = 4;
+
+/// The metric in which both are compared.
+#[derive(Debug, Clone)]
+pub(crate) struct Metric {
+    /// The noise.
+    pub noise: ArModel,
+    /// Variance of its innovations \[output unit squared\].
+    pub variance: f64,
+}
+
+/// A model's information on its free parameters from the records that are there: rows `[R | 0]`, the initial states eliminated.
+pub(crate) fn information(node: &Node) -> Triangle {
+    let setup = &node.setup;
+    let count = setup.parameter_count();
+    let (parameters, states): (Vec<usize>, Vec<usize>) =
+        (0..setup.free().len()).partition(|&column| setup.free()[column] < count);
+    let order: Vec<usize> = states.iter().chain(&parameters).copied().collect();
+    let all = node.fit.triangle.select(&order);
+    let mut own = Triangle::new(parameters.len());
+    for i in states.len()..order.len() {
+        let row: Vec<f64> = (states.len()..order.len()).map(|j| all.at(i, j)).collect();
+        own.push(&row);
+    }
+    own.finish();
+    own
+}
+
+/// A model's vector for an experiment: its parameters, the levels at which it begins, lags at rest.
+pub(crate) fn vector(node: &Node, setup: &Setup, played: &Played) -> Vec<f64> {
+    let mut x = node.fit.x[..node.setup.parameter_count()].to_vec();
+    x.extend(&played.initial);
+    x.resize(setup.names().len(), 0.0);
+    x
+}
+
+/// The least of `|rows|^2` over the first columns, what is known of the leading ones added; the last column is the residual.
+pub(crate) fn least(rows: &Triangle, known: &Triangle) -> f64 {
+    let columns = rows.columns();
+    let mut all = Triangle::new(columns);
+    let mut row = vec![0.0; columns];
+    for i in 0..columns {
+        for (j, value) in row.iter_mut().enumerate() {
+            *value = rows.at(i, j);
+        }
+        all.push(&row);
+    }
+    for i in 0..known.columns() {
+        row.fill(0.0);
+        for (j, value) in row[..known.columns()].iter_mut().enumerate() {
+            *value = known.at(i, j);
+        }
+        all.push(&row);
+    }
+    all.finish();
+    let free: Vec<usize> = (0..columns - 1).collect();
+    let step = all.solve(&free, &[], 0.0);
+    all.predicted(&step)
+}
+
+/// The linear form: what a model cannot imitate of an experiment that was played on the other.
+pub(crate) fn linear(
+    played: &Played,
+    stand_in: &Node,
+    known: &Triangle,
+    metric: &Metric,
+) -> Option<f64> {
+    let records = std::slice::from_ref(&played.record);
+    let setup = stand_in.setup.with_records(records).ok()?;
+    let x = vector(stand_in, &setup, played);
+    let rows = setup.linearise(&x, &metric.noise)?;
+    Some(least(&rows, known) / metric.variance)
+}
+
+/// One model's simulation of the existing records.
+pub(crate) fn imagined(truth: &Node) -> Result<Vec<Record>, Error> {
+    let outputs = truth.setup.simulate(&truth.fit.x)?.output;
+    let records = truth.setup.records.iter().zip(outputs);
+    Ok(records
+        .map(|(record, output)| {
+            let mut record = record.clone();
+            record.output.values = output;
+            record
+        })
+        .collect())
+}
+
+/// The parameters and the plant's initial states of a node, in the order of a setup without a loop.
+pub(crate) fn unlooped(node: &Node) -> Vec<f64> {
+    let mut x = node.fit.x[..node.setup.parameter_count()].to_vec();
+    for r in 0..node.setup.records.len() {
+        x.extend(&node.fit.x[node.setup.plant_states_of(r)]);
+    }
+    x
+}
+
+/// The misfit of a model to another's simulation of the existing records, refitted \[output unit squared\].
+pub(crate) fn misfit_before(
+    existing: &[Record],
+    stand_in: &Node,
+    metric: &Metric,
+) -> Result<f64, Error> {
+    let setup = stand_in.setup.with_records(existing)?;
+    Ok(fit_from(&setup, &[unlooped(stand_in)], &metric.noise, FINE)?.cost)
+}
+
+/// The same with the experiment among the records, in units of the noise and beyond what was there `before`.
+pub(crate) fn refitted(
+    existing: &[Record],
+    played: &Played,
+    stand_in: &Node,
+    before: f64,
+    metric: &Metric,
+) -> Result<f64, Error> {
+    let mut records = existing.to_vec();
+    records.push(played.record.clone());
+    let setup = stand_in.setup.with_records(&records)?;
+    let mut own = unlooped(stand_in);
+    own.extend(&played.initial);
+    own.resize(setup.names().len(), 0.0);
+    let mut starts = starts_around(&setup, &own, STARTS_AROUND, 1);
+    starts.push(own);
+    let fit = fit_from(&setup, &starts, &metric.noise, FINE)?;
+    Ok(((fit.cost - before) / metric.variance).max(0.0))
+}

@@ -1,0 +1,317 @@
+#![allow(clippy::unwrap_used)]
+
+use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
+use greybox::{Triangle, fit_from};
+use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rayon::prelude::*;
+
+use super::{
+    Bounds, Candidacy, Fitted, Limits, Metric, Prospect, Refused, design, fitted,
+    play::{Loop, play},
+    separation::{imagined, information, linear, misfit_before, refitted, unlooped, vector},
+};
+use crate::{Error, Options, Problem, search::FINE};
+
+const NOISE: f64 = 0.05;
+const INTERVAL: f64 = 2.0;
+
+/// A tank that hides an effect, under a command that hardly moves.
+fn problem(plant: Plant, hidden: (&str, f64), samples: usize) -> Problem {
+    let known = Known {
+        area: [(plant == Plant::SingleTank).then_some(154.0), None],
+        tank_height: Some(60.0),
+        input_range: Some(10.0),
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let u = excitation::steps(samples, 20..=60, 4.3, 5.7, &mut rng).unwrap();
+    let mut scales = Scales::from_ranges((4.3, 5.7), (10.0, 22.0), INTERVAL, 600.0);
+    scales.input_range = 10.0;
+    let effect = EffectInfo::find(hidden.0).unwrap();
+    let structure = Structure::new(plant, known.clone(), scales)
+        .with(Placed { effect, vessel: 0 })
+        .unwrap();
+    let mut theta = if plant == Plant::SingleTank {
+        vec![10.0, 12.5]
+    } else {
+        vec![6.4, 100.0, -16.0]
+    };
+    theta.push(hidden.1);
+    let mut simulator = Simulator::<f64>::new(&structure, &theta, &[16.0], u[0]).unwrap();
+    let mut y = noise::white(samples, NOISE, &mut rng);
+    for (y, u) in y.iter_mut().zip(&u) {
+        *y += simulator.read();
+        simulator.advance(Command::held(*u), INTERVAL);
+    }
+    Problem {
+        plant,
+        known,
+        effects: Vec::new(),
+        terms: Vec::new(),
+        start: Default::default(),
+        fixed: Vec::new(),
+        records: vec![Record {
+            name: "narrow".to_string(),
+            time: (0..samples).map(|k| k as f64 * INTERVAL).collect(),
+            input: Signal::new("u", "V", u),
+            output: Signal::new("y", "cm", y),
+            reference: None,
+            hold: Hold::Zero,
+        }],
+        controller: None,
+        test: Vec::new(),
+    }
+}
+
+fn between(a: &str, b: &str) -> [Candidacy; 2] {
+    [a, b].map(|id| Candidacy {
+        effect: EffectInfo::find(id).unwrap(),
+        vessel: None,
+    })
+}
+
+fn white(fitted: &mut Fitted) {
+    fitted.metric = Metric {
+        noise: ArModel::white(1.0),
+        variance: NOISE * NOISE,
+    };
+}
+
+fn noisy(records: &[Record], seed: u64) -> Vec<Record> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut records = records.to_vec();
+    for record in &mut records {
+        let e = noise::white(record.len(), NOISE, &mut rng);
+        for (y, e) in record.output.values.iter_mut().zip(e) {
+            *y += e;
+        }
+    }
+    records
+}
+
+/// The mean of the likelihood ratio over records with noise, both models refitted each time, is the power.
+#[test]
+fn the_power_is_the_mean_of_the_likelihood_ratio() {
+    let problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);
+    let mut fitted = fitted(
+        &problem,
+        between("const_leak", "pump_nonlinearity"),
+        &Options::default(),
+    )
+    .unwrap();
+    white(&mut fitted);
+    let metric = &fitted.metric;
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let values = excitation::steps(300, 30..=60, 3.9, 6.1, &mut rng).unwrap();
+    for truth in 0..2 {
+        let (a, b) = (&fitted.nodes[truth], &fitted.nodes[1 - truth]);
+        let played = play(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
+        let promised = linear(&played, b, &information(b), metric).unwrap();
+        let existing = imagined(a).unwrap();
+        let before = misfit_before(&existing, b, metric).unwrap();
+        let confirmed = refitted(&existing, &played, b, before, metric).unwrap();
+
+        let cost = |node: &crate::search::Node, records: &[Record]| {
+            let setup = node.setup.with_records(records).unwrap();
+            let mut x = unlooped(node);
+            x.truncate(node.setup.parameter_count());
+            for record in 0..records.len() {
+                x.push(if record == 0 {
+                    unlooped(node)[x.len()]
+                } else {
+                    played.initial[0]
+                });
+            }
+            fit_from(&setup, &[x], &metric.noise, FINE).unwrap().cost
+        };
+        let ratios: Vec<f64> = (0..200u64)
+            .into_par_iter()
+            .map(|seed| {
+                let mut both = existing.clone();
+                both.push(played.record.clone());
+                let both = noisy(&both, 100 + seed);
+                let ratio = |records: &[Record]| cost(b, records) - cost(a, records);
+                (ratio(&both) - ratio(&both[..1])) / metric.variance
+            })
+            .collect();
+        let n = ratios.len() as f64;
+        let mean = ratios.iter().sum::<f64>() / n;
+        let variance = ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let error = (variance / n).sqrt();
+        println!("promised {promised:.1}, refitted {confirmed:.1}, mean {mean:.1} +- {error:.1}");
+        assert!(
+            promised > 5.0,
+            "an experiment that shows something: {promised}"
+        );
+        assert!((mean - confirmed).abs() < 3.0 * error, "{mean} {confirmed}");
+        assert!((mean - promised).abs() < 3.0 * error, "{mean} {promised}");
+        // Twice the logarithm of a likelihood ratio of two fixed means: variance 4 lambda.
+        assert!(
+            (variance / (4.0 * confirmed) - 1.0).abs() < 0.4,
+            "{variance}"
+        );
+    }
+}
+
+/// A small effect, and no record before: the formula of the signatures.
+#[test]
+fn for_a_small_effect_the_power_is_that_of_the_signatures() {
+    let problem = problem(Plant::SingleTank, ("const_leak", 8.0), 300);
+    let mut fitted = fitted(
+        &problem,
+        between("const_leak", "pump_nonlinearity"),
+        &Options::default(),
+    )
+    .unwrap();
+    white(&mut fitted);
+    let size = 0.02;
+    let base = fitted.base.fit.x.clone();
+    for (node, own) in fitted.nodes.iter_mut().zip([size, 0.0]) {
+        node.fit.x = vec![base[0], base[1], own, base[2]];
+    }
+    let [a, b] = &fitted.nodes;
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let values = excitation::steps(300, 30..=60, 2.0, 8.0, &mut rng).unwrap();
+    let mut played = play(b, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
+    // The same beginning for both: it is a part of the base.
+    let records = std::slice::from_ref(&played.record).to_vec();
+    let setup = a.setup.with_records(&records).unwrap();
+    let shown = setup.simulate(&vector(a, &setup, &played)).unwrap().output;
+    played.record.output.values = shown[0].clone();
+    let found = linear(&played, b, &Triangle::new(0), &fitted.metric).unwrap();
+
+    let both = b.setup.structure.with(a.added[0]).unwrap();
+    let setup = b.setup.with_records(&records).unwrap();
+    let setup = setup.with_structure(both).unwrap();
+    let mut x = vec![0.0; setup.names().len()];
+    for (name, value) in setup.names().iter().zip(&mut x) {
+        match name.as_str() {
+            "pump_gain" => *value = base[0],
+            "alpha" => *value = base[1],
+            "level(0)" => *value = played.initial[0],
+            _ => {}
+        }
+    }
+    let rows = setup.linearise(&x, &fitted.metric.noise).unwrap();
+    let of = |name: &str| setup.names().iter().position(|n| n == name).unwrap();
+    let signature = of("const_leak.flow");
+    let mut order: Vec<usize> = (0..setup.names().len())
+        .filter(|i| *i != signature)
+        .collect();
+    order.push(signature);
+    // |p_A|^2 (1 - rho^2): what is left of the column beside the base's and the other's.
+    let last = order.len() - 1;
+    let left = rows.select(&order).at(last, last);
+    let expected = (size * left / NOISE).powi(2);
+    assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
+}
+
+#[test]
+fn exact_twins_have_no_power() {
+    // On a linear tank the two lags make one transfer function in either order.
+    let problem = problem(Plant::SingleTankLinear, ("pump_lag", 10.0), 400);
+    let found = design(
+        &problem,
+        between("pump_lag", "sensor_lag"),
+        &Limits {
+            range: Some((2.0, 8.0)),
+            ..Limits::default()
+        },
+        &Options::default(),
+        &|_| {},
+    )
+    .unwrap();
+    assert_eq!(found.prospect, Prospect::Twins);
+    let most = found
+        .candidates
+        .iter()
+        .map(|c| c.power.power)
+        .fold(0.0, f64::max);
+    assert!(most < 1e-2, "{most}");
+    let said = found.sentences.join(" ");
+    assert!(said.contains("No experiment within these limits"), "{said}");
+    // What a person can do instead.
+    for rival in &found.between {
+        assert!(said.contains(&rival.confirm), "{said}");
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let problem = problem(Plant::SingleTank, ("const_leak", 8.0), 100);
+    let refused = |between, limits: Limits| match design(
+        &problem,
+        between,
+        &limits,
+        &Options::default(),
+        &|_| {},
+    ) {
+        Err(Error::Design(refused)) => refused,
+        other => panic!("{other:?}"),
+    };
+    let pair = between("const_leak", "pump_deadzone");
+    let none = Limits::default();
+    let range = |low, high| Limits {
+        range: Some((low, high)),
+        ..none
+    };
+    assert!(matches!(
+        refused(between("overflow", "overflow"), none),
+        Refused::SameEffect { .. }
+    ));
+    for (low, high) in [
+        (5.0, 5.0),
+        (6.0, 2.0),
+        (f64::NAN, 1.0),
+        (1.0, f64::INFINITY),
+    ] {
+        assert!(matches!(
+            refused(pair, range(low, high)),
+            Refused::Range { .. }
+        ));
+    }
+    for (low, high) in [(-1.0, 5.0), (2.0, 10.5)] {
+        assert!(matches!(
+            refused(pair, range(low, high)),
+            Refused::Beyond { .. }
+        ));
+    }
+    for duration in [-5.0, 0.0, 20.0, f64::NAN] {
+        let limits = Limits {
+            duration: Some(duration),
+            ..none
+        };
+        assert!(matches!(refused(pair, limits), Refused::Duration { .. }));
+    }
+    let endless = Limits {
+        duration: Some(1e12),
+        ..none
+    };
+    assert!(matches!(refused(pair, endless), Refused::TooLong { .. }));
+    for slew in [-1.0, 0.0, 1e-6, f64::NAN] {
+        let limits = Limits {
+            slew: Some(slew),
+            ..none
+        };
+        assert!(matches!(refused(pair, limits), Refused::Slew { .. }));
+    }
+}
+
+#[test]
+fn a_tank_that_would_overflow_is_left_out() {
+    let mut problem = problem(Plant::SingleTank, ("const_leak", 8.0), 300);
+    problem.known.tank_height = Some(25.0);
+    let limits = Limits {
+        range: Some((2.0, 8.0)),
+        ..Limits::default()
+    };
+    let pair = between("const_leak", "pump_nonlinearity");
+    let found = design(&problem, pair, &limits, &Options::default(), &|_| {}).unwrap();
+    assert!(found.overfull > 0);
+    for candidate in &found.candidates {
+        assert!(candidate.reaches.iter().all(|reach| reach.high <= 25.0));
+    }
+    let bounds: &Bounds = &found.limits;
+    let within = |u: &f64| (bounds.low..=bounds.high).contains(u);
+    assert!(found.experiment.values.iter().all(within));
+}

@@ -1,0 +1,237 @@
+//! The design in words.
+
+use super::{
+    plan::{Candidate, Design, Power, Prospect, Rival},
+    sequences::Kind,
+};
+use crate::{diagnose::GROUP_MARGIN, numbers::significant, sentences::with_error};
+
+fn with_unit(number: &str, unit: &str) -> String {
+    format!("{number} {unit}").trim_end().to_string()
+}
+
+/// An effect, with the tank where there are two, and its size.
+fn sized(rival: &Rival) -> String {
+    let size = rival.size.as_ref().map_or(String::new(), |size| {
+        let name = size.name.rsplit('.').next().unwrap_or_default();
+        format!(" ({name} = {})", with_error(size))
+    });
+    format!("{}{size}", named(rival))
+}
+
+/// An effect, with the tank where there are two.
+pub(super) fn named(rival: &Rival) -> String {
+    match &rival.place {
+        Some(place) => format!("{} in the {place} tank", rival.effect),
+        None => rival.effect.clone(),
+    }
+}
+
+/// A probability that is not called certain or impossible.
+fn probability(p: f64) -> String {
+    if p > 0.99 {
+        "above 0.99".to_string()
+    } else if p < 0.01 {
+        "below 0.01".to_string()
+    } else {
+        format!("about {p:.2}")
+    }
+}
+
+fn with_power(power: &Power) -> String {
+    format!(
+        "power {}, a probability to decide of {}",
+        significant(power.power, 2),
+        probability(power.decides).trim_start_matches("about ")
+    )
+}
+
+/// A kind of sequence with its settings.
+#[must_use]
+pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
+    let range = format!(
+        "between {} and {}",
+        significant(candidate.low, 3),
+        with_unit(&significant(candidate.high, 3), unit)
+    );
+    let clock = format!("{} s", significant(candidate.clock, 3));
+    let slowly = candidate.slew.map_or(String::new(), |slew| {
+        let slew = with_unit(&significant(slew, 2), unit);
+        format!(", changed by at most {slew} a second")
+    });
+    let sequence = match (candidate.kind, candidate.levels) {
+        (Kind::Again, _) => format!("what the record played, {range}"),
+        (Kind::Step, _) => format!("steps {range}, one every {clock}"),
+        (Kind::Staircase, Some(levels)) => {
+            format!("a staircase of {levels} levels {range}, up and down, each held for {clock}")
+        }
+        (Kind::Staircase, None) => format!("a staircase {range}, each level held for {clock}"),
+        (Kind::Binary, _) => {
+            format!("a pseudo-random binary sequence {range} with a clock period of {clock}")
+        }
+        (Kind::MultiLevel, _) => {
+            format!("a sequence of many levels drawn {range}, each held for {clock}")
+        }
+    };
+    sequence + &slowly
+}
+
+/// What the records say already.
+fn so_far(design: &Design) -> Vec<String> {
+    let [a, b] = &design.between;
+    let mut said = Vec::new();
+    let ahead = significant(design.bic_ahead.abs(), 2);
+    let (first, second) = if design.bic_ahead < 0.0 {
+        (b, a)
+    } else {
+        (a, b)
+    };
+    said.push(if design.bic_ahead.abs() > GROUP_MARGIN {
+        format!(
+            "The records that there are decide for {}: the criterion of {} is higher by {ahead}.",
+            sized(first),
+            sized(second)
+        )
+    } else {
+        format!(
+            "The records that there are leave it open: {} fits best, the criterion of {} is higher by {ahead} alone.",
+            sized(first),
+            sized(second)
+        )
+    });
+    for rival in [a, b] {
+        if rival.bic_gain < GROUP_MARGIN {
+            let called = if rival.bic_gain < 0.0 {
+                format!("the criterion is higher with it, by {:.0}", -rival.bic_gain)
+            } else {
+                format!("it lowers the criterion by {:.0} alone", rival.bic_gain)
+            };
+            let edge = if rival.at_the_edge {
+                ", and its size ends where its plausible range does"
+            } else {
+                ""
+            };
+            said.push(format!(
+                "They do not call for {}: {called}{edge}. What is hardly there is hardly told from anything.",
+                named(rival)
+            ));
+        }
+    }
+    said
+}
+
+/// What there is to say, the experiment first.
+pub(super) fn of(design: &Design) -> Vec<String> {
+    let mut said = so_far(design);
+    let unit = &design.experiment.unit;
+    let [a, b] = &design.between;
+    let Some(best) = design.candidates.first() else {
+        return said;
+    };
+    let played = if design.in_loop {
+        "reference"
+    } else {
+        "command"
+    };
+    if design.prospect == Prospect::Twins {
+        said.push(format!(
+            "No experiment within these limits tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters shows what {} would show.",
+            design.candidates.len(),
+            significant(best.power.power, 1),
+            if best.power.if_true[0] < best.power.if_true[1] { named(b) } else { named(a) },
+            if best.power.if_true[0] < best.power.if_true[1] { named(a) } else { named(b) },
+        ));
+    } else {
+        let first = design.experiment.values.first().copied();
+        said.push(format!(
+            "The next experiment: {}, {} samples of {} s. Let the plant settle at a {played} of {} first.",
+            described(best, unit),
+            design.experiment.values.len(),
+            significant(design.limits.interval, 3),
+            with_unit(&significant(first.unwrap_or(f64::NAN), 3), unit)
+        ));
+        let levels: Vec<String> = best
+            .reaches
+            .iter()
+            .map(|reach| {
+                format!(
+                    "{} moves between {} and {}",
+                    reach.level,
+                    significant(reach.low, 3),
+                    with_unit(&significant(reach.high, 3), &design.output_unit)
+                )
+            })
+            .collect();
+        said.push(format!("In it {}.", levels.join(", ")));
+        said.push(format!(
+            "All records together then decide for the true one with a probability {} (power {}): {}.",
+            of_probability(best.power.decides),
+            significant(best.power.power, 2),
+            match design.prospect {
+                Prospect::Decides => "play it",
+                Prospect::May => "it is worth playing, and may leave the question open",
+                _ => "it will hardly do",
+            }
+        ));
+        if let Some(times) = design.times_as_long {
+            said.push(format!("Played {times} times over it would decide."));
+        }
+    }
+    if design.overfull > 0 {
+        said.push(format!(
+            "{} left out: a level would rise above the tank.",
+            match design.overfull {
+                1 => "One experiment was".to_string(),
+                n => format!("{n} experiments were"),
+            }
+        ));
+    }
+    if design.limited > 0 {
+        said.push(format!(
+            "{} left out: the controller would come to a limit, where the loop is open.",
+            match design.limited {
+                1 => "One experiment was".to_string(),
+                n => format!("{n} experiments were"),
+            }
+        ));
+    }
+    if let Some(again) = &design.again {
+        said.push(format!(
+            "The same as before once more would give {}.",
+            with_power(&again.power)
+        ));
+    }
+    let wider = design.wider.as_ref();
+    if let Some(wider) = wider.filter(|_| design.prospect != Prospect::Decides) {
+        said.push(format!(
+            "With --range {} {} the best would give {}.",
+            significant(wider.low, 3),
+            significant(wider.high, 3),
+            with_power(&wider.best.power)
+        ));
+    }
+    if let Some(second) = &design.second_sensor {
+        said.push(format!(
+            "With {} measured too, with the same noise: in records like those that there are {} (instead of {}), in the best experiment {}.",
+            second.level,
+            with_power(&second.existing_with),
+            with_power(&second.existing_without),
+            with_power(&second.best_with)
+        ));
+    }
+    if design.prospect != Prospect::Decides {
+        said.push("Without an experiment, at the plant:".to_string());
+        said.extend([a, b].map(|rival| format!("{}: {}", rival.effect, rival.confirm)));
+    }
+    said
+}
+
+/// A probability after the words "with a probability".
+fn of_probability(p: f64) -> String {
+    let said = probability(p);
+    if said.starts_with("about") {
+        format!("of {said}")
+    } else {
+        said
+    }
+}

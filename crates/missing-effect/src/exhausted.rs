@@ -1,0 +1,34 @@
+//! Whether a set of effects leaves nothing to explain: then larger sets need no search.
+
+use greybox::{Setup, coloured};
+
+use crate::{
+    Error,
+    confirm::BIC_MARGIN,
+    noise_floor::NOISE_ORDER,
+    problem::STOPPING,
+    remains::remains,
+    search::{Node, any_promise},
+};
+
+/// What a set leaves is noise, and in the metric of that noise no effect more promises what it would cost.
+///
+/// The colour is that of the set's own residual, so that a coloured noise does not keep the search going. A set beside this
+/// one, which leaves as little, is found where this one's effects are exchanged.
+pub(crate) fn exhausted(node: &Node) -> Result<bool, Error> {
+    let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?;
+    if remains(node, &own)?.is_some() {
+        return Ok(false);
+    }
+    let noise = own.noise.clone();
+    let node = Node {
+        fit: own,
+        ..node.clone()
+    };
+    let (n, cost) = (node.setup.samples() as f64, node.fit.cost);
+    let pays = |setup: &Setup, promise: f64| {
+        let more = setup.free().len() as f64 - node.setup.free().len() as f64;
+        n * (cost / promise).ln() - more * n.ln() > BIC_MARGIN
+    };
+    Ok(!any_promise(&node, &noise, pays))
+}

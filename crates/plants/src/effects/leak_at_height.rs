@@ -1,0 +1,65 @@
+//! `leak_at_height`: a hole in the wall, through which water leaves once the level is above it.
+
+use super::{EffectInfo, Place, any_plant, spread};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "leak_at_height",
+    place: Place::Vessel,
+    by_clock: false,
+    physics: "Water leaves through a hole in the wall, or over a side outlet, once the level stands above it.",
+    equation: "S dH/dt = ... - c sqrt(max(H - h_leak, 0))",
+    applies: any_plant,
+    parameters,
+    confused_with: &["overflow", "const_leak", "sqrt_outflow"],
+    confirm: "Fill the tank with the outlet shut and watch at which level it begins to fall by itself.",
+    source: "E. Torricelli, De motu gravium, 1643.",
+};
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (low, high) = site.level();
+    let span = (high - low).max(f64::MIN_POSITIVE);
+    // Half the throughput through a hole that is halfway up would have been seen.
+    let whole = site.scales.flow.abs() / (0.5 * span).sqrt();
+    // A level that is not measured is known from the believed model alone, which has its water leave by another way and may have
+    // it far too low.
+    let beyond = if site.is_last() { 0.5 } else { 3.0 } * span;
+    vec![
+        ParameterInfo {
+            name: "coefficient",
+            unit: Unit { level_halves: 1, area: 1, time: -1, ..Unit::ONE },
+            meaning: "outflow through the hole at one unit of level above it",
+            absent: 0.0,
+            lower: 0.0,
+            upper: 0.5 * whole,
+            starts: vec![0.05 * whole],
+        },
+        ParameterInfo {
+            name: "height",
+            unit: Unit::LEVEL,
+            meaning: "level from which on it leaks",
+            absent: f64::NAN,
+            lower: low - 0.5 * span,
+            upper: high + beyond,
+            starts: spread(low, high, 5),
+        },
+    ]
+}
+
+struct LeakAtHeight<T> {
+    coefficient: T,
+    height: T,
+}
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    LeakAtHeight { coefficient: parameters[0], height: parameters[1] }
+}
+
+impl<T: Scalar> Law<T> for LeakAtHeight<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Net)
+    }
+    fn net(&self, level: &T, net: &mut T, _t: &T) {
+        *net = *net - self.coefficient * square_root(*level - self.height);
+    }
+}

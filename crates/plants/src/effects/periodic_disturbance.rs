@@ -1,0 +1,81 @@
+//! `periodic_disturbance`: somebody draws or adds water periodically.
+
+use super::{EffectInfo, Place, any_plant};
+use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
+
+pub(super) const INFO: EffectInfo = EffectInfo {
+    id: "periodic_disturbance",
+    place: Place::Vessel,
+    by_clock: true,
+    physics: "A flow that nobody measures comes and goes with a period: a consumer that switches, a pump that pulsates.",
+    equation: "S dH/dt = ... + A sin(2 pi t/P + phi) = ... + s sin(2 pi t/P) + c cos(2 pi t/P); A = sqrt(s^2 + c^2), phi = atan2(c, s)",
+    applies: any_plant,
+    parameters,
+    confused_with: &[],
+    confirm: "Hold the command and watch whether the level keeps swinging with that period.",
+    source: "R. Isermann, Fault-Diagnosis Systems, 2006: periodic signals of unknown frequency.",
+};
+
+/// Periods in the record that are tried beside the strongest line of the spectrum, the fewest and the most that are tried, and from one start to the next. Off by one period in the
+/// record, half of a sinusoid's signature is still there in its slope by the period; off by more, nothing is.
+const PERIODS: (f64, f64, f64) = (2.5, 24.5, 1.0);
+
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
+    let (flow, duration) = (site.scales.flow.abs(), site.duration());
+    // Sine and cosine rather than size and phase: the model is then linear in both, and one start finds every phase.
+    let amplitude = |name, meaning, start| ParameterInfo {
+        name,
+        unit: Unit::FLOW,
+        meaning,
+        absent: 0.0,
+        lower: -0.3 * flow,
+        upper: 0.3 * flow,
+        starts: vec![start * flow],
+    };
+    let (fewest, most, step) = PERIODS;
+    let count = ((most - fewest) / step).round() as usize;
+    let mut periods: Vec<f64> = (0..=count)
+        .map(|i| duration / (fewest + step * i as f64))
+        .collect();
+    if site.scales.period > 0.0 {
+        periods.push(site.scales.period);
+    }
+    vec![
+        amplitude("sine", "flow that goes with the sine", 0.01),
+        amplitude("cosine", "flow that goes with the cosine", 0.01),
+        ParameterInfo {
+            name: "period",
+            unit: Unit::TIME,
+            meaning: "period",
+            absent: f64::NAN,
+            lower: (4.0 * site.scales.sample_interval).min(0.1 * duration),
+            // What has not come twice is no period: it would fit any slow course of time.
+            upper: 0.5 * duration,
+            starts: periods,
+        },
+    ]
+}
+
+struct PeriodicDisturbance<T> {
+    sine: T,
+    cosine: T,
+    frequency: T,
+}
+
+pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    PeriodicDisturbance {
+        sine: parameters[0],
+        cosine: parameters[1],
+        frequency: T::constant(std::f64::consts::TAU) / parameters[2],
+    }
+}
+
+impl<T: Scalar> Law<T> for PeriodicDisturbance<T> {
+    fn changes(&self) -> Option<Balance> {
+        Some(Balance::Net)
+    }
+    fn net(&self, _level: &T, net: &mut T, t: &T) {
+        let (sin, cos) = (self.frequency * *t).sin_cos();
+        *net = *net + (self.sine * sin + self.cosine * cos);
+    }
+}

@@ -1,0 +1,148 @@
+//! The mark for a diagnosis: a refit of the true structure and of every single effect by the Bayesian information criterion,
+//! the noise's colour known.
+
+use ct_signals::ArModel;
+use ctid_tests::Rig;
+use greybox::{Fit, Setup, Stopping, fit_from, random_starts};
+use missing_effect::Problem;
+use plants::{EffectInfo, ParameterInfo, Placed};
+use serde_json::{Value, json};
+
+const STOPPING: Stopping = Stopping {
+    evaluations: 80,
+    cost: 1e-8,
+};
+
+/// What it says of a record.
+#[derive(Debug, Clone)]
+pub struct Mark {
+    /// Fall of the criterion with the true structure, from its true values.
+    pub truth: f64,
+    /// The single effect with which the criterion falls most, and by how much.
+    pub best: (&'static str, f64),
+    /// What the criterion falls by with the effect that was named first.
+    pub named: Option<f64>,
+}
+
+impl Mark {
+    pub fn as_json(&self) -> Value {
+        json!({ "truth": self.truth, "best": self.best.0, "best_falls": self.best.1, "named_falls": self.named })
+    }
+}
+
+/// The mark of a record with one effect; `None` where a fit is not possible.
+pub fn mark(rig: &Rig, problem: &Problem, named: &[String]) -> Option<Mark> {
+    let noise = if rig.colour > 0.0 {
+        ArModel::from_coefficients(&[rig.colour], 1.0).ok()?
+    } else {
+        ArModel::white(1.0)
+    };
+    let white = ArModel::white(1.0);
+    let records = &problem.records;
+    let mut open = Setup::from_records(
+        rig.plant,
+        rig.known(),
+        &[],
+        records,
+        std::collections::BTreeMap::new(),
+    )
+    .ok()?;
+    let rough = fit_from(&open, &random_starts(&open, 12, 1), &white, STOPPING).ok()?;
+    open.structure.scales = open.scales_at(&rough.x).ok()?;
+    let open = open.with_structure(open.structure.clone()).ok()?;
+    let (setup, x) = match &problem.controller {
+        Some(controller) => open.in_loop(controller, &rough.x).ok()?,
+        None => (open, rough.x),
+    };
+    let base = fit_from(&setup, &[x], &noise, STOPPING).ok()?;
+    let (id, vessel, values) = rig.hidden.first()?;
+    let own = Placed {
+        effect: EffectInfo::find(id)?,
+        vessel: *vessel,
+    };
+    let mut of_named: Option<f64> = None;
+    let (mut truth, mut best) = (f64::NEG_INFINITY, ("", f64::NEG_INFINITY));
+    for placed in setup.structure.candidates() {
+        let Some(mut fit) = with(&setup, &base, placed, &noise, None) else {
+            continue;
+        };
+        if placed == own
+            && let Some(from_truth) = with(&setup, &base, placed, &noise, Some((rig, values)))
+        {
+            fit = fit.or_better(from_truth);
+        }
+        let fall = base.bic() - fit.bic();
+        if placed == own {
+            truth = fall;
+        }
+        if named.len() == 1 && named[0] == placed.effect.id {
+            of_named = Some(of_named.map_or(fall, |other| other.max(fall)));
+        }
+        if fall > best.1 {
+            best = (placed.effect.id, fall);
+        }
+    }
+    Some(Mark {
+        truth,
+        best,
+        named: of_named,
+    })
+}
+
+/// The base and one effect, from every start of the effect, or from the truth.
+fn with(
+    base: &Setup,
+    fit: &Fit,
+    placed: Placed,
+    noise: &ArModel,
+    truth: Option<(&Rig, &[f64])>,
+) -> Option<Fit> {
+    let setup = base
+        .with_structure(base.structure.with(placed).ok()?)
+        .ok()?;
+    let name = |p: &ParameterInfo| format!("{}.{}", placed.effect.id, p.name);
+    let parameters = setup.structure.effect_parameters(placed);
+    let carried: Vec<f64> = setup
+        .names()
+        .iter()
+        .map(|known| {
+            let at = base.names().iter().position(|other| other == known);
+            at.map_or(0.0, |at| fit.x[at])
+        })
+        .collect();
+    let put = |x: &mut Vec<f64>, values: &[f64]| {
+        for (parameter, value) in parameters.iter().zip(values) {
+            if let Some(at) = setup.names().iter().position(|n| *n == name(parameter)) {
+                x[at] = *value;
+            }
+        }
+    };
+    let starts: Vec<Vec<f64>> = if let Some((rig, values)) = truth {
+        let mut x = carried;
+        x[..rig.theta.len()].copy_from_slice(&rig.theta);
+        put(&mut x, values);
+        vec![x]
+    } else {
+        let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
+        for parameter in &parameters {
+            grid = grid
+                .iter()
+                .flat_map(|begun| {
+                    parameter.starts.iter().map(move |start| {
+                        let mut longer = begun.clone();
+                        longer.push(*start);
+                        longer
+                    })
+                })
+                .collect();
+        }
+        grid.iter()
+            .map(|values| {
+                let mut x = carried.clone();
+                put(&mut x, values);
+                x
+            })
+            .collect()
+    };
+    fit_from(&setup, &starts, noise, STOPPING).ok()
+}

@@ -1,0 +1,310 @@
+//! One record of the study: how it is made, and what the diagnosis says of it.
+
+use ct_signals::Record;
+use ctid_tests::{
+    Drive, Rig,
+    draw::{self, PLANTS},
+    outside::OUTSIDE,
+};
+use missing_effect::{Diagnosis, Options, Problem, Verdict, diagnose};
+use plants::{EffectInfo, Fitted, Place, Plant, Term, Variable};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+use crate::mark;
+
+/// Correlation of the coloured noise from sample to sample, in turn.
+const COLOURS: [f64; 2] = [0.8, 0.95];
+
+/// A record of the study.
+#[derive(Debug, Clone, Copy)]
+pub enum Job {
+    /// An effect is hidden in it.
+    Effect {
+        /// The effect.
+        effect: &'static EffectInfo,
+        /// Structural error over noise.
+        ratio: f64,
+        /// Open or closed loop.
+        drive: Drive,
+        /// The noise is coloured.
+        coloured: bool,
+        /// Number in its cell.
+        number: u64,
+    },
+    /// Nothing is missing.
+    Nothing(u64),
+    /// Something that no effect describes.
+    Unknown {
+        /// Which.
+        kind: usize,
+        /// Number of its kind.
+        number: u64,
+    },
+}
+
+/// What came of a record.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The answer; `None` where the effect can be given the size in no plant, or the diagnosis was refused.
+    pub answer: Option<Answer>,
+    /// Why not.
+    pub refused: Option<String>,
+}
+
+/// A diagnosis in short.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    pub plant: &'static str,
+    pub verdict: Verdict,
+    pub effects: Vec<String>,
+    pub groups: Vec<Vec<String>>,
+    /// What an exhaustive refit says of a record whose effect is not in a group.
+    pub mark: Option<mark::Mark>,
+    /// On one core.
+    pub seconds: f64,
+}
+
+impl Answer {
+    /// Something of the catalogue is named.
+    pub fn named(&self) -> bool {
+        matches!(self.verdict, Verdict::Effect | Verdict::Undecided)
+    }
+
+    /// The group that holds an effect.
+    pub fn group(&self, effect: &str) -> Option<&Vec<String>> {
+        let holds = |group: &&Vec<String>| group.iter().any(|member| member == effect);
+        self.groups.iter().find(holds)
+    }
+}
+
+impl Outcome {
+    pub fn as_json(&self) -> Value {
+        self.answer.as_ref().map_or_else(
+            || json!({ "refused": self.refused }),
+            |answer| {
+                json!({
+                    "plant": answer.plant,
+                    "verdict": answer.verdict,
+                    "effects": answer.effects,
+                    "groups": answer.groups,
+                    "mark": answer.mark.as_ref().map(mark::Mark::as_json),
+                    "seconds": answer.seconds,
+                })
+            },
+        )
+    }
+}
+
+/// A term of the balance or of the pump that is none of the catalogue's: what it is, and how it depends on its variable.
+type Strange = (&'static str, Place, Variable, fn(f64) -> f64);
+
+const STRANGE: [Strange; 3] = [
+    ("a wave in the level", Place::Vessel, Variable::Level, |h| {
+        2.5 * (1.1 * h).sin()
+    }),
+    ("a dip in the level", Place::Vessel, Variable::Level, |h| {
+        -4.0 * (-(h - 14.0).powi(2)).exp()
+    }),
+    (
+        "a wave in the command",
+        Place::Actuator,
+        Variable::Input,
+        |u| 0.15 * (4.0 * u).sin(),
+    ),
+];
+
+/// How many kinds of unknown there are.
+pub fn kinds_of_unknown() -> usize {
+    OUTSIDE.len() + STRANGE.len()
+}
+
+impl Job {
+    /// In short.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Effect {
+                effect,
+                ratio,
+                drive,
+                coloured,
+                number,
+            } => format!(
+                "{} {ratio} {} {number}",
+                effect.id,
+                condition(*drive, *coloured)
+            ),
+            Self::Nothing(number) => format!("nothing {number}"),
+            Self::Unknown { kind, number } => format!("{} {number}", unknown_name(*kind)),
+        }
+    }
+
+    /// The record's own seed: it does not hang on what else is run.
+    fn seed(&self) -> u64 {
+        match self {
+            Self::Effect {
+                effect,
+                ratio,
+                drive,
+                coloured,
+                number,
+            } => {
+                let position = plants::CATALOGUE
+                    .iter()
+                    .position(|known| known.id == effect.id)
+                    .unwrap_or(0) as u64;
+                let cell =
+                    4 * position + 2 * u64::from(*drive == Drive::Closed) + u64::from(*coloured);
+                1_000_000 * cell + 1000 * (100.0 * ratio).round() as u64 + number
+            }
+            Self::Nothing(number) => 1_000_000_000 + number,
+            Self::Unknown { kind, number } => 2_000_000_000 + 1000 * *kind as u64 + number,
+        }
+    }
+
+    /// Makes the record and diagnoses it.
+    pub fn run(&self, samples: usize, wants_mark: bool) -> Outcome {
+        let refused = |why: String| Outcome {
+            answer: None,
+            refused: Some(why),
+        };
+        let Some(rig) = self.rig(samples) else {
+            return refused("the effect can be given this size in none of the plants drawn".into());
+        };
+        let problem = problem(&rig, rig.run(&mut ChaCha8Rng::seed_from_u64(self.seed())));
+        match diagnose(&problem, &Options::default(), &|_| {}) {
+            Err(why) => refused(why.to_string()),
+            Ok(found) => {
+                let mut answer = answer(&rig, &found);
+                if let (true, Self::Effect { effect, .. }) = (wants_mark, self)
+                    && answer.group(effect.id).is_none()
+                {
+                    answer.mark = mark::mark(&rig, &problem, &answer.effects);
+                }
+                Outcome {
+                    answer: Some(answer),
+                    refused: None,
+                }
+            }
+        }
+    }
+
+    fn rig(&self, samples: usize) -> Option<Rig> {
+        let seed = self.seed();
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        match *self {
+            Self::Effect {
+                effect,
+                ratio,
+                drive,
+                coloured,
+                number,
+            } => {
+                let colour = colour(coloured, number);
+                draw::with_effect(effect, ratio, drive, colour, samples, seed)
+            }
+            Self::Nothing(number) => {
+                let plant = PLANTS[number as usize % PLANTS.len()];
+                let number = number / PLANTS.len() as u64;
+                let drive = [Drive::Open, Drive::Closed][number as usize % 2];
+                let colour = colour((number / 2).is_multiple_of(2), number / 4);
+                Some(draw::rig(plant, drive, colour, samples, rng))
+            }
+            Self::Unknown { kind, .. } => {
+                let rig = draw::rig(Plant::SingleTank, Drive::Open, 0.0, samples, rng);
+                // The disturbances are in seconds of a record of 2000 s.
+                let rig = Rig {
+                    samples: 1000,
+                    interval: 2.0,
+                    hold: (20, 90),
+                    noise: 0.05,
+                    ..rig
+                };
+                Some(match OUTSIDE.get(kind) {
+                    Some((_, outside)) => Rig {
+                        outside: *outside,
+                        ..rig
+                    },
+                    None => Rig {
+                        terms: vec![strange(STRANGE[kind - OUTSIDE.len()])],
+                        ..rig
+                    },
+                })
+            }
+        }
+    }
+}
+
+/// What a kind of unknown is called.
+pub fn unknown_name(kind: usize) -> String {
+    const OUTSIDE_NAMES: [&str; OUTSIDE.len()] = [
+        "a slow course of the reading",
+        "the reading jumps by 3 cm",
+        "the reading jumps by 0.3 cm",
+        "a flow nobody recorded, 200 s",
+        "a flow nobody recorded, 100 s",
+        "a loss nobody recorded, 100 s",
+    ];
+    OUTSIDE_NAMES.get(kind).map_or_else(
+        || STRANGE[kind - OUTSIDE.len()].0.to_string(),
+        ToString::to_string,
+    )
+}
+
+/// Open or closed loop, white or coloured noise.
+pub fn condition(drive: Drive, coloured: bool) -> &'static str {
+    match (drive, coloured) {
+        (Drive::Open, false) => "open, white",
+        (Drive::Open, true) => "open, coloured",
+        (Drive::Closed, false) => "closed, white",
+        (Drive::Closed, true) => "closed, coloured",
+    }
+}
+
+fn colour(coloured: bool, number: u64) -> f64 {
+    if coloured {
+        COLOURS[number as usize % COLOURS.len()]
+    } else {
+        0.0
+    }
+}
+
+/// What the user knows: the plant, and the controller of a closed loop.
+fn problem(rig: &Rig, record: Record) -> Problem {
+    Problem {
+        controller: (rig.drive == Drive::Closed).then(|| rig.controller()),
+        ..rig.problem(record)
+    }
+}
+
+fn answer(rig: &Rig, found: &Diagnosis) -> Answer {
+    Answer {
+        plant: rig.plant.id(),
+        verdict: found.verdict,
+        effects: found.effects.clone(),
+        groups: found.groups.clone(),
+        mark: None,
+        seconds: found.seconds,
+    }
+}
+
+fn strange((name, place, variable, f): Strange) -> Term {
+    let (low, high) = if variable == Variable::Input {
+        (0.0, 10.0)
+    } else {
+        (0.0, 40.0)
+    };
+    let knots: Vec<f64> = (0..200)
+        .map(|i| low + (high - low) * f64::from(i) / 199.0)
+        .collect();
+    Term {
+        name: name.replace(' ', "_"),
+        place,
+        vessel: 0,
+        variable,
+        ordinates: knots.iter().map(|v| f(*v)).collect(),
+        knots,
+        fitted: Fitted::Scale,
+    }
+}

@@ -1,0 +1,338 @@
+//! The tables of the study.
+
+use std::{collections::BTreeMap, fmt::Write};
+
+use ctid_tests::Drive;
+use missing_effect::Verdict;
+
+use crate::record::{Answer, Job, Outcome, condition, unknown_name};
+
+/// Open or closed loop, white or coloured noise.
+const CONDITIONS: [(Drive, bool); 4] = [
+    (Drive::Open, false),
+    (Drive::Open, true),
+    (Drive::Closed, false),
+    (Drive::Closed, true),
+];
+
+/// The counts of some records with a hidden effect.
+#[derive(Debug, Clone, Default)]
+struct Count {
+    records: usize,
+    /// The verdict is not that the model is adequate.
+    seen: usize,
+    /// Something of the catalogue is named.
+    named: usize,
+    /// What is hidden is in a group of what is named.
+    in_group: usize,
+    /// It is the one named first in its group.
+    first: usize,
+    undecided: usize,
+    sizes: Vec<usize>,
+    seconds: Vec<f64>,
+}
+
+impl Count {
+    fn add(&mut self, effect: &str, answer: &Answer) {
+        self.records += 1;
+        self.seen += usize::from(answer.verdict != Verdict::Adequate);
+        self.named += usize::from(answer.named());
+        self.undecided += usize::from(answer.verdict == Verdict::Undecided);
+        self.first += usize::from(answer.effects.iter().any(|named| named == effect));
+        if let Some(group) = answer.group(effect) {
+            self.in_group += 1;
+            self.sizes.push(group.len());
+        }
+        self.seconds.push(answer.seconds);
+    }
+
+    fn percent(&self, part: usize) -> String {
+        if self.records == 0 {
+            "-".to_string()
+        } else {
+            format!("{:.0}", 100.0 * part as f64 / self.records as f64)
+        }
+    }
+}
+
+fn median<T: Copy + PartialOrd>(values: &[T]) -> Option<T> {
+    let mut values = values.to_vec();
+    values.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+    values.get(values.len() / 2).copied()
+}
+
+fn shown<T: std::fmt::Display>(value: Option<T>) -> String {
+    value.map_or("-".to_string(), |value| format!("{value:.1}"))
+}
+
+/// A cell: the effect's place in the catalogue's order, its name, 100 times the ratio, and the condition.
+type Cell = (usize, &'static str, u64, usize);
+
+fn cells(jobs: &[Job], outcomes: &[Outcome]) -> BTreeMap<Cell, Count> {
+    let mut cells: BTreeMap<Cell, Count> = BTreeMap::new();
+    for (job, outcome) in jobs.iter().zip(outcomes) {
+        let Job::Effect {
+            effect,
+            ratio,
+            drive,
+            coloured,
+            ..
+        } = job
+        else {
+            continue;
+        };
+        let order = plants::CATALOGUE
+            .iter()
+            .position(|known| known.id == effect.id);
+        let at = CONDITIONS
+            .iter()
+            .position(|known| *known == (*drive, *coloured));
+        let key = (
+            order.unwrap_or(0),
+            effect.id,
+            (100.0 * ratio).round() as u64,
+            at.unwrap_or(0),
+        );
+        let cell = cells.entry(key).or_default();
+        if let Some(answer) = &outcome.answer {
+            cell.add(effect.id, answer);
+        }
+    }
+    cells
+}
+
+/// The counts of all cells that a rule puts together.
+fn together<K: Ord>(cells: &BTreeMap<Cell, Count>, key: impl Fn(&Cell) -> K) -> BTreeMap<K, Count> {
+    let mut sums: BTreeMap<K, Count> = BTreeMap::new();
+    for (cell, count) in cells {
+        let sum = sums.entry(key(cell)).or_default();
+        sum.records += count.records;
+        sum.seen += count.seen;
+        sum.named += count.named;
+        sum.in_group += count.in_group;
+        sum.first += count.first;
+        sum.undecided += count.undecided;
+        sum.sizes.extend(&count.sizes);
+        sum.seconds.extend(&count.seconds);
+    }
+    sums
+}
+
+fn ratio(hundredths: u64) -> String {
+    format!("{}", hundredths as f64 / 100.0)
+}
+
+fn named_condition(at: usize) -> &'static str {
+    let (drive, coloured) = CONDITIONS[at];
+    condition(drive, coloured)
+}
+
+/// Records that miss nothing: how many there are, and those in which something was named or called unexplained.
+fn nulls(jobs: &[Job], outcomes: &[Outcome]) -> (usize, Vec<String>, Vec<String>) {
+    let (mut records, mut claims, mut doubted) = (0, Vec::new(), Vec::new());
+    for (job, outcome) in jobs.iter().zip(outcomes) {
+        let (Job::Nothing(_), Some(answer)) = (job, &outcome.answer) else {
+            continue;
+        };
+        records += 1;
+        if answer.named() {
+            claims.push(format!("{}: {}", job.name(), answer.effects.join(", ")));
+        } else if answer.verdict != Verdict::Adequate {
+            doubted.push(job.name());
+        }
+    }
+    (records, claims, doubted)
+}
+
+/// For each kind of unknown: its name, records, those declared unexplained, and what the others were called.
+fn unknowns(jobs: &[Job], outcomes: &[Outcome]) -> Vec<(String, usize, usize, Vec<String>)> {
+    let mut kinds: BTreeMap<usize, (usize, usize, Vec<String>)> = BTreeMap::new();
+    for (job, outcome) in jobs.iter().zip(outcomes) {
+        let (Job::Unknown { kind, .. }, Some(answer)) = (job, &outcome.answer) else {
+            continue;
+        };
+        let entry = kinds.entry(*kind).or_default();
+        entry.0 += 1;
+        match answer.verdict {
+            Verdict::Unexplained => entry.1 += 1,
+            Verdict::Adequate => entry.2.push("adequate".to_string()),
+            _ => entry.2.push(answer.effects.join(" + ")),
+        }
+    }
+    kinds
+        .into_iter()
+        .map(|(kind, (records, right, others))| (unknown_name(kind), records, right, others))
+        .collect()
+}
+
+/// How often each of the others was said.
+fn counted(others: &[String]) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for other in others {
+        *counts.entry(other).or_default() += 1;
+    }
+    let counts: Vec<String> = counts
+        .iter()
+        .map(|(what, count)| format!("{what} {count}"))
+        .collect();
+    counts.join(", ")
+}
+
+/// Every cell, then what misses nothing and what is unknown, for a terminal.
+pub fn text(jobs: &[Job], outcomes: &[Outcome]) -> String {
+    let mut out = String::new();
+    let cells = cells(jobs, outcomes);
+    if !cells.is_empty() {
+        let _ = writeln!(
+            out,
+            "{:<21} {:>5} {:<16} {:>7} {:>6} {:>6} {:>8} {:>5} {:>9} {:>5} {:>7}",
+            "effect",
+            "ratio",
+            "loop, noise",
+            "records",
+            "seen",
+            "named",
+            "in group",
+            "first",
+            "undecided",
+            "size",
+            "seconds"
+        );
+    }
+    for ((_, effect, hundredths, at), c) in &cells {
+        let _ = writeln!(
+            out,
+            "{effect:<21} {:>5} {:<16} {:>7} {:>6} {:>6} {:>8} {:>5} {:>9} {:>5} {:>7}",
+            ratio(*hundredths),
+            named_condition(*at),
+            c.records,
+            c.percent(c.seen),
+            c.percent(c.named),
+            c.percent(c.in_group),
+            c.percent(c.first),
+            c.percent(c.undecided),
+            shown(median(&c.sizes)),
+            shown(median(&c.seconds))
+        );
+    }
+    for (job, outcome) in jobs.iter().zip(outcomes) {
+        if let Some(mark) = outcome.answer.as_ref().and_then(|a| a.mark.as_ref()) {
+            let answer = outcome.answer.as_ref();
+            let _ = writeln!(
+                out,
+                "{} ({}): {:?} {:?}; a refit that knows the colour: truth {:.1}, best {} {:.1}, named {}",
+                job.name(),
+                answer.map_or("", |a| a.plant),
+                answer.map(|a| a.verdict),
+                answer.map(|a| &a.groups),
+                mark.truth,
+                mark.best.0,
+                mark.best.1,
+                shown(mark.named)
+            );
+        }
+        if let Some(why) = &outcome.refused {
+            let _ = writeln!(out, "{}: {why}", job.name());
+        }
+    }
+    out + &summary(jobs, outcomes, &cells)
+}
+
+/// Tables for a page: all effects together, each effect, what misses nothing, what is unknown.
+pub fn markdown(jobs: &[Job], outcomes: &[Outcome]) -> String {
+    let cells = cells(jobs, outcomes);
+    let mut out = summary(jobs, outcomes, &cells);
+    let columns: std::collections::BTreeSet<(usize, u64)> = cells
+        .keys()
+        .map(|(_, _, ratio, at)| (*at, *ratio))
+        .collect();
+    if columns.is_empty() {
+        return out;
+    }
+    out += "\nNamed / in the named group \\[% of the records\\], and the median size of that group, for each effect:\n\n| effect |";
+    for (at, hundredths) in &columns {
+        let _ = write!(out, " {}, {} |", named_condition(*at), ratio(*hundredths));
+    }
+    out += "\n|---|";
+    out += &"---|".repeat(columns.len());
+    let rows = together(&cells, |(order, effect, _, _)| (*order, *effect));
+    for (order, effect) in rows.into_keys() {
+        let _ = write!(out, "\n| `{effect}` |");
+        for (at, hundredths) in &columns {
+            let entry = cells.get(&(order, effect, *hundredths, *at));
+            let entry = entry
+                .filter(|c| c.records > 0)
+                .map_or("-".to_string(), |c| {
+                    format!(
+                        "{} / {} ({})",
+                        c.percent(c.named),
+                        c.percent(c.in_group),
+                        median(&c.sizes).map_or("-".to_string(), |size| size.to_string())
+                    )
+                });
+            let _ = write!(out, " {entry} |");
+        }
+    }
+    out + "\n"
+}
+
+fn summary(jobs: &[Job], outcomes: &[Outcome], cells: &BTreeMap<Cell, Count>) -> String {
+    let mut out = String::new();
+    if !cells.is_empty() {
+        out += "\n| structural error / noise | loop, noise | records | seen | named | in the named group | named itself | undecided | group size, median | seconds, median |\n|---|---|---|---|---|---|---|---|---|---|\n";
+    }
+    let rows = together(cells, |(_, _, hundredths, at)| (*hundredths, *at));
+    for ((hundredths, at), c) in rows {
+        let _ = writeln!(
+            out,
+            "| {} | {} | {} | {} % | {} % | {} % | {} % | {} % | {} | {} |",
+            ratio(hundredths),
+            named_condition(at),
+            c.records,
+            c.percent(c.seen),
+            c.percent(c.named),
+            c.percent(c.in_group),
+            c.percent(c.first),
+            c.percent(c.undecided),
+            median(&c.sizes).map_or("-".to_string(), |size| size.to_string()),
+            shown(median(&c.seconds))
+        );
+    }
+    let (records, claims, doubted) = nulls(jobs, outcomes);
+    if records > 0 {
+        let _ = writeln!(
+            out,
+            "\nNothing is missing in {records} records: an effect is named in {}{}, and {} more {} called unexplained{}.",
+            claims.len(),
+            listed(&claims),
+            doubted.len(),
+            if doubted.len() == 1 { "is" } else { "are" },
+            listed(&doubted)
+        );
+    }
+    let unknowns = unknowns(jobs, outcomes);
+    if !unknowns.is_empty() {
+        out +=
+            "\n| outside the catalogue | records | unexplained | the others |\n|---|---|---|---|\n";
+        let (mut all, mut right) = (0, 0);
+        for (name, records, unexplained, others) in unknowns {
+            (all, right) = (all + records, right + unexplained);
+            let _ = writeln!(
+                out,
+                "| {name} | {records} | {unexplained} | {} |",
+                counted(&others)
+            );
+        }
+        let percent = 100.0 * right as f64 / all.max(1) as f64;
+        let _ = writeln!(out, "| all | {all} | {right} ({percent:.1} %) | |");
+    }
+    out
+}
+
+fn listed(records: &[String]) -> String {
+    if records.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", records.join("; "))
+    }
+}

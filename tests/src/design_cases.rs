@@ -1,0 +1,179 @@
+//! Records that leave two effects undecided, the experiment that is proposed for them, and what both records then say.
+
+use ct_signals::Record;
+use missing_effect::design::{Candidacy, Design, Limits, Prospect, design};
+use missing_effect::{Diagnosis, Options, Problem, Verdict, diagnose};
+use plants::EffectInfo;
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+
+use crate::{Drive, Rig};
+
+/// What the plant hides, and how the first record comes about: a command that hardly moves, or a loop.
+pub type Row = (&'static str, Drive, &'static str, usize, &'static [f64]);
+
+/// Plants, loops and effects, the truth now one of a family, now another. Sizes are such that a record with a narrow command can
+/// show that something is missing, and hardly what.
+pub const ROWS: [Row; 24] = [
+    ("single", Drive::Open, "pump_deadzone", 0, &[0.6]),
+    ("linear", Drive::Open, "sqrt_outflow", 0, &[0.4]),
+    ("single", Drive::Closed, "const_leak", 0, &[6.0]),
+    ("cascaded", Drive::Open, "const_leak", 1, &[4.0]),
+    ("single", Drive::Open, "laminar_outflow", 0, &[0.8]),
+    ("single", Drive::Open, "sensor_lag", 0, &[10.0]),
+    ("linear", Drive::Open, "pump_nonlinearity", 0, &[0.6]),
+    ("single", Drive::Closed, "pump_deadzone", 0, &[0.6]),
+    ("single", Drive::Open, "overflow", 0, &[19.5]),
+    ("cascaded", Drive::Open, "pipe_height", 1, &[3.0]),
+    ("single", Drive::Open, "valve_drift", 0, &[0.006]),
+    ("linear", Drive::Open, "transport_delay", 0, &[5.0]),
+    ("single", Drive::Open, "sensor_offset", 0, &[1.5]),
+    ("single", Drive::Closed, "sensor_lag", 0, &[8.0]),
+    (
+        "single",
+        Drive::Open,
+        "pump_gain_drift",
+        0,
+        &[0.006, 2000.0],
+    ),
+    ("cascaded", Drive::Open, "pump_lag", 0, &[10.0]),
+    ("single", Drive::Open, "sensor_saturation", 0, &[19.5]),
+    ("single", Drive::Closed, "sensor_offset", 0, &[0.8]),
+    ("single", Drive::Open, "pump_lag", 0, &[10.0]),
+    ("linear", Drive::Open, "pump_saturation", 0, &[5.55]),
+    ("cascaded", Drive::Open, "laminar_outflow", 1, &[0.8]),
+    ("single", Drive::Open, "pump_nonlinearity", 0, &[-0.3]),
+    ("cascaded", Drive::Open, "sensor_drift", 0, &[0.5]),
+    ("single", Drive::Closed, "laminar_outflow", 0, &[0.5]),
+];
+
+/// Seeds of a row that are looked at.
+pub const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
+/// What the experiment may do, as parts of the middle command, or in a loop of the level that the tank is held at.
+const RANGE: (f64, f64) = (0.5, 1.5);
+
+/// The rig of a row: its command stays near the middle.
+#[must_use]
+pub fn rig(row: &Row) -> Rig {
+    let (plant, drive, effect, vessel, parameters) = *row;
+    let rig = match plant {
+        "single" => Rig::single_tank(),
+        "cascaded" => Rig::cascaded_tanks(),
+        _ => Rig::linear_tank(),
+    };
+    Rig {
+        command: (4.4, 5.6),
+        drive,
+        samples: 600,
+        hidden: vec![(effect, vessel, parameters.to_vec())],
+        ..rig
+    }
+}
+
+/// A record that leaves it open, and who else it may be.
+pub struct Undecided {
+    /// The rig.
+    pub rig: Rig,
+    /// Its record, and what is known of it.
+    pub problem: Problem,
+    /// The truth.
+    pub truth: &'static str,
+    /// The others of its group, best first.
+    pub others: Vec<String>,
+}
+
+fn problem(rig: &Rig, records: Vec<Record>) -> Option<Problem> {
+    let mut problem = rig.problem(records.first()?.clone());
+    problem.records = records;
+    problem.controller = (rig.drive == Drive::Closed).then(|| rig.controller());
+    Some(problem)
+}
+
+fn diagnosed(problem: &Problem) -> Option<Diagnosis> {
+    diagnose(problem, &Options::default(), &|_| {}).ok()
+}
+
+/// A row's record, where its diagnosis is one group of several that holds the truth.
+#[must_use]
+pub fn undecided(row: &Row, seed: u64) -> Option<Undecided> {
+    let rig = rig(row);
+    let record = rig.run(&mut ChaCha8Rng::seed_from_u64(seed));
+    let problem = problem(&rig, vec![record])?;
+    let found = diagnosed(&problem)?;
+    let [group] = &found.groups[..] else {
+        return None;
+    };
+    let truth = row.2;
+    let others: Vec<String> = group.iter().filter(|id| *id != truth).cloned().collect();
+    let open = found.verdict == Verdict::Undecided && others.len() + 1 == group.len();
+    (open && !others.is_empty()).then_some(Undecided {
+        rig,
+        problem,
+        truth,
+        others,
+    })
+}
+
+/// The experiment between the truth and the best of the others that is no twin of it; `Err` holds the twins where all are.
+///
+/// # Errors
+/// The twins.
+pub fn proposed(case: &Undecided) -> Result<(String, Design), Vec<String>> {
+    let middle = match case.rig.drive {
+        Drive::Open => 0.5 * (case.rig.command.0 + case.rig.command.1),
+        Drive::Closed => case.rig.levels.last().copied().unwrap_or_default(),
+    };
+    let limits = Limits {
+        range: Some((RANGE.0 * middle, RANGE.1 * middle)),
+        seed: 1,
+        ..Limits::default()
+    };
+    let plan = |between, limits: &Limits| {
+        design(&case.problem, between, limits, &Options::default(), &|_| {})
+    };
+    let mut twins = Vec::new();
+    for other in &case.others {
+        // Which is called the first makes no difference to a design.
+        let named = [case.truth, other.as_str()].map(EffectInfo::find);
+        let [Some(a), Some(b)] = named else { continue };
+        let between = [a, b].map(|effect| Candidacy {
+            effect,
+            vessel: None,
+        });
+        match plan(between, &limits) {
+            Ok(found) if found.prospect != Prospect::Twins => {
+                return Ok((other.clone(), found));
+            }
+            _ => twins.push(other.clone()),
+        }
+    }
+    Err(twins)
+}
+
+/// What both records say.
+pub struct Answer {
+    /// The truth is named or in the one group, the other is not, and nothing else was added.
+    pub pair_decided: bool,
+    /// The truth is named, alone.
+    pub truth_alone: bool,
+    /// The groups.
+    pub groups: Vec<Vec<String>>,
+}
+
+/// Plays the experiment to the rig, and diagnoses both records together.
+#[must_use]
+pub fn answered(case: &Undecided, other: &str, plan: &Design, seed: u64) -> Option<Answer> {
+    // The design says how many times it has to be played.
+    let times = plan.times_as_long.unwrap_or(1);
+    let values = plan.experiment.values.repeat(times);
+    let mut next = case.rig.play(values, &mut ChaCha8Rng::seed_from_u64(seed));
+    next.name = "next".to_string();
+    let mut records = case.problem.records.clone();
+    records.push(next);
+    let found = diagnosed(&problem(&case.rig, records)?)?;
+    let holds = |id: &str| found.groups.iter().flatten().any(|named| named == id);
+    Some(Answer {
+        pair_decided: found.groups.len() == 1 && holds(case.truth) && !holds(other),
+        truth_alone: found.verdict == Verdict::Effect && found.effects == [case.truth],
+        groups: found.groups,
+    })
+}

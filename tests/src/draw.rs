@@ -1,0 +1,289 @@
+//! Rigs drawn at random, and effects in them whose size is set by what the believed model cannot follow.
+
+use std::{collections::BTreeMap, ops::RangeInclusive};
+
+use ct_signals::{ArModel, Record};
+use greybox::{Fit, Setup, Stopping, fit_from, random_starts};
+use plants::{EffectInfo, ParameterInfo, Placed, Plant};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::{Drive, Rig};
+
+/// The plants that are drawn from.
+pub const PLANTS: [Plant; 4] = [
+    Plant::SingleTank,
+    Plant::SingleTankLinear,
+    Plant::CascadedTanks,
+    Plant::CascadedTanksLinear,
+];
+
+/// The command about which the rigs work \[V\].
+const MIDDLE: f64 = 5.0;
+/// The ratio is met within this part.
+const MET: f64 = 0.03;
+/// Rigs that are drawn before an effect is said to show nowhere.
+const DRAWS: usize = 12;
+/// Starts with which the minimum is checked at the end.
+const MORE: usize = 6;
+const STOPPING: Stopping = Stopping {
+    evaluations: 60,
+    cost: 1e-9,
+};
+
+fn between(rng: &mut ChaCha8Rng, range: RangeInclusive<f64>) -> f64 {
+    rng.random_range(range)
+}
+
+fn by_factor(rng: &mut ChaCha8Rng, range: RangeInclusive<f64>) -> f64 {
+    between(rng, range.start().ln()..=range.end().ln()).exp()
+}
+
+/// A rig with levels of 12 to 20 cm, time constants of 60 to 240 s, of two tanks the upper one's 0.2 to 1.2 times the
+/// lower one's; 20 to 60 samples in a time constant, steps of 0.3 to 1.5 of it; noise of 0.02 to 0.1 cm.
+#[must_use]
+pub fn rig(plant: Plant, drive: Drive, colour: f64, samples: usize, rng: &mut ChaCha8Rng) -> Rig {
+    let level = between(rng, 12.0..=20.0);
+    let lower = by_factor(rng, 60.0..=240.0);
+    let upper = lower * by_factor(rng, 0.2..=1.2);
+    let fineness = by_factor(rng, 20.0..=60.0);
+    let swing = between(rng, 1.0..=2.0);
+    let two = plant.vessels() > 1;
+    let area: f64 = 154.0;
+    // Torricelli: tau = 2 S H/Q.
+    let flow = 2.0 * area * level / lower;
+    let above = level * upper / lower;
+    let (gain, alpha) = (flow / MIDDLE, |level: f64| flow / level.sqrt());
+    let slope = between(rng, 2.0..=6.0);
+    let offset = level - slope * MIDDLE;
+    let (theta, levels) = match plant {
+        Plant::CascadedTanks => (vec![gain, alpha(above), alpha(level)], vec![above, level]),
+        Plant::SingleTankLinear => (vec![slope, lower, offset], vec![level]),
+        Plant::CascadedTanksLinear => (
+            vec![slope, upper, lower, offset],
+            vec![slope * MIDDLE, level],
+        ),
+        _ => (vec![gain, alpha(level)], vec![level]),
+    };
+    let rise = match plant.outlet() {
+        plants::Outlet::Torricelli => 2.0 * level / MIDDLE,
+        plants::Outlet::Linear => slope,
+    };
+    let feedback = by_factor(rng, 0.8..=2.5) * if two { 0.5 } else { 1.0 };
+    let slowest = if two { lower + upper } else { lower };
+    let steps = |part: f64| ((part * fineness).round() as usize).max(2);
+    Rig {
+        plant,
+        theta,
+        levels,
+        command: (MIDDLE - swing, MIDDLE + swing),
+        noise: by_factor(rng, 0.02..=0.1),
+        colour,
+        drive,
+        hold: (steps(0.3), steps(1.5)),
+        pi: (feedback / rise, slowest * between(rng, 0.7..=1.2)),
+        samples,
+        interval: lower / fineness,
+        ..Rig::single_tank()
+    }
+}
+
+/// A rig with an effect whose structural error is `ratio` times the noise: the root mean square of what the believed model,
+/// refitted to the record without noise, cannot follow.
+///
+/// The plant is drawn from those in which the effect may act, and the vessel from those of the plant. What is beside the size
+/// (a height, a time, a time constant, a phase) is drawn from the range that the catalogue's starts cover. The
+/// size goes from absent to the end of its plausible range until the ratio is met. Where it is not met, or the
+/// level leaves 0.1 to 3 times the level at rest, another rig is drawn; `None` where none of twelve would do.
+#[must_use]
+pub fn with_effect(
+    effect: &'static EffectInfo,
+    ratio: f64,
+    drive: Drive,
+    colour: f64,
+    samples: usize,
+    seed: u64,
+) -> Option<Rig> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let places: Vec<(Plant, usize)> = PLANTS
+        .into_iter()
+        .flat_map(|plant| effect.sites(plant).map(move |vessel| (plant, vessel)))
+        .collect();
+    let plants: Vec<Plant> = PLANTS
+        .into_iter()
+        .filter(|plant| places.iter().any(|(other, _)| other == plant))
+        .collect();
+    (0..DRAWS).find_map(|_| {
+        let plant = plants[rng.random_range(0..plants.len())];
+        let vessels: Vec<usize> = effect.sites(plant).collect();
+        let vessel = vessels[rng.random_range(0..vessels.len())];
+        let rig = rig(plant, drive, colour, samples, &mut rng);
+        let placed = Placed { effect, vessel };
+        built(rig, placed, ratio, seed, &mut rng)
+    })
+}
+
+fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) -> Option<Rig> {
+    let path = Path::draw(&rig, placed, seed, rng)?;
+    // The minimum from which the next size's is sought; at the end others are looked for.
+    let mut near: Option<Vec<f64>> = None;
+    for _ in 0..2 {
+        let mut at = |size: f64| {
+            let with = path.at(&rig, size);
+            let fit = misfit(&with, seed, near.as_deref(), 0)?;
+            let reached = fit.rmse / rig.noise;
+            near = Some(fit.x);
+            Some((with, reached))
+        };
+        // Outwards until the ratio lies between two sizes, then along the line through their logarithms.
+        let mut below: Option<(f64, f64)> = None;
+        let mut size = 1.0 / 1024.0;
+        let mut found = at(size)?;
+        while found.1 < ratio {
+            if size >= 1.0 {
+                return None;
+            }
+            below = Some((size, found.1));
+            size = (2.0 * size).min(1.0);
+            found = at(size)?;
+        }
+        let mut above = (size, found.1);
+        for step in 0..20 {
+            if (found.1 / ratio - 1.0).abs() < MET {
+                break;
+            }
+            size = match below {
+                // A threshold may leave nothing on one side: every other step halves the way.
+                Some(below) if step % 2 == 0 && below.1 > 0.0 => {
+                    let part = (ratio / below.1).ln() / (above.1 / below.1).ln();
+                    below.0 * (above.0 / below.0).powf(part.clamp(0.02, 0.98))
+                }
+                Some(below) => (below.0 * above.0).sqrt(),
+                None => 0.25 * above.0,
+            };
+            found = at(size)?;
+            if found.1 < ratio {
+                below = Some((size, found.1));
+            } else {
+                above = (size, found.1);
+            }
+        }
+        let (with, _) = found;
+        let best = misfit(&with, seed, near.as_deref(), MORE)?;
+        let reached = best.rmse / rig.noise;
+        if (reached / ratio - 1.0).abs() < 2.0 * MET {
+            return Some(with);
+        }
+        near = Some(best.x);
+    }
+    None
+}
+
+/// The record without noise.
+#[must_use]
+pub fn without_noise(rig: &Rig, seed: u64) -> Record {
+    let silent = Rig {
+        noise: 0.0,
+        ..rig.clone()
+    };
+    silent.run(&mut ChaCha8Rng::seed_from_u64(seed))
+}
+
+/// The believed model, refitted to the record without noise; `None` where the rig leaves its levels.
+fn misfit(rig: &Rig, seed: u64, near: Option<&[f64]>, more: usize) -> Option<Fit> {
+    let records = [without_noise(rig, seed)];
+    let level = *rig.levels.last()?;
+    let sound = |y: &f64| y.is_finite() && (0.1 * level..3.0 * level).contains(y);
+    if !records[0].output.values.iter().all(sound) {
+        return None;
+    }
+    let setup = Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
+    let mut starts = random_starts(&setup, more, seed);
+    starts.push(near.map_or_else(
+        || [rig.theta.as_slice(), &rig.levels].concat(),
+        <[f64]>::to_vec,
+    ));
+    fit_from(&setup, &starts, &ArModel::white(1.0), STOPPING).ok()
+}
+
+/// The sizes of an effect in a rig, from absent at 0 to the end of the plausible range at 1.
+struct Path {
+    placed: Placed,
+    /// For each parameter its value at 0 and at 1.
+    ends: Vec<(f64, f64)>,
+}
+
+impl Path {
+    fn draw(rig: &Rig, placed: Placed, seed: u64, rng: &mut ChaCha8Rng) -> Option<Self> {
+        let records = [without_noise(rig, seed)];
+        let setup =
+            Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
+        let mut structure = setup.structure.clone();
+        let x = [rig.theta.as_slice(), &rig.levels].concat();
+        structure.scales = setup.scales_at(&x).ok()?;
+        let parameters = structure.effect_parameters(placed);
+        let leading = parameters.first()?;
+        // Sine and cosine of a swing are one size, in a direction of their own.
+        let sized = |p: &ParameterInfo| p.unit == leading.unit && p.absent == leading.absent;
+        let several = parameters.iter().filter(|p| sized(p)).count() > 1;
+        let ends = parameters.iter().map(|p| {
+            if !sized(p) {
+                let value = beside(p, rng);
+                (value, value)
+            } else if p.absent.is_finite() {
+                let end = if p.lower < p.absent && rng.random() {
+                    p.lower
+                } else {
+                    p.upper
+                };
+                let part = if several {
+                    between(rng, 0.1..=1.0)
+                } else {
+                    1.0
+                };
+                (p.absent, p.absent + part * (end - p.absent))
+            } else {
+                (p.upper, p.lower)
+            }
+        });
+        Some(Self {
+            placed,
+            ends: ends.collect(),
+        })
+    }
+
+    fn at(&self, rig: &Rig, size: f64) -> Rig {
+        let values = self
+            .ends
+            .iter()
+            .map(|(from, to)| from + size * (to - from))
+            .collect();
+        Rig {
+            hidden: vec![(self.placed.effect.id, self.placed.vessel, values)],
+            ..rig.clone()
+        }
+    }
+}
+
+/// A parameter that is not the size: anywhere between its first and its last start, or within a factor of two of its only
+/// one.
+fn beside(parameter: &ParameterInfo, rng: &mut ChaCha8Rng) -> f64 {
+    let least = parameter
+        .starts
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    let most = parameter
+        .starts
+        .iter()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
+    let value = if least == most {
+        least * by_factor(rng, 0.5..=2.0)
+    } else if least > 0.0 {
+        by_factor(rng, least..=most)
+    } else {
+        between(rng, least..=most)
+    };
+    value.min(parameter.upper).max(parameter.lower)
+}

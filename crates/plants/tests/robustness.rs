@@ -290,3 +290,18 @@ fn a_record_around_zero_has_no_operating_level_to_divide_by() {
         }
     }
 }
+
+/// A tank that has run dry through a pipe of no height: the square of what is left in it is no number.
+#[test]
+fn a_pipe_below_a_tank_that_ran_dry_has_derivatives() {
+    let plant = Plant::SingleTank;
+    let pipe = placements(plant)
+        .into_iter()
+        .find(|placed| placed.effect.id == "pipe_height")
+        .expect("an effect of this plant");
+    let mut case = base(plant).with_interior(&[pipe]);
+    case.theta.copy_from_slice(&[1e-5, 4000.0, 0.0]);
+    case.levels[0] = 1e-200;
+    let input = vec![(Command::held(0.0), case.h); 300];
+    run(&case, &input, 1).expect("numbers");
+}

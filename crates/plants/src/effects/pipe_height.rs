@@ -36,6 +36,9 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     }]
 }
 
+/// A level of so little is none.
+const NOTHING: f64 = 1e-100;
+
 struct PipeHeight<T>(T);
 
 pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
@@ -47,8 +50,8 @@ impl<T: Scalar> Law<T> for PipeHeight<T> {
         Some(Balance::Outflow)
     }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
-        // An empty tank lets nothing out, however long its pipe.
-        if level.value() > 0.0 {
+        // An empty tank lets nothing out, however long its pipe; and the square of a level has to be a number.
+        if level.value() > NOTHING {
             // alpha sqrt(H) sqrt(1 + h/H): at h = 0 a factor of exactly one.
             *outflow = *outflow * (self.0 / *level + 1.0).sqrt();
         }

@@ -6,18 +6,16 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
     Error,
-    search::{Node, exchanges, without},
+    search::{NEAR, Node, best_first, exchanges, without},
 };
 
 /// An effect is accepted where its criterion falls by more than this ...
 pub(crate) const BIC_MARGIN: f64 = 6.0;
 /// ... and where chance would let so large a fall happen less often than this, counted over all candidates.
 const FALSE_CLAIM: f64 = 0.001;
-/// An exchange is followed where it comes this near, ...
-const NEAR: f64 = 25.0;
-/// ... the best of them; ...
+/// Of the exchanges that come near so many are followed, the best; ...
 const EXCHANGES: usize = 6;
-/// ... and one of as many effects is taken where the criterion falls by this.
+/// ... one of as many effects is taken where the criterion falls by this.
 const CLEARLY: f64 = 1.0;
 
 /// Whether a fall of the deviance is more than the best of all candidates would bring where there is nothing:
@@ -53,11 +51,8 @@ pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a
             .map(|position| exchanges(&node, position, noise, None))
             .collect::<Result<Vec<_>, _>>()?
             .concat();
-        others.retain(|other| {
-            other.gain_over(&node) > -NEAR
-                && !other.added.iter().any(|placed| other.at_the_edge(*placed))
-        });
-        others.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+        others.retain(|other| other.gain_over(&node) > -NEAR && other.plausible());
+        let mut others = best_first(others);
         others.truncate(EXCHANGES);
         let others = others
             .into_par_iter()

@@ -87,7 +87,7 @@ const PROMISE_DAMPING: f64 = 1e-6;
 const FOLLOWED: usize = 2;
 
 /// A rough fit this near in the criterion may come within a group's margin.
-const NEAR: f64 = 25.0;
+pub(crate) const NEAR: f64 = 25.0;
 /// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
 /// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
 const BY_CLOCK: usize = 1;
@@ -248,7 +248,8 @@ fn realise_all<'a>(
         .collect()
 }
 
-fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
+/// By the criterion.
+pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
 }

@@ -12,25 +12,36 @@ use crate::{
 /// An effect is accepted where its criterion falls by more than this ...
 pub(crate) const BIC_MARGIN: f64 = 6.0;
 /// ... and where chance would let so large a fall happen less often than this, counted over all candidates.
-const FALSE_CLAIM: f64 = 0.001;
+const FALSE_CLAIM: f64 = 0.003;
 /// Of the exchanges that come near so many are followed, the best; ...
 const EXCHANGES: usize = 6;
 /// ... one of as many effects is taken where the criterion falls by this.
 const CLEARLY: f64 = 1.0;
 
-/// Whether a fall of the deviance is more than the best of all candidates would bring where there is nothing:
-/// chi-square, corrected (Bonferroni) for every start of every candidate of the `lacking` model.
-pub(crate) fn beyond_chance(fall: f64, freedom: f64, lacking: &Node) -> bool {
-    let chance = ChiSquared::new(freedom).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
-    chance * candidates(lacking) < FALSE_CLAIM
+/// Whether a fall of the deviance with these effects is more than chance would bring where there is nothing.
+///
+/// Chi-square, corrected (Bonferroni) for all that the search looked at, with a share of the risk for each effect: one that
+/// has a single start is not made to pay for another with many.
+pub(crate) fn beyond_chance(fall: f64, lacking: &Node, gained: &Node) -> bool {
+    let free = |node: &Node| node.setup.free().len();
+    let freedom = free(gained).saturating_sub(free(lacking)).max(1);
+    let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
+    let structure = &lacking.setup.structure;
+    let candidates = structure.candidates().len() as f64;
+    let looks: f64 = gained
+        .added
+        .iter()
+        .filter(|placed| !lacking.added.contains(placed))
+        .map(|placed| candidates * structure.ways(*placed))
+        .product();
+    chance * looks < FALSE_CLAIM
 }
 
 /// Takes out, one by one, what the noise explains as well.
 pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
     while let Some(lacking) = least_useful(&node, noise)? {
-        let freedom = (node.fit.parameters - lacking.fit.parameters).max(1) as f64;
         let fall = lacking.fit.deviance - node.fit.deviance;
-        if node.gain_over(&lacking) > BIC_MARGIN && beyond_chance(fall, freedom, &lacking) {
+        if node.gain_over(&lacking) > BIC_MARGIN && beyond_chance(fall, &lacking, &node) {
             break;
         }
         node = lacking;
@@ -95,11 +106,4 @@ pub(crate) fn least_useful<'a>(
     Ok(lacking
         .into_iter()
         .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())))
-}
-
-/// How many ways the search had to find something where there is nothing.
-fn candidates(node: &Node) -> f64 {
-    let structure = &node.setup.structure;
-    let candidates = structure.candidates();
-    candidates.into_iter().map(|on| structure.ways(on)).sum()
 }

@@ -12,6 +12,7 @@ mod diagnose;
 mod diagnosis;
 mod error;
 mod exhausted;
+mod jump;
 mod locate;
 mod noise_floor;
 pub mod numbers;

@@ -5,7 +5,7 @@
 
 use ct_signals::ArModel;
 use greybox::{Fit, Setup, Stopping, fit_from};
-use plants::Placed;
+use plants::{Place, Placed, Unit};
 use rayon::prelude::*;
 
 use crate::{Error, spectral_line::strongest_line};
@@ -99,7 +99,24 @@ const EXCHANGED: usize = 12;
 const OUT_OF_REACH: f64 = 0.5;
 
 /// A child's starts: the vector of a node, with the new effect's parameters on the grid of its starts.
+///
+/// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel tells
+/// them apart, and from the wrong order no fit comes to the right one.
 fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
+    let mut begun = vec![transfer(from, child)];
+    let pair = child.structure.plant.interchangeable();
+    if let Some(pair) = pair.filter(|_| placed.effect.place == Place::Vessel) {
+        let free = |name| {
+            let at = child.names().iter().position(|known| known == name)?;
+            child.free().contains(&at).then_some(at)
+        };
+        if let [Some(a), Some(b)] = pair.map(free) {
+            let mut exchanged = begun[0].clone();
+            exchanged.swap(a, b);
+            begun.push(exchanged);
+        }
+    }
+
     let parameters = child.structure.effect_parameters(placed);
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
     for parameter in &parameters {
@@ -116,8 +133,8 @@ fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     }
     combinations
         .into_iter()
-        .map(|values| {
-            let mut x = transfer(from, child);
+        .flat_map(|values| begun.iter().map(move |x| (x.clone(), values.clone())))
+        .map(|(mut x, values)| {
             for (parameter, value) in parameters.iter().zip(values) {
                 let name = format!("{}.{}", placed.effect.id, parameter.name);
                 if let Some(at) = child.names().iter().position(|known| *known == name) {
@@ -508,8 +525,11 @@ pub(crate) fn exchanges<'a>(
     };
     let nodes = begun
         .into_par_iter()
-        .filter(|begun| node.gain_over(begun) < reach)
-        .filter_map(|begun| fitted(&begun, noise, ROUGH, &[]).ok())
+        .filter_map(|begun| {
+            let carried = carried(node, own, &begun);
+            let near = carried.is_some() || node.gain_over(&begun) < reach;
+            near.then(|| fitted(&begun, noise, ROUGH, carried.as_slice()).ok())?
+        })
         .map(|rough| {
             // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
             if rough.fit.bic() - node.fit.bic() < NEAR {
@@ -520,6 +540,43 @@ pub(crate) fn exchanges<'a>(
         })
         .collect();
     Ok(best_first(nodes))
+}
+
+/// A start of a stand-in whose size is of the same kind as that of the effect it stands for: the same size.
+///
+/// What a lag of the pump is to the sensor's, a time constant that the data determine: from a grid of starts, with two more in
+/// the tanks to get out of its way, a fit creeps towards it.
+fn carried(node: &Node, own: Placed, stand_in: &Node) -> Option<Vec<f64>> {
+    let added = *stand_in.added.last()?;
+    let size = |node: &Node, placed: Placed| {
+        let leading = node
+            .setup
+            .structure
+            .effect_parameters(placed)
+            .swap_remove(0);
+        let name = format!("{}.{}", placed.effect.id, leading.name);
+        let at = node.setup.names().iter().position(|known| *known == name)?;
+        Some((leading, at))
+    };
+    let (from, at) = size(node, own)?;
+    let (to, into) = size(stand_in, added)?;
+    if from.unit != to.unit || from.unit == Unit::ONE {
+        return None;
+    }
+    let mut x = transfer(node, &stand_in.setup);
+    x[into] = node.fit.x[at].clamp(to.lower, to.upper);
+    // What else the stand-in has is where it is.
+    for (name, (value, fitted)) in stand_in
+        .setup
+        .names()
+        .iter()
+        .zip(x.iter_mut().zip(&stand_in.fit.x))
+    {
+        if !node.setup.names().contains(name) && *value == 0.0 {
+            *value = *fitted;
+        }
+    }
+    Some(x)
 }
 
 /// First fits of what may stand in the place of an effect of a node, of which another is `lacking`.

@@ -121,6 +121,13 @@ impl Plant {
         }
     }
 
+    /// Two parameters that may be exchanged without any reading becoming another; an effect in one of the vessels tells them
+    /// apart.
+    #[must_use]
+    pub fn interchangeable(self) -> Option<[&'static str; 2]> {
+        (self == Self::CascadedTanksLinear).then_some(["tau1", "tau2"])
+    }
+
     /// Its own fitted parameters, in the order in which the simulator takes them.
     #[must_use]
     pub fn parameters(self, scales: &Scales) -> Vec<ParameterInfo> {

@@ -1,0 +1,92 @@
+//! The simplest course of time that no effect describes: from one sample to the next the reading is another.
+//!
+//! A recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant imitates it
+//! in part, and beside it a wide play of the sensor or a leak the rest: down to the noise, with three sizes or four for
+//! what is one. So whatever is claimed has to be better than a jump.
+
+use std::ops::Range;
+
+use ct_signals::{ArModel, Record};
+use greybox::fit_from;
+use plants::{Fitted, Place, Term, Variable};
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    noise_floor::residual_colour,
+    remains::{Left, Remains},
+    search::{FINE, Node},
+};
+
+/// Instants that are tried, those where the whitened residual is largest.
+const INSTANTS: usize = 4;
+/// The jump's first size is that of the residual's means over so many samples before and after.
+const AROUND: usize = 8;
+/// A jump has a size and an instant; the fit counts the size.
+const INSTANT: f64 = 1.0;
+
+/// A model with a jump of the reading, fitted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Jump {
+    /// Its criterion.
+    pub bic: f64,
+    /// The record in which it was sought, and the last sample before it.
+    record: usize,
+    before: usize,
+}
+
+impl Jump {
+    /// What it leaves to be explained of records.
+    pub fn left(self, records: &[Record]) -> Left {
+        let time = &records[self.record].time;
+        Left {
+            what: Remains::Instant(time[self.before + 1], 0.0),
+            record: Some(self.record),
+        }
+    }
+}
+
+/// A node with a jump of the reading where that helps most, in the metric of a noise; `None` where the records have no
+/// room for one.
+pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> {
+    // Beside all else that the model lacks, an instant stands out where the residual's own colour does not foretell it.
+    let own = residual_colour(node)?;
+    let mut instants: Vec<(f64, usize, usize)> = Vec::new();
+    let residuals = node.setup.disturbance(&node.fit.x)?;
+    for (record, residual) in residuals.iter().enumerate() {
+        let whitened = own.whiten(residual);
+        let room = AROUND..residual.len().saturating_sub(AROUND);
+        instants.extend(room.map(|k| (whitened[k].abs(), record, k)));
+    }
+    instants.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let fitted = |record: usize, k: usize| -> Result<f64, Error> {
+        let sum = |range: Range<usize>| residuals[record][range].iter().sum::<f64>();
+        let size = (sum(k..k + AROUND) - sum(k - AROUND..k)) / AROUND as f64;
+        let time = &node.setup.records[record].time;
+        let structure = node.setup.structure.with_term(Term {
+            name: "jump_of_the_reading".to_string(),
+            place: Place::Sensor,
+            vessel: 0,
+            variable: Variable::Time,
+            knots: vec![time[k - 1] - time[0], time[k] - time[0]],
+            ordinates: vec![0.0, size],
+            fitted: Fitted::Scale,
+        })?;
+        let setup = node.setup.with_structure(structure)?;
+        let mut start = node.fit.x.clone();
+        start.insert(node.setup.parameter_count(), 1.0);
+        let fit = fit_from(&setup, &[start], noise, FINE)?;
+        Ok(fit.bic() + INSTANT * (setup.samples() as f64).ln())
+    };
+    Ok(instants
+        .into_par_iter()
+        .take(INSTANTS)
+        .filter_map(|(_, record, k)| {
+            Some(Jump {
+                bic: fitted(record, k).ok()?,
+                record,
+                before: k - 1,
+            })
+        })
+        .min_by(|a, b| a.bic.total_cmp(&b.bic)))
+}

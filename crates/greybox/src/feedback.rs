@@ -225,7 +225,6 @@ impl Feedback {
         Response {
             plant: self.plant.clone(),
             levels: vec![0.0; columns * self.plant.b.len()],
-            scratch: vec![0.0; columns * self.plant.b.len()],
         }
     }
 }
@@ -235,7 +234,6 @@ impl Feedback {
 pub(crate) struct Response {
     plant: Arc<LinearPlant>,
     levels: Vec<f64>,
-    scratch: Vec<f64>,
 }
 
 impl Response {
@@ -254,19 +252,21 @@ impl Response {
 
     /// A step under the commands of a row.
     pub(crate) fn advance(&mut self, commands: &[f64]) {
-        let columns = commands.len();
-        let rows = self.scratch.chunks_exact_mut(columns);
-        for ((to, a), b) in rows.zip(&self.plant.a).zip(&self.plant.b) {
-            to.fill(0.0);
-            for (a, x) in a.iter().zip(self.levels.chunks_exact(columns)) {
-                for (to, x) in to.iter_mut().zip(x) {
-                    *to += a * x;
-                }
+        let (a, b) = (&self.plant.a, &self.plant.b);
+        const { assert!(MAX_VESSELS == 2) };
+        // One pass over the columns: a row is short, and every loop over it would cost more than its sums.
+        if let [b0, b1] = b[..] {
+            let [[a00, a01], [a10, a11]] = [[a[0][0], a[0][1]], [a[1][0], a[1][1]]];
+            let (first, second) = self.levels.split_at_mut(commands.len());
+            for ((x0, x1), u) in first.iter_mut().zip(second).zip(commands) {
+                let (before0, before1) = (*x0, *x1);
+                *x0 = a00 * before0 + a01 * before1 + b0 * u;
+                *x1 = a10 * before0 + a11 * before1 + b1 * u;
             }
-            for (to, u) in to.iter_mut().zip(commands) {
-                *to += b * u;
+        } else {
+            for (x, u) in self.levels.iter_mut().zip(commands) {
+                *x = a[0][0] * *x + b[0] * u;
             }
         }
-        std::mem::swap(&mut self.levels, &mut self.scratch);
     }
 }

@@ -6,7 +6,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::{
     Error, Setup, Stop, Stopping, Triangle,
-    levenberg_marquardt::{held, minimise},
+    levenberg_marquardt::{held, minimise, within},
     marginal, random_starts,
     starts::extend_levels,
 };
@@ -208,13 +208,60 @@ pub fn fit_from(
     noise: &ArModel,
     stopping: Stopping,
 ) -> Result<Fit, Error> {
+    let starts = starts.iter().cloned().map(Start::from).collect();
+    fit_onward(setup, starts, noise, stopping)
+}
+
+/// Where a fit begins.
+#[derive(Debug, Clone)]
+pub struct Start {
+    /// The vector.
+    pub x: Vec<f64>,
+    /// What [`Setup::linearise`] gives there in the metric of the fit, where it is known: it is not simulated again.
+    pub triangle: Option<Triangle>,
+}
+
+impl From<Vec<f64>> for Start {
+    fn from(x: Vec<f64>) -> Self {
+        Self { x, triangle: None }
+    }
+}
+
+impl Start {
+    /// Where a fit of the same setup ended, for one in the metric of a given noise.
+    #[must_use]
+    pub fn at_end(fit: &Fit, noise: &ArModel) -> Self {
+        // White noise leaves the rows as they are, whatever its size.
+        let same_metric = fit.noise == *noise || fit.noise.order() + noise.order() == 0;
+        Self {
+            x: fit.x.clone(),
+            triangle: same_metric.then(|| fit.triangle.clone()),
+        }
+    }
+}
+
+/// As [`fit_from`], from starts of which more may be known.
+///
+/// # Errors
+/// As [`fit_from`].
+pub fn fit_onward(
+    setup: &Setup,
+    starts: Vec<Start>,
+    noise: &ArModel,
+    stopping: Stopping,
+) -> Result<Fit, Error> {
     let free = setup.free();
     let bounds: Vec<(f64, f64)> = free.iter().map(|&i| setup.bounds()[i]).collect();
+    let count = starts.len();
     let minima: Vec<_> = starts
-        .par_iter()
-        .map(|start| {
-            let mut start = start.clone();
+        .into_par_iter()
+        .map(|Start { x: given, triangle }| {
+            let mut start = given.clone();
             setup.impose_fixed(&mut start);
+            for (&i, bounds) in free.iter().zip(&bounds) {
+                start[i] = within(start[i], *bounds);
+            }
+            let known = triangle.filter(|_| start == given);
             let full = |x: &[f64]| {
                 let mut full = start.clone();
                 for (&i, value) in free.iter().zip(x) {
@@ -223,7 +270,14 @@ pub fn fit_from(
                 full
             };
             let x: Vec<f64> = free.iter().map(|&i| start[i]).collect();
-            let minimum = minimise(x, &bounds, stopping, |x| setup.linearise(&full(x), noise));
+            let minimum = minimise(
+                x,
+                known,
+                &bounds,
+                stopping,
+                |x, limit| setup.linearise_below(&full(x), noise, limit),
+                |x, limit| setup.costs_more(&full(x), noise, limit),
+            );
             (full(&minimum.x), minimum)
         })
         .filter(|(_, minimum)| minimum.stop != Stop::NotFinite)
@@ -241,9 +295,7 @@ pub fn fit_from(
     let (x, minimum) = minima
         .into_iter()
         .find(|(_, minimum)| minimum.triangle.cost() <= best)
-        .ok_or(Error::NoFiniteStart {
-            starts: starts.len(),
-        })?;
+        .ok_or(Error::NoFiniteStart { starts: count })?;
     let interior: Vec<usize> = (0..free.len())
         .filter(|&j| {
             // What no sample speaks of has no error: the state behind a lag that is zero.
@@ -269,7 +321,7 @@ pub fn fit_from(
             + log_det,
         parameters: free.len() + 1 + noise.order(),
         samples,
-        starts: starts.len(),
+        starts: count,
         agree,
         stop: minimum.stop,
         triangle: minimum.triangle,

@@ -53,18 +53,23 @@ pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
     (x <= lower + room && descent <= 0.0) || (x >= upper - room && descent >= 0.0)
 }
 
-/// From `x`, which is clipped to the box; `evaluate` gives the folded rows `[J, r]`, `r` = measured minus model.
+/// A trial that promises less than this part of the cost, or follows one that failed, may well fail.
+const DOUBTFUL: f64 = 1e-2;
+
+/// From `x`, which lies in the box, and its rows `at`, where they are known. `evaluate` gives the folded rows `[J, r]`, `r` =
+/// measured minus model, and may give nothing where the cost is above its second argument; `worse` says, without derivatives
+/// and so much sooner, that it is.
 pub(crate) fn minimise(
     mut x: Vec<f64>,
+    at: Option<Triangle>,
     bounds: &[(f64, f64)],
     stopping: Stopping,
-    evaluate: impl Fn(&[f64]) -> Option<Triangle>,
+    evaluate: impl Fn(&[f64], f64) -> Option<Triangle>,
+    worse: impl Fn(&[f64], f64) -> bool,
 ) -> Minimum {
     let p = x.len();
-    for (value, (lower, upper)) in x.iter_mut().zip(bounds) {
-        *value = within(*value, (*lower, *upper));
-    }
-    let Some(mut at) = evaluate(&x).filter(|at| at.cost().is_finite()) else {
+    let at = at.or_else(|| evaluate(&x, f64::INFINITY));
+    let Some(mut at) = at.filter(|at| at.cost().is_finite()) else {
         return Minimum {
             x,
             triangle: Triangle::new(p + 1),
@@ -125,7 +130,11 @@ pub(crate) fn minimise(
             };
         }
         evaluations += 1;
-        let next = evaluate(&trial).filter(|next| next.cost() < cost);
+        let doubtful = growth > 2.0 || predicted < DOUBTFUL * cost;
+        let next = (!(doubtful && worse(&trial, cost)))
+            .then(|| evaluate(&trial, cost))
+            .flatten()
+            .filter(|next| next.cost() < cost);
         if let Some(next) = next {
             let fall = cost - next.cost();
             let ratio = fall / predicted;

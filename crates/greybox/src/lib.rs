@@ -15,7 +15,9 @@ mod triangle;
 
 pub use error::Error;
 pub use feedback::{LinearPlant, Replay, replay};
-pub use fit::{Fit, FitOptions, coloured, fit, fit_from, fit_initial_levels, noise_of};
+pub use fit::{
+    Fit, FitOptions, Start, coloured, fit, fit_from, fit_initial_levels, fit_onward, noise_of,
+};
 pub use levenberg_marquardt::{Stop, Stopping};
 pub use sandwich::{Robust, robust};
 pub use setup::{LoopRun, Rows, Setup, Simulated};

@@ -13,6 +13,9 @@ use crate::{
     reading_step::reading_step,
 };
 
+/// More than sums of squares over a record differ by where they are taken in another order.
+const ROUNDING: f64 = 1e-9;
+
 /// A structure, the records, and which parameters are free.
 ///
 /// The fitted vector holds the structure's parameters (free ones and fixed ones), then for every record the initial
@@ -552,18 +555,49 @@ impl<'a> Setup<'a> {
     /// simulation is not finite.
     #[must_use]
     pub fn linearise(&self, x: &[f64], noise: &ArModel) -> Option<Triangle> {
+        self.linearise_below(x, noise, f64::INFINITY)
+    }
+
+    /// The same; `None` too where the cost is above a limit, which is known long before the last sample as a rule.
+    pub(crate) fn linearise_below(
+        &self,
+        x: &[f64],
+        noise: &ArModel,
+        limit: f64,
+    ) -> Option<Triangle> {
         let columns = self.free.len() + 1;
         let mut triangle = Triangle::new(columns);
         let mut whitener = noise.whitener(columns);
+        // The triangle's cost is a sum in another order.
+        let limit = limit * (1.0 + ROUNDING);
+        let mut cost = 0.0;
         self.each_row(x, |first, row| {
             if first {
                 whitener.reset();
             }
             whitener.push(row);
+            cost += row[columns - 1] * row[columns - 1];
             triangle.push(row);
+            cost <= limit
         })?;
         triangle.finish();
         Some(triangle)
+    }
+
+    /// Whether the cost is above a limit, or not finite.
+    pub(crate) fn costs_more(&self, x: &[f64], noise: &ArModel, limit: f64) -> bool {
+        let mut whitener = noise.whitener(1);
+        let limit = limit * (1.0 + ROUNDING);
+        let mut cost = 0.0;
+        let within = self.each_row_in_lanes::<0>(x, &[], |first, row| {
+            if first {
+                whitener.reset();
+            }
+            whitener.push(row);
+            cost += row[0] * row[0];
+            cost <= limit
+        });
+        within.is_none()
     }
 
     /// The rows `[d model/d x_free, measured - model]`, one for each sample of all records, as they are; `None` where
@@ -572,7 +606,10 @@ impl<'a> Setup<'a> {
     pub fn rows(&self, x: &[f64]) -> Option<Rows> {
         let columns = self.free.len() + 1;
         let mut values = Vec::with_capacity(self.samples() * columns);
-        self.each_row(x, |_, row| values.extend_from_slice(row))?;
+        self.each_row(x, |_, row| {
+            values.extend_from_slice(row);
+            true
+        })?;
         Some(Rows {
             columns,
             lengths: self.records.iter().map(Record::len).collect(),
@@ -580,8 +617,8 @@ impl<'a> Setup<'a> {
         })
     }
 
-    /// Shows every row, and whether it is the first one of its record.
-    fn each_row(&self, x: &[f64], each: impl FnMut(bool, &mut [f64])) -> Option<()> {
+    /// Shows every row, and whether it is the first one of its record, until `each` has seen enough; `None` then too.
+    fn each_row(&self, x: &[f64], each: impl FnMut(bool, &mut [f64]) -> bool) -> Option<()> {
         // Parameters and one record's initial states; a few lane counts, so that short vectors stay cheap.
         let parameters = self
             .free
@@ -589,23 +626,25 @@ impl<'a> Setup<'a> {
             .filter(|&&i| i < self.parameter_count())
             .count();
         match parameters + self.states() {
-            0..=4 => self.each_row_in_lanes::<4>(x, each),
-            5..=6 => self.each_row_in_lanes::<6>(x, each),
-            7..=8 => self.each_row_in_lanes::<8>(x, each),
-            9..=10 => self.each_row_in_lanes::<10>(x, each),
-            11..=12 => self.each_row_in_lanes::<12>(x, each),
+            0..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
+            5..=6 => self.each_row_in_lanes::<6>(x, &self.free, each),
+            7..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
+            9..=10 => self.each_row_in_lanes::<10>(x, &self.free, each),
+            11..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
             // One lane more, and a compiler copies a dual by a call instead of in registers.
-            13..=15 => self.each_row_in_lanes::<15>(x, each),
-            _ => self.each_row_in_lanes::<8>(x, each),
+            13..=15 => self.each_row_in_lanes::<15>(x, &self.free, each),
+            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
         }
     }
 
+    /// The same with derivatives by some of the entries, in simulators of so many lanes.
     fn each_row_in_lanes<const L: usize>(
         &self,
         x: &[f64],
-        mut each: impl FnMut(bool, &mut [f64]),
+        by: &[usize],
+        mut each: impl FnMut(bool, &mut [f64]) -> bool,
     ) -> Option<()> {
-        let columns = self.free.len() + 1;
+        let columns = by.len() + 1;
         let mut row = vec![0.0; columns];
         let count = self.parameter_count();
         // What the commands of the loop do to the plant: its commands for the derivatives, for the residual what it was given
@@ -623,15 +662,19 @@ impl<'a> Setup<'a> {
             }
             // Columns of this record: the free parameters and its own initial levels, in lanes of one simulator or,
             // where they are too many, of several that run side by side.
-            let lanes: Vec<usize> = (0..self.free.len())
-                .filter(|&column| self.free[column] < count || own.contains(&self.free[column]))
+            let lanes: Vec<usize> = (0..by.len())
+                .filter(|&column| by[column] < count || own.contains(&by[column]))
                 .collect();
-            let mut simulators = Vec::with_capacity(lanes.len().div_ceil(L));
-            for chunk in lanes.chunks(L) {
+            let mut chunks: Vec<&[usize]> = lanes.chunks(L.max(1)).collect();
+            if chunks.is_empty() {
+                chunks.push(&[]);
+            }
+            let mut simulators = Vec::with_capacity(chunks.len());
+            for chunk in &chunks {
                 let dual = |i: usize| {
                     let lane = chunk
                         .iter()
-                        .position(|&column| self.free[column] == i)
+                        .position(|&column| by[column] == i)
                         .unwrap_or(L);
                     Dual::<L>::variable(x[i], lane)
                 };
@@ -651,7 +694,7 @@ impl<'a> Setup<'a> {
             for k in 0..n {
                 row.fill(0.0);
                 let mut model = f64::NAN;
-                for ((simulator, regulator), chunk) in simulators.iter_mut().zip(lanes.chunks(L)) {
+                for ((simulator, regulator), chunk) in simulators.iter_mut().zip(&chunks) {
                     let y = simulator.read();
                     model = y.re;
                     for (lane, &column) in chunk.iter().enumerate() {
@@ -684,7 +727,9 @@ impl<'a> Setup<'a> {
                 if !row.iter().all(|value| value.is_finite()) {
                     return None;
                 }
-                each(k == 0, &mut row);
+                if !each(k == 0, &mut row) {
+                    return None;
+                }
             }
         }
         Some(())
@@ -780,4 +825,43 @@ fn command(record: &Record, k: usize) -> Command {
 /// The set point at sample `k`; not a number where the record has none.
 fn reference(record: &Record, k: usize) -> f64 {
     record.reference.as_ref().map_or(f64::NAN, |r| r.values[k])
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use ct_signals::Signal;
+    use plants::{Known, Plant};
+
+    #[test]
+    fn a_cost_above_a_limit_is_seen_with_and_without_derivatives() {
+        let wave = |k: usize| 5.0 + (0.1 * k as f64).sin();
+        let record = Record {
+            name: "wave".into(),
+            time: (0..300).map(|k| 2.0 * k as f64).collect(),
+            input: Signal::new("u", "V", (0..300).map(wave).collect()),
+            output: Signal::new("y", "cm", (0..300).map(|k| 2.0 * wave(k + 40)).collect()),
+            reference: None,
+            hold: Hold::Zero,
+        };
+        let records = [record];
+        let fixed = BTreeMap::new();
+        let known = Known::default();
+        let setup = Setup::from_records(Plant::CascadedTanks, known, &[], &records, fixed).unwrap();
+        let x = [0.05, 0.1, 0.08, 7.0, 9.0];
+        for noise in [
+            ArModel::white(1.0),
+            ArModel::from_coefficients(&[0.9, -0.3], 0.2).unwrap(),
+        ] {
+            let cost = setup.linearise(&x, &noise).unwrap().cost();
+            for (share, above) in [(1.0 - 1e-6, true), (1.0, false), (1.0 + 1e-6, false)] {
+                let limit = share * cost;
+                assert_eq!(setup.costs_more(&x, &noise, limit), above);
+                let below = setup.linearise_below(&x, &noise, limit);
+                assert_eq!(below.map(|below| below.cost()), (!above).then_some(cost));
+            }
+            assert!(setup.costs_more(&[f64::NAN; 5], &noise, f64::INFINITY));
+        }
+    }
 }

@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 
 use approx::assert_relative_eq;
 use ct_signals::ArModel;
-use greybox::{Error, FitOptions, Setup, Stop, Stopping, fit, fit_from, random_starts};
+use greybox::{
+    Error, FitOptions, Setup, Start, Stop, Stopping, fit, fit_from, fit_onward, random_starts,
+};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 use plants::Plant;
@@ -229,6 +231,38 @@ fn what_it_says_of_its_end_is_true() {
     };
     let fit = fit_from(&setup, &[start], &white, short).unwrap();
     assert_eq!(fit.stop, Stop::Evaluations);
+}
+
+#[test]
+fn a_fit_that_goes_on_is_the_fit_from_there() {
+    let rough = Stopping {
+        evaluations: 4,
+        cost: 1e-3,
+    };
+    let coloured = ArModel::from_coefficients(&[0.8], 0.3).unwrap();
+    let white = ArModel::white(0.2);
+    for rig in Rig::all() {
+        let records = [rig.record(1)];
+        let setup = rig.setup(&records);
+        let start = random_starts(&setup, 1, 5).remove(0);
+        for (first, then) in [
+            (&white, &coloured),
+            (&coloured, &coloured),
+            (&white, &white),
+        ] {
+            let begun = fit_from(&setup, std::slice::from_ref(&start), first, rough).unwrap();
+            let end = Start::at_end(&begun, then);
+            assert_eq!(end.triangle.is_some(), first == then);
+            // What is known of a start that does not lie within the bounds is known of another one.
+            let mut outside = end.clone();
+            outside.x[1] = setup.bounds()[1].1 + 1.0;
+            for start in [end, outside] {
+                let again = fit_from(&setup, std::slice::from_ref(&start.x), then, PRECISE);
+                let onward = fit_onward(&setup, vec![start], then, PRECISE).unwrap();
+                assert_eq!(onward.x, again.unwrap().x);
+            }
+        }
+    }
 }
 
 #[test]

@@ -3,8 +3,10 @@
 //! On the measured Cascaded Tanks data a pump dead zone alone lowers the error from 0.67 to 0.60 V and an overflow
 //! alone to 0.52 V, both together to 0.33 V: a search that stops at the first effect that does not pay misses such pairs.
 
+use std::sync::OnceLock;
+
 use ct_signals::ArModel;
-use greybox::{Fit, Setup, Stopping, fit_from};
+use greybox::{Fit, Setup, Start, Stopping, Triangle, fit_from, fit_onward};
 use plants::{Place, Placed, Unit};
 use rayon::prelude::*;
 
@@ -162,12 +164,11 @@ fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
         .collect()
 }
 
-/// The cost after one step from a start, as the linearised model predicts it.
+/// The cost after one step from a start, as the linearised model there predicts it.
 ///
 /// The step is hardly damped: an effect that the other parameters nearly imitate takes long steps in both, and a damped one would
 /// leave the start's own error in the promise.
-fn promise(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<f64> {
-    let triangle = setup.linearise(x, noise)?;
+fn promise(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
     let free: Vec<usize> = (0..setup.free().len()).collect();
     let scale: Vec<f64> = free.iter().map(|&j| triangle.column_norm(j)).collect();
     let mut step = triangle.solve(&free, &scale, PROMISE_DAMPING);
@@ -180,43 +181,75 @@ fn promise(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<f64> {
         };
         *d = (x[i] + *d).clamp(lower, upper.max(lower)) - x[i];
     }
-    Some(triangle.predicted(&step))
+    triangle.predicted(&step)
 }
 
 /// One effect more, at its most promising starts.
 struct Proposal<'a> {
     setup: Setup<'a>,
     added: Vec<Placed>,
-    starts: Vec<Vec<f64>>,
+    starts: Vec<Start>,
     promise: f64,
 }
 
-/// `from`: where all other parameters start, the parent or a node of another structure.
-fn propose<'a>(
-    parent: &Node<'a>,
-    from: &Node<'a>,
-    placed: Placed,
-    noise: &ArModel,
-) -> Option<Proposal<'a>> {
-    let mut structure = parent.setup.structure.with(placed).ok()?;
-    if placed.effect.by_clock {
-        structure.scales.period = strongest_period(parent)?;
+/// A node that is extended, and the period that shows most in what it does not explain, once that was asked for.
+struct Parent<'n, 'a> {
+    node: &'n Node<'a>,
+    period: OnceLock<Option<f64>>,
+}
+
+impl<'n, 'a> Parent<'n, 'a> {
+    fn new(node: &'n Node<'a>) -> Self {
+        Self {
+            node,
+            period: OnceLock::new(),
+        }
     }
-    let setup = parent.setup.with_structure(structure).ok()?;
-    let mut ranked: Vec<(f64, Vec<f64>)> = grid(from, &setup, placed)
-        .into_par_iter()
-        .filter_map(|x| Some((promise(&setup, &x, noise)?, x)))
-        .collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let promise = ranked.first()?.0;
-    let mut added = parent.added.clone();
+
+    /// The setup with one effect more.
+    fn with(&self, placed: Placed) -> Option<Setup<'a>> {
+        let mut structure = self.node.setup.structure.with(placed).ok()?;
+        if placed.effect.by_clock {
+            structure.scales.period = (*self.period.get_or_init(|| strongest_period(self.node)))?;
+        }
+        self.node.setup.with_structure(structure).ok()
+    }
+}
+
+fn propose<'a>(parent: &Parent<'_, 'a>, placed: Placed, noise: &ArModel) -> Option<Proposal<'a>> {
+    let setup = parent.with(placed)?;
+    let (promise, starts) = promising(parent.node, &setup, placed, noise)?;
+    let mut added = parent.node.added.clone();
     added.push(placed);
     Some(Proposal {
         setup,
         added,
-        starts: ranked.into_iter().take(FOLLOWED).map(|(_, x)| x).collect(),
+        starts,
         promise,
     })
+}
+
+/// The most promising starts of a new effect, the other parameters being where they are in `from`, and the best one's promise.
+fn promising(
+    from: &Node,
+    setup: &Setup,
+    placed: Placed,
+    noise: &ArModel,
+) -> Option<(f64, Vec<Start>)> {
+    let mut ranked: Vec<(f64, Start)> = grid(from, setup, placed)
+        .into_par_iter()
+        .filter_map(|x| {
+            let triangle = setup.linearise(&x, noise)?;
+            let promise = promise(setup, &x, &triangle);
+            let triangle = Some(triangle);
+            Some((promise, Start { x, triangle }))
+        })
+        .collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let promise = ranked.first()?.0;
+    let starts = ranked.into_iter().take(FOLLOWED);
+    let starts = starts.map(|(_, start)| start).collect();
+    Some((promise, starts))
 }
 
 /// The period that shows most in what a node does not explain \[s\].
@@ -230,7 +263,7 @@ fn strongest_period(node: &Node) -> Option<f64> {
 }
 
 fn realise<'a>(proposal: Proposal<'a>, noise: &ArModel, stopping: Stopping) -> Option<Node<'a>> {
-    let fit = fit_from(&proposal.setup, &proposal.starts, noise, stopping).ok()?;
+    let fit = fit_onward(&proposal.setup, proposal.starts, noise, stopping).ok()?;
     Some(Node {
         setup: proposal.setup,
         fit,
@@ -246,9 +279,10 @@ pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Node<'a>> {
 
 /// All extensions of a node by one effect, not fitted, the most promising first.
 fn proposals<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Proposal<'a>> {
+    let from = Parent::new(parent);
     let mut proposals: Vec<Proposal> = candidates(parent)
         .into_par_iter()
-        .filter_map(|placed| propose(parent, parent, placed, noise))
+        .filter_map(|placed| propose(&from, placed, noise))
         .collect();
     proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
     proposals
@@ -422,11 +456,15 @@ fn extensions<'a>(
     width: usize,
     noise: &ArModel,
 ) -> Result<Vec<Proposal<'a>>, Error> {
-    let mut wanted: Vec<(&Node, Placed)> = Vec::new();
+    let parents: Vec<Parent> = distinct(base, parents, width)?
+        .into_iter()
+        .map(Parent::new)
+        .collect();
+    let mut wanted: Vec<(&Parent, Placed)> = Vec::new();
     let mut seen = std::collections::HashSet::new();
-    for parent in distinct(base, parents, width)? {
-        for placed in candidates(parent) {
-            let mut added = parent.added.clone();
+    for parent in &parents {
+        for placed in candidates(parent.node) {
+            let mut added = parent.node.added.clone();
             added.push(placed);
             if seen.insert(key(&added)) {
                 wanted.push((parent, placed));
@@ -435,7 +473,7 @@ fn extensions<'a>(
     }
     let mut proposals: Vec<Proposal> = wanted
         .into_par_iter()
-        .filter_map(|(parent, placed)| propose(parent, parent, placed, noise))
+        .filter_map(|(parent, placed)| propose(parent, placed, noise))
         .collect();
     proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
     Ok(proposals)
@@ -456,9 +494,9 @@ fn fitted<'a>(
     stopping: Stopping,
     more: &[Vec<f64>],
 ) -> Result<Node<'a>, Error> {
-    let mut starts = vec![node.fit.x.clone()];
-    starts.extend_from_slice(more);
-    let fit = fit_from(&node.setup, &starts, noise, stopping)?;
+    let mut starts = vec![Start::at_end(&node.fit, noise)];
+    starts.extend(more.iter().cloned().map(Start::from));
+    let fit = fit_onward(&node.setup, starts, noise, stopping)?;
     Ok(Node {
         setup: node.setup.clone(),
         fit,
@@ -497,8 +535,9 @@ pub(crate) fn any_promise(
     noise: &ArModel,
     worth: impl Fn(&Setup, f64) -> bool + Sync,
 ) -> bool {
+    let from = Parent::new(parent);
     candidates(parent).into_par_iter().any(|placed| {
-        propose(parent, parent, placed, noise)
+        propose(&from, placed, noise)
             .is_some_and(|proposal| worth(&proposal.setup, proposal.promise))
     })
 }
@@ -586,18 +625,18 @@ fn begin_exchanges<'a>(
     own: Placed,
     noise: &ArModel,
 ) -> Vec<Node<'a>> {
+    let from = Parent::new(lacking);
     let mut proposals: Vec<Proposal> = candidates(lacking)
         .into_par_iter()
         .filter(|placed| *placed != own)
         .filter_map(|placed| {
-            let mut proposal = propose(lacking, lacking, placed, noise)?;
+            let mut proposal = propose(&from, placed, noise)?;
             proposal.starts.truncate(1);
             // The model that lacks the effect has bent the other parameters to imitate it, and may have lost its way back.
             // Beside a true stand-in they are where they are beside the effect itself.
-            if let Some(mut beside) = propose(lacking, node, placed, noise) {
-                beside.starts.truncate(1);
-                proposal.starts.append(&mut beside.starts);
-                proposal.promise = proposal.promise.min(beside.promise);
+            if let Some((promise, starts)) = promising(node, &proposal.setup, placed, noise) {
+                proposal.starts.extend(starts.into_iter().take(1));
+                proposal.promise = proposal.promise.min(promise);
             }
             Some(proposal)
         })
@@ -628,7 +667,8 @@ pub(crate) fn place<'a>(
     noise: &ArModel,
     stopping: Stopping,
 ) -> Option<Node<'a>> {
-    let mut proposal = propose(parent, parent, placed, noise)?;
-    proposal.starts.push(transfer(known, &proposal.setup));
+    let mut proposal = propose(&Parent::new(parent), placed, noise)?;
+    let start = transfer(known, &proposal.setup);
+    proposal.starts.push(start.into());
     realise(proposal, noise, stopping)
 }

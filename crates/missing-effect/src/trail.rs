@@ -1,7 +1,7 @@
 //! The trail: the believed model, then one effect after the other, so that the error can be watched falling.
 
 use ct_signals::ArModel;
-use greybox::{Fit, fit_from, starts_around};
+use greybox::{Fit, Start, fit_onward, starts_around};
 use plants::Placed;
 use rayon::prelude::*;
 
@@ -57,35 +57,36 @@ pub(crate) fn trail<'a>(
 
 /// The node's minimum against those that starts around it reach.
 fn around(node: &mut Node, noise: &ArModel, seed: u64) -> Result<(), Error> {
-    let mut ends = starts_around(&node.setup, &node.fit.x, STARTS_AROUND, seed);
+    let mut starts = starts_around(&node.setup, &node.fit.x, STARTS_AROUND, seed);
     // Every line of a spectrum is a minimum of its own, and the strongest was picked: the starts stay on it.
     let names = node.setup.names();
     if let Some(period) = names.iter().position(|name| name == PERIOD) {
-        for start in &mut ends {
+        for start in &mut starts {
             start[period] = node.fit.x[period];
         }
     }
+    let mut starts: Vec<Start> = starts.into_iter().map(Start::from).collect();
     for hopeless in HOPELESS {
-        let rough: Vec<Fit> = ends
+        let rough: Vec<Fit> = starts
             .into_par_iter()
-            .filter_map(|start| fit_from(&node.setup, &[start], noise, ROUGH).ok())
+            .filter_map(|start| fit_onward(&node.setup, vec![start], noise, ROUGH).ok())
             .collect();
         // What is far behind by then ends elsewhere.
         let least = rough
             .iter()
             .map(|fit| fit.cost)
             .fold(node.fit.cost, f64::min);
-        ends = rough
+        starts = rough
             .into_iter()
             .filter(|fit| fit.cost <= hopeless * least)
-            .map(|fit| fit.x)
+            .map(|fit| Start::at_end(&fit, noise))
             .collect();
     }
-    if ends.is_empty() {
+    if starts.is_empty() {
         node.fit.starts += STARTS_AROUND;
         return Ok(());
     }
-    let mut fit = fit_from(&node.setup, &ends, noise, FINE)?;
+    let mut fit = fit_onward(&node.setup, starts, noise, FINE)?;
     fit.starts = STARTS_AROUND;
     node.fit = node.fit.clone().or_better(fit);
     Ok(())

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use crate::{
     Law, Scalar,
     inflow::Inflow,
-    moments::{decayed, exponential_moments},
+    moments::{KeptMoments, decayed},
 };
 
 /// Corners of a ramp that lie closer together than this share of the interval are one.
@@ -75,7 +75,7 @@ struct Piece<T> {
 pub(crate) struct Actuator<T: Scalar> {
     laws: Vec<Box<dyn Law<T>>>,
     delay: Option<T>,
-    lag: Option<T>,
+    lag: Option<KeptMoments<T>>,
     /// By how much the lagged signal exceeds the one it follows.
     excess: T,
     /// What the command was, oldest first; only kept where there is a delay.
@@ -93,6 +93,7 @@ impl<T: Scalar> Actuator<T> {
     pub(crate) fn new(laws: Vec<Box<dyn Law<T>>>, at_rest: f64, start: f64) -> Self {
         let delay = laws.iter().find_map(|law| law.delay());
         let lag = laws.iter().find_map(|law| law.actuator_lag());
+        let lag = lag.map(KeptMoments::new);
         let zero = T::constant(0.0);
         let drifts = laws.iter().any(|law| law.gain(zero).is_some());
         let mut actuator = Self {
@@ -119,8 +120,8 @@ impl<T: Scalar> Actuator<T> {
 
     /// The lag had not settled: `h` before the record its signal exceeded the one that it follows by this.
     pub(crate) fn unsettle(&mut self, before: T, h: f64) {
-        if let Some(lag) = self.lag {
-            self.excess = decayed(before, lag, h);
+        if let Some(lag) = &self.lag {
+            self.excess = decayed(before, lag.time_constant, h);
         }
     }
 
@@ -290,7 +291,10 @@ impl<T: Scalar> Actuator<T> {
     /// The signal behind the lag over a stretch of length `h`, as the parabola with the same first three moments.
     fn lagged(&mut self, h: T, command: Signal<T>) -> Inflow<T> {
         let ahead = command.over(h);
-        let Some(lag) = self.lag else { return ahead };
+        let Some(kept) = &mut self.lag else {
+            return ahead;
+        };
+        let lag = kept.time_constant;
         // The lag follows continuously: what the command jumps by is added to the excess.
         self.excess = self.excess + (self.last - command.value);
         self.last = ahead.end;
@@ -308,7 +312,7 @@ impl<T: Scalar> Actuator<T> {
             -(lag * (command.slope + command.curve * s * 2.0)) + lag * lag * command.curve * 2.0
         };
         let amplitude = self.excess - settled(T::constant(0.0));
-        let (decay, [m0, m1, m2]) = exponential_moments(lag, h);
+        let (decay, [m0, m1, m2]) = kept.over(h);
         let (l0, l1, l2) = (m0, m1 * 2.0 - m0, (m2 - m1) * 6.0 + m0);
         let at = |s: f64| {
             let (p1, p2) = (2.0 * s - 1.0, 6.0 * s * s - 6.0 * s + 1.0);

@@ -16,7 +16,7 @@ pub(crate) struct Propagators<T> {
 }
 
 /// Steps that differ by less than this share are one step: times are read from text.
-const SAME_STEP: f64 = 1e-9;
+pub(crate) const SAME_STEP: f64 = 1e-9;
 /// Exponentials that are kept.
 const KEPT: usize = 12;
 

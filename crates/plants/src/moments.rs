@@ -5,7 +5,35 @@
 //! `M_j = int_0^1 s^j exp(-s/e) ds`; they go to zero with `e`, with the right slope (`M_0 -> e`), so
 //! that a lag does not jump where it vanishes.
 
-use crate::Scalar;
+use crate::{Scalar, linear::SAME_STEP};
+
+/// The last moments of one time constant: most steps are as long as the one before.
+pub(crate) struct KeptMoments<T> {
+    pub time_constant: T,
+    last: Option<(T, (T, [T; 3]))>,
+}
+
+impl<T: Scalar> KeptMoments<T> {
+    pub(crate) fn new(time_constant: T) -> Self {
+        Self {
+            time_constant,
+            last: None,
+        }
+    }
+
+    /// [`exponential_moments`] over a step of length `h`.
+    pub(crate) fn over(&mut self, h: T) -> (T, [T; 3]) {
+        if let Some((known, moments)) = self.last
+            && (known.value() - h.value()).abs() <= SAME_STEP * h.value()
+            && known.same_derivatives(h)
+        {
+            return moments;
+        }
+        let moments = exponential_moments(self.time_constant, h);
+        self.last = Some((h, moments));
+        moments
+    }
+}
 
 /// `exp(-1/e)` and the moments `M_0, M_1, M_2` for `e = time_constant/h`, both non-negative, not both zero.
 pub(crate) fn exponential_moments<T: Scalar>(time_constant: T, h: T) -> (T, [T; 3]) {
@@ -50,6 +78,17 @@ mod tests {
     use super::*;
     use crate::Dual;
     use approx::assert_relative_eq;
+
+    #[test]
+    fn kept_moments_are_those_of_the_step() {
+        let lag = Dual::<2>::variable(3.0, 0);
+        let mut kept = KeptMoments::new(lag);
+        // The same length again, another one, and the same again with derivatives.
+        let [plain, other] = [2.0, 0.5].map(Dual::constant);
+        for h in [plain, plain, other, plain, Dual::variable(2.0, 1), plain] {
+            assert_eq!(kept.over(h), exponential_moments(lag, h));
+        }
+    }
 
     #[test]
     fn moments_agree_with_a_fine_quadrature() {

@@ -2,13 +2,13 @@
 
 use crate::{
     Law, Scalar,
-    moments::{decayed, exponential_moments},
+    moments::{KeptMoments, decayed},
     vessels::Stretch,
 };
 
 pub(crate) struct Sensor<T: Scalar> {
     laws: Vec<Box<dyn Law<T>>>,
-    lag: Option<T>,
+    lag: Option<KeptMoments<T>>,
     /// Reading behind the lag minus the level.
     excess: T,
 }
@@ -17,6 +17,7 @@ impl<T: Scalar> Sensor<T> {
     /// The sensor has settled when the record begins, unless [`Sensor::unsettle`] says otherwise.
     pub(crate) fn new(laws: Vec<Box<dyn Law<T>>>) -> Self {
         let lag = laws.iter().find_map(|law| law.sensor_lag());
+        let lag = lag.map(KeptMoments::new);
         Self {
             laws,
             lag,
@@ -26,8 +27,8 @@ impl<T: Scalar> Sensor<T> {
 
     /// The lag had not settled: `h` before the record the reading behind it exceeded the level by this.
     pub(crate) fn unsettle(&mut self, before: T, h: f64) {
-        if let Some(lag) = self.lag {
-            self.excess = decayed(before, lag, h);
+        if let Some(lag) = &self.lag {
+            self.excess = decayed(before, lag.time_constant, h);
         }
     }
 
@@ -38,9 +39,10 @@ impl<T: Scalar> Sensor<T> {
     /// Follows the level over a stretch: `T dw/dt = -w - T dH/dt`, `w` the excess, with the level's cubic
     /// through its values and rates at both ends.
     pub(crate) fn follow(&mut self, stretch: &Stretch<T>) {
-        let Some(lag) = self.lag else { return };
+        let Some(kept) = &mut self.lag else { return };
         let h = stretch.h;
         if h.value() == 0.0 {
+            let lag = kept.time_constant;
             let relaxed = if lag.value() > 0.0 {
                 self.excess / lag
             } else {
@@ -54,7 +56,7 @@ impl<T: Scalar> Sensor<T> {
         let rise = stretch.after - stretch.before;
         let b = rise * 6.0 - a * 4.0 - end * 2.0;
         let c = (a + end - rise * 2.0) * 3.0;
-        let (decay, [m0, m1, m2]) = exponential_moments(lag, h);
+        let (decay, [m0, m1, m2]) = kept.over(h);
         // int_0^1 exp(-(1-s)/e) (a + b s + c s^2) ds
         let felt = a * m0 + b * (m0 - m1) + c * (m0 - m1 * 2.0 + m2);
         self.excess = self.excess * decay - felt;

@@ -123,7 +123,7 @@ impl<T: Scalar> Vessels<T> {
         } else {
             self.flow(h, q, t)
         };
-        let quiet = self.first_event(&next, h, q, t).is_none();
+        let quiet = self.first_event(&next, None, h, q, t).is_none();
         if quiet {
             self.accept(next, h, q, t, watch);
         }

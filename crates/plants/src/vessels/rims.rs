@@ -1,7 +1,7 @@
 //! Steps of vessels with rims: which of them spill, and the instant at which a level meets its rim or leaves it, located
 //! so that the step keeps its order and its derivatives.
 
-use crate::{Scalar, inflow::Inflow};
+use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
 
 use super::{Levels, Vessel, Vessels, Watch};
 
@@ -24,8 +24,8 @@ impl<T: Scalar> Vessels<T> {
         // Each vessel can meet its rim and leave it a few times within a step; more is chatter.
         for _ in 0..MOST_EVENTS {
             self.settle_modes(q.start, t, released);
-            let next = self.trial(h, &q, t);
-            let Some(event) = self.first_event(&next, h, &q, t) else {
+            let (next, begin) = self.trial_and_rates(h, &q, t);
+            let Some(event) = self.first_event(&next, begin, h, &q, t) else {
                 self.accept(next, h, &q, t, watch);
                 self.clock = whole;
                 return;
@@ -79,10 +79,12 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    /// The first thing to happen within the step that would lead to `next`, if anything does.
+    /// The first thing to happen within the step that would lead to `next`, if anything does; `begin`: the rates at its
+    /// beginning, where they are known.
     pub(super) fn first_event(
         &self,
         next: &Levels<T>,
+        begin: Option<[f64; MAX_VESSELS]>,
         h: T,
         q: &Inflow<T>,
         t: f64,
@@ -121,7 +123,9 @@ impl<T: Scalar> Vessels<T> {
                     continue;
                 }
                 // Above the rim in between? The top of the cubic through levels and rates says where to look.
-                let Some(top) = self.top(i, next, h, q, t).filter(|&(_, level)| level > rim) else {
+                let begin = begin.map(|rates| rates[i]);
+                let top = self.top(i, next, begin, h, q, t);
+                let Some(top) = top.filter(|&(_, level)| level > rim) else {
                     continue;
                 };
                 let (levels, q, t) = at(top.0);
@@ -163,9 +167,17 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// Where within the step, and how high, the level of a vessel is highest; `None` where that is at an end.
-    fn top(&self, i: usize, next: &Levels<T>, h: T, q: &Inflow<T>, t: f64) -> Option<(f64, f64)> {
+    fn top(
+        &self,
+        i: usize,
+        next: &Levels<T>,
+        begin: Option<f64>,
+        h: T,
+        q: &Inflow<T>,
+        t: f64,
+    ) -> Option<(f64, f64)> {
         let dt = h.value();
-        let begin = self.rates(&self.levels, q.start, t)[i].value() * dt;
+        let begin = begin.unwrap_or_else(|| self.rates(&self.levels, q.start, t)[i].value()) * dt;
         if begin <= 0.0 {
             return None;
         }

@@ -10,17 +10,28 @@ impl<T: Scalar> Vessels<T> {
     /// One Runge-Kutta step from the present levels, in the present modes.
     #[inline]
     pub(super) fn trial(&self, h: T, q: &Inflow<T>, t: f64) -> Levels<T> {
+        self.trial_and_rates(h, q, t).0
+    }
+
+    /// The same, and the rates at its beginning, where they were needed for it.
+    #[inline]
+    pub(super) fn trial_and_rates(
+        &self,
+        h: T,
+        q: &Inflow<T>,
+        t: f64,
+    ) -> (Levels<T>, Option<[f64; MAX_VESSELS]>) {
         let dt = h.value();
         if let Some(rates) = self.damping {
-            self.damped_trial(rates, None, h, q, t)
+            (self.damped_trial(rates, None, h, q, t), None)
         } else if !h.same_derivatives(T::constant(0.0)) {
             self.trial_by(h, dt, q, t)
         } else if !self.bare {
             self.trial_by(dt, dt, q, t)
         } else if let [only] = &self.vessels[..] {
-            self.bare_trial([only], dt, q)
+            (self.bare_trial([only], dt, q), None)
         } else if let [upper, lower] = &self.vessels[..] {
-            self.bare_trial([upper, lower], dt, q)
+            (self.bare_trial([upper, lower], dt, q), None)
         } else {
             self.trial_by(dt, dt, q, t)
         }
@@ -76,7 +87,7 @@ impl<T: Scalar> Vessels<T> {
         dt: f64,
         q: &Inflow<T>,
         t: f64,
-    ) -> Levels<T>
+    ) -> (Levels<T>, Option<[f64; MAX_VESSELS]>)
     where
         T: Mul<H, Output = T>,
     {
@@ -93,6 +104,7 @@ impl<T: Scalar> Vessels<T> {
         ];
         let mut rates = [zero; MAX_VESSELS];
         let mut sum = [zero; MAX_VESSELS];
+        let mut begin = [0.0; MAX_VESSELS];
         for (stage, (ahead, q, t, weight)) in stages.into_iter().enumerate() {
             if stage > 0 {
                 for i in 0..self.states {
@@ -100,6 +112,9 @@ impl<T: Scalar> Vessels<T> {
                 }
             }
             self.rates_into(&mut rates, &at, q, t);
+            if stage == 0 {
+                begin = rates.map(T::value);
+            }
             for i in 0..self.states {
                 sum[i] = sum[i] + rates[i] * weight;
             }
@@ -108,7 +123,7 @@ impl<T: Scalar> Vessels<T> {
         for i in 0..self.states {
             next[i] = next[i] + sum[i] * sixth;
         }
-        next
+        (next, Some(begin))
     }
 
     /// `from + by h`.

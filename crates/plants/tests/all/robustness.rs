@@ -1,10 +1,9 @@
 //! Whatever a fit may try and a user may record, the output stays finite and the levels within their vessels.
 
-mod support;
-
+use crate::support;
+use crate::support::{Case, base, difference, effect, placements, random_sets, reference};
 use plants::{Command, Dual, Outlet, Plant, Simulator};
 use proptest::prelude::*;
-use support::{Case, base, difference, effect, placements, random_sets, reference};
 
 /// Somewhere between two bounds, by a share: on a scale of decades where both are positive and far apart.
 fn between(lower: f64, upper: f64, share: f64) -> f64 {

@@ -3,10 +3,11 @@
 use ct_signals::Record;
 use missing_effect::design::{Candidacy, Design, Limits, Prospect, design};
 use missing_effect::{Diagnosis, Options, Problem, Verdict, diagnose};
-use plants::EffectInfo;
+use plants::{CATALOGUE, EffectInfo};
+use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
-use crate::{Drive, Rig};
+use crate::{Drive, Rig, draw};
 
 /// What the plant hides, and how the first record comes about: a command that hardly moves, or a loop.
 pub type Row = (&'static str, Drive, &'static str, usize, &'static [f64]);
@@ -92,17 +93,28 @@ fn diagnosed(problem: &Problem) -> Option<Diagnosis> {
     diagnose(problem, &Options::default(), &|_| {}).ok()
 }
 
-/// A row's record, where its diagnosis is one group of several that holds the truth.
+/// A rig that nobody chose: any effect of the catalogue, any plant that it may act in, in open loop or in a loop, under white or
+/// coloured noise, with a structural error of one to eight times the noise. `None` where that shows nowhere.
 #[must_use]
-pub fn undecided(row: &Row, seed: u64) -> Option<Undecided> {
-    let rig = rig(row);
+pub fn drawn(seed: u64) -> Option<Rig> {
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    let effect = CATALOGUE[rng.random_range(0..CATALOGUE.len())];
+    let drive = [Drive::Open, Drive::Closed][rng.random_range(0..2_usize)];
+    let colour = [0.0, rng.random_range(0.3..0.9)][rng.random_range(0..2_usize)];
+    let ratio = rng.random_range(0.0..8.0_f64.ln()).exp();
+    draw::with_effect(effect, ratio, drive, colour, 600, rng.random())
+}
+
+/// A rig's record, where its diagnosis is one group of several that holds the truth.
+#[must_use]
+pub fn undecided(rig: Rig, seed: u64) -> Option<Undecided> {
+    let truth = rig.hidden.first()?.0;
     let record = rig.run(&mut ChaCha8Rng::seed_from_u64(seed));
     let problem = problem(&rig, vec![record])?;
     let found = diagnosed(&problem)?;
     let [group] = &found.groups[..] else {
         return None;
     };
-    let truth = row.2;
     let others: Vec<String> = group.iter().filter(|id| *id != truth).cloned().collect();
     let open = found.verdict == Verdict::Undecided && others.len() + 1 == group.len();
     (open && !others.is_empty()).then_some(Undecided {

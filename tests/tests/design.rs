@@ -1,7 +1,7 @@
 //! The experiment that `ctid design` proposes decides what the record left open.
 #![allow(clippy::unwrap_used)]
 
-use ctid_tests::design_cases::{ROWS, answered, proposed, undecided};
+use ctid_tests::design_cases::{ROWS, answered, proposed, rig, undecided};
 use missing_effect::design::Prospect;
 
 /// Rows and seeds of `cargo run --release -p ctid-tests --example design` for which the experiment is promised to decide: the static
@@ -12,7 +12,7 @@ const CASES: [(usize, u64); 4] = [(0, 1), (4, 1), (5, 1), (17, 1)];
 fn the_proposed_experiment_decides_for_the_truth() {
     for (row, seed) in CASES {
         let row = &ROWS[row];
-        let case = undecided(row, seed).unwrap();
+        let case = undecided(rig(row), seed).unwrap();
         let (other, plan) = proposed(&case).unwrap();
         let best = &plan.candidates[0];
         assert_eq!(plan.prospect, Prospect::Decides, "{row:?} {other}");

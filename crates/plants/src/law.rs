@@ -27,8 +27,10 @@ pub enum Balance {
     Head,
     /// [`Law::outflow`].
     Outflow,
-    /// [`Law::net`].
+    /// [`Law::net`], by an amount that is the same at every level.
     Net,
+    /// [`Law::net`], by an amount that differs from level to level.
+    NetByLevel,
     /// [`Law::area`].
     Area,
 }

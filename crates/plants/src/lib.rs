@@ -25,7 +25,7 @@
 //! 176 (2002) 430-455; A.-K. Kassam, L. N. Trefethen, SIAM J. Scientific Computing 26 (2005) 1214-1233. A vessel that has
 //! settled takes one part. With one step a sample of 1.6 to 45 time constants, any single effect and levels from 4 to 20,
 //! the output errs by at most 0.0003 (linear vessels; those without an effect in them are exact) and 0.006 (Torricelli):
-//! `cargo test -p plants --test fast_vessels -- --nocapture`. A level that moves too far within the shortest part, 1/32 of
+//! `cargo test -p plants --test all fast_vessels:: -- --nocapture`. A level that moves too far within the shortest part, 1/32 of
 //! a step, for its forgetting to be one number goes by an implicit part of order one that keeps the balance of mass.
 
 mod actuator;

@@ -269,7 +269,10 @@ impl<T: Scalar> Law<T> for TermLaw<T> {
         u + self.value(u, u, T::constant(t))
     }
     fn changes(&self) -> Option<Balance> {
-        Some(Balance::Net)
+        Some(match self.variable {
+            Variable::Level => Balance::NetByLevel,
+            _ => Balance::Net,
+        })
     }
     fn net(&self, level: &T, net: &mut T, t: &T) {
         *net = *net + self.value(*net, *level, *t);

@@ -29,6 +29,7 @@ pub use sequences::Kind;
 use crate::{
     Error, Options, Problem, Progress,
     control_loop::slowest_time_constant,
+    diagnose::GROUP_MARGIN,
     noise_floor::colour,
     problem::base,
     search::{FINE, Node, place, refine},
@@ -38,7 +39,8 @@ use experiments::Search;
 use play::Loop;
 use separation::Metric;
 
-/// An effect, and the vessel it is to act in; `None`: the one in which it explains the records best.
+/// An effect, and the vessel it is to act in; `None`: of those in which it explains the records well, the one in which it comes
+/// nearest to the other effect.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidacy {
     /// The effect.
@@ -159,22 +161,34 @@ fn fitted<'a>(
         base.setup.structure.with(Placed { effect, vessel })?;
     }
     let white = ArModel::white(1.0);
-    let fits = |candidacy: Candidacy| {
+    let fits = |candidacy: Candidacy| -> Result<Vec<Node<'a>>, Refused> {
         let sites = candidacy.effect.sites(problem.plant);
-        sites
+        let mut nodes: Vec<Node<'a>> = sites
             .filter(|site| candidacy.vessel.is_none_or(|vessel| vessel == *site))
             .filter_map(|vessel| {
                 let effect = candidacy.effect;
                 place(&base, Placed { effect, vessel }, &base, &white, FINE)
             })
-            .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
-            .ok_or_else(|| no_fit(candidacy))
+            .collect();
+        let bics = nodes.iter().map(|node| node.fit.bic());
+        let open = bics.fold(f64::INFINITY, f64::min) + GROUP_MARGIN;
+        nodes.retain(|node| node.fit.bic() <= open);
+        if nodes.is_empty() {
+            return Err(no_fit(candidacy));
+        }
+        Ok(nodes)
     };
-    let rough = [fits(between[0])?, fits(between[1])?];
+    let [first, second] = [fits(between[0])?, fits(between[1])?];
+    // Whichever vessels are still open, the two are told apart only where the nearest are.
+    let rough = first
+        .iter()
+        .flat_map(|a| second.iter().map(move |b| [a, b]))
+        .min_by(|pair, other| apart(*pair).total_cmp(&apart(*other)))
+        .ok_or_else(|| no_fit(between[0]))?;
     let better = usize::from(rough[1].fit.bic() < rough[0].fit.bic());
-    let noise = colour(&rough[better])?;
+    let noise = colour(rough[better])?;
     let refined = |i: usize| -> Result<Node<'a>, Error> {
-        place(&base, rough[i].added[0], &rough[i], &noise, FINE)
+        place(&base, rough[i].added[0], rough[i], &noise, FINE)
             .ok_or_else(|| no_fit(between[i]).into())
     };
     let nodes = [refined(0)?, refined(1)?];
@@ -188,6 +202,16 @@ fn fitted<'a>(
         base: refine(&base, &noise, &[])?,
         metric: Metric { noise, variance },
     })
+}
+
+/// Sum of the squares by which two fits differ on the records.
+fn apart([a, b]: [&Node; 2]) -> f64 {
+    let residuals = |node: &Node| node.setup.residuals(&node.fit.x);
+    let (Ok(a), Ok(b)) = (residuals(a), residuals(b)) else {
+        return f64::INFINITY;
+    };
+    let pairs = a.iter().flatten().zip(b.iter().flatten());
+    pairs.map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
 fn no_fit(candidacy: Candidacy) -> Refused {

@@ -57,7 +57,7 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 
 impl<T: Scalar> Law<T> for LeakAtHeight<T> {
     fn changes(&self) -> Option<Balance> {
-        Some(Balance::Net)
+        Some(Balance::NetByLevel)
     }
     fn net(&self, level: &T, net: &mut T, _t: &T) {
         *net = *net - self.coefficient * square_root(*level - self.height);

@@ -1,6 +1,6 @@
 //! The vessels' balance equations: rates, and how fast each vessel is.
 
-use crate::{Outlet, Scalar, Side, structure::MAX_VESSELS};
+use crate::{Outlet, Scalar, Side, inflow::Inflow, structure::MAX_VESSELS};
 
 use super::{
     Levels, VesselLaws, Vessels,
@@ -100,7 +100,7 @@ impl<T: Scalar> Vessels<T> {
 
     /// Surface of vessel `i` at a level.
     #[inline]
-    fn area(&self, i: usize, level: &T) -> T {
+    pub(super) fn area(&self, i: usize, level: &T) -> T {
         let vessel = &self.vessels[i];
         let mut area = vessel.area;
         for &law in &vessel.laws.area {
@@ -180,10 +180,9 @@ impl<T: Scalar> Vessels<T> {
         self.balance(i, inflow, levels, t).1
     }
 
-    /// By how much a higher level slows its own rise \[1/s\]: what the effects add to it by a difference, so that it
+    /// By how much a level of vessel `i`, the others being as they are, slows its own rise where it is higher \[1/s\]: what the effects add to it by a difference, so that it
     /// vanishes with them.
-    pub(super) fn slope(&self, i: usize, t: f64) -> T {
-        let level = self.levels[i];
+    pub(super) fn slope(&self, i: usize, level: T, t: f64) -> T {
         let vessel = &self.vessels[i];
         let own = match vessel.outlet {
             Outlet::Torricelli => vessel.coefficient * slope_of_root(level),
@@ -197,6 +196,9 @@ impl<T: Scalar> Vessels<T> {
         let added =
             |level: &T| self.outflow(i, level, &self.levels, &t) - self.own_outflow(i, level);
         let mut slope = own + (added(&(level + step)) - added(&level)) * (1.0 / step);
+        if !vessel.laws.by_level.is_empty() {
+            slope = slope + self.loss_slope(i, level, &t);
+        }
         if let Some(side) = &self.side {
             slope = slope + self.exchange(side);
         }
@@ -210,7 +212,7 @@ impl<T: Scalar> Vessels<T> {
             *rate = match self.linear {
                 // Where the vessels' own forgetting is exact it alone is meant.
                 Some(_) => self.vessels[i].inverse,
-                None => self.slope(i, t).max(T::constant(0.0)),
+                None => self.slope(i, self.levels[i], t).max(T::constant(0.0)),
             };
         }
         if let Some(side) = &self.side {
@@ -222,7 +224,7 @@ impl<T: Scalar> Vessels<T> {
     /// How many time constants of its fastest vessel a step of length `h` lasts, up to a factor of two: what
     /// Runge-Kutta must not be asked. It looks at values alone, so that derivatives follow one path.
     #[inline]
-    pub(super) fn stiffness(&self, h: f64, t: f64) -> f64 {
+    pub(super) fn stiffness(&self, h: f64, q: &Inflow<T>, t: f64) -> f64 {
         let mut most = 0.0_f64;
         for (i, vessel) in self.vessels.iter().enumerate() {
             let level = self.levels[i];
@@ -258,7 +260,7 @@ impl<T: Scalar> Vessels<T> {
                 // The vessel's own forgetting is exact; here it is what the effects add to it.
                 Outlet::Linear => {
                     let own = 1.0 / vessel.area.value().abs();
-                    let slope = self.slope(i, t).value().abs();
+                    let slope = self.slope(i, self.levels[i], t).value().abs();
                     let added = if h * own > STEP_LIMIT {
                         slope - own
                     } else {
@@ -271,6 +273,6 @@ impl<T: Scalar> Vessels<T> {
         if let Some(side) = &self.side {
             most = most.max(h * (1.0 + side.share.value()) / side.time_constant.value());
         }
-        most
+        most.max(self.stiffness_of_losses(h, q, t))
     }
 }

@@ -1,10 +1,12 @@
 //! The vessels in series: their parts, their laws and their present levels.
 //!
-//! [`balance`] has the equations, [`parts`] cuts a step, [`rims`] finds what happens in a part, [`runge_kutta`] and
-//! [`exponential`] take it.
+//! [`balance`] has the equations, [`losses`] how fast they become by what leaves beside the outlets, [`parts`] cuts a step,
+//! [`rims`] finds what happens in a part, [`runge_kutta`], [`exponential`] and [`implicit`] take it.
 
 mod balance;
 mod exponential;
+mod implicit;
+mod losses;
 mod parts;
 mod rims;
 mod runge_kutta;
@@ -44,6 +46,8 @@ struct VesselLaws {
     head: Vec<usize>,
     outflow: Vec<usize>,
     net: Vec<usize>,
+    /// Those of `net` that differ from level to level.
+    by_level: Vec<usize>,
     area: Vec<usize>,
     /// Any of them, or a side tank.
     any: bool,
@@ -119,6 +123,10 @@ impl<T: Scalar> Vessels<T> {
                 Some(Balance::Head) => vessel.laws.head.push(bound.len()),
                 Some(Balance::Outflow) => vessel.laws.outflow.push(bound.len()),
                 Some(Balance::Net) => vessel.laws.net.push(bound.len()),
+                Some(Balance::NetByLevel) => {
+                    vessel.laws.net.push(bound.len());
+                    vessel.laws.by_level.push(bound.len());
+                }
                 Some(Balance::Area) => vessel.laws.area.push(bound.len()),
                 None => {}
             }

@@ -4,9 +4,9 @@
 //! sets off is over when they are long, and a vessel that has settled takes the rest in one exponential part. Where a
 //! level moves too far for its forgetting to be one number the parts are short, or at last implicit and of order one.
 
-use crate::{Outlet, Scalar, inflow::Inflow, structure::MAX_VESSELS};
+use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
 
-use super::{Stretch, Vessels, Watch};
+use super::{Vessels, Watch};
 
 /// Runge-Kutta is trusted while a step is shorter than this many time constants of every vessel.
 pub(super) const STEP_LIMIT: f64 = 1.0;
@@ -112,7 +112,7 @@ impl<T: Scalar> Vessels<T> {
 
     /// A part of linear vessels with rims, in one piece: `false`, and nothing is done, where something happens at a rim.
     fn quiet_part(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) -> bool {
-        if self.stiffness(h.value(), t) > STEP_LIMIT {
+        if self.stiffness(h.value(), q, t) > STEP_LIMIT {
             return false;
         }
         self.settle_modes(q.start, t, None);
@@ -132,7 +132,7 @@ impl<T: Scalar> Vessels<T> {
     }
 
     fn part(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
-        if self.stiffness(h.value(), t) <= STEP_LIMIT {
+        if self.stiffness(h.value(), q, t) <= STEP_LIMIT {
             self.unit(h, q, t, watch);
             return;
         }
@@ -140,20 +140,20 @@ impl<T: Scalar> Vessels<T> {
         let mut done = 0;
         while done < UNITS {
             let left = UNITS - done;
-            let stiffness = self.stiffness(h.value(), t);
             let span = |from: usize, to: usize| {
                 let edge = |k: usize| T::constant(k as f64 / UNITS as f64);
                 let length = h * ((to - from) as f64 / UNITS as f64);
                 let begin = t + h.value() * (from as f64 / UNITS as f64);
                 (length, q.part(edge(from), edge(to)), begin)
             };
+            let (length, inflow, begin) = span(done, UNITS);
             // The longest that is short enough, in powers of two.
+            let stiffness = self.stiffness(h.value(), &inflow, begin);
             let mut units = 1 << left.ilog2();
             while units > 1 && stiffness * units as f64 > STEP_LIMIT * UNITS as f64 {
                 units /= 2;
             }
             let short = stiffness * units as f64 <= STEP_LIMIT * UNITS as f64;
-            let (length, inflow, begin) = span(done, UNITS);
             let rates = self.forgetting(begin);
             let calm = if self.linear.is_some() {
                 // What makes such a part too long is the effects' doing, which its vessels' forgetting does not cover.
@@ -198,7 +198,9 @@ impl<T: Scalar> Vessels<T> {
                 let share = if level <= 0.0 && moves <= 0.0 {
                     0.0
                 } else {
-                    (moves * time / level).abs()
+                    // A root's slope changes by half the share by which its argument does.
+                    let bends = 2.0 * time * self.forgetting_changes(i, moves * time, t);
+                    (moves * time / level).abs().max(bends)
                 };
                 let settled = SETTLED[usize::from(i + 1 == self.vessels.len())];
                 if share.is_nan() || share > SETTLING {
@@ -220,56 +222,5 @@ impl<T: Scalar> Vessels<T> {
         }
         let next = self.flow(h, q, t);
         self.accept(next, h, q, t, watch);
-    }
-
-    /// One step that cannot overshoot, whatever its length: implicit in each vessel's own level, of order one.
-    fn relax(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
-        let mut next = self.levels;
-        let mut inflow = q.end;
-        for (i, to) in next.iter_mut().enumerate().take(self.vessels.len()) {
-            let level = self.levels[i];
-            let (outflow, net) = self.balance(i, inflow, &self.levels, t);
-            let slope = self.slope(i, t).max(T::constant(0.0));
-            let damped = T::constant(1.0) / (h * slope + 1.0);
-            let rise = self.rate(i, &level, net) * h * damped;
-            let low = match self.vessels[i].outlet {
-                Outlet::Torricelli => 0.0,
-                Outlet::Linear => f64::NEG_INFINITY,
-            };
-            let rim = self.vessels[i].rim;
-            *to = (level + rise).max(T::constant(low)).min(rim.level);
-            // Nothing is lost: what is not kept has left, by the outlet or over the rim.
-            let kept = net * damped;
-            inflow = outflow + net - kept;
-            if to.value() != (level + rise).value() && rise.value() != 0.0 {
-                let beyond = kept * (T::constant(1.0) - (*to - level) / rise);
-                inflow = if rise.value() > 0.0 {
-                    inflow + beyond * rim.fraction
-                } else {
-                    inflow + beyond
-                };
-            }
-            // A leak takes no more than there is.
-            inflow = inflow.max(T::constant(low));
-        }
-        if let Some(side) = &self.side {
-            let last = self.states - 1;
-            let drawn = h / side.time_constant;
-            next[last] = (next[last] + drawn * next[last - 1]) / (drawn + 1.0);
-        }
-        if let Some(watch) = watch {
-            // The transient is over at once; what is left looks straight.
-            let last = self.vessels.len() - 1;
-            let (before, after) = (self.levels[last], next[last]);
-            let rate = (after - before) / h;
-            watch(&Stretch {
-                h,
-                before,
-                after,
-                rate_before: rate,
-                rate_after: rate,
-            });
-        }
-        self.levels = next;
     }
 }

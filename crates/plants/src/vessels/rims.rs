@@ -199,7 +199,11 @@ impl<T: Scalar> Vessels<T> {
 
 /// Where a function that is negative at `low` and positive at `high` changes its sign, by regula falsi that does not
 /// stall (Illinois). Nine digits are enough: at a rim a Newton step follows, and a release is flat.
-fn crossing(mut low: (f64, f64), mut high: (f64, f64), f: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn crossing(
+    mut low: (f64, f64),
+    mut high: (f64, f64),
+    mut f: impl FnMut(f64) -> f64,
+) -> f64 {
     let mut last = f64::NAN;
     let mut side = 0;
     for _ in 0..60 {

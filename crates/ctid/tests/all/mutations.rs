@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod common;
-
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-use common::{Place, Random, Tanks, bundled};
+use crate::common::{Place, Random, Tanks, bundled};
 
 /// What may stand in a cell of a logger's file, or be typed there.
 const CELLS: &[&str] = &[

@@ -1,9 +1,7 @@
 //! An effect at its absent value is the base model, bit for bit, and smooth there.
 
-mod support;
-
+use crate::support::{DRIVES, base, input, interior, label, placements};
 use plants::{Place, Plant};
-use support::{DRIVES, base, input, interior, label, placements};
 
 #[test]
 fn an_absent_effect_leaves_the_output_bit_for_bit() {

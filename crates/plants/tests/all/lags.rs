@@ -1,9 +1,7 @@
 //! Lags and dead times where they vanish, where they are long, and where they meet the samples.
 
-mod support;
-
+use crate::support::{Case, DRIVES, base, difference, effect, input, reference};
 use plants::{Command, Dual, Placed, Plant};
-use support::{Case, DRIVES, base, difference, effect, input, reference};
 
 fn with(plant: Plant, effects: &[(&str, f64)]) -> Case {
     let placed: Vec<Placed> = effects

@@ -1,9 +1,7 @@
 //! Vessels that are over within a sampling interval: against the equations, absent effects, and derivatives.
 
-mod support;
-
+use crate::support::{Case, DRIVES, difference, fast, input, label, placements, reference};
 use plants::{Outlet, Plant};
-use support::{Case, DRIVES, difference, fast, input, label, placements, reference};
 
 const PLANTS: [Plant; 4] = [
     Plant::SingleTank,

@@ -1,10 +1,8 @@
 //! The controller around the simulator.
 #![allow(clippy::expect_used)]
 
-mod support;
-
+use crate::support::{base, effect};
 use plants::{Command, Plant, Simulator, controller::Pi};
-use support::{base, effect};
 
 /// Gain \[input/output\] and integral time \[s\] that suit the plants of `support`.
 fn controller() -> Pi {

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod common;
-
-use common::{Place, Tanks, lasting};
+use crate::common::{Place, Tanks, lasting};
 use plants::{Fitted, Term, Variable};
 
 /// A tank with a wave in the level that no effect describes.

@@ -3,10 +3,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod support;
-
+use crate::support::{Case, DRIVES, base, difference, effect, input};
 use plants::{Error, Fitted, Outlet, Place, Placed, Plant, Term, Variable};
-use support::{Case, DRIVES, base, difference, effect, input};
 
 /// A bent term at a place, large enough to show.
 fn bent(case: &Case, place: Place, vessel: usize, variable: Variable, fitted: Fitted) -> Term {

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::Place;
+use crate::common::Place;
 use ct_signals::{Hold, Record, Signal, excitation};
 use ctid::identify::{Identification, LevelChoice, Method, Order, Request, identify};
 use fcloe::{Controller, LoopData, Noise, PlantModel, continuous_loop, noise_at_snr, sampled_loop};

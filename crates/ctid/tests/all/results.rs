@@ -3,13 +3,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod common;
-
+use crate::common;
 use std::collections::BTreeSet;
 use std::fs;
 use std::process::Stdio;
 
-use common::{Place, Tanks, bundled, csv, lasting, outcome};
+use crate::common::{Place, Tanks, bundled, csv, lasting, outcome};
 use plants::CATALOGUE;
 use serde_json::Value;
 

@@ -2,9 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::Place;
+use crate::common;
+use crate::common::Place;
 use std::path::Path;
 
 use ctid::tables::udink::{Settings, study};

@@ -1,12 +1,10 @@
 //! The simulator against the written equations, integrated by other means, and against closed forms.
 
-mod support;
-
-use plants::{Command, Placed, Plant};
-use support::{
+use crate::support::{
     Case, DRIVES, Drive, base, begins_with_a_root, difference, effect, input, label, placements,
     random_sets, reference,
 };
+use plants::{Command, Placed, Plant};
 
 /// Compares one structure with one step a sample and with three, by which an error of order four falls 81 times.
 fn compare(case: &Case, drive: Drive, seed: u64, most: f64) -> Vec<String> {

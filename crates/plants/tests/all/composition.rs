@@ -1,12 +1,10 @@
 //! Effects compose: any that may act together, added in any order, are one chain; what may not is refused.
 
-mod support;
-
+use crate::support::{DRIVES, base, effect, input, label, placements, random_sets};
 use plants::{Error, Placed, Plant, Simulator, Structure};
 use proptest::prelude::*;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
-use support::{DRIVES, base, effect, input, label, placements, random_sets};
 
 #[test]
 fn the_order_of_adding_does_not_matter() {

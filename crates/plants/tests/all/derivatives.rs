@@ -1,12 +1,10 @@
 //! Derivatives that duals carry against central differences of the output, at values where every effect shows.
 
-mod support;
-
-use plants::{Placed, Plant};
-use support::{
+use crate::support::{
     Case, DRIVES, Drive, STEPPED, base, begins_with_a_root, effect, fast, input, label, placements,
     random_sets,
 };
+use plants::{Placed, Plant};
 
 /// The largest disagreement, as a share of the largest derivative by that variable, over samples and variables.
 ///

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod common;
-
-use common::{Place, Tanks};
+use crate::common::{Place, Tanks};
 
 /// A tank whose reading lags: or its pump.
 fn lagging() -> Place {

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Place, bundled};
+use crate::common::{Place, bundled};
 use ct_lti::{Simulator, StateSpace, TransferFunction};
 use ct_signals::{Hold, Record, Signal, excitation, noise};
 use ctid::identify::{Identification, Method, Order, Request, identify};

@@ -1,0 +1,235 @@
+//! Effects, terms of the user's own, and first guesses.
+
+use std::collections::BTreeMap;
+
+use plants::{EffectInfo, Fitted, Known, Place, Placed, Plant, Scales, Structure, Term};
+use toml::Spanned;
+
+use super::{
+    ModelFile, OwnTerm,
+    raw::{EffectTable, Entry, Number, RawTerm},
+    source::Source,
+};
+use crate::{Error, names, term_file};
+
+/// What an `[effect.X]` table says.
+#[derive(Default)]
+pub(super) struct Setting {
+    pub(super) vessel: Option<usize>,
+    /// Value and place in the file, by parameter.
+    pub(super) values: BTreeMap<String, (f64, usize)>,
+    pub(super) fixed: Vec<String>,
+}
+
+impl Source<'_> {
+    /// The `[effect.X]` tables; a table of an effect that is not on is checked too, and kept for
+    /// the day on which it is added.
+    pub(super) fn effect_tables(
+        &self,
+        plant: Plant,
+        tables: &BTreeMap<Spanned<String>, Spanned<EffectTable>>,
+    ) -> Result<BTreeMap<&'static str, Setting>, Error> {
+        let mut settings = BTreeMap::new();
+        for (name, table) in tables {
+            let effect = self.effect(name)?;
+            let mut setting = Setting::default();
+            for (key, entry) in table.as_ref() {
+                let at = entry.span().start;
+                match (key.as_ref().as_str(), entry.as_ref()) {
+                    ("where", Entry::Word(word)) => {
+                        setting.vessel =
+                            Some(vessel(plant, effect, word).map_err(|what| self.at(at, what))?);
+                    }
+                    ("where", _) => {
+                        return Err(self.at(at, "where is a word: \"upper\" or \"lower\""));
+                    }
+                    ("fixed", Entry::Words(words)) => setting.fixed.clone_from(words),
+                    ("fixed", _) => {
+                        return Err(self.at(at, "fixed is a list of parameters, such as [\"rim\"]"));
+                    }
+                    (key, Entry::Number(value)) if value.is_finite() => {
+                        setting.values.insert(key.to_string(), (*value, at));
+                    }
+                    (key, _) => {
+                        return Err(self.at(
+                            at,
+                            format!("{key} has to be a finite number, without quotes"),
+                        ));
+                    }
+                }
+            }
+            self.check_parameters(plant, effect, &setting, table.span().start)?;
+            settings.insert(effect.id, setting);
+        }
+        Ok(settings)
+    }
+
+    /// The `[term.X]` tables, and whether each is kept as it stands; one that is not on is checked too.
+    pub(super) fn terms(
+        &self,
+        plant: Plant,
+        tables: &BTreeMap<Spanned<String>, Spanned<RawTerm>>,
+    ) -> Result<BTreeMap<String, (OwnTerm, bool)>, Error> {
+        let mut terms = BTreeMap::new();
+        for (name, table) in tables {
+            let raw = table.as_ref();
+            let (place, vessel) = term_file::place_of(plant, raw.place.as_ref())
+                .map_err(|what| self.at(raw.place.span().start, what))?;
+            let variable = term_file::variable_of(raw.variable.as_ref())
+                .map_err(|what| self.at(raw.variable.span().start, what))?;
+            let numbers = |list: &[Number]| list.iter().map(|number| number.value()).collect();
+            let term = Term {
+                name: name.as_ref().clone(),
+                place,
+                vessel,
+                variable,
+                knots: numbers(&raw.at),
+                ordinates: numbers(&raw.value),
+                fitted: Fitted::Scale,
+            };
+            term.check(plant)
+                .map_err(|error| self.at(name.span().start, error.to_string()))?;
+            let own = OwnTerm {
+                term,
+                at_unit: raw.at_unit.clone(),
+                unit: raw.unit.clone(),
+            };
+            terms.insert(name.as_ref().clone(), (own, raw.fixed));
+        }
+        Ok(terms)
+    }
+
+    /// The table's names are parameters of the effect at its place, and what is fixed has a value.
+    pub(super) fn check_parameters(
+        &self,
+        plant: Plant,
+        effect: &'static EffectInfo,
+        setting: &Setting,
+        table_at: usize,
+    ) -> Result<(), Error> {
+        let placed = Placed {
+            effect,
+            vessel: setting.vessel.unwrap_or(effect.usual_site(plant)),
+        };
+        let infos = any_structure(plant).effect_parameters(placed);
+        let names: Vec<&str> = infos.iter().map(|info| info.name).collect();
+        let unknown = |name: &str| {
+            format!(
+                "{} has no parameter {name}; it has {}{}",
+                effect.id,
+                names.join(", "),
+                names::suggestion(name, names.iter().copied())
+            )
+        };
+        for (name, (_, at)) in &setting.values {
+            if !names.contains(&name.as_str()) {
+                return Err(self.at(*at, unknown(name)));
+            }
+        }
+        for name in &setting.fixed {
+            if !names.contains(&name.as_str()) {
+                return Err(self.at(table_at, unknown(name)));
+            }
+            if !setting.values.contains_key(name) {
+                return Err(self.at(
+                    table_at,
+                    format!(
+                        "{name} is fixed but has no value; write {name} = ... in [effect.{}]",
+                        effect.id
+                    ),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn effect(&self, name: &Spanned<String>) -> Result<&'static EffectInfo, Error> {
+        EffectInfo::find(name.as_ref())
+            .ok_or_else(|| self.at(name.span().start, names::unknown_effect(name.as_ref())))
+    }
+
+    /// An effect of the list, checked against the plant and the effects before it.
+    pub(super) fn placed(
+        &self,
+        plant: Plant,
+        before: &[Placed],
+        name: &Spanned<String>,
+        settings: &BTreeMap<&'static str, Setting>,
+    ) -> Result<Placed, Error> {
+        let effect = self.effect(name)?;
+        let vessel = settings.get(effect.id).and_then(|setting| setting.vessel);
+        let placed = Placed {
+            effect,
+            vessel: vessel.unwrap_or(effect.usual_site(plant)),
+        };
+        before
+            .iter()
+            .try_fold(any_structure(plant), |structure, &on| structure.with(on))
+            .and_then(|structure| structure.with(placed))
+            .map_err(|error| self.at(name.span().start, error.to_string()))?;
+        Ok(placed)
+    }
+
+    pub(super) fn start(
+        &self,
+        model: &mut ModelFile,
+        raw: &BTreeMap<Spanned<String>, Spanned<Number>>,
+    ) -> Result<(), Error> {
+        let structure = model.structure(any_scales())?;
+        let infos = structure.parameters();
+        let names = structure.parameter_names();
+        for (name, number) in raw {
+            let key = name.as_ref();
+            let Some(index) = names.iter().position(|known| known == key) else {
+                return Err(self.at(
+                    name.span().start,
+                    format!(
+                        "[start] has {key}, which is not a parameter of this model; it has {}{}",
+                        names.join(", "),
+                        names::suggestion(key, names.iter().map(String::as_str))
+                    ),
+                ));
+            };
+            // Gains, outflow coefficients and time constants of the plant are above zero whatever
+            // the data; the bounds of an effect follow from the data.
+            let above_zero = infos[index].lower > 0.0 && !key.contains('.');
+            let value = if above_zero {
+                self.positive(key, number)?
+            } else {
+                self.finite(key, number)?
+            };
+            model.start.insert(key.clone(), value);
+        }
+        Ok(())
+    }
+}
+
+/// The vessel that `where = "..."` names.
+pub(crate) fn vessel(plant: Plant, effect: &EffectInfo, word: &str) -> Result<usize, String> {
+    if effect.place != Place::Vessel {
+        return Err(format!(
+            "{} acts at the {}, so where = \"{word}\" has no meaning; leave it out",
+            effect.id,
+            effect.place.name()
+        ));
+    }
+    if plant.vessels() == 1 {
+        return Err(format!(
+            "plant {} has one vessel, so where = \"{word}\" has no meaning; leave it out",
+            plant.id()
+        ));
+    }
+    (0..plant.vessels())
+        .find(|&vessel| plant.vessel_name(vessel) == Some(word))
+        .ok_or_else(|| format!("where = \"{word}\" is no vessel; write \"upper\" or \"lower\""))
+}
+
+/// Names and places do not depend on the data: any ranges will do to ask for them.
+fn any_scales() -> Scales {
+    Scales::from_ranges((0.0, 1.0), (0.0, 1.0), 1.0, 100.0)
+}
+
+/// A structure to ask for names and places.
+pub(crate) fn any_structure(plant: Plant) -> Structure {
+    Structure::new(plant, Known::default(), any_scales())
+}

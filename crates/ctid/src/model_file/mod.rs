@@ -1,0 +1,189 @@
+//! The model file: which plant, which effects, which columns, what is known.
+//!
+//! ```
+//! let model = ctid::model_file::parse("tank.toml", r#"
+//!     plant = "cascaded-tanks"
+//!     effects = ["overflow"]
+//!
+//!     [start]
+//!     pump_gain = 4.0
+//!
+//!     [effect.overflow]
+//!     where = "upper"
+//!     rim = 8.2
+//!     fixed = ["rim"]
+//! "#)?;
+//! assert_eq!(model.start["overflow.rim"], 8.2);
+//! assert_eq!(model.fixed, ["overflow.rim"]);
+//!
+//! let error = ctid::model_file::parse("tank.toml", "plant = \"single-tank\"\neffects = [\"overflw\"]");
+//! assert_eq!(
+//!     error.unwrap_err().to_string(),
+//!     "tank.toml:2: unknown effect \"overflw\": `ctid effects` lists the catalogue; did you mean overflow?"
+//! );
+//! # Ok::<(), ctid::Error>(())
+//! ```
+
+mod controller;
+mod effects;
+mod raw;
+mod source;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use ct_signals::{Columns, Hold};
+use plants::{Known, Placed, Plant, Scales, Structure, Term};
+
+use crate::Error;
+
+pub use controller::{ControllerLaw, ControllerSettings};
+pub(crate) use effects::{any_structure, vessel};
+use raw::Raw;
+use source::Source;
+
+/// What a model file says, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelFile {
+    /// The plant.
+    pub plant: Plant,
+    /// The effects that have been added, in the file's order.
+    pub effects: Vec<Placed>,
+    /// The terms of the user's own that have been added, in the file's order.
+    pub terms: Vec<OwnTerm>,
+    /// Which column of the records is what.
+    pub columns: Columns,
+    /// Constants that are not fitted.
+    pub known: Known,
+    /// First guesses by name, as [`Structure::parameter_names`] writes it: `alpha`, `overflow.rim`.
+    pub start: BTreeMap<String, f64>,
+    /// Names of the parameters that stay at their value in `start`.
+    pub fixed: Vec<String>,
+    /// The controller of the loop, where it is known.
+    pub controller: Option<ControllerSettings>,
+    /// What the input does between samples.
+    pub hold: Hold,
+}
+
+/// A term of the user's own, and the units that it is written in; empty where the file does not say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnTerm {
+    /// The term.
+    pub term: Term,
+    /// Unit of its knots.
+    pub at_unit: String,
+    /// Unit of its values.
+    pub unit: String,
+}
+
+impl ModelFile {
+    /// The plant with its effects, over the ranges that the data visit.
+    ///
+    /// # Errors
+    /// None for a model that [`parse`] has returned.
+    pub fn structure(&self, scales: Scales) -> Result<Structure, plants::Error> {
+        let plant = Structure::new(self.plant, self.known.clone(), scales);
+        self.effects
+            .iter()
+            .try_fold(plant, |structure, &placed| structure.with(placed))
+            .and_then(|structure| {
+                let mut terms = self.terms.iter();
+                terms.try_fold(structure, |structure, own| {
+                    structure.with_term(own.term.clone())
+                })
+            })
+    }
+}
+
+/// Reads a model file.
+///
+/// # Errors
+/// One line that names the file, the line, what is wrong and the mend.
+pub fn read(path: &Path) -> Result<ModelFile, Error> {
+    parse(&path.display().to_string(), &read_text(path)?)
+}
+
+/// The text of a model file.
+pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
+    let cannot = |what: String| Error::file(path, what);
+    if path.is_dir() {
+        return Err(cannot("it is a folder; name a file in it".to_string()));
+    }
+    let bytes = std::fs::read(path).map_err(|error| {
+        cannot(format!(
+            "the model file cannot be opened: {error}; check the path and the permissions"
+        ))
+    })?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| cannot("the model file is not UTF-8 text; save it as UTF-8".to_string()))?;
+    // Some editors put a byte-order mark in front.
+    Ok(text
+        .strip_prefix('\u{feff}')
+        .map(str::to_string)
+        .unwrap_or(text))
+}
+
+/// Reads the text of a model file; `file` names it in messages.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
+    let source = Source { file, text };
+    let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
+    let plant = source.plant(raw.plant.as_ref())?;
+    let known = source.known(plant, &raw.known)?;
+    let controller = raw
+        .controller
+        .as_ref()
+        .map(|controller| source.controller(controller))
+        .transpose()?;
+    let mut model = ModelFile {
+        plant,
+        effects: Vec::new(),
+        terms: Vec::new(),
+        columns: raw.columns,
+        known,
+        start: BTreeMap::new(),
+        fixed: Vec::new(),
+        controller,
+        hold: raw.hold,
+    };
+    let settings = source.effect_tables(plant, &raw.effect)?;
+    let terms = source.terms(plant, &raw.term)?;
+    for name in &raw.effects {
+        if let Some((term, fixed)) = terms.get(name.as_ref().as_str()) {
+            if model.terms.iter().any(|on| on.term.name == term.term.name) {
+                let what = format!("{} stands here twice; keep it once", name.as_ref());
+                return Err(source.at(name.span().start, what));
+            }
+            if *fixed {
+                let scale = format!("{}.scale", term.term.name);
+                model.start.insert(scale.clone(), 1.0);
+                model.fixed.push(scale);
+            }
+            model.terms.push(term.clone());
+            continue;
+        }
+        let placed = source.placed(plant, &model.effects, name, &settings)?;
+        model.effects.push(placed);
+    }
+    source.start(&mut model, &raw.start)?;
+    for placed in &model.effects {
+        let Some(setting) = settings.get(placed.effect.id) else {
+            continue;
+        };
+        for (parameter, (value, at)) in &setting.values {
+            let name = format!("{}.{parameter}", placed.effect.id);
+            if model.start.insert(name.clone(), *value).is_some() {
+                return Err(source.at(
+                    *at,
+                    format!("{name} is given here and under [start]; keep one of the two"),
+                ));
+            }
+            if setting.fixed.contains(parameter) {
+                model.fixed.push(name);
+            }
+        }
+    }
+    Ok(model)
+}

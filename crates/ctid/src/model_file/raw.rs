@@ -1,0 +1,103 @@
+//! The file as `serde` reads it.
+
+use std::collections::BTreeMap;
+
+use ct_signals::{Columns, Hold};
+use serde::Deserialize;
+use toml::Spanned;
+
+/// The file as it stands; its numbers and names are checked afterwards, where their lines are known.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Raw {
+    pub(super) plant: Option<Spanned<String>>,
+    #[serde(default)]
+    pub(super) effects: Vec<Spanned<String>>,
+    #[serde(default)]
+    pub(super) columns: Columns,
+    #[serde(default)]
+    pub(super) known: RawKnown,
+    #[serde(default)]
+    pub(super) start: BTreeMap<Spanned<String>, Spanned<Number>>,
+    pub(super) controller: Option<Spanned<RawController>>,
+    #[serde(default)]
+    pub(super) effect: BTreeMap<Spanned<String>, Spanned<EffectTable>>,
+    #[serde(default)]
+    pub(super) term: BTreeMap<Spanned<String>, Spanned<RawTerm>>,
+    #[serde(default)]
+    pub(super) hold: Hold,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawTerm {
+    pub(super) place: Spanned<String>,
+    pub(super) variable: Spanned<String>,
+    pub(super) at: Vec<Number>,
+    pub(super) value: Vec<Number>,
+    #[serde(default)]
+    pub(super) at_unit: String,
+    #[serde(default)]
+    pub(super) unit: String,
+    #[serde(default)]
+    pub(super) fixed: bool,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct RawKnown {
+    pub(super) area: Option<Spanned<Number>>,
+    pub(super) area_upper: Option<Spanned<Number>>,
+    pub(super) area_lower: Option<Spanned<Number>>,
+    pub(super) tank_height: Option<Spanned<Number>>,
+    pub(super) input_range: Option<Spanned<Number>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawController {
+    #[serde(rename = "type")]
+    pub(super) kind: Option<Spanned<String>>,
+    pub(super) gain: Option<Spanned<Number>>,
+    pub(super) integral_time: Option<Spanned<Number>>,
+    pub(super) variable: Option<Spanned<String>>,
+    pub(super) r: Option<Spanned<Vec<Number>>>,
+    pub(super) s: Option<Spanned<Vec<Number>>>,
+    pub(super) u_min: Option<Spanned<Number>>,
+    pub(super) u_max: Option<Spanned<Number>>,
+}
+
+/// A number, written with or without a decimal point.
+#[derive(Deserialize, Clone, Copy)]
+#[serde(
+    untagged,
+    expecting = "not a number: write it without quotes, such as 154.0"
+)]
+pub(super) enum Number {
+    Float(f64),
+    Integer(i64),
+}
+
+impl Number {
+    pub(super) fn value(self) -> f64 {
+        match self {
+            Self::Float(value) => value,
+            Self::Integer(value) => value as f64,
+        }
+    }
+}
+
+/// An `[effect.X]` table as it stands.
+pub(super) type EffectTable = BTreeMap<Spanned<String>, Spanned<Entry>>;
+
+/// An entry of an `[effect.X]` table.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "not understood: a number, where = \"upper\" or \"lower\", or fixed = [\"parameter\"] may stand here"
+)]
+pub(super) enum Entry {
+    Number(f64),
+    Word(String),
+    Words(Vec<String>),
+}

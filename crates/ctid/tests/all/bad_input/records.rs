@@ -1,0 +1,238 @@
+//! Records whose cells or numbers cannot be.
+
+use super::{Rows, both_refuse, place, record_refused};
+use crate::common::bundled;
+
+#[test]
+fn a_missing_column() {
+    record_refused(
+        Rows::new().with(1, 2, "level [cm]").text(),
+        &[
+            "bad.csv, row 1",
+            "no column \"y [cm]\" for the output",
+            "\"t [s]\", \"u [V]\", \"level [cm]\"",
+            "output = ",
+            "[columns]",
+        ],
+    );
+}
+
+#[test]
+fn a_repeated_time() {
+    record_refused(
+        Rows::new().with(10, 0, "14").text(),
+        &[
+            "bad.csv, row 10, column \"t [s]\"",
+            "14 is repeated",
+            "remove one",
+        ],
+    );
+}
+
+#[test]
+fn a_backward_time() {
+    record_refused(
+        Rows::new().with(10, 0, "5").text(),
+        &[
+            "bad.csv, row 10, column \"t [s]\"",
+            "back from 14 to 5",
+            "sort the rows",
+        ],
+    );
+}
+
+#[test]
+fn a_gap() {
+    record_refused(
+        Rows::new().without(50).without(50).text(),
+        &[
+            "bad.csv, row 50, column \"t [s]\"",
+            "2 samples are missing",
+            "from 94 to 100, elsewhere by 2)",
+            "split the file",
+        ],
+    );
+    // Steps that are not exact in binary.
+    record_refused(
+        Rows::new()
+            .each(0, |t| (t / 2.0).round() / 10.0)
+            .without(50)
+            .text(),
+        &[
+            "bad.csv, row 50, column \"t [s]\"",
+            "1 sample is missing",
+            "from 4.7 to 4.9, elsewhere by 0.1)",
+        ],
+    );
+}
+
+#[test]
+fn not_a_number_in_a_cell() {
+    record_refused(
+        Rows::new().with(20, 2, "NaN").text(),
+        &[
+            "bad.csv, row 20, column \"y [cm]\"",
+            "\"NaN\" is not a finite number",
+            "replace it",
+        ],
+    );
+}
+
+#[test]
+fn an_infinity_in_a_cell() {
+    record_refused(
+        Rows::new().with(21, 1, "-inf").text(),
+        &[
+            "bad.csv, row 21, column \"u [V]\"",
+            "\"-inf\" is not a finite number",
+            "replace it",
+        ],
+    );
+}
+
+#[test]
+fn a_number_too_large_for_a_computer() {
+    record_refused(
+        Rows::new().with(22, 1, "1e999").text(),
+        &[
+            "bad.csv, row 22, column \"u [V]\"",
+            "\"1e999\" is not a finite number",
+        ],
+    );
+}
+
+#[test]
+fn text_in_a_cell() {
+    record_refused(
+        Rows::new().with(23, 2, "n/a").text(),
+        &[
+            "bad.csv, row 23, column \"y [cm]\"",
+            "\"n/a\" is not a number",
+            "correct the cell",
+        ],
+    );
+}
+
+#[test]
+fn a_date_for_a_time() {
+    record_refused(
+        Rows::new().with(2, 0, "2024-05-01 12:00:00").text(),
+        &[
+            "bad.csv, row 2, column \"t [s]\"",
+            "2024-05-01 12:00:00",
+            "give the time as a number",
+        ],
+    );
+}
+
+#[test]
+fn an_empty_cell() {
+    record_refused(
+        Rows::new().with(24, 1, "").text(),
+        &[
+            "bad.csv, row 24, column \"u [V]\"",
+            "the cell is empty",
+            "fill it in",
+        ],
+    );
+}
+
+#[test]
+fn a_constant_input() {
+    record_refused(
+        Rows::new().each(1, |_| 4.2).text(),
+        &[
+            "bad.csv, column \"u [V]\"",
+            "the input is 4.2 in all 900 rows",
+            "record an experiment in which it moves",
+        ],
+    );
+}
+
+#[test]
+fn a_constant_output() {
+    record_refused(
+        Rows::new().each(2, |_| 7.5).text(),
+        &[
+            "bad.csv, column \"y [cm]\"",
+            "the output is 7.5 in all 900 rows",
+            "check the sensor",
+        ],
+    );
+}
+
+#[test]
+fn numbers_beyond_all_measure() {
+    record_refused(
+        Rows::new().with(25, 2, "1e300").text(),
+        &[
+            "bad.csv, row 25, column \"y [cm]\"",
+            "1e300 is too large",
+            "correct the cell",
+        ],
+    );
+    record_refused(
+        Rows::new().each(2, |y| 1e-150 * y).text(),
+        &[
+            "bad.csv, column \"y [cm]\"",
+            "e-149, which is too small",
+            "a smaller unit",
+        ],
+    );
+    record_refused(
+        Rows::new().each(0, |t| 1e-40 * t).text(),
+        &[
+            "bad.csv, column \"t [s]\"",
+            "the time steps by 2e-40 s",
+            "check the column and its unit",
+        ],
+    );
+}
+
+#[test]
+fn a_saturated_record() {
+    record_refused(
+        Rows::new().each(2, |y| y.min(12.0)).text(),
+        &[
+            "bad.csv, column \"y [cm]\"",
+            "of 900 samples sit exactly at a limit",
+            "at 12 cm",
+            "keep the experiment within the sensor's range",
+        ],
+    );
+}
+
+#[test]
+fn too_few_rows_for_any_model() {
+    let lines: Vec<String> = bundled("tour.csv")
+        .lines()
+        .take(1 + 15)
+        .map(str::to_string)
+        .collect();
+    record_refused(
+        lines.join("\n"),
+        &["bad.csv: 15 rows", "20 are needed", "give a longer record"],
+    );
+}
+
+#[test]
+fn too_few_rows_for_the_parameters() {
+    let place = place();
+    let mut rows = Rows::new();
+    rows.0.drain(1..31);
+    rows.0.truncate(1 + 30);
+    place.write("bad.csv", rows.text());
+    place.write(
+        "two.toml",
+        "plant = \"cascaded-tanks\"\neffects = [\"overflow\"]\n",
+    );
+    both_refuse(
+        &place,
+        "bad.csv --model two.toml",
+        &[
+            "bad.csv: 30 rows",
+            "35 are needed to fit 7 parameters",
+            "give a longer record",
+        ],
+    );
+}

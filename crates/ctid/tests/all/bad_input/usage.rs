@@ -1,0 +1,72 @@
+//! Commands that make no sense.
+
+use super::{model_with, place};
+
+#[test]
+fn effects_that_cannot_be_added_or_removed() {
+    let place = place();
+    place.write(
+        "on.toml",
+        model_with("effects = []", "effects = [\"overflow\"]"),
+    );
+    for (words, says) in [
+        (
+            "add overfow --model tour.toml",
+            ["unknown effect \"overfow\"", "did you mean overflow?"],
+        ),
+        (
+            "add overflow --model on.toml",
+            ["on.toml: overflow is on already", "`ctid remove overflow`"],
+        ),
+        (
+            "add sqrt_outflow --model tour.toml",
+            ["tour.toml: ", "does not act on plant `single-tank`"],
+        ),
+        (
+            "add overflow --where upper --model tour.toml",
+            ["tour.toml: ", "has one vessel"],
+        ),
+        (
+            "remove overfow --model on.toml",
+            ["unknown effect \"overfow\"", "did you mean overflow?"],
+        ),
+        (
+            "remove pump_lag --model on.toml",
+            ["on.toml: pump_lag is not on", "effects = [\"overflow\"]"],
+        ),
+        (
+            "effects overfow",
+            ["unknown effect \"overfow\"", "did you mean overflow?"],
+        ),
+    ] {
+        place.refuses(words, &says);
+    }
+}
+
+#[test]
+fn wrong_usage() {
+    let place = place();
+    for (words, says) in [
+        (
+            "diagnos tour.csv --model tour.toml",
+            ["'diagnos'", "diagnose"],
+        ),
+        (
+            "diagnose tour.csv --modle tour.toml",
+            ["'--modle'", "'--model'"],
+        ),
+        ("diagnose tour.csv", ["--model", "--help"]),
+        ("diagnose --model tour.toml", ["DATA.csv", "--help"]),
+        (
+            "diagnose tour.csv --model tour.toml --max-effects 0",
+            ["'0'", "--max-effects"],
+        ),
+        (
+            "add overflow --where middle --model tour.toml",
+            ["'middle'", "upper, lower"],
+        ),
+        ("remove overflow", ["--model", "--help"]),
+    ] {
+        place.refuses(words, &says);
+    }
+}

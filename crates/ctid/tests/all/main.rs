@@ -1,0 +1,15 @@
+//! One program for all tests: each of its own would link the crate again.
+#![allow(clippy::unwrap_used)]
+
+mod bad_input;
+mod common;
+mod design;
+mod identify;
+mod identify_loop;
+mod model_file;
+mod mutations;
+mod own_term;
+mod program;
+mod results;
+mod tables;
+mod udink_reference;

@@ -1,0 +1,13 @@
+//! One program for all tests: each of its own would link the crate again.
+#![allow(clippy::unwrap_used)]
+
+mod absent;
+mod closed_loop;
+mod composition;
+mod derivatives;
+mod fast_vessels;
+mod lags;
+mod reference;
+mod robustness;
+mod support;
+mod terms;

@@ -12,8 +12,8 @@ use statrs::{
 };
 
 use crate::{
-    ControlLoop, Error, Options, Problem, control_loop::check_stable, noise_floor::NOISE_ORDER,
-    problem::STOPPING, search::Node,
+    ControlLoop, Error, Options, Problem, control_loop::check_stable, node::Node,
+    noise_floor::NOISE_ORDER, problem::STOPPING,
 };
 
 /// Feedback is said to be there below this p-value.

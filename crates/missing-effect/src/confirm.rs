@@ -6,7 +6,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
     Error,
-    search::{NEAR, Node, best_first, exchanges, without},
+    exchange::{NEAR, exchanges},
+    node::{Node, best_first, without},
 };
 
 /// An effect is accepted where its criterion falls by more than this ...

@@ -5,7 +5,7 @@ use greybox::LinearPlant;
 use nalgebra::DMatrix;
 use plants::controller::Controller;
 
-use crate::{Error, search::Node};
+use crate::{Error, node::Node};
 
 /// A loop that grows e-fold so often over the longest record cannot have produced it.
 const GROWTH: f64 = 1.0;

@@ -3,12 +3,8 @@
 use greybox::{Setup, coloured};
 
 use crate::{
-    Error,
-    confirm::BIC_MARGIN,
-    noise_floor::NOISE_ORDER,
-    problem::STOPPING,
-    remains::remains,
-    search::{Node, any_promise},
+    Error, confirm::BIC_MARGIN, node::Node, noise_floor::NOISE_ORDER, problem::STOPPING,
+    proposal::any_promise, remains::remains,
 };
 
 /// What a set leaves is noise, and in the metric of that noise no effect more promises what it would cost.

@@ -13,9 +13,9 @@ use rayon::prelude::*;
 
 use crate::{
     Error,
+    node::{FINE, Node},
     noise_floor::residual_colour,
     remains::{Left, Remains},
-    search::{FINE, Node},
 };
 
 /// Instants that are tried, those where the whitened residual is largest.

@@ -5,18 +5,25 @@
 //! the trail of the falling error. [`design()`](design::design) proposes the experiment that tells two of them apart.
 
 mod closed_loop;
+mod compare;
 mod confirm;
 mod control_loop;
 pub mod design;
 mod diagnose;
 mod diagnosis;
+mod doubt;
 mod error;
+mod exchange;
 mod exhausted;
+mod find;
+mod groups;
 mod jump;
 mod locate;
+mod node;
 mod noise_floor;
 pub mod numbers;
 mod problem;
+mod proposal;
 mod remains;
 mod scores;
 mod search;
@@ -26,7 +33,8 @@ mod step;
 mod trail;
 mod unknown;
 
-pub use diagnose::{compare, diagnose};
+pub use compare::compare;
+pub use diagnose::diagnose;
 pub use diagnosis::{
     Bin, ControlLoop, Diagnosis, Failures, NoiseFloor, Parameter, ResidualTests, Score, Shown,
     Step, Verdict,

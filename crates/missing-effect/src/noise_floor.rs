@@ -3,7 +3,7 @@
 use ct_signals::ArModel;
 use greybox::noise_of;
 
-use crate::{Error, search::Node};
+use crate::{Error, node::Node};
 
 /// Largest order of the noise model.
 pub(crate) const NOISE_ORDER: usize = 6;

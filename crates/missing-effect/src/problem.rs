@@ -6,7 +6,7 @@ use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 
-use crate::{ControlLoop, Error, closed_loop::enclose, search::Node};
+use crate::{ControlLoop, Error, closed_loop::enclose, node::Node};
 
 /// What the fit of a believed model is taken to.
 pub(crate) const STOPPING: Stopping = Stopping {

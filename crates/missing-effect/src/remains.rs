@@ -28,7 +28,7 @@ use statrs::{
 };
 
 use crate::{
-    Error, control_loop::slowest_time_constant, noise_floor::slowness, search::Node,
+    Error, control_loop::slowest_time_constant, node::Node, noise_floor::slowness,
     spectral_line::strongest_line,
 };
 

@@ -1,10 +1,9 @@
 //! What each single effect of the catalogue does to the believed model, and what the data would show of it.
 
 use ct_signals::ArModel;
-use plants::{ParameterInfo, Placed};
 use rayon::prelude::*;
 
-use crate::{Score, search::Node, step};
+use crate::{Score, node::Node, step};
 
 /// Shown at 1 % false alarm with 90 % power, in standard errors.
 const VISIBLE: f64 = 2.576 + 1.282;
@@ -16,7 +15,8 @@ pub(crate) fn scores(base: &Node, single: &[Node], noise: &ArModel) -> Vec<Score
     single
         .iter()
         .filter_map(|node| {
-            let (placed, _, at) = leading(node)?;
+            let placed = *node.added.last()?;
+            let (_, at) = node.size_of(placed)?;
             let parameters = step::parameters(&node.setup, &node.fit, &node.fit.std_errors());
             let projected = signature(base, node, noise);
             Some(Score {
@@ -54,20 +54,10 @@ pub(crate) fn price_of_colour(base: &Node, single: &[Node], noise: &ArModel) -> 
     ratios.get(ratios.len() / 2).copied()
 }
 
-/// The effect that a node added last, its leading parameter, and where that stands in the vector.
-fn leading(node: &Node) -> Option<(Placed, ParameterInfo, usize)> {
-    let placed = *node.added.last()?;
-    let parameters = node.setup.structure.effect_parameters(placed);
-    let leading = parameters.into_iter().next()?;
-    let name = format!("{}.{}", placed.effect.id, leading.name);
-    let at = node.setup.names().iter().position(|known| *known == name)?;
-    Some((placed, leading, at))
-}
-
 /// The length of the signature of an effect at its absent value, beside what the base's own parameters can imitate and as
 /// a whole; `None` where it has no derivative there.
 fn signature(base: &Node, node: &Node, noise: &ArModel) -> Option<(f64, f64)> {
-    let (_, leading, at) = leading(node)?;
+    let (leading, at) = node.size_of(*node.added.last()?)?;
     if !leading.absent.is_finite() {
         return None;
     }

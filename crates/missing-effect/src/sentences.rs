@@ -2,9 +2,9 @@
 
 use crate::{
     Diagnosis, Parameter, Step, Unknown, Verdict,
+    node::Node,
     numbers::{significant, value_and_error},
     remains::{Left, Remains},
-    search::Node,
 };
 
 /// A value with its standard error to two significant digits of the latter.

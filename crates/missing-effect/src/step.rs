@@ -7,9 +7,9 @@ use crate::{
     Error, Parameter, ResidualTests, Step,
     closed_loop::widened,
     locate::{Located, Series, locate},
+    node::Node,
     noise_floor::NOISE_ORDER,
     remains::input_p,
-    search::Node,
 };
 
 /// Samples of a held-out record on which its initial levels are fitted, and which are not scored.

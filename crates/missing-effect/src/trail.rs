@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use crate::{
     Error,
-    search::{FINE, Node, ROUGH, place, refine},
+    node::{FINE, Node, ROUGH, refine},
+    proposal::place,
 };
 
 /// The parameter that has as many minima as a spectrum has lines.

@@ -14,7 +14,7 @@ use super::{
     separation::{Metric, imagined, information, linear, misfit_before, refitted},
     sequences::{Sequence, sequences},
 };
-use crate::{Error, Problem, Progress, search::Node};
+use crate::{Error, Problem, Progress, node::Node};
 
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 6;

@@ -29,10 +29,11 @@ pub use sequences::Kind;
 use crate::{
     Error, Options, Problem, Progress,
     control_loop::slowest_time_constant,
-    diagnose::GROUP_MARGIN,
+    groups::GROUP_MARGIN,
+    node::{FINE, Node, refine},
     noise_floor::colour,
     problem::base,
-    search::{FINE, Node, place, refine},
+    proposal::place,
     step,
 };
 use experiments::Search;

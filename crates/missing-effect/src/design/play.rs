@@ -3,7 +3,7 @@
 use ct_signals::{Hold, Record, Signal};
 use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller};
 
-use crate::search::Node;
+use crate::node::Node;
 
 /// What the experiment is played into.
 #[derive(Debug, Clone)]

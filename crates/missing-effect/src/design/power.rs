@@ -3,7 +3,7 @@
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::plan::{Power, Prospect};
-use crate::diagnose::GROUP_MARGIN;
+use crate::groups::GROUP_MARGIN;
 
 /// A decision as good as certain, as likely, and what the criterion does not notice.
 const SURE: f64 = 0.9;

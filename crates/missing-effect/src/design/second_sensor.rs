@@ -8,7 +8,7 @@ use super::{
     play::Played,
     separation::{Metric, imagined, least, unlooped, vector},
 };
-use crate::search::Node;
+use crate::node::Node;
 
 /// Step of a central difference, as a part of the value or of the typical size of its like.
 const STEP: f64 = 1e-5;

@@ -28,7 +28,7 @@ use greybox::{Setup, Triangle, fit_from, starts_around};
 use super::play::Played;
 use crate::{
     Error,
-    search::{FINE, Node},
+    node::{FINE, Node},
 };
 
 /// Starts around B's fit beside itself.

@@ -11,7 +11,7 @@ use super::{
     play::{Loop, play},
     separation::{imagined, information, linear, misfit_before, refitted, unlooped, vector},
 };
-use crate::{Error, Options, Problem, search::FINE};
+use crate::{Error, Options, Problem, node::FINE};
 
 const NOISE: f64 = 0.05;
 const INTERVAL: f64 = 2.0;
@@ -111,7 +111,7 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
         let before = misfit_before(&existing, b, metric).unwrap();
         let confirmed = refitted(&existing, &played, b, before, metric).unwrap();
 
-        let cost = |node: &crate::search::Node, records: &[Record]| {
+        let cost = |node: &crate::node::Node, records: &[Record]| {
             let setup = node.setup.with_records(records).unwrap();
             let mut x = unlooped(node);
             x.truncate(node.setup.parameter_count());

@@ -4,7 +4,7 @@ use super::{
     plan::{Candidate, Design, Power, Prospect, Rival},
     sequences::Kind,
 };
-use crate::{diagnose::GROUP_MARGIN, numbers::significant, sentences::with_error};
+use crate::{groups::GROUP_MARGIN, numbers::significant, sentences::with_error};
 
 fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()

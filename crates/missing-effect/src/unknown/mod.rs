@@ -21,7 +21,7 @@ use self::{
     shape::{Shape, shape},
     smooth::{Smoothed, Spot, smooth},
 };
-use crate::{Error, search::Node};
+use crate::{Error, node::Node};
 
 /// Half-width of a 95 % band in standard errors.
 const BAND: f64 = 1.96;

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use plants::{Command, Fitted, Simulator, Term, Variable};
 
 use super::smooth::{Smoothed, Spot, carrier};
-use crate::{Error, noise_floor::slowness, search::Node};
+use crate::{Error, node::Node, noise_floor::slowness};
 
 /// Knots of a polyline.
 const KNOTS: usize = 16;

@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use plants::{Fitted, Place, Term, Variable};
 
-use crate::{Error, search::Node};
+use crate::{Error, node::Node};
 
 /// Instants of a path: at most so many, and so many samples for each at least.
 const INSTANTS: usize = 96;

@@ -14,7 +14,7 @@ use super::{
     shape::shape,
     smooth::{Spot, carrier, smooth},
 };
-use crate::search::Node;
+use crate::node::Node;
 
 /// Samples, so that ten lie between two instants of the path.
 const N: usize = 951;

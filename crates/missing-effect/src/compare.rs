@@ -1,0 +1,72 @@
+//! The comparison: the believed model, fitted, and where it fails.
+
+use std::time::Instant;
+
+use greybox::coloured;
+
+use crate::{
+    ControlLoop, Diagnosis, Error, Options, Problem, Verdict,
+    confirm::{BIC_MARGIN, beyond_chance},
+    diagnose::{assemble, floor},
+    node::Node,
+    noise_floor::{NOISE_ORDER, wanders},
+    problem::{STOPPING, base},
+    proposal::singles,
+    remains::remains,
+    sentences, step,
+};
+
+/// Fits the believed model and says where it fails: a diagnosis of one step without a search of sets.
+///
+/// # Errors
+/// Where the records, the plant or the fit do not allow it.
+pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
+    let begun = Instant::now();
+    let (base, control_loop) = base(problem, options)?;
+    let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
+    // The model lacks something where its residual is not noise, or where some effect would lower the error by more than
+    // chance does: the one needs no catalogue, the other sees what is small.
+    let in_noise = Node {
+        fit: own.clone(),
+        ..base.clone()
+    };
+    let tempted = singles(&in_noise, &own.noise)
+        .first()
+        .is_some_and(|single| {
+            single.gain_over(&in_noise) > BIC_MARGIN && {
+                beyond_chance(own.deviance - single.fit.deviance, &in_noise, single)
+            }
+        });
+    let left = remains(&base, &own)?;
+    let lacking = tempted || left.is_some();
+    let verdict = if lacking {
+        Verdict::Unexplained
+    } else {
+        Verdict::Adequate
+    };
+    let floor = floor(&own.noise, "the residual of the believed model");
+    // In the metric of a noise that wanders a simulation may drift off.
+    let shown = if lacking || wanders(&base, &own.noise) {
+        base
+    } else {
+        Node {
+            fit: own.clone().continuing(&base.fit),
+            ..base
+        }
+    };
+    let floor = if lacking {
+        floor.of_what_is_new()
+    } else {
+        floor
+    };
+    let widen = ControlLoop::widens(control_loop.as_ref());
+    let step = step::report(&shown, own.bic(), &floor.model()?, &problem.test, widen)?;
+    let mut diagnosis = assemble(problem, verdict, vec![step], floor);
+    diagnosis.sentences = sentences::of_comparison(&diagnosis, left);
+    diagnosis
+        .sentences
+        .extend(sentences::of_a_minimum(&diagnosis));
+    diagnosis.speak_of_the_loop(control_loop);
+    diagnosis.seconds = begun.elapsed().as_secs_f64();
+    Ok(diagnosis)
+}

@@ -1,0 +1,68 @@
+//! What a confirmed set of effects is still held against: the colour of each model's own residual, a jump of the reading, and
+//! any course of time.
+
+use greybox::{Fit, coloured};
+
+use crate::{
+    Error,
+    confirm::{BIC_MARGIN, beyond_chance, confirm},
+    find::Found,
+    jump::{Jump, jump},
+    node::{Node, without_clock},
+    noise_floor::NOISE_ORDER,
+    problem::STOPPING,
+    remains::remains,
+};
+
+/// What a doubt leaves.
+pub(crate) struct Doubted<'a> {
+    pub confirmed: Node<'a>,
+    /// The believed model with the colour of its own residual.
+    pub own_base: Fit,
+    /// The jump that explains more than what was confirmed.
+    pub jumped: Option<Jump>,
+}
+
+/// Takes from what is confirmed what something simpler explains as well.
+pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a>, Error> {
+    let noise = &found.noise;
+    let mut confirmed = found.confirmed.clone();
+    // Each model with the colour of its own residual: what a coloured noise explains needs no effect. The richest model has
+    // taken a part of a slow noise for effects, and the colour that it leaves is too fast: chance is counted here too.
+    let own_base = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
+    let own_last = coloured(
+        &confirmed.setup,
+        confirmed.fit.clone(),
+        NOISE_ORDER,
+        STOPPING,
+    )?;
+    let needed_in_colour = own_base.bic() - own_last.bic() >= BIC_MARGIN
+        && beyond_chance(own_base.deviance - own_last.deviance, base, &confirmed);
+    if !confirmed.added.is_empty() && !needed_in_colour {
+        confirmed = found.base.clone();
+    }
+    // What is claimed has to be better than the simplest course of which no effect is the cause.
+    let jumped = if confirmed.added.is_empty() {
+        None
+    } else {
+        jump(&found.base, noise)?.filter(|jump| jump.bic < confirmed.fit.bic())
+    };
+    if jumped.is_some() {
+        confirmed = found.base.clone();
+    }
+    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, and where the other
+    // effects of the set are called for without them. What is there to mend an imitation is not.
+    if confirmed.added.iter().any(|placed| placed.effect.by_clock) {
+        let others = without_clock(&confirmed, noise)?;
+        let count = others.added.len();
+        let others = confirm(others, noise)?;
+        if others.added.len() < count || remains(&confirmed, &own_last)?.is_some() {
+            confirmed = others;
+        }
+    }
+    Ok(Doubted {
+        confirmed,
+        own_base,
+        jumped,
+    })
+}

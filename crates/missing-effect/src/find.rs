@@ -1,0 +1,160 @@
+//! The search: a set of effects, and the noise in whose metric it is confirmed.
+
+use ct_signals::ArModel;
+
+use crate::{
+    Error,
+    confirm::{BIC_MARGIN, confirm, improve, least_useful},
+    exhausted::exhausted,
+    node::{Node, refine},
+    noise_floor::{bic_in_colour, colour, wanders},
+    search::{Breadth, Grown, grow},
+};
+
+/// Sets grown side by side, and refits of a size.
+const BEAM: usize = 3;
+const REFITS: usize = 12;
+/// Sets are grown to so many effects where they pay.
+const RICHEST: usize = 6;
+
+/// In the metric of a noise that wanders they are grown to so many.
+const PAIR: usize = 2;
+
+/// What the search found.
+pub(crate) struct Found<'a> {
+    /// The richest model in play, by simulation error; its residual gives the noise.
+    pub richest: Node<'a>,
+    pub noise: ArModel,
+    /// The base, and what is confirmed, in the metric of the noise.
+    pub base: Node<'a>,
+    pub confirmed: Node<'a>,
+    /// The sets that were grown, in the metric of the noise where that is not by simulation.
+    pub grown: Grown<'a>,
+    /// Whether the noise wanders.
+    pub wandering: bool,
+    /// Whether it does and something is confirmed: then models are compared and shown by their simulation error.
+    pub by_simulation: bool,
+}
+
+/// Searches sets of effects of at most `most`, or more where the noise needs them.
+pub(crate) fn find<'a>(
+    base: &Node<'a>,
+    most: usize,
+    tell: &(dyn Fn(&'static str, usize, usize) + Sync),
+) -> Result<Found<'a>, Error> {
+    let breadth = Breadth {
+        beam: BEAM,
+        refits: REFITS,
+        // What may be added does not bound what is tried: only the richest model shows what is noise.
+        most: most.max(RICHEST),
+    };
+    let pays = |before: &Node, after: &Node| after.gain_over(before) > BIC_MARGIN;
+    // While the colour is not known, a coloured noise would pay for one effect after the other: what counts is what remains of
+    // the gain where each model has the colour of its own residual.
+    let pays_in_colour = |before: &Node, after: &Node| {
+        let fall = || Ok::<_, Error>(bic_in_colour(before)? - bic_in_colour(after)?);
+        pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
+    };
+    let white = ArModel::white(1.0);
+    let mut grown = grow(
+        base,
+        &white,
+        breadth,
+        pays_in_colour,
+        exhausted,
+        &|done, total| tell("searching sets of effects", done, total),
+    )?;
+    let richest = refine(&chosen(&grown.sizes, base), &white, &[])?;
+    let noise = colour(&richest)?;
+
+    // Confirm in the metric of the noise.
+    tell("confirming", 0, 3);
+    let base = refine(base, &noise, &[])?;
+    let mut confirmed = confirm(refine(&richest, &noise, &[])?, &noise)?;
+    let wandering = wanders(&richest, &noise);
+    let by_simulation = wandering && !confirmed.added.is_empty();
+    if noise.order() > 0 {
+        // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
+        // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
+        // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many
+        // effects it tells little.
+        let breadth = Breadth {
+            most: if by_simulation { PAIR } else { breadth.most },
+            ..breadth
+        };
+        let coloured = grow(
+            &base,
+            &noise,
+            breadth,
+            pays,
+            // It was exhausted in this colour, which is that of its own residual.
+            |node| Ok(grown.exhausted_by(node) || exhausted(node)?),
+            &|done, total| tell("searching in the noise's metric", done, total),
+        )?;
+        let best = chosen(&coloured.sizes, &base);
+        let other = confirm(refine(&best, &noise, &[])?, &noise)?;
+        if other.fit.bic() < confirmed.fit.bic()
+            && !(by_simulation && drifts_off(&confirmed, &other)?)
+        {
+            confirmed = other;
+        }
+        if !by_simulation {
+            grown = coloured.with_sizes_of(grown);
+        }
+    }
+    if !by_simulation {
+        confirmed = improve(confirmed, &noise)?;
+    }
+    Ok(Found {
+        richest,
+        noise,
+        base,
+        confirmed,
+        grown,
+        wandering,
+        by_simulation,
+    })
+}
+
+/// The best of all sizes: a larger set must pay for itself against every smaller one.
+fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
+    sizes
+        .iter()
+        .skip(1)
+        .filter_map(|nodes| nodes.first())
+        .fold(base.clone(), |best, node| {
+            if node.gain_over(&best) > BIC_MARGIN {
+                node.clone()
+            } else {
+                best
+            }
+        })
+}
+
+/// Whether a set simulates clearly worse than another, by the criterion.
+fn drifts_off(before: &Node, after: &Node) -> Result<bool, Error> {
+    let white = ArModel::white(1.0);
+    Ok(refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?) > BIC_MARGIN)
+}
+
+/// The best set of at most so many effects: of a set that is too large, or of those that were grown.
+pub(crate) fn shortened<'a>(
+    mut node: Node<'a>,
+    sizes: &[Vec<Node<'a>>],
+    most: usize,
+    noise: &ArModel,
+) -> Result<Node<'a>, Error> {
+    while node.added.len() > most {
+        let Some(lacking) = least_useful(&node, noise)? else {
+            break;
+        };
+        node = lacking;
+    }
+    if let Some(grown) = sizes.get(most).and_then(|nodes| nodes.first()) {
+        let grown = refine(grown, noise, &[])?;
+        if grown.fit.bic() < node.fit.bic() {
+            node = grown;
+        }
+    }
+    Ok(node)
+}

@@ -1,0 +1,134 @@
+//! A set of effects with its fit, and the fits of what it is changed to.
+
+use ct_signals::ArModel;
+use greybox::{Fit, Setup, Start, Stopping, fit_from, fit_onward};
+use plants::{ParameterInfo, Placed};
+
+use crate::Error;
+
+/// A first fit needs no more than this: its rank is sought, not its digits.
+pub(crate) const ROUGH: Stopping = Stopping {
+    evaluations: 20,
+    cost: 1e-3,
+};
+/// Which of many are worth a first fit.
+pub(crate) const QUICK: Stopping = Stopping {
+    evaluations: 5,
+    cost: 1e-3,
+};
+/// What a fit is taken to once its structure has a name.
+pub(crate) const FINE: Stopping = Stopping {
+    evaluations: 80,
+    cost: 1e-8,
+};
+/// A structure with its fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Node<'a> {
+    pub setup: Setup<'a>,
+    pub fit: Fit,
+    /// What was added to the base, in order.
+    pub added: Vec<Placed>,
+}
+
+impl Node<'_> {
+    /// Fall of the criterion against another node in the same metric.
+    pub fn gain_over(&self, other: &Node) -> f64 {
+        other.fit.bic() - self.fit.bic()
+    }
+
+    /// The size of every added effect lies inside its plausible range, neither absent nor at the far end.
+    pub fn plausible(&self) -> bool {
+        !self.added.iter().any(|placed| self.at_the_edge(*placed))
+    }
+
+    /// The leading parameter of an added effect, its size, and where that stands in the vector.
+    pub fn size_of(&self, placed: Placed) -> Option<(ParameterInfo, usize)> {
+        let parameters = self.setup.structure.effect_parameters(placed);
+        let leading = parameters.into_iter().next()?;
+        let name = format!("{}.{}", placed.effect.id, leading.name);
+        let at = self.setup.names().iter().position(|known| *known == name)?;
+        Some((leading, at))
+    }
+
+    /// The size of an added effect is absent or at the far end of its plausible range.
+    pub fn at_the_edge(&self, placed: Placed) -> bool {
+        let Some((leading, at)) = self.size_of(placed) else {
+            return false;
+        };
+        let room = 1e-6 * (leading.upper - leading.lower);
+        let size = self.fit.x[at];
+        size <= leading.lower + room || size >= leading.upper - room
+    }
+}
+
+/// The parent's vector in the child's order; what the parent does not have is zero.
+pub(crate) fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
+    child
+        .names()
+        .iter()
+        .map(|name| {
+            parent
+                .setup
+                .names()
+                .iter()
+                .position(|known| known == name)
+                .map_or(0.0, |at| parent.fit.x[at])
+        })
+        .collect()
+}
+
+/// Fits a node's structure anew to the end, from where it is and from the given further starts.
+pub(crate) fn refine<'a>(
+    node: &Node<'a>,
+    noise: &ArModel,
+    more: &[Vec<f64>],
+) -> Result<Node<'a>, Error> {
+    fitted(node, noise, FINE, more)
+}
+
+pub(crate) fn fitted<'a>(
+    node: &Node<'a>,
+    noise: &ArModel,
+    stopping: Stopping,
+    more: &[Vec<f64>],
+) -> Result<Node<'a>, Error> {
+    let mut starts = vec![Start::at_end(&node.fit, noise)];
+    starts.extend(more.iter().cloned().map(Start::from));
+    let fit = fit_onward(&node.setup, starts, noise, stopping)?;
+    Ok(Node {
+        setup: node.setup.clone(),
+        fit,
+        added: node.added.clone(),
+    })
+}
+
+/// The node without one of its effects, refitted from where it was.
+pub(crate) fn without<'a>(
+    node: &Node<'a>,
+    position: usize,
+    noise: &ArModel,
+) -> Result<Node<'a>, Error> {
+    let setup = node
+        .setup
+        .with_structure(node.setup.structure.without(node.added[position].effect))?;
+    let start = transfer(node, &setup);
+    let fit = fit_from(&setup, &[start], noise, FINE)?;
+    let mut added = node.added.clone();
+    added.remove(position);
+    Ok(Node { setup, fit, added })
+}
+
+/// The node without its effects that follow the clock alone, refitted from where it was.
+pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+    let mut node = node.clone();
+    while let Some(position) = node.added.iter().position(|placed| placed.effect.by_clock) {
+        node = without(&node, position, noise)?;
+    }
+    Ok(node)
+}
+
+/// By the criterion.
+pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
+    nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+    nodes
+}

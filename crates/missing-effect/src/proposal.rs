@@ -1,0 +1,250 @@
+//! What a set may be extended by, and what that promises.
+
+use std::sync::OnceLock;
+
+use ct_signals::ArModel;
+use greybox::{Setup, Start, Stopping, Triangle, fit_onward};
+use plants::{Place, Placed};
+use rayon::prelude::*;
+
+use crate::{
+    node::{Node, ROUGH, best_first, transfer},
+    spectral_line::strongest_line,
+};
+
+/// Damping of the step that a promise takes, against what the data do not determine.
+const PROMISE_DAMPING: f64 = 1e-6;
+/// Starts of a new effect that are followed down, the most promising of its grid.
+const FOLLOWED: usize = 2;
+
+/// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
+/// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
+const BY_CLOCK: usize = 1;
+/// A child's starts: the vector of a node, with the new effect's parameters on the grid of its starts.
+///
+/// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel tells
+/// them apart, and from the wrong order no fit comes to the right one.
+fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
+    let mut begun = vec![transfer(from, child)];
+    let pair = child.structure.plant.interchangeable();
+    if let Some(pair) = pair.filter(|_| placed.effect.place == Place::Vessel) {
+        let free = |name| {
+            let at = child.names().iter().position(|known| known == name)?;
+            child.free().contains(&at).then_some(at)
+        };
+        if let [Some(a), Some(b)] = pair.map(free) {
+            let mut exchanged = begun[0].clone();
+            exchanged.swap(a, b);
+            begun.push(exchanged);
+        }
+    }
+
+    let parameters = child.structure.effect_parameters(placed);
+    let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
+    for parameter in &parameters {
+        combinations = combinations
+            .iter()
+            .flat_map(|begun| {
+                parameter.starts.iter().map(|start| {
+                    let mut longer = begun.clone();
+                    longer.push(*start);
+                    longer
+                })
+            })
+            .collect();
+    }
+    combinations
+        .into_iter()
+        .flat_map(|values| begun.iter().map(move |x| (x.clone(), values.clone())))
+        .map(|(mut x, values)| {
+            for (parameter, value) in parameters.iter().zip(values) {
+                let name = format!("{}.{}", placed.effect.id, parameter.name);
+                if let Some(at) = child.names().iter().position(|known| *known == name) {
+                    x[at] = value;
+                }
+            }
+            x
+        })
+        .collect()
+}
+
+/// The cost after one step from a start, as the linearised model there predicts it.
+///
+/// The step is hardly damped: an effect that the other parameters nearly imitate takes long steps in both, and a damped one would
+/// leave the start's own error in the promise.
+fn promise(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
+    let free: Vec<usize> = (0..setup.free().len()).collect();
+    let scale: Vec<f64> = free.iter().map(|&j| triangle.column_norm(j)).collect();
+    let mut step = triangle.solve(&free, &scale, PROMISE_DAMPING);
+    for (d, &i) in step.iter_mut().zip(setup.free()) {
+        let (lower, upper) = setup.bounds()[i];
+        let lower = if lower > 0.0 {
+            lower.max(0.2 * x[i])
+        } else {
+            lower
+        };
+        *d = (x[i] + *d).clamp(lower, upper.max(lower)) - x[i];
+    }
+    triangle.predicted(&step)
+}
+
+/// One effect more, at its most promising starts.
+pub(crate) struct Proposal<'a> {
+    pub setup: Setup<'a>,
+    pub added: Vec<Placed>,
+    pub starts: Vec<Start>,
+    pub promise: f64,
+}
+
+/// A node that is extended, and the period that shows most in what it does not explain, once that was asked for.
+pub(crate) struct Parent<'n, 'a> {
+    pub node: &'n Node<'a>,
+    period: OnceLock<Option<f64>>,
+}
+
+impl<'n, 'a> Parent<'n, 'a> {
+    pub(crate) fn new(node: &'n Node<'a>) -> Self {
+        Self {
+            node,
+            period: OnceLock::new(),
+        }
+    }
+
+    /// The setup with one effect more.
+    pub(crate) fn with(&self, placed: Placed) -> Option<Setup<'a>> {
+        let mut structure = self.node.setup.structure.with(placed).ok()?;
+        if placed.effect.by_clock {
+            structure.scales.period = (*self.period.get_or_init(|| strongest_period(self.node)))?;
+        }
+        self.node.setup.with_structure(structure).ok()
+    }
+}
+
+pub(crate) fn propose<'a>(
+    parent: &Parent<'_, 'a>,
+    placed: Placed,
+    noise: &ArModel,
+) -> Option<Proposal<'a>> {
+    let setup = parent.with(placed)?;
+    let (promise, starts) = promising(parent.node, &setup, placed, noise)?;
+    let mut added = parent.node.added.clone();
+    added.push(placed);
+    Some(Proposal {
+        setup,
+        added,
+        starts,
+        promise,
+    })
+}
+
+/// The most promising starts of a new effect, the other parameters being where they are in `from`, and the best one's promise.
+pub(crate) fn promising(
+    from: &Node,
+    setup: &Setup,
+    placed: Placed,
+    noise: &ArModel,
+) -> Option<(f64, Vec<Start>)> {
+    let mut ranked: Vec<(f64, Start)> = grid(from, setup, placed)
+        .into_par_iter()
+        .filter_map(|x| {
+            let triangle = setup.linearise(&x, noise)?;
+            let promise = promise(setup, &x, &triangle);
+            let triangle = Some(triangle);
+            Some((promise, Start { x, triangle }))
+        })
+        .collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let promise = ranked.first()?.0;
+    let starts = ranked.into_iter().take(FOLLOWED);
+    let starts = starts.map(|(_, start)| start).collect();
+    Some((promise, starts))
+}
+
+/// The period that shows most in what a node does not explain \[s\].
+fn strongest_period(node: &Node) -> Option<f64> {
+    let residuals = node.setup.disturbance(&node.fit.x).ok()?;
+    let lines = residuals.iter().zip(node.setup.records);
+    let strongest = lines
+        .filter_map(|(residual, record)| Some((strongest_line(residual).ok()??, record.duration())))
+        .min_by(|a, b| a.0.chance.total_cmp(&b.0.chance));
+    Some(strongest.map_or(0.0, |(line, duration)| duration / line.cycles as f64))
+}
+
+pub(crate) fn realise<'a>(
+    proposal: Proposal<'a>,
+    noise: &ArModel,
+    stopping: Stopping,
+) -> Option<Node<'a>> {
+    let fit = fit_onward(&proposal.setup, proposal.starts, noise, stopping).ok()?;
+    Some(Node {
+        setup: proposal.setup,
+        fit,
+        added: proposal.added,
+    })
+}
+
+/// All single extensions of a node, refitted, best first.
+pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Node<'a>> {
+    let proposals = proposals(parent, noise);
+    best_first(realise_all(proposals, noise, ROUGH))
+}
+
+/// All extensions of a node by one effect, not fitted, the most promising first.
+pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Proposal<'a>> {
+    let from = Parent::new(parent);
+    let mut proposals: Vec<Proposal> = candidates(parent)
+        .into_par_iter()
+        .filter_map(|placed| propose(&from, placed, noise))
+        .collect();
+    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    proposals
+}
+
+pub(crate) fn realise_all<'a>(
+    proposals: Vec<Proposal<'a>>,
+    noise: &ArModel,
+    stopping: Stopping,
+) -> Vec<Node<'a>> {
+    proposals
+        .into_par_iter()
+        .filter_map(|proposal| realise(proposal, noise, stopping))
+        .collect()
+}
+
+/// What may be added to a set.
+pub(crate) fn candidates(parent: &Node) -> Vec<Placed> {
+    let mut candidates = parent.setup.structure.candidates();
+    let on = parent.setup.structure.effects().iter();
+    if on.filter(|placed| placed.effect.by_clock).count() >= BY_CLOCK {
+        candidates.retain(|placed| !placed.effect.by_clock);
+    }
+    candidates
+}
+
+/// Whether some effect more makes a promise that is `worth` it.
+pub(crate) fn any_promise(
+    parent: &Node,
+    noise: &ArModel,
+    worth: impl Fn(&Setup, f64) -> bool + Sync,
+) -> bool {
+    let from = Parent::new(parent);
+    candidates(parent).into_par_iter().any(|placed| {
+        propose(&from, placed, noise)
+            .is_some_and(|proposal| worth(&proposal.setup, proposal.promise))
+    })
+}
+
+/// The node with one given effect more, fitted so far; `known` is a fit of a larger set, whose values serve as a
+/// further start.
+pub(crate) fn place<'a>(
+    parent: &Node<'a>,
+    placed: Placed,
+    known: &Node<'a>,
+    noise: &ArModel,
+    stopping: Stopping,
+) -> Option<Node<'a>> {
+    let mut proposal = propose(&Parent::new(parent), placed, noise)?;
+    let start = transfer(known, &proposal.setup);
+    proposal.starts.push(start.into());
+    realise(proposal, noise, stopping)
+}

@@ -6,6 +6,7 @@ use crate::{
     Error,
     confirm::{BIC_MARGIN, confirm, improve, least_useful},
     exhausted::exhausted,
+    minima::begun_again,
     node::{Node, refine},
     noise_floor::{bic_in_colour, colour, wanders},
     search::{Breadth, Grown, grow},
@@ -64,7 +65,10 @@ pub(crate) fn find<'a>(
         exhausted,
         &|done, total| tell("searching sets of effects", done, total),
     )?;
-    let richest = refine(&chosen(&grown.sizes, base), &white, &[])?;
+    let mut richest = refine(&chosen(&grown.sizes, base), &white, &[])?;
+    if richest.added.len() > 1 {
+        begun_again(&mut richest, &white)?;
+    }
     let noise = colour(&richest)?;
 
     // Confirm in the metric of the noise.

@@ -19,6 +19,7 @@ mod find;
 mod groups;
 mod jump;
 mod locate;
+mod minima;
 mod node;
 mod noise_floor;
 pub mod numbers;

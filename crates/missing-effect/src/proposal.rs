@@ -24,7 +24,7 @@ const BY_CLOCK: usize = 1;
 ///
 /// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel tells
 /// them apart, and from the wrong order no fit comes to the right one.
-fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
+pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let mut begun = vec![transfer(from, child)];
     let pair = child.structure.plant.interchangeable();
     if let Some(pair) = pair.filter(|_| placed.effect.place == Place::Vessel) {

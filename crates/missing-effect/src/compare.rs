@@ -31,12 +31,8 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
         ..base.clone()
     };
     let tempted = singles(&in_noise, &own.noise)
-        .first()
-        .is_some_and(|single| {
-            single.gain_over(&in_noise) > BIC_MARGIN && {
-                beyond_chance(own.deviance - single.fit.deviance, &in_noise, single)
-            }
-        });
+        .iter()
+        .any(|single| single.gain_over(&in_noise) > BIC_MARGIN && beyond_chance(single, &in_noise));
     let left = remains(&base, &own)?;
     let lacking = tempted || left.is_some();
     let verdict = if lacking {

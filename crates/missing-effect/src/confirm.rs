@@ -19,35 +19,41 @@ const EXCHANGES: usize = 6;
 /// ... one of as many effects is taken where the criterion falls by this.
 const CLEARLY: f64 = 1.0;
 
-/// Whether a fall of the deviance with these effects is more than chance would bring where there is nothing.
+/// Whether a set of effects lowers the deviance by more than chance would where there is nothing; each in the same metric, or
+/// each in its own.
 ///
 /// Chi-square, corrected (Bonferroni) for all that the search looked at, with a share of the risk for each effect: one that
 /// has a single start is not made to pay for another with many.
-pub(crate) fn beyond_chance(fall: f64, lacking: &Node, gained: &Node) -> bool {
+pub(crate) fn beyond_chance(gained: &Node, lacking: &Node) -> bool {
     let free = |node: &Node| node.setup.free().len();
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);
+    // A noise of its own may have more coefficients, which lower the deviance too.
+    let freedom = freedom.max(gained.fit.parameters.saturating_sub(lacking.fit.parameters));
+    let fall = lacking.fit.deviance - gained.fit.deviance;
     let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
-    let structure = &lacking.setup.structure;
-    let candidates = structure.candidates().len() as f64;
+    let candidates = lacking.setup.structure.candidates().len() as f64;
     let looks: f64 = gained
         .added
         .iter()
         .filter(|placed| !lacking.added.contains(placed))
-        .map(|placed| candidates * structure.ways(*placed))
+        .map(|placed| candidates * gained.setup.structure.ways(*placed))
         .product();
     chance * looks < FALSE_CLAIM
 }
 
-/// Takes out, one by one, what the noise explains as well.
+/// Takes out, one by one, what the noise explains as well, first what is worth least.
 pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
-    while let Some(lacking) = least_useful(&node, noise)? {
-        let fall = lacking.fit.deviance - node.fit.deviance;
-        if node.gain_over(&lacking) > BIC_MARGIN && beyond_chance(fall, &lacking, &node) {
-            break;
-        }
-        node = lacking;
+    loop {
+        // Each has its own share of the risk: that the one which is worth least is beyond chance says nothing of the others.
+        let lacking = each_lacking(&node, noise)?.into_iter();
+        let doubtful = lacking.filter(|lacking| {
+            node.gain_over(lacking) <= BIC_MARGIN || !beyond_chance(&node, lacking)
+        });
+        let Some(least) = least_bic(doubtful) else {
+            return Ok(node);
+        };
+        node = least;
     }
-    Ok(node)
 }
 
 /// Exchanges effects for others while that makes another one superfluous, or the whole better.
@@ -100,11 +106,17 @@ pub(crate) fn least_useful<'a>(
     node: &Node<'a>,
     noise: &ArModel,
 ) -> Result<Option<Node<'a>>, Error> {
-    let lacking: Vec<Node<'a>> = (0..node.added.len())
+    Ok(least_bic(each_lacking(node, noise)?.into_iter()))
+}
+
+/// The node without each of its effects.
+fn each_lacking<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Vec<Node<'a>>, Error> {
+    (0..node.added.len())
         .into_par_iter()
         .map(|position| without(node, position, noise))
-        .collect::<Result<_, _>>()?;
-    Ok(lacking
-        .into_iter()
-        .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())))
+        .collect()
+}
+
+fn least_bic<'a>(nodes: impl Iterator<Item = Node<'a>>) -> Option<Node<'a>> {
+    nodes.min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
 }

@@ -16,7 +16,7 @@ use crate::{
     node::{Node, refine},
     noise_floor::{NOISE_ORDER, residual_colour, slowness},
     problem::{STOPPING, base},
-    remains::{Left, remains},
+    remains::{Left, Remains, remains},
     scores::{price_of_colour, scores},
     sentences, step,
     trail::trail,
@@ -56,7 +56,7 @@ pub fn diagnose(
     }
 
     tell("telling apart", 1, 3);
-    let jumped = doubted.jumped.map(|jump| jump.left(&problem.records));
+    let jumped = doubted.jumped.map(|jump| jump.left(&problem.records[0]));
     let mut course = course(&base, &confirmed, &found, jumped, stopped)?;
     let mut floor = floor(
         &found.noise,
@@ -208,10 +208,17 @@ fn course<'a>(
     let in_noise = if found.by_simulation || stopped {
         last.clone()
     } else {
-        refine(confirmed, &found.noise, std::slice::from_ref(&last.fit.x))?
+        // The trail is shorter where an effect could not be simulated beside the others.
+        let whole = last.added.len() == confirmed.added.len();
+        let ends: Vec<_> = whole.then(|| last.fit.x.clone()).into_iter().collect();
+        refine(confirmed, &found.noise, &ends)?
     };
     let own = coloured(&in_noise.setup, in_noise.fit, NOISE_ORDER, STOPPING)?;
-    let left = remains(&last, &own)?.or(jumped);
+    // That the residual wanders says less than that it jumps.
+    let left = match remains(&last, &own)? {
+        Some(left) if !matches!(left.what, Remains::Slow(..)) => Some(left),
+        left => jumped.or(left),
+    };
     // The last model is shown in the noise's metric, where its parameters are best known; a model that lacks
     // something is not: a metric that takes what it lacks for noise would let its simulation drift off.
     if !found.wandering && !stopped && left.is_none() {

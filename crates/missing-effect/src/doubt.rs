@@ -36,8 +36,12 @@ pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a
         NOISE_ORDER,
         STOPPING,
     )?;
-    let needed_in_colour = own_base.bic() - own_last.bic() >= BIC_MARGIN
-        && beyond_chance(own_base.deviance - own_last.deviance, base, &confirmed);
+    let in_own = |node: &Node<'a>, fit: &Fit| Node {
+        fit: fit.clone(),
+        ..node.clone()
+    };
+    let (bare, rich) = (in_own(base, &own_base), in_own(&confirmed, &own_last));
+    let needed_in_colour = rich.gain_over(&bare) >= BIC_MARGIN && beyond_chance(&rich, &bare);
     if !confirmed.added.is_empty() && !needed_in_colour {
         confirmed = found.base.clone();
     }

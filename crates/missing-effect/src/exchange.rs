@@ -19,7 +19,7 @@ const OUT_OF_REACH: f64 = 0.5;
 
 /// The node with one of its effects exchanged for each other candidate, refitted, best first.
 ///
-/// `singles`: what [`singles`] gives in the same metric. It holds the exchanges of an only effect.
+/// `singles`: what [`singles`](crate::proposal::singles) gives in the same metric. It holds the exchanges of an only effect.
 pub(crate) fn exchanges<'a>(
     node: &Node<'a>,
     position: usize,
@@ -83,7 +83,7 @@ fn carried(node: &Node, own: Placed, stand_in: &Node) -> Option<Vec<f64>> {
     Some(x)
 }
 
-/// First fits of what may stand in the place of an effect of a node, of which another is `lacking`.
+/// First fits of what may stand in the place of an effect; `lacking` is the node without it.
 fn begin_exchanges<'a>(
     lacking: &Node<'a>,
     node: &Node<'a>,

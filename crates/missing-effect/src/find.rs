@@ -29,7 +29,8 @@ pub(crate) struct Found<'a> {
     /// The base, and what is confirmed, in the metric of the noise.
     pub base: Node<'a>,
     pub confirmed: Node<'a>,
-    /// The sets that were grown, in the metric of the noise where that is not by simulation.
+    /// The sets that were grown by simulation error, and the single effects in the metric of the noise where models are not shown
+    /// by their simulation error.
     pub grown: Grown<'a>,
     /// Whether the noise wanders.
     pub wandering: bool,

@@ -30,39 +30,38 @@ const INSTANT: f64 = 1.0;
 pub(crate) struct Jump {
     /// Its criterion.
     pub bic: f64,
-    /// The record in which it was sought, and the last sample before it.
-    record: usize,
+    /// The last sample before it.
     before: usize,
 }
 
 impl Jump {
-    /// What it leaves to be explained of records.
-    pub fn left(self, records: &[Record]) -> Left {
-        let time = &records[self.record].time;
+    /// What it leaves to be explained of the record.
+    pub fn left(self, record: &Record) -> Left {
         Left {
-            what: Remains::Instant(time[self.before + 1], 0.0),
-            record: Some(self.record),
+            what: Remains::Instant(record.time[self.before + 1], 0.0),
+            record: Some(0),
         }
     }
 }
 
-/// A node with a jump of the reading where that helps most, in the metric of a noise; `None` where the records have no
-/// room for one.
+/// A node with a jump of the reading where that helps most, in the metric of a noise; `None` where the record is too short, no
+/// fit succeeds, or there are several records.
 pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> {
+    let [record] = node.setup.records else {
+        return Ok(None);
+    };
     // Beside all else that the model lacks, an instant stands out where the residual's own colour does not foretell it.
     let own = residual_colour(node)?;
-    let mut instants: Vec<(f64, usize, usize)> = Vec::new();
-    let residuals = node.setup.disturbance(&node.fit.x)?;
-    for (record, residual) in residuals.iter().enumerate() {
-        let whitened = own.whiten(residual);
-        let room = AROUND..residual.len().saturating_sub(AROUND);
-        instants.extend(room.map(|k| (whitened[k].abs(), record, k)));
-    }
+    let residual = node.setup.disturbance(&node.fit.x)?.concat();
+    let whitened = own.whiten(&residual);
+    let mut instants: Vec<(f64, usize)> = (AROUND..residual.len().saturating_sub(AROUND))
+        .map(|k| (whitened[k].abs(), k))
+        .collect();
     instants.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let fitted = |record: usize, k: usize| -> Result<f64, Error> {
-        let sum = |range: Range<usize>| residuals[record][range].iter().sum::<f64>();
+    let fitted = |k: usize| -> Result<f64, Error> {
+        let sum = |range: Range<usize>| residual[range].iter().sum::<f64>();
         let size = (sum(k..k + AROUND) - sum(k - AROUND..k)) / AROUND as f64;
-        let time = &node.setup.records[record].time;
+        let time = &record.time;
         let structure = node.setup.structure.with_term(Term {
             name: "jump_of_the_reading".to_string(),
             place: Place::Sensor,
@@ -81,10 +80,9 @@ pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> 
     Ok(instants
         .into_par_iter()
         .take(INSTANTS)
-        .filter_map(|(_, record, k)| {
+        .filter_map(|(_, k)| {
             Some(Jump {
-                bic: fitted(record, k).ok()?,
-                record,
+                bic: fitted(k).ok()?,
                 before: k - 1,
             })
         })

@@ -23,12 +23,11 @@ pub(crate) fn residual_colour(node: &Node) -> Result<ArModel, Error> {
 /// The criterion of a node as it is fitted, its residual whitened by an autoregressive model of its own: that of the fit in
 /// that metric is a little lower.
 pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
-    let residuals = node.setup.residuals(&node.fit.x)?;
-    let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-    let noise = ArModel::fit(&segments, NOISE_ORDER)?;
+    let noise = residual_colour(node)?;
+    let residuals = node.setup.disturbance(&node.fit.x)?;
     let n = node.setup.samples() as f64;
     let (mut cost, mut log_det) = (0.0_f64, 0.0);
-    for segment in segments {
+    for segment in &residuals {
         cost += noise.whiten(segment).iter().map(|w| w * w).sum::<f64>();
         log_det += noise.log_det(segment.len());
     }

@@ -44,7 +44,7 @@ fn distinct<'n, 'a>(
     nodes: &'n [Node<'a>],
     most: usize,
 ) -> Result<Vec<&'n Node<'a>>, Error> {
-    let residual = |node: &Node| Ok::<_, Error>(node.setup.residuals(&node.fit.x)?.concat());
+    let residual = |node: &Node| Ok::<_, Error>(node.setup.disturbance(&node.fit.x)?.concat());
     let before = residual(base)?;
     let mut chosen: Vec<(&Node, Vec<f64>)> = Vec::new();
     for node in nodes {
@@ -98,7 +98,7 @@ impl<'a> Grown<'a> {
         }
     }
 
-    /// What [`singles`] gives for the base in the metric in which it was grown.
+    /// What [`singles`](crate::proposal::singles) gives for the base in the metric in which it was grown.
     pub fn singles(self, noise: &ArModel) -> Vec<Node<'a>> {
         let mut nodes = self.refitted;
         nodes.extend(realise_all(self.unpromising, noise, ROUGH));

@@ -286,14 +286,8 @@ pub(crate) fn of_diagnosis(
 
 /// The command that proposes what would tell the first two of a group apart.
 fn next_experiment(group: &[String], added: usize) -> String {
-    let [first, second, ..] = group else {
+    let [a, b, ..] = group else {
         return String::new();
-    };
-    // One effect in either tank: the command has to be told which is which.
-    let (a, b) = if first == second {
-        (format!("{first}:upper"), format!("{second}:lower"))
-    } else {
-        (first.clone(), second.clone())
     };
     let others = if added > 1 {
         ", once the other effects are in the model file,"

@@ -27,7 +27,7 @@ pub enum Balance {
     Head,
     /// [`Law::outflow`].
     Outflow,
-    /// [`Law::net`], by an amount that is the same at every level.
+    /// [`Law::net`], by an amount that does not hang on the level but through the net inflow.
     Net,
     /// [`Law::net`], by an amount that differs from level to level.
     NetByLevel,

@@ -68,7 +68,8 @@ pub(crate) fn find<'a>(
     )?;
     let mut richest = refine(&chosen(&grown.sizes, base), &white, &[])?;
     if richest.added.len() > 1 {
-        begun_again(&mut richest, &white)?;
+        let effects = richest.added.clone();
+        begun_again(&mut richest, &effects, &white)?;
     }
     let noise = colour(&richest)?;
 

@@ -2,6 +2,7 @@
 
 use ct_signals::ArModel;
 use greybox::{Fit, Start, fit_onward, starts_around};
+use plants::Placed;
 use rayon::prelude::*;
 
 use crate::{
@@ -33,12 +34,17 @@ pub(crate) fn around(
     descend(node, starts, noise)
 }
 
-/// The node's minimum against those that each of its effects reaches from its own starts, beside the others as they are.
+/// The node's minimum against those that each of these effects of it reaches from its own starts, beside the others as they
+/// are.
 ///
 /// While a set grows, an effect takes the place that is free. On the measured Cascaded Tanks data that is a leak a little
 /// below the rim; once the sensor's play and limit are there, one near the bottom lowers the error by an eighth.
-pub(crate) fn begun_again(node: &mut Node, noise: &ArModel) -> Result<(), Error> {
-    let starts = node.added.iter();
+pub(crate) fn begun_again(
+    node: &mut Node,
+    effects: &[Placed],
+    noise: &ArModel,
+) -> Result<(), Error> {
+    let starts = effects.iter();
     let starts = starts.flat_map(|placed| grid(node, &node.setup, *placed));
     let starts = starts.collect();
     descend(node, starts, noise)

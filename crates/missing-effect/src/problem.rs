@@ -6,7 +6,7 @@ use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 
-use crate::{ControlLoop, Error, closed_loop::enclose, node::Node};
+use crate::{ControlLoop, Error, closed_loop::enclose, minima::begun_again, node::Node};
 
 /// What the fit of a believed model is taken to.
 pub(crate) const STOPPING: Stopping = Stopping {
@@ -123,10 +123,14 @@ pub(crate) fn base<'a>(
     setup.structure.scales = setup.scales_at(&fit.x)?;
     let setup = setup.with_structure(setup.structure.clone())?;
     let fit = fit_from(&setup, std::slice::from_ref(&fit.x), &white, STOPPING)?.continuing(&fit);
-    let node = Node {
+    let mut node = Node {
         setup,
         fit,
         added: Vec::new(),
     };
+    // Random starts of many effects hardly find the places of all of them at once.
+    if problem.effects.len() > 1 {
+        begun_again(&mut node, &problem.effects, &white)?;
+    }
     enclose(problem, options, node)
 }

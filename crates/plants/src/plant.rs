@@ -121,8 +121,8 @@ impl Plant {
         }
     }
 
-    /// Two parameters that may be exchanged without any reading becoming another; an effect in one of the vessels tells them
-    /// apart.
+    /// Two parameters that may be exchanged without any reading becoming another, once the first level of the vessel that nobody
+    /// measures is fitted anew; an effect in one of the vessels tells them apart.
     #[must_use]
     pub fn interchangeable(self) -> Option<[&'static str; 2]> {
         (self == Self::CascadedTanksLinear).then_some(["tau1", "tau2"])

@@ -144,6 +144,30 @@ fn linear_plants_are_exact_whatever_the_sampling() {
 }
 
 #[test]
+fn two_lags_in_series_may_be_exchanged() {
+    for plant in Plant::ALL {
+        let Some(pair) = plant.interchangeable() else {
+            assert_ne!(plant, Plant::CascadedTanksLinear);
+            continue;
+        };
+        let case = base(plant);
+        let names: Vec<_> = plant.parameters(&case.structure.scales);
+        let at = pair.map(|name| names.iter().position(|info| info.name == name).unwrap());
+        let offset = case.theta[names.iter().position(|info| info.name == "offset").unwrap()];
+        let mut other = base(plant);
+        other.theta.swap(at[0], at[1]);
+        // The same reading and the same slope of it at the beginning.
+        let low = case.levels[1] - offset;
+        other.levels[0] = low + (case.levels[0] - low) * case.theta[at[0]] / case.theta[at[1]];
+        for drive in DRIVES {
+            let input = input(drive, 100, case.h, 7);
+            let (y, exchanged) = (case.run(&input, 1), other.run(&input, 1));
+            assert!(difference(&y, &exchanged) < 1e-11);
+        }
+    }
+}
+
+#[test]
 fn the_order_is_four_with_contacts_at_a_rim_inside_the_steps() {
     for plant in [Plant::SingleTank, Plant::CascadedTanks] {
         let mut sets: Vec<Vec<Placed>> = vec![vec![]];

@@ -192,16 +192,15 @@
 
   function scores() {
     const c = theme();
-    const best = report.scores.slice().reverse();
-    const equal = new Set(report.groups.flat());
+    const best = report.scores.map((s, k) => ({ ...s, added: report.added[k], equal: report.equal[k] })).reverse();
     const gains = present(best.map((s) => s.bic_gain));
     const [low, high] = [Math.min(0, ...gains), Math.max(1, ...gains)];
     const room = (narrow.matches ? 0.24 : 0.08) * (high - low);
     const names = best.map((s) => plain(s.place ? `${s.effect} (${s.place})` : s.effect));
     return { data: [{
       type: "bar", orientation: "h", y: names, x: best.map((s) => s.bic_gain),
-      marker: { color: best.map((s) => (report.effects.includes(s.effect) ? c.best : equal.has(s.effect) ? c.equal : c.passing)),
-        pattern: hatch(best.map((s) => !report.effects.includes(s.effect) && equal.has(s.effect))) },
+      marker: { color: best.map((s) => (s.added ? c.best : s.equal ? c.equal : c.passing)),
+        pattern: hatch(best.map((s) => s.equal)) },
       text: best.map((s) => (s.bic_gain === null ? "" : s.bic_gain.toFixed(1).replace("-", "−"))), textposition: "outside", cliponaxis: false,
       hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${sized(s.rmse, OUT)}`), hoverinfo: "text",
     }], layout: layout(70 + 26 * best.length, {

@@ -66,6 +66,39 @@ fn wrong_usage() {
             ["'middle'", "upper, lower"],
         ),
         ("remove overflow", ["--model", "--help"]),
+        (
+            "diagnose tour.csv --model tour.toml --max-effects -1",
+            ["-1 is not in 1..", "--max-effects"],
+        ),
+        (
+            "identify tour.csv --method ct-rls --memory -3",
+            ["memory", "-3"],
+        ),
+        (
+            "identify tour.csv --method ls --bandwidth -3",
+            ["bandwidth", "-3"],
+        ),
+        (
+            "identify tour.csv --method ls --columns a,b,c",
+            [
+                "no column \"a\" for the time",
+                "name it with --columns TIME,INPUT,OUTPUT",
+            ],
+        ),
+        (
+            "identify tour.csv --method ls --columns t,u,u",
+            [
+                "both as input and as output",
+                "with --columns TIME,INPUT,OUTPUT",
+            ],
+        ),
+        (
+            "compare tour.toml --model tour.csv",
+            [
+                "tour.csv:1: ",
+                "is this the record? --model takes the .toml",
+            ],
+        ),
     ] {
         place.refuses(words, &says);
     }

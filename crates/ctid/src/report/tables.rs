@@ -160,12 +160,15 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
 pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
     let steps = &diagnosis.steps;
     let output = unit(&diagnosis.output_unit);
-    let heads: String = steps
-        .iter()
-        .enumerate()
+    let heads: String = last_first(steps)
         .map(|(k, step)| {
+            let last = if k > 0 && k + 1 == steps.len() {
+                "last: "
+            } else {
+                ""
+            };
             format!(
-                "<th scope=\"col\" class=\"number\" data-step=\"{k}\">{}</th>",
+                "<th scope=\"col\" class=\"number\" data-step=\"{k}\">{last}{}</th>",
                 escape(&step_label(step))
             )
         })
@@ -212,7 +215,7 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
         "Parameters after each step",
         &format!("<tr><th scope=\"col\">Parameter</th><th scope=\"col\">Unit</th>{heads}</tr>"),
         &rows,
-        "Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
+        "The last model first. Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
          A minimum that one start alone has reached may not be the best one.",
     )
 }
@@ -228,10 +231,15 @@ fn names(steps: &[Step]) -> Vec<(&str, &str)> {
     names
 }
 
+/// The last model first, so that it is seen however many there are; then the others in their order.
+fn last_first(steps: &[Step]) -> impl Iterator<Item = (usize, &Step)> {
+    let all = || steps.iter().enumerate();
+    let before = steps.len().saturating_sub(1);
+    all().skip(before).chain(all().take(before))
+}
+
 fn row(name: &str, unit: &str, steps: &[Step], cell: impl Fn(&Step) -> String) -> String {
-    let cells: String = steps
-        .iter()
-        .enumerate()
+    let cells: String = last_first(steps)
         .map(|(k, step)| format!("<td class=\"number\" data-step=\"{k}\">{}</td>", cell(step)))
         .collect();
     format!("<tr><th scope=\"row\">{name}</th><td>{unit}</td>{cells}</tr>\n")

@@ -115,6 +115,24 @@ fn the_headline_counts_and_says_what_remains() {
 }
 
 #[test]
+fn the_last_model_stands_first_in_the_table() {
+    let page = html(&sample::two_tanks());
+    let (_, table) = page
+        .split_once("<th scope=\"col\">Unit</th>")
+        .expect("the table");
+    let columns = |part: &str| -> Vec<usize> {
+        let cells = part.split("data-step=\"").skip(1);
+        cells
+            .filter_map(|cell| cell.split('"').next()?.parse().ok())
+            .collect()
+    };
+    for row in table.split("</tr>").take(6) {
+        assert_eq!(columns(row), [2, 0, 1], "{row}");
+    }
+    assert!(table.contains("data-step=\"2\">last: + pump_deadzone</th>"));
+}
+
+#[test]
 fn every_plot_has_a_place_and_every_place_a_plot() {
     let page = html(&sample::two_tanks());
     let mut places = 0;

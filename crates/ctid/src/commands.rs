@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use ct_signals::{Columns, Hold, read_csv};
 use missing_effect::Options;
 
+use crate::column_errors::{of_columns, of_option};
 use crate::design;
 use crate::identify::{self, LevelChoice, Method, Order, Request};
 use crate::input::Files;
@@ -91,7 +92,7 @@ struct Diagnose {
     #[arg(long, value_name = "F.csv")]
     unknown: Option<PathBuf>,
     /// Add at most so many effects
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..), allow_negative_numbers = true)]
     max_effects: Option<u8>,
 }
 
@@ -152,17 +153,17 @@ struct Identify {
     #[arg(long, value_enum, default_value_t = InputHold::Zero)]
     hold: InputHold,
     /// Memory of stabilized-oe, ct-rls and recursive-fcloe [s]; without it a fifth of the record, at least 10 time constants
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     memory: Option<f64>,
     /// Bandwidth of the state variable filters [1/s]: without it 3 over the time constant for stabilized-oe and ct-rls; for ls and iv the
     /// best of several, from which fcloe and recursive-fcloe start
-    #[arg(long, value_name = "L")]
+    #[arg(long, value_name = "L", allow_negative_numbers = true)]
     bandwidth: Option<f64>,
     /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe
     #[arg(long, value_enum, default_value_t = LevelChoice::Auto)]
     levels: LevelChoice,
     /// Bandwidth of a filter on the reading in front of the controller [1/s]; y is the filtered reading
-    #[arg(long, value_name = "ZETA")]
+    #[arg(long, value_name = "ZETA", allow_negative_numbers = true)]
     sensor_filter: Option<f64>,
     #[command(flatten)]
     results: Results,
@@ -293,6 +294,19 @@ impl Compare {
         }
     }
 
+    /// What stands in the model file and has no effect, where there is such.
+    fn notes(&self, look: Look) -> Result<String, Error> {
+        let waiting = model_file::read(&self.model)?.waiting;
+        let note = |table: &String| {
+            let name = table.split_once('.').map_or("", |(_, name)| name);
+            look.paragraph(
+                "",
+                &format!("note: [{table}] has no effect until `ctid add {name}`"),
+            )
+        };
+        Ok(waiting.iter().map(note).collect())
+    }
+
     fn options(&self) -> Options {
         Options {
             simulate_loop: self.way == LoopWay::Simulated,
@@ -311,7 +325,7 @@ impl Compare {
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
-            &terminal::comparison(&diagnosis, look),
+            &(self.notes(look)? + &terminal::comparison(&diagnosis, look)),
             &outputs,
             out,
             look,
@@ -336,7 +350,7 @@ impl Diagnose {
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
-            &terminal::diagnosis(&diagnosis, look),
+            &(self.compare.notes(look)? + &terminal::diagnosis(&diagnosis, look)),
             &outputs,
             out,
             look,
@@ -402,7 +416,12 @@ impl Identify {
         };
         let (columns, hold, controller) = self.layout()?;
         let request = self.request(controller)?;
-        let record = read_csv(data, &columns, hold)?;
+        let named_by = if self.model.is_some() {
+            of_columns
+        } else {
+            of_option
+        };
+        let record = read_csv(data, &columns, hold).map_err(named_by)?;
         let inputs: Vec<&Path> = [Some(data), self.model.as_ref()]
             .into_iter()
             .flatten()

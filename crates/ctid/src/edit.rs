@@ -7,6 +7,7 @@ use plants::{Fitted, Place, Placed, Term};
 use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
 
 use crate::model_file::{self, ModelFile};
+use crate::report::rounded;
 use crate::term_file::{self, TermFile};
 use crate::{Error, atomic, names};
 
@@ -166,7 +167,15 @@ pub fn with_term(
     if has_table(&document, name) {
         return Err(Error::File {
             file: file.to_string(),
-            what: format!("[term.{name}] is there already; give another name, or delete the table"),
+            what: if model.terms.iter().any(|on| on.term.name == name) {
+                format!(
+                    "{name} is on already; give another name, or `ctid remove {name}` and delete [term.{name}]"
+                )
+            } else {
+                format!(
+                    "[term.{name}] is there already; give another name, delete the table, or `ctid add {name}` alone"
+                )
+            },
         });
     }
     let refuse = |what: String| Error::File {
@@ -174,13 +183,14 @@ pub fn with_term(
         what,
     };
     let (place, vessel) = term_file::place_of(model.plant, &shape.place).map_err(&refuse)?;
+    let (at, values) = (knots(&shape.at), shortened(&shape.value));
     let term = Term {
         name: name.to_string(),
         place,
         vessel,
         variable: term_file::variable_of(&shape.variable).map_err(&refuse)?,
-        knots: shape.at.clone(),
-        ordinates: shape.value.clone(),
+        knots: at.clone(),
+        ordinates: values.clone(),
         fitted: Fitted::Scale,
     };
     term.check(model.plant)
@@ -188,12 +198,9 @@ pub fn with_term(
     let mut table = Table::new();
     table.insert("place", value(&shape.place));
     table.insert("variable", value(&shape.variable));
-    table.insert("at", value(Array::from_iter(shape.at.iter().copied())));
+    table.insert("at", value(Array::from_iter(at)));
     table.insert("at_unit", value(&shape.at_unit));
-    table.insert(
-        "value",
-        value(Array::from_iter(shape.value.iter().copied())),
-    );
+    table.insert("value", value(Array::from_iter(values)));
     table.insert("unit", value(&shape.unit));
     table.decor_mut().set_prefix("\n");
     let mut tables = Table::new();
@@ -217,6 +224,21 @@ pub fn with_term(
         list(&model)
     );
     Ok(Edited { text, done })
+}
+
+/// To the digits that a person reads.
+fn shortened(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|&value| rounded(value, 6)).collect()
+}
+
+/// The same of knots, where they still rise then.
+fn knots(at: &[f64]) -> Vec<f64> {
+    let short = shortened(at);
+    if short.windows(2).all(|pair| pair[0] < pair[1]) {
+        short
+    } else {
+        at.to_vec()
+    }
 }
 
 /// The text of a model file without an effect or a term; its `[effect.X]` table stays for another day.

@@ -30,6 +30,9 @@ pub enum Error {
     /// The command line asks for something that does not go together.
     #[error("{0}")]
     Usage(String),
+    /// The columns of a record, with a mend for the place where they are named.
+    #[error("{0}")]
+    Columns(String),
     /// A record.
     #[error(transparent)]
     Record(#[from] ct_signals::Error),

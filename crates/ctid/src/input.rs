@@ -5,13 +5,18 @@ use std::path::{Path, PathBuf};
 use ct_signals::{ROWS_PER_PARAMETER, Record, read_csv};
 use missing_effect::Problem;
 use plants::controller::Controller;
-use plants::{Outlet, Plant, Scales};
+use plants::{Outlet, Place, Plant, Scales};
 
+use crate::column_errors::of_columns;
 use crate::model_file::{self, ControllerLaw, ControllerSettings, ModelFile};
 use crate::output::same_file;
 use crate::{Error, numbers};
 
-/// A level this many times the tank's height is in another unit.
+/// Readings above the tank's height by this part, and commands above their range, are noise.
+const BEYOND_THE_RANGE: f64 = 1.01;
+
+/// Where an effect of the sensor is in the model a full tank may read this many times its height; a reading beyond is in
+/// another unit.
 const BEYOND_THE_TANK: f64 = 1.5;
 
 /// Readings this far below zero, as a part of what the record spans, are no noise about an empty tank.
@@ -46,11 +51,12 @@ impl Files {
     pub fn read(&self) -> Result<Problem, Error> {
         self.check_repetition()?;
         let model = model_file::read(&self.model)?;
-        let read = |paths: &[PathBuf]| -> Result<Vec<Record>, ct_signals::Error> {
+        let read = |paths: &[PathBuf]| -> Result<Vec<Record>, Error> {
             paths
                 .iter()
                 .map(|path| {
-                    let mut record = read_csv(path, &model.columns, model.hold)?;
+                    let mut record =
+                        read_csv(path, &model.columns, model.hold).map_err(of_columns)?;
                     if self.shares_its_name(path) {
                         record.name = path.display().to_string();
                     }
@@ -132,6 +138,7 @@ pub fn problem(
 ) -> Result<Problem, Error> {
     check_units(&records, &test)?;
     check_height(model_name, &model, records.iter().chain(&test))?;
+    check_input(model_name, &model, records.iter().chain(&test))?;
     check_levels(&model, records.iter().chain(&test))?;
     check_rows(&model, &records)?;
     check_terms(model_name, &model, &records[0])?;
@@ -228,7 +235,7 @@ fn check_units(records: &[Record], test: &[Record]) -> Result<(), Error> {
     Ok(())
 }
 
-/// A level far above the tank is in another unit than the tank.
+/// A level above the tank is in another unit than the tank, or its sensor is not right.
 fn check_height<'a>(
     model_name: &str,
     model: &ModelFile,
@@ -237,21 +244,70 @@ fn check_height<'a>(
     let Some(height) = model.known.tank_height else {
         return Ok(());
     };
+    let of_sensor = model
+        .effects
+        .iter()
+        .any(|placed| placed.effect.place == Place::Sensor);
+    let (most, mend) = if of_sensor {
+        (BEYOND_THE_TANK, "")
+    } else {
+        (
+            BEYOND_THE_RANGE,
+            ", or, where the sensor reads too high, run `ctid add sensor_offset`",
+        )
+    };
     for record in records {
         let (_, highest) = record.output_range();
-        if highest > BEYOND_THE_TANK * height {
+        if highest > most * height {
             return Err(Error::File {
                 file: model_name.to_string(),
                 what: format!(
-                    "tank_height = {height}, but the output of {} reaches {} {}; give the height in the output's unit",
+                    "tank_height = {height}, but column \"{}\" of {} reaches {}{}; give the height in the output's unit{mend}",
+                    record.output.name,
                     record.name,
                     numbers::significant(highest, 3),
-                    record.output.unit
+                    after_space(&record.output.unit)
                 ),
             });
         }
     }
     Ok(())
+}
+
+/// A command beyond its full range is in another unit, or the range is that of another actuator.
+fn check_input<'a>(
+    model_name: &str,
+    model: &ModelFile,
+    records: impl Iterator<Item = &'a Record>,
+) -> Result<(), Error> {
+    let Some(range) = model.known.input_range else {
+        return Ok(());
+    };
+    for record in records {
+        let (low, high) = record.input_range();
+        let furthest = if -low > high { low } else { high };
+        if furthest.abs() > BEYOND_THE_RANGE * range {
+            return Err(Error::File {
+                file: model_name.to_string(),
+                what: format!(
+                    "input_range = {range}, but column \"{}\" of {} reaches {}{}; give the full range of the command in its unit, or delete the line",
+                    record.input.name,
+                    record.name,
+                    numbers::significant(furthest, 3),
+                    after_space(&record.input.unit)
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// A unit behind a number.
+fn after_space(unit: &str) -> String {
+    match unit {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    }
 }
 
 /// Where the outflow is a square root of the level a reading far below zero has another zero than the outlet: no such
@@ -274,10 +330,7 @@ fn check_levels<'a>(
     let Some((record, low)) = below else {
         return Ok(());
     };
-    let unit = match record.output.unit.as_str() {
-        "" => String::new(),
-        unit => format!(" {unit}"),
-    };
+    let unit = after_space(&record.output.unit);
     Err(Error::File {
         file: record.name.clone(),
         what: format!(
@@ -391,7 +444,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_far_above_the_tank_is_refused() {
+    fn a_level_above_the_tank_is_refused() {
         let message = refused(
             "plant = \"single-tank\"\n[known]\ntank_height = 0.6",
             vec![record("a.csv", 50, "cm")],
@@ -399,10 +452,41 @@ mod tests {
         );
         assert!(
             message.starts_with(
-                "tank.toml: tank_height = 0.6, but the output of a.csv reaches 14.0 cm"
+                "tank.toml: tank_height = 0.6, but column \"y\" of a.csv reaches 14.0 cm"
             ),
             "{message}"
         );
+        let taken = |height: f64, effects: &str| {
+            let text = format!(
+                "plant = \"single-tank\"\neffects = [{effects}]\n[known]\ntank_height = {height}"
+            );
+            let model = model_file::parse("tank.toml", &text).unwrap();
+            problem("tank.toml", model, vec![record("a.csv", 50, "cm")], vec![]).is_ok()
+        };
+        // The readings reach 14 cm.
+        assert!(taken(13.9, "") && !taken(13.8, "") && !taken(13.8, "\"overflow\""));
+        assert!(taken(9.4, "\"sensor_offset\"") && !taken(9.3, "\"sensor_offset\""));
+    }
+
+    #[test]
+    fn a_command_beyond_its_range_is_refused() {
+        let model = |range: f64| format!("plant = \"single-tank\"\n[known]\ninput_range = {range}");
+        let records = || vec![record("a.csv", 50, "cm")];
+        assert_eq!(
+            refused(&model(1.0), records(), vec![]),
+            "tank.toml: input_range = 1, but column \"u\" of a.csv reaches 7.00 V; give the full range of the command in its \
+             unit, or delete the line"
+        );
+        // The command runs from 1 to 7 V.
+        let taken = |range: f64, sign: f64| {
+            let mut records = records();
+            records[0].input.values.iter_mut().for_each(|u| *u *= sign);
+            let model = model_file::parse("tank.toml", &model(range)).unwrap();
+            problem("tank.toml", model, records, vec![]).is_ok()
+        };
+        for sign in [1.0, -1.0] {
+            assert!(taken(7.0, sign) && taken(6.95, sign) && !taken(6.9, sign));
+        }
     }
 
     #[test]

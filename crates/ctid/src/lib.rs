@@ -17,10 +17,12 @@
 
 mod atomic;
 pub mod catalogue;
+mod column_errors;
 mod commands;
 pub mod design;
 pub mod edit;
 mod error;
+mod findings;
 pub mod identify;
 pub mod input;
 pub mod look;

@@ -3,6 +3,7 @@
 use console::Style;
 use missing_effect::{Diagnosis, Parameter, ResidualTests, Score, Shown, Step, Verdict};
 
+use crate::findings;
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
@@ -364,13 +365,15 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
     if diagnosis.scores.is_empty() {
         return String::new();
     }
-    // As much as the width takes; what an effect does to the error goes last.
-    let variants: [&[Ranked]; 6] = [
+    // As much as the width takes. The verdict refers to what would have been visible: sizes go before it. What an effect does
+    // to the error goes last.
+    let variants: [&[Ranked]; 7] = [
         &[Place, Effect, Gain, Error, Size, Visible],
         &[Place, Effect, Gain, Error, SizeAlone, Visible],
         &[Place, Effect, Error, SizeAlone, Visible],
-        &[Place, Effect, Error, SizeAlone],
-        &[Place, Effect, Gain, Error],
+        &[Place, Effect, Gain, Error, Visible],
+        &[Place, Effect, Error, Visible],
+        &[Place, Effect, Error],
         &[Effect, Error],
     ];
     let fits = |lines: &Vec<String>| {
@@ -382,7 +385,7 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
     let lines = tables
         .iter()
         .find(|lines| fits(lines))
-        .unwrap_or(&tables[5]);
+        .unwrap_or(&tables[6]);
 
     let title = match diagnosis.verdict {
         Verdict::Adequate => "The catalogue, one effect at a time: none is called for",
@@ -424,7 +427,7 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
             Ranked::Place => (index + 1).to_string(),
             Ranked::Effect => {
                 let name = placed(&score.effect, score.place.as_deref());
-                if diagnosis.effects.contains(&score.effect) {
+                if findings::is_added(diagnosis, score) {
                     look.good(name)
                 } else {
                     name
@@ -561,4 +564,31 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
         text += &look.paragraph("  ", sentence);
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn a_narrow_ranking_keeps_what_would_have_been_visible() {
+        let mut diagnosis = sample::two_tanks();
+        diagnosis.scores[0].effect = "an_effect_whose_name_is_rather_long".to_owned();
+        let seen = |width: usize| {
+            let text = ranking(
+                &diagnosis,
+                Look {
+                    width,
+                    ..Look::plain()
+                },
+            );
+            let widest = text.lines().skip(1).map(|line| line.chars().count()).max();
+            assert!(widest <= Some(width), "{text}");
+            ["size found", "visible from", "error after"].map(|column| text.contains(column))
+        };
+        assert_eq!(seen(200), [true, true, true]);
+        assert_eq!(seen(80), [false, true, true]);
+        assert_eq!(seen(65), [false, false, true]);
+    }
 }

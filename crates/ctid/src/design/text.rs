@@ -136,11 +136,13 @@ fn row(number: &str, candidate: &Candidate, design: &Design) -> Vec<String> {
     ]
 }
 
-/// What is below a thousandth is nothing.
+/// What is below a hundredth is nothing.
 fn power(power: &Power, refitted: bool) -> String {
     let mark = if refitted { "" } else { "~" };
-    let shown = if power.power < 1e-3 { 0.0 } else { power.power };
-    format!("{mark}{}", numbers::significant(shown, 2))
+    if power.power < 0.01 {
+        return format!("{mark}nothing");
+    }
+    format!("{mark}{}", numbers::significant(power.power, 2))
 }
 
 fn findings(design: &Design, look: Look) -> String {

@@ -19,6 +19,8 @@ pub(super) struct Setting {
     /// Value and place in the file, by parameter.
     pub(super) values: BTreeMap<String, (f64, usize)>,
     pub(super) fixed: Vec<String>,
+    /// Place of the list in the file.
+    pub(super) fixed_at: usize,
 }
 
 impl Source<'_> {
@@ -43,7 +45,10 @@ impl Source<'_> {
                     ("where", _) => {
                         return Err(self.at(at, "where is a word: \"upper\" or \"lower\""));
                     }
-                    ("fixed", Entry::Words(words)) => setting.fixed.clone_from(words),
+                    ("fixed", Entry::Words(words)) => {
+                        setting.fixed.clone_from(words);
+                        setting.fixed_at = at;
+                    }
                     ("fixed", _) => {
                         return Err(self.at(at, "fixed is a list of parameters, such as [\"rim\"]"));
                     }
@@ -58,7 +63,7 @@ impl Source<'_> {
                     }
                 }
             }
-            self.check_parameters(plant, effect, &setting, table.span().start)?;
+            self.check_parameters(plant, effect, &setting)?;
             settings.insert(effect.id, setting);
         }
         Ok(settings)
@@ -105,7 +110,6 @@ impl Source<'_> {
         plant: Plant,
         effect: &'static EffectInfo,
         setting: &Setting,
-        table_at: usize,
     ) -> Result<(), Error> {
         let placed = Placed {
             effect,
@@ -128,11 +132,11 @@ impl Source<'_> {
         }
         for name in &setting.fixed {
             if !names.contains(&name.as_str()) {
-                return Err(self.at(table_at, unknown(name)));
+                return Err(self.at(setting.fixed_at, unknown(name)));
             }
             if !setting.values.contains_key(name) {
                 return Err(self.at(
-                    table_at,
+                    setting.fixed_at,
                     format!(
                         "{name} is fixed but has no value; write {name} = ... in [effect.{}]",
                         effect.id

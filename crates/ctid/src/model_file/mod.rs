@@ -63,6 +63,8 @@ pub struct ModelFile {
     pub controller: Option<ControllerSettings>,
     /// What the input does between samples.
     pub hold: Hold,
+    /// Tables of effects and terms that are not on, and so have no effect: `effect.overflow`.
+    pub waiting: Vec<String>,
 }
 
 /// A term of the user's own, and the units that it is written in; empty where the file does not say.
@@ -100,7 +102,18 @@ impl ModelFile {
 /// # Errors
 /// One line that names the file, the line, what is wrong and the mend.
 pub fn read(path: &Path) -> Result<ModelFile, Error> {
-    parse(&path.display().to_string(), &read_text(path)?)
+    let read = parse(&path.display().to_string(), &read_text(path)?);
+    let named_as_record = path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+    read.map_err(|error| match error {
+        Error::AtLine { file, line, what } if named_as_record => Error::AtLine {
+            file,
+            line,
+            what: format!("{what}; is this the record? --model takes the .toml"),
+        },
+        error => error,
+    })
 }
 
 /// The text of a model file.
@@ -147,6 +160,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
         fixed: Vec::new(),
         controller,
         hold: raw.hold,
+        waiting: Vec::new(),
     };
     let settings = source.effect_tables(plant, &raw.effect)?;
     let terms = source.terms(plant, &raw.term)?;
@@ -185,5 +199,13 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
             }
         }
     }
+    let on = |name: &str| raw.effects.iter().any(|effect| effect.as_ref() == name);
+    let effects = settings.keys().map(|name| ("effect", *name));
+    let own = terms.keys().map(|name| ("term", name.as_str()));
+    model.waiting = effects
+        .chain(own)
+        .filter(|(_, name)| !on(name))
+        .map(|(kind, name)| format!("{kind}.{name}"))
+        .collect();
     Ok(model)
 }

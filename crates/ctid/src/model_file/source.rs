@@ -36,6 +36,15 @@ impl Source<'_> {
             );
         } else if let Some((_, rest)) = what.split_once("unknown variant `") {
             what = format!("unknown word `{rest}");
+        } else if let Some(word) = what
+            .strip_prefix("invalid type: string ")
+            .and_then(|rest| rest.strip_suffix(", expected a sequence"))
+        {
+            let start = error.span().map_or(0, |span| span.start);
+            let before = self.text.get(..start).unwrap_or_default();
+            let line = before.rsplit('\n').next().unwrap_or_default();
+            let key = line.split('=').next().unwrap_or_default().trim();
+            what = format!("{key} is a list; write {key} = [{word}]");
         } else if toml::from_str::<toml::Table>(self.text).is_err() {
             // what is wrong is the writing, not what it says
             what += "; write `key = value`, words in quotes, numbers without quotes and without a unit, each key once";

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::decimate::min_max;
 use super::text;
+use crate::findings;
 
 /// Points of one curve that are drawn at most.
 const POINTS: usize = 5_000;
@@ -17,9 +18,10 @@ struct Report<'a> {
     records: Vec<Record<'a>>,
     steps: Vec<Model<'a>>,
     scores: &'a [Score],
-    /// The effects that were added and all that cannot be told apart from them.
-    groups: &'a [Vec<String>],
-    effects: &'a [String],
+    /// Which of the scores are of effects that were added.
+    added: Vec<bool>,
+    /// Which of the scores are of effects that cannot be told from an added one.
+    equal: Vec<bool>,
     /// What nothing explains.
     unknown: Option<&'a Unknown>,
 }
@@ -80,11 +82,16 @@ pub(super) fn json(diagnosis: &Diagnosis) -> String {
             .map(|step| model(step, &diagnosis.records))
             .collect(),
         scores: &diagnosis.scores,
-        groups: &diagnosis.groups,
-        effects: &diagnosis.effects,
+        added: scores(diagnosis, findings::is_added),
+        equal: scores(diagnosis, findings::fits_as_well),
         unknown: diagnosis.unknown.as_ref(),
     };
     script_safe(&report)
+}
+
+fn scores(diagnosis: &Diagnosis, are: fn(&Diagnosis, &Score) -> bool) -> Vec<bool> {
+    let scores = diagnosis.scores.iter();
+    scores.map(|score| are(diagnosis, score)).collect()
 }
 
 /// JSON without what could close a `<script>` element.
@@ -196,7 +203,7 @@ fn pick(values: &[f64], at: &[usize]) -> Vec<f64> {
 }
 
 /// Rounds to significant digits: nobody sees more, and the file is half as large.
-pub(super) fn rounded(value: f64, digits: usize) -> f64 {
+pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }
 

@@ -14,7 +14,7 @@ mod figures;
 mod identification;
 mod page;
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 mod tables;
 mod text;
 mod udink;
@@ -22,10 +22,12 @@ mod udink;
 use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
 pub use self::baysse::html as baysse;
+pub(crate) use self::data::rounded;
 pub use self::identification::html as identification;
 use self::page::{NOTICES, Page, figure, figure_with, section};
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
+use crate::findings;
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.
 pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
@@ -77,18 +79,30 @@ fn headline(diagnosis: &Diagnosis) -> String {
     )
 }
 
-fn verdict(diagnosis: &Diagnosis) -> &'static str {
+fn verdict(diagnosis: &Diagnosis) -> String {
     if is_comparison(diagnosis) {
-        return "Model against measurement";
+        return "Model against measurement".to_owned();
     }
     match diagnosis.verdict {
-        Verdict::Effect => "The missing effect is found",
+        Verdict::Effect => {
+            let found = match diagnosis.effects.len() {
+                0 | 1 => "The missing effect is found",
+                _ => "The missing effects are found",
+            };
+            let rest = if findings::something_remains(diagnosis) {
+                "; something remains"
+            } else {
+                ""
+            };
+            return format!("{found}{rest}");
+        }
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
         Verdict::Unexplained => {
             "What is left is not noise, and no effect of the catalogue explains it"
         }
         Verdict::Adequate => "The model is adequate",
     }
+    .to_owned()
 }
 
 /// Nothing was scored: the report of `compare`.

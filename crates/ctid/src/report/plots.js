@@ -11,13 +11,13 @@ const plots = (() => {
     text: "#1b1f26", faint: "#59616e", grid: "#e3e6eb", zero: "#a9b0bb", measured: "#1b1f26",
     failing: "#e69f00", passing: "#8794a6", ground: "#ffffff",
     band: "rgba(0,99,163,0.12)", held: "#a8518a", best: "#0072b2", equal: "#56a3d4",
-    steps: ["#d55e00", "#0072b2", "#008a66", "#b5578f", "#8a6d00", "#4a6fa5"],
+    steps: ["#d55e00", "#0072b2", "#008a66", "#b5578f", "#8a6d00", "#4a6fa5", "#6b3fa0", "#9c2f3f"],
   };
   const DARK = {
     text: "#e7eaef", faint: "#a3acb9", grid: "#2b313a", zero: "#5c6674", measured: "#dfe3e9",
     failing: "#f0b428", passing: "#75839a", ground: "#14171c",
     band: "rgba(108,188,242,0.16)", held: "#e39ac8", best: "#56b4e9", equal: "#2f7fb0",
-    steps: ["#ff8a3c", "#56b4e9", "#2fc79a", "#e39ac8", "#e0c341", "#9db4dd"],
+    steps: ["#ff8a3c", "#56b4e9", "#2fc79a", "#e39ac8", "#e0c341", "#9db4dd", "#b48cff", "#ff8f9c"],
   };
   const FONT = "system-ui, -apple-system, Segoe UI, Roboto, Arial, sans-serif";
   const theme = () => (dark.matches && !printing ? DARK : LIGHT);

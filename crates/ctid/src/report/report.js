@@ -192,20 +192,20 @@
 
   function scores() {
     const c = theme();
-    const best = report.scores.slice().reverse();
-    const equal = new Set(report.groups.flat());
+    const best = report.scores.map((s, k) => ({ ...s, added: report.added[k], equal: report.equal[k] })).reverse();
     const gains = present(best.map((s) => s.bic_gain));
     const [low, high] = [Math.min(0, ...gains), Math.max(1, ...gains)];
-    const room = (narrow.matches ? 0.24 : 0.08) * (high - low);
+    const room = (narrow.matches ? 0.5 : 0.08) * (high - low);
     const names = best.map((s) => plain(s.place ? `${s.effect} (${s.place})` : s.effect));
     return { data: [{
       type: "bar", orientation: "h", y: names, x: best.map((s) => s.bic_gain),
-      marker: { color: best.map((s) => (report.effects.includes(s.effect) ? c.best : equal.has(s.effect) ? c.equal : c.passing)),
-        pattern: hatch(best.map((s) => !report.effects.includes(s.effect) && equal.has(s.effect))) },
+      marker: { color: best.map((s) => (s.added ? c.best : s.equal ? c.equal : c.passing)),
+        pattern: hatch(best.map((s) => s.equal)) },
       text: best.map((s) => (s.bic_gain === null ? "" : s.bic_gain.toFixed(1).replace("-", "−"))), textposition: "outside", cliponaxis: false,
       hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${sized(s.rmse, OUT)}`), hoverinfo: "text",
-    }], layout: layout(70 + 26 * best.length, {
-      hovermode: "closest", margin: { l: 20, r: 10, t: 10, b: 40 },
+    }], layout: layout(94 + 26 * best.length, {
+      // The tools stand above the first bar.
+      hovermode: "closest", margin: { l: 20, r: 10, t: 34, b: 40 },
       // Room for the numbers at the ends of the bars.
       xaxis: axis("fall of BIC (larger is better)", { range: [low < 0 ? low - room : 0, high + room] }), yaxis: axis("", { type: "category", ticksuffix: " ", nticks: best.length + 1, dtick: 1, fixedrange: true }),
     }) };
@@ -309,8 +309,8 @@
     document.querySelectorAll("#steps [data-step]").forEach((b) => {
       const here = Number(b.dataset.step) === chosen;
       b.setAttribute("aria-pressed", String(here));
-      // On a narrow screen the row of buttons scrolls.
-      if (here) b.parentElement.scrollLeft = b.offsetLeft - (b.parentElement.clientWidth - b.offsetWidth) / 2;
+      // On a narrow screen the buttons scroll.
+      if (here) b.parentElement.scrollTop = b.offsetTop - (b.parentElement.clientHeight - b.offsetHeight) / 2;
     });
     if (steps.length > 1) document.querySelectorAll("table [data-step]").forEach((cell) => cell.classList.toggle("chosen", Number(cell.dataset.step) === chosen));
   }

@@ -220,7 +220,7 @@ fn score(effect: &str, bic_gain: f64, rmse: f64, size: Option<Parameter>) -> Sco
 }
 
 /// Two tanks, an overflow and a dead zone found.
-pub(super) fn two_tanks() -> Diagnosis {
+pub(crate) fn two_tanks() -> Diagnosis {
     let records: Vec<Shown> = [
         (600, 0.0, "tanks-estimation.csv"),
         (500, 700.0, "tanks-validation.csv"),
@@ -323,7 +323,7 @@ pub(super) fn two_tanks() -> Diagnosis {
 }
 
 /// The same after `compare`: the base model alone, nothing scored, nothing held out.
-pub(super) fn comparison() -> Diagnosis {
+pub(crate) fn comparison() -> Diagnosis {
     let mut diagnosis = two_tanks();
     diagnosis.verdict = Verdict::Unexplained;
     diagnosis.effects.clear();
@@ -342,7 +342,7 @@ pub(super) fn comparison() -> Diagnosis {
 }
 
 /// Long records, a name that is markup, gaps, infinite edges and numbers that are not finite.
-pub(super) fn awkward() -> Diagnosis {
+pub(crate) fn awkward() -> Diagnosis {
     let mut diagnosis = two_tanks();
     let repeats = 100;
     for (k, record) in diagnosis.records.iter_mut().enumerate() {

@@ -4,6 +4,7 @@ use missing_effect::{Diagnosis, Parameter, Step, Unknown};
 
 use super::data::step_label;
 use super::text::{code, escape, significant, unit, with_error};
+use crate::findings;
 use crate::numbers::duration;
 
 /// What was looked at: plant, records, noise floor.
@@ -44,7 +45,8 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
         .groups
         .iter()
         .zip(&diagnosis.effects)
-        .map(|(group, effect)| {
+        .enumerate()
+        .map(|(k, (group, effect))| {
             let others: Vec<String> = group
                 .iter()
                 .filter(|other| *other != effect)
@@ -55,7 +57,14 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
             } else {
                 format!("these data cannot tell it from {}", others.join(", "))
             };
-            format!("<li>{}: {finding}</li>\n", code(effect))
+            let tank = findings::tank(diagnosis, k)
+                .map_or(String::new(), |tank| format!(" ({})", escape(tank)));
+            let doubt = if findings::in_doubt(diagnosis, k) {
+                "; in doubt: its size ends at the edge of what is plausible"
+            } else {
+                ""
+            };
+            format!("<li>{}{tank}: {finding}{doubt}</li>\n", code(effect))
         })
         .collect();
     if items.is_empty() {
@@ -108,7 +117,7 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
                 .place
                 .as_ref()
                 .map_or(String::new(), |place| format!(" ({})", escape(place)));
-            let class = if diagnosis.effects.contains(&score.effect) {
+            let class = if findings::is_added(diagnosis, score) {
                 " class=\"added\""
             } else {
                 ""
@@ -138,12 +147,12 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
              <th scope=\"col\" class=\"number\">Simulation error [{output}]</th>\
              <th scope=\"col\" class=\"number\">Visible part</th>\
              <th scope=\"col\" class=\"number\">Size ± standard error</th>\
-             <th scope=\"col\" class=\"number\">Smallest size seen</th></tr>"
+             <th scope=\"col\" class=\"number\">Visible from</th></tr>"
         ),
         &rows,
         "Simulation error: root mean square on the fitted data after the refit. Visible part: how much of \
-         the effect's signature the fitted parameters cannot imitate. Smallest size seen: a smaller \
-         effect would have stayed hidden in these data.",
+         the effect's signature the fitted parameters cannot imitate. Visible from: an effect of a smaller \
+         size would have stayed hidden in these data.",
     )
 }
 
@@ -151,12 +160,15 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
 pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
     let steps = &diagnosis.steps;
     let output = unit(&diagnosis.output_unit);
-    let heads: String = steps
-        .iter()
-        .enumerate()
+    let heads: String = last_first(steps)
         .map(|(k, step)| {
+            let last = if k > 0 && k + 1 == steps.len() {
+                "last: "
+            } else {
+                ""
+            };
             format!(
-                "<th scope=\"col\" class=\"number\" data-step=\"{k}\">{}</th>",
+                "<th scope=\"col\" class=\"number\" data-step=\"{k}\">{last}{}</th>",
                 escape(&step_label(step))
             )
         })
@@ -203,7 +215,7 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
         "Parameters after each step",
         &format!("<tr><th scope=\"col\">Parameter</th><th scope=\"col\">Unit</th>{heads}</tr>"),
         &rows,
-        "Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
+        "The last model first. Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
          A minimum that one start alone has reached may not be the best one.",
     )
 }
@@ -219,10 +231,15 @@ fn names(steps: &[Step]) -> Vec<(&str, &str)> {
     names
 }
 
+/// The last model first, so that it is seen however many there are; then the others in their order.
+fn last_first(steps: &[Step]) -> impl Iterator<Item = (usize, &Step)> {
+    let all = || steps.iter().enumerate();
+    let before = steps.len().saturating_sub(1);
+    all().skip(before).chain(all().take(before))
+}
+
 fn row(name: &str, unit: &str, steps: &[Step], cell: impl Fn(&Step) -> String) -> String {
-    let cells: String = steps
-        .iter()
-        .enumerate()
+    let cells: String = last_first(steps)
         .map(|(k, step)| format!("<td class=\"number\" data-step=\"{k}\">{}</td>", cell(step)))
         .collect();
     format!("<tr><th scope=\"row\">{name}</th><td>{unit}</td>{cells}</tr>\n")

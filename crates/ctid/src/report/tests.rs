@@ -61,6 +61,78 @@ fn every_step_and_every_record_is_there() {
 }
 
 #[test]
+fn an_effect_is_added_in_its_own_tank_alone() {
+    let mut diagnosis = sample::two_tanks();
+    // The upper tank overflows; sensor_saturation gives its place to an overflow of the lower one.
+    diagnosis.scores[1].effect = "overflow".to_owned();
+    diagnosis.scores[1].place = Some("lower".to_owned());
+    let page = html(&diagnosis);
+    let rows: Vec<&str> = page.matches("<tr class=\"added\">").collect();
+    assert_eq!(rows.len(), 2);
+    assert!(page.contains("<tr class=\"added\"><td class=\"number\">1</td>"));
+    assert!(page.contains("<tr><td class=\"number\">2</td>"));
+    let data: serde_json::Value =
+        serde_json::from_str(&data::json(&diagnosis)).expect("valid JSON");
+    let set = |name: &str| -> Vec<usize> {
+        let flags = data[name].as_array().expect("a list").iter().enumerate();
+        flags
+            .filter(|(_, flag)| **flag == true)
+            .map(|(k, _)| k)
+            .collect()
+    };
+    assert_eq!((set("added"), set("equal")), (vec![0, 3], vec![4]));
+    assert!(page.contains("<li><code>overflow</code> (upper): told apart"));
+}
+
+#[test]
+fn the_headline_counts_and_says_what_remains() {
+    let mut diagnosis = sample::two_tanks();
+    diagnosis.verdict = Verdict::Effect;
+    let headline = |diagnosis: &Diagnosis, says: &str| {
+        assert!(
+            html(diagnosis).contains(&format!("<h1>{says}</h1>")),
+            "{says}"
+        );
+    };
+    headline(&diagnosis, "The missing effects are found");
+    assert!(!html(&diagnosis).contains("in doubt: its size"));
+    diagnosis.sentences[1] += " In doubt: its size ends at the edge of what is plausible.";
+    diagnosis
+        .sentences
+        .push("Something remains: a slow part.".to_owned());
+    headline(
+        &diagnosis,
+        "The missing effects are found; something remains",
+    );
+    assert!(
+        html(&diagnosis).contains(
+            "from <code>pump_<wbr>nonlinearity</code>; in doubt: its size ends at the edge"
+        )
+    );
+    diagnosis.effects.truncate(1);
+    diagnosis.sentences.pop();
+    headline(&diagnosis, "The missing effect is found");
+}
+
+#[test]
+fn the_last_model_stands_first_in_the_table() {
+    let page = html(&sample::two_tanks());
+    let (_, table) = page
+        .split_once("<th scope=\"col\">Unit</th>")
+        .expect("the table");
+    let columns = |part: &str| -> Vec<usize> {
+        let cells = part.split("data-step=\"").skip(1);
+        cells
+            .filter_map(|cell| cell.split('"').next()?.parse().ok())
+            .collect()
+    };
+    for row in table.split("</tr>").take(6) {
+        assert_eq!(columns(row), [2, 0, 1], "{row}");
+    }
+    assert!(table.contains("data-step=\"2\">last: + pump_deadzone</th>"));
+}
+
+#[test]
 fn every_plot_has_a_place_and_every_place_a_plot() {
     let page = html(&sample::two_tanks());
     let mut places = 0;

@@ -411,7 +411,7 @@ fn tables_of_effects() {
     );
     refuses(
         &two("[effect.overflow]\nfixed = [\"rim\"]"),
-        "tank.toml:3: rim is fixed but has no value",
+        "tank.toml:4: rim is fixed but has no value",
         "write rim = ...",
     );
     refuses(

@@ -67,7 +67,15 @@ fn the_unknown_is_written_kept_and_taken_out() {
         said.contains("added my_wave, a term in the level with"),
         "{said}"
     );
-    assert!(place.read("tank.toml").contains("effects = [\"my_wave\"]"));
+    let model_text = place.read("tank.toml");
+    assert!(model_text.contains("effects = [\"my_wave\"]"));
+    let lists = model_text.lines().filter(|line| line.contains(" = ["));
+    for number in lists.flat_map(|line| line.split(['[', ',', ']']).skip(1)) {
+        let digits = number.split(['e', 'E']).next().unwrap();
+        let digits = digits.trim_start_matches(['-', '0', '.', ' ']);
+        let count = digits.chars().filter(char::is_ascii_digit).count();
+        assert!(count <= 6, "{number} in {model_text}");
+    }
     let after = place.result(compare);
     let error = |result: &serde_json::Value, key: &str| result["steps"][0][key].as_f64().unwrap();
     for (key, part) in [("rmse", 0.25), ("rmse_test", 1.0)] {
@@ -91,6 +99,18 @@ fn the_unknown_is_written_kept_and_taken_out() {
         "{said}"
     );
     assert!(place.read("tank.toml").starts_with(&model));
+    let said = place.succeeds(compare);
+    assert!(
+        said.starts_with("note: [term.my_wave] has no effect until `ctid add my_wave`\n"),
+        "{said}"
+    );
+    place.refuses(
+        "add my_wave --from u.csv --model tank.toml",
+        &[
+            "[term.my_wave] is there already",
+            "or `ctid add my_wave` alone",
+        ],
+    );
     assert_eq!(lasting(place.result(compare)), lasting(before));
     place.succeeds("add my_wave --model tank.toml");
     assert_eq!(lasting(place.result(compare)), lasting(after));

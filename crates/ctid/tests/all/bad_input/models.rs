@@ -36,6 +36,14 @@ fn an_unknown_effect() {
 }
 
 #[test]
+fn an_effect_that_is_no_list() {
+    model_refused(
+        model_with("effects = []", "effects = \"overflow\""),
+        &["bad.toml:2: effects is a list; write effects = [\"overflow\"]"],
+    );
+}
+
+#[test]
 fn an_effect_twice() {
     model_refused(
         model_with("effects = []", "effects = [\"overflow\", \"overflow\"]"),

@@ -26,7 +26,7 @@ fn a_tank_in_another_unit_than_the_level() {
         "tour.csv --model metre.toml",
         &[
             "metre.toml: tank_height = 0.25",
-            "tour.csv reaches 20",
+            "column \"y\" of tour.csv reaches 20",
             "cm",
             "give the height in the output's unit",
         ],
@@ -63,6 +63,52 @@ fn a_time_in_no_unit_of_time() {
             "bad.csv, row 1, column \"t [V]\"",
             "V is not a unit of time",
             "use us, ms, s, min, h or d",
+        ],
+    );
+}
+
+#[test]
+fn a_time_in_another_unit_than_the_model_says() {
+    let place = place();
+    place.write("bad.csv", Rows::new().with(1, 0, "t [min]").text());
+    both_refuse(
+        &place,
+        "bad.csv --model tour.toml",
+        &[
+            "bad.csv, row 1, column \"t [min]\": the file says min but the model says s",
+            "or write \"t [min]\" under [columns]: us, ms, s, min, h and d are understood",
+        ],
+    );
+}
+
+#[test]
+fn a_column_of_almost_that_name() {
+    let place = place();
+    place.write(
+        "slip.toml",
+        model_with("input = \"u [V]\"", "input = \"U [V]\""),
+    );
+    both_refuse(
+        &place,
+        "tour.csv --model slip.toml",
+        &["did you mean \"u [V]\"? Set input = \"...\" under [columns]"],
+    );
+}
+
+#[test]
+fn a_command_beyond_its_range() {
+    let place = place();
+    place.write(
+        "range.toml",
+        model_with("area = 154.0", "input_range = 1\narea = 154.0"),
+    );
+    both_refuse(
+        &place,
+        "tour.csv --model range.toml",
+        &[
+            "range.toml: input_range = 1",
+            "column \"u\" of tour.csv reaches",
+            "give the full range",
         ],
     );
 }

@@ -1,6 +1,6 @@
 //! Commands that make no sense.
 
-use super::{model_with, place};
+use super::{Rows, model_with, place};
 
 #[test]
 fn effects_that_cannot_be_added_or_removed() {
@@ -66,7 +66,61 @@ fn wrong_usage() {
             ["'middle'", "upper, lower"],
         ),
         ("remove overflow", ["--model", "--help"]),
+        (
+            "diagnose tour.csv --model tour.toml --max-effects -1",
+            ["-1 is not in 1..", "--max-effects"],
+        ),
+        (
+            "identify tour.csv --method ct-rls --memory -3",
+            ["memory", "-3"],
+        ),
+        (
+            "identify tour.csv --method ls --bandwidth -3",
+            ["bandwidth", "-3"],
+        ),
+        (
+            "identify tour.csv --method ls --columns a,b,c",
+            [
+                "no column \"a\" for the time",
+                "name it with --columns TIME,INPUT,OUTPUT",
+            ],
+        ),
+        (
+            "identify tour.csv --method ls --columns t,u,u",
+            [
+                "both as input and as output",
+                "with --columns TIME,INPUT,OUTPUT",
+            ],
+        ),
+        (
+            "compare tour.toml --model tour.csv",
+            [
+                "tour.csv:1: ",
+                "is this the record? --model takes the .toml",
+            ],
+        ),
     ] {
         place.refuses(words, &says);
+    }
+}
+
+#[test]
+fn columns_that_the_option_has_to_name() {
+    let place = place();
+    let header = |names: [&str; 3]| {
+        let rows = Rows::new().with(1, 0, names[0]).with(1, 1, names[1]);
+        rows.with(1, 2, names[2]).text()
+    };
+    place.write("minutes.csv", header(["t [min]", "u", "y"]));
+    place.write("inputs.csv", header(["t", "u_1", "u_2"]));
+    for (words, says) in [
+        (
+            "minutes.csv --columns t[s],u,y",
+            "the file says min but --columns says s; write \"t [min]\" in --columns TIME,INPUT,OUTPUT",
+        ),
+        ("inputs.csv", "say which with --columns TIME,INPUT,OUTPUT"),
+        ("minutes.csv --columns t,U,z", "--columns TIME,INPUT,OUTPUT"),
+    ] {
+        place.refuses(&format!("identify {words} --method ls"), &[says]);
     }
 }

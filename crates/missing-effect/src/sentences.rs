@@ -254,7 +254,7 @@ pub(crate) fn of_diagnosis(
                 };
                 if group.len() > 1 {
                     said.push(format!(
-                        "It is {}: this data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
+                        "It is {}: these data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
                         list(group, "or"),
                         next_experiment(group, diagnosis.effects.len())
                     ));

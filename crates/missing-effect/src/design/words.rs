@@ -6,6 +6,9 @@ use super::{
 };
 use crate::{groups::GROUP_MARGIN, numbers::significant, sentences::with_error};
 
+/// Criteria that differ by less are equal, in words.
+const TWIN: f64 = 0.01;
+
 fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
@@ -89,6 +92,12 @@ fn so_far(design: &Design) -> Vec<String> {
     said.push(if design.bic_ahead.abs() > GROUP_MARGIN {
         format!(
             "The records that there are decide for {}: the criterion of {} is higher by {ahead}.",
+            sized(first),
+            sized(second)
+        )
+    } else if design.bic_ahead.abs() < TWIN {
+        format!(
+            "The records that there are leave it open: {} and {} fit alike.",
             sized(first),
             sized(second)
         )

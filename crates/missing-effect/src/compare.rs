@@ -59,9 +59,10 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     let step = step::report(&shown, own.bic(), &floor.model()?, &problem.test, widen)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
     diagnosis.sentences = sentences::of_comparison(&diagnosis, left);
-    diagnosis
-        .sentences
-        .extend(sentences::of_a_minimum(&diagnosis));
+    let held_out = sentences::of_held_out(&diagnosis);
+    let minimum = sentences::of_a_minimum(&diagnosis);
+    let more = [held_out, minimum, sentences::of_terms(problem)];
+    diagnosis.sentences.extend(more.into_iter().flatten());
     diagnosis.speak_of_the_loop(control_loop);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     Ok(diagnosis)

@@ -147,11 +147,13 @@ pub fn diagnose(
         .map(|placed| last.at_the_edge(*placed))
         .collect();
     diagnosis.sentences = sentences::of_diagnosis(&diagnosis, left, &doubtful);
+    let held_out = sentences::of_held_out(&diagnosis);
     let minimum = sentences::of_a_minimum(&diagnosis);
+    let terms = sentences::of_terms(problem);
     let stop = stopped.then(|| sentences::of_a_stop(options.max_effects, needed));
     let colour = price.and_then(sentences::of_the_colour);
-    let more = [remark, minimum, stop, colour].into_iter().flatten();
-    diagnosis.sentences.extend(more);
+    let more = [remark, held_out, minimum, stop, terms, colour];
+    diagnosis.sentences.extend(more.into_iter().flatten());
     diagnosis.speak_of_the_loop(control_loop);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     tell("done", 3, 3);

@@ -1,7 +1,7 @@
 //! The findings in words.
 
 use crate::{
-    Diagnosis, Parameter, Step, Unknown, Verdict,
+    Diagnosis, Parameter, Problem, Step, Unknown, Verdict,
     node::Node,
     numbers::{significant, value_and_error},
     remains::{Left, Remains},
@@ -135,6 +135,32 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
             "Of {} starts {} ended in the minimum that is shown: there may be a better one, and other values of the parameters.",
             step.starts,
             if step.starts_agree == 0 { "none" } else { "one alone" }
+        )
+    })
+}
+
+/// The held-out error is this many times the fitted one where what was fitted does not carry over.
+const CARRIES_OVER: f64 = 2.0;
+
+/// Whether what was fitted holds on another record.
+pub(crate) fn of_held_out(diagnosis: &Diagnosis) -> Option<String> {
+    let step = diagnosis.steps.last()?;
+    let times = step.rmse_test? / step.rmse;
+    (times > CARRIES_OVER).then(|| {
+        format!(
+            "On held-out data the simulation error is {} times as large: what was fitted does not carry over to that record.",
+            significant(times, 2)
+        )
+    })
+}
+
+/// What the standard errors do not hold beside a term of the user's own.
+pub(crate) fn of_terms(problem: &Problem) -> Option<String> {
+    let names: Vec<_> = problem.terms.iter().map(|term| term.name.clone()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "Beside {} the standard errors are too small: the shape of a term is taken as known, and may hold a part of what the plant's own parameters explain.",
+            list(&names, "and")
         )
     })
 }

@@ -84,6 +84,18 @@ fn the_unknown_is_written_kept_and_taken_out() {
         assert!(after < part * before, "{key}: {before} -> {after}");
     }
     assert_eq!(after["known_effects"][0], "my_wave");
+    // Said where it is so, and only there.
+    let says = |result: &serde_json::Value, words: &str| {
+        let said = result["sentences"].as_array().unwrap();
+        said.iter().any(|one| one.as_str().unwrap().contains(words))
+    };
+    let by = |result| error(result, "rmse_test") / error(result, "rmse");
+    for result in [&before, &after] {
+        let carries = !says(result, "does not carry over to that record");
+        assert_eq!(carries, by(result) <= 2.0, "{}", by(result));
+    }
+    let small = "Beside my_wave the standard errors are too small";
+    assert!(says(&after, small) && !says(&before, small));
     let parameters = after["steps"][0]["parameters"].as_array().unwrap();
     assert!(parameters.iter().any(|p| p["name"] == "my_wave.scale"));
 

@@ -88,7 +88,9 @@ pub fn diagnose(
     let mut groups = Vec::new();
     if fair {
         let (metric, per_sample) = if found.by_simulation || stopped {
-            (&white, slowness(&residual_colour(course.last())?))
+            let last = course.last();
+            let residuals = last.setup.disturbance(&last.fit.x)?;
+            (&white, slowness(&residual_colour(&residuals)?))
         } else {
             (&found.noise, 1.0)
         };

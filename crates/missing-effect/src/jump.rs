@@ -50,10 +50,12 @@ pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> 
     let [record] = node.setup.records else {
         return Ok(None);
     };
+    let residuals = node.setup.disturbance(&node.fit.x)?;
+    let [residual] = &residuals[..] else {
+        return Ok(None);
+    };
     // Beside all else that the model lacks, an instant stands out where the residual's own colour does not foretell it.
-    let own = residual_colour(node)?;
-    let residual = node.setup.disturbance(&node.fit.x)?.concat();
-    let whitened = own.whiten(&residual);
+    let whitened = residual_colour(&residuals)?.whiten(residual);
     let mut instants: Vec<(f64, usize)> = (AROUND..residual.len().saturating_sub(AROUND))
         .map(|k| (whitened[k].abs(), k))
         .collect();

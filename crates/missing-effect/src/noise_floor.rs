@@ -13,9 +13,8 @@ pub(crate) fn colour(node: &Node) -> Result<ArModel, Error> {
     Ok(noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
 }
 
-/// The autoregressive model of a node's residual as it is, without what the fit has taken from the noise.
-pub(crate) fn residual_colour(node: &Node) -> Result<ArModel, Error> {
-    let residuals = node.setup.disturbance(&node.fit.x)?;
+/// The autoregressive model of residuals as they are, without what the fit has taken from the noise.
+pub(crate) fn residual_colour(residuals: &[Vec<f64>]) -> Result<ArModel, Error> {
     let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
     Ok(ArModel::fit(&segments, NOISE_ORDER)?)
 }
@@ -23,8 +22,8 @@ pub(crate) fn residual_colour(node: &Node) -> Result<ArModel, Error> {
 /// The criterion of a node as it is fitted, its residual whitened by an autoregressive model of its own: that of the fit in
 /// that metric is a little lower.
 pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
-    let noise = residual_colour(node)?;
     let residuals = node.setup.disturbance(&node.fit.x)?;
+    let noise = residual_colour(&residuals)?;
     let n = node.setup.samples() as f64;
     let (mut cost, mut log_det) = (0.0_f64, 0.0);
     for segment in &residuals {

@@ -57,6 +57,8 @@ pub struct Fit {
     pub deviance: f64,
     /// Fitted numbers, those of the noise included.
     pub parameters: usize,
+    /// What they cost in [`Fit::bic`].
+    pub price: f64,
     /// Samples.
     pub samples: usize,
     /// How many starts were tried.
@@ -107,7 +109,7 @@ impl Fit {
     /// Bayesian information criterion: smaller is better.
     #[must_use]
     pub fn bic(&self) -> f64 {
-        self.deviance + self.parameters as f64 * (self.samples as f64).ln()
+        self.deviance + self.price
     }
 
     /// Variance of the innovations, with the degrees of freedom that are left.
@@ -320,6 +322,7 @@ pub fn fit_onward(
         deviance: n * (1.0 + (std::f64::consts::TAU * (cost / n).max(f64::MIN_POSITIVE)).ln())
             + log_det,
         parameters: free.len() + 1 + noise.order(),
+        price: setup.price(noise.order()),
         samples,
         starts: count,
         agree,

@@ -61,6 +61,13 @@ pub struct Simulated {
     pub mean_level: [f64; MAX_VESSELS],
 }
 
+/// What an initial state costs in [`Setup::price`].
+///
+/// The logarithm of the samples stands for what a record tells of a parameter, which grows with its length. An initial state is
+/// forgotten after a few time constants, and a longer record tells no more of it. Two is the price of Akaike's criterion. Where
+/// it costs the logarithm, a lag, whose state before the record is unknown, is handicapped against a dead time.
+const STATE_PRICE: f64 = 2.0;
+
 /// The derivatives and the residual of every sample, one record after the other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows {
@@ -379,6 +386,16 @@ impl<'a> Setup<'a> {
     pub(crate) fn freeze_parameters(&mut self) {
         let count = self.parameter_count();
         self.free.retain(|&i| i >= count);
+    }
+
+    /// What the fitted numbers cost in the Bayesian information criterion, with a noise of so many coefficients and its variance:
+    /// the logarithm of the samples each, but [`STATE_PRICE`] for an initial state.
+    #[must_use]
+    pub fn price(&self, noise_order: usize) -> f64 {
+        let (parameters, states): (Vec<usize>, Vec<usize>) =
+            self.free.iter().partition(|&&i| i < self.parameters);
+        let lasting = parameters.len() + 1 + noise_order;
+        lasting as f64 * (self.samples() as f64).ln() + STATE_PRICE * states.len() as f64
     }
 
     /// Samples in all records.

@@ -23,8 +23,7 @@ pub(crate) fn exhausted(node: &Node) -> Result<bool, Error> {
     };
     let (n, cost) = (node.setup.samples() as f64, node.fit.cost);
     let pays = |setup: &Setup, promise: f64| {
-        let more = setup.free().len() as f64 - node.setup.free().len() as f64;
-        n * (cost / promise).ln() - more * n.ln() > BIC_MARGIN
+        n * (cost / promise).ln() - (setup.price(0) - node.setup.price(0)) > BIC_MARGIN
     };
     Ok(!any_promise(&node, &noise, pays))
 }

@@ -30,8 +30,8 @@ pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
         cost += noise.whiten(segment).iter().map(|w| w * w).sum::<f64>();
         log_det += noise.log_det(segment.len());
     }
-    let parameters = (node.setup.free().len() + 1 + noise.order()) as f64;
-    Ok(n * (cost / n).max(f64::MIN_POSITIVE).ln() + log_det + parameters * n.ln())
+    let price = node.setup.price(noise.order());
+    Ok(n * (cost / n).max(f64::MIN_POSITIVE).ln() + log_det + price)
 }
 
 /// The noise's spectrum at frequency zero over its mean: by how much slow parameters are less certain than under

@@ -97,8 +97,8 @@ impl Search<'_, '_> {
             second_sensor::in_experiment(&played[truth], node, other, known, self.metric)
         };
         // Records that were recorded anew have decided nothing yet: what is ahead is what a parameter costs.
-        let [a, b] = self.nodes.each_ref().map(|node| node.fit.parameters as f64);
-        let fewer = (b - a) * (self.nodes[0].setup.samples() as f64).ln();
+        let [a, b] = self.nodes.each_ref().map(|node| node.fit.price);
+        let fewer = b - a;
         let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };
         Some(SecondSensor {
             level: plant.level_name(0).to_string(),

@@ -8,11 +8,9 @@ use rayon::prelude::*;
 use crate::{
     Error,
     node::{FINE, Node, ROUGH},
-    proposal::grid,
+    proposal::{grid, period_of},
 };
 
-/// The parameter that has as many minima as a spectrum has lines.
-const PERIOD: &str = "periodic_disturbance.period";
 /// After one rough fit, a second one and a third one, so many times the least cost is out of reach of its minimum.
 const HOPELESS: [f64; 3] = [1.5, 1.15, 1.05];
 
@@ -25,8 +23,7 @@ pub(crate) fn around(
 ) -> Result<(), Error> {
     let mut starts = starts_around(&node.setup, &node.fit.x, count, seed);
     // Every line of a spectrum is a minimum of its own, and the strongest was picked: the starts stay on it.
-    let names = node.setup.names();
-    if let Some(period) = names.iter().position(|name| name == PERIOD) {
+    if let Some(period) = period_of(&node.setup) {
         for start in &mut starts {
             start[period] = node.fit.x[period];
         }

@@ -1,8 +1,8 @@
 //! What a set may be extended by, and what that promises.
 
-use std::sync::OnceLock;
+use std::{f64::consts::TAU, sync::OnceLock};
 
-use ct_signals::ArModel;
+use ct_signals::{ArModel, Record};
 use greybox::{Setup, Start, Stopping, Triangle, fit_onward};
 use plants::{Place, Placed};
 use rayon::prelude::*;
@@ -16,6 +16,10 @@ use crate::{
 const PROMISE_DAMPING: f64 = 1e-6;
 /// Starts of a new effect that are followed down, the most promising of its grid.
 const FOLLOWED: usize = 2;
+
+/// The parameter that has as many minima as a spectrum has lines, and how many of its starts are looked at.
+const PERIOD: &str = "periodic_disturbance.period";
+const PERIODS_SHOWN: usize = 6;
 
 /// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
 /// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
@@ -144,7 +148,9 @@ pub(crate) fn promising(
     placed: Placed,
     noise: &ArModel,
 ) -> Option<(f64, Vec<Start>)> {
-    let mut ranked: Vec<(f64, Start)> = grid(from, setup, placed)
+    let mut starts = grid(from, setup, placed);
+    keep_shown_periods(from, setup, &mut starts, noise);
+    let mut ranked: Vec<(f64, Start)> = starts
         .into_par_iter()
         .filter_map(|x| {
             let triangle = setup.linearise(&x, noise)?;
@@ -158,6 +164,51 @@ pub(crate) fn promising(
     let starts = ranked.into_iter().take(FOLLOWED);
     let starts = starts.map(|(_, start)| start).collect();
     Some((promise, starts))
+}
+
+/// Of starts with many periods keeps those whose periods show most in what a node does not explain: a plant answers a swing with
+/// a swing of that period, and a Fourier sum costs far less than a simulation.
+fn keep_shown_periods(from: &Node, setup: &Setup, starts: &mut Vec<Vec<f64>>, noise: &ArModel) {
+    let Some(at) = period_of(setup) else {
+        return;
+    };
+    let mut periods: Vec<f64> = starts.iter().map(|start| start[at]).collect();
+    periods.sort_by(f64::total_cmp);
+    periods.dedup();
+    let Ok(residuals) = from.setup.disturbance(&from.fit.x) else {
+        return;
+    };
+    let whitened: Vec<(&Record, Vec<f64>)> = setup
+        .records
+        .iter()
+        .zip(&residuals)
+        .map(|(record, residual)| (record, noise.whiten(residual)))
+        .collect();
+    let mut shown: Vec<(f64, f64)> = periods
+        .into_par_iter()
+        .map(|period| (power_at(TAU / period, &whitened), period))
+        .collect();
+    shown.sort_by(|a, b| b.0.total_cmp(&a.0));
+    shown.truncate(PERIODS_SHOWN);
+    starts.retain(|start| shown.iter().any(|(_, period)| *period == start[at]));
+}
+
+/// The power of series at a frequency \[rad/s\].
+fn power_at(frequency: f64, series: &[(&Record, Vec<f64>)]) -> f64 {
+    let of_one = |(record, values): &(&Record, Vec<f64>)| {
+        let terms = record.time.iter().zip(values);
+        let (sine, cosine) = terms.fold((0.0, 0.0), |(sine, cosine), (t, value)| {
+            let (sin, cos) = (frequency * t).sin_cos();
+            (sine + value * sin, cosine + value * cos)
+        });
+        sine * sine + cosine * cosine
+    };
+    series.iter().map(of_one).sum()
+}
+
+/// Where the period of a swing stands in the vector.
+pub(crate) fn period_of(setup: &Setup) -> Option<usize> {
+    setup.names().iter().position(|name| name == PERIOD)
 }
 
 /// The period that shows most in what a node does not explain \[s\].

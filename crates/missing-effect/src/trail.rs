@@ -11,10 +11,11 @@ use crate::{
     proposal::place,
 };
 
-/// Further starts of every step: its minimum must not hang on where the search came from.
-const STARTS_AROUND: usize = 12;
-/// Rounds of as many more where the last model's minimum was not found twice.
-const MORE_ROUNDS: u64 = 3;
+/// Further starts of every step, because its minimum must not hang on where the search came from: so many, ...
+const STARTS_AROUND: usize = 6;
+/// ... and as many again and again while it was not found twice, in so many rounds at most on the way and at its end. The model that
+/// names the effects is held to the same as the believed one.
+const ROUNDS: (u64, u64) = (2, 8);
 
 /// The believed model, then one effect after the other, first what lowers the error most.
 pub(crate) fn trail<'a>(
@@ -40,11 +41,14 @@ pub(crate) fn trail<'a>(
         let mut node = refine(&first, noise, &[])?;
         // The end of the search has no vote: how often its minimum is found is counted over the starts around it.
         (node.fit.starts, node.fit.agree) = (0, 0);
-        around(&mut node, STARTS_AROUND, noise, k as u64)?;
-        // The model that names the effects is held to the same as the believed one: its minimum is to be found twice.
-        for round in 1..=MORE_ROUNDS {
-            if k + 1 == last.added.len() && node.fit.agree < 2 {
-                around(&mut node, STARTS_AROUND, noise, 100 + round)?;
+        let rounds = if k + 1 == last.added.len() {
+            ROUNDS.1
+        } else {
+            ROUNDS.0
+        };
+        for round in 0..rounds {
+            if node.fit.agree < 2 {
+                around(&mut node, STARTS_AROUND, noise, 100 * k as u64 + round)?;
             }
         }
         trail.push(node);

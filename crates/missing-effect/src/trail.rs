@@ -15,7 +15,7 @@ use crate::{
 const STARTS_AROUND: usize = 6;
 /// ... and as many again and again while it was not found twice, in so many rounds at most on the way and at its end. The model that
 /// names the effects is held to the same as the believed one.
-const ROUNDS: (u64, u64) = (2, 8);
+const ROUNDS: (u64, u64) = (2, 4);
 
 /// The believed model, then one effect after the other, first what lowers the error most.
 pub(crate) fn trail<'a>(

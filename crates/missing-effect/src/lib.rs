@@ -17,6 +17,7 @@ mod exchange;
 mod exhausted;
 mod find;
 mod groups;
+mod hidden_step;
 mod jump;
 mod locate;
 mod minima;

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::{
     Error,
+    hidden_step::step_of,
     node::{FINE, Node, ROUGH},
     proposal::{grid, period_of},
 };
@@ -22,10 +23,14 @@ pub(crate) fn around(
     seed: u64,
 ) -> Result<(), Error> {
     let mut starts = starts_around(&node.setup, &node.fit.x, count, seed);
-    // Every line of a spectrum is a minimum of its own, and the strongest was picked: the starts stay on it.
-    if let Some(period) = period_of(&node.setup) {
+    // Every line of a spectrum is a minimum of its own, and so is every step of a reading; the strongest was picked: the starts
+    // stay on it.
+    for picked in [period_of(&node.setup), step_of(&node.setup)]
+        .into_iter()
+        .flatten()
+    {
         for start in &mut starts {
-            start[period] = node.fit.x[period];
+            start[picked] = node.fit.x[picked];
         }
     }
     descend(node, starts, noise)

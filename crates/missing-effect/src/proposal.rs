@@ -4,10 +4,11 @@ use std::{f64::consts::TAU, sync::OnceLock};
 
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Start, Stopping, Triangle, fit_onward};
-use plants::{Place, Placed};
+use plants::{Picked, Place, Placed};
 use rayon::prelude::*;
 
 use crate::{
+    hidden_step::{self, hidden_step},
     node::{Node, ROUGH, best_first, transfer},
     spectral_line::strongest_line,
 };
@@ -100,10 +101,12 @@ pub(crate) struct Proposal<'a> {
     pub promise: f64,
 }
 
-/// A node that is extended, and the period that shows most in what it does not explain, once that was asked for.
+/// A node that is extended, and the period and the step of the reading that show most in what it does not explain, once they were
+/// asked for.
 pub(crate) struct Parent<'n, 'a> {
     pub node: &'n Node<'a>,
     period: OnceLock<Option<f64>>,
+    step: OnceLock<Option<Picked>>,
 }
 
 impl<'n, 'a> Parent<'n, 'a> {
@@ -111,6 +114,7 @@ impl<'n, 'a> Parent<'n, 'a> {
         Self {
             node,
             period: OnceLock::new(),
+            step: OnceLock::new(),
         }
     }
 
@@ -119,6 +123,10 @@ impl<'n, 'a> Parent<'n, 'a> {
         let mut structure = self.node.setup.structure.with(placed).ok()?;
         if placed.effect.by_clock {
             structure.scales.period = (*self.period.get_or_init(|| strongest_period(self.node)))?;
+        }
+        if placed.effect.id == hidden_step::EFFECT && structure.scales.reading_step == 0.0 {
+            let find = || hidden_step(self.node).ok().flatten();
+            structure.scales.hidden_step = *self.step.get_or_init(find);
         }
         self.node.setup.with_structure(structure).ok()
     }

@@ -9,6 +9,15 @@ use crate::{
 /// The most vessels a plant has.
 pub const MAX_VESSELS: usize = 2;
 
+/// The best of many values that were looked at: a start whose choice a claim has to pay for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Picked {
+    /// The best.
+    pub value: f64,
+    /// How many were looked at.
+    pub of: f64,
+}
+
 /// What the data visit: it sets the plausible ranges, the starts and the operating levels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scales {
@@ -24,6 +33,9 @@ pub struct Scales {
     pub area: [f64; MAX_VESSELS],
     /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
     pub reading_step: f64,
+    /// Step of a sensor that takes most out of what is not explained so far, where the readings show none; `None` where none is looked for
+    /// \[level unit\].
+    pub hidden_step: Option<Picked>,
     /// Period of the strongest line in the spectrum of what is not explained so far; zero where none is looked for \[s\].
     pub period: f64,
     /// Mean throughput \[area x level/s\].
@@ -212,16 +224,26 @@ impl Structure {
     }
 
     /// In how many ways a search can find an effect where there is nothing: every combination of its starts is one, and so is
-    /// every line of the spectrum of which the strongest is a start.
+    /// every line of the spectrum, and every step of the reading, of which the strongest is a start.
     #[must_use]
     pub fn ways(&self, placed: Placed) -> f64 {
         let parameters = self.effect_parameters(placed);
         let combinations: f64 = parameters.iter().map(|p| p.starts.len() as f64).product();
-        let picked = parameters
-            .iter()
-            .any(|p| p.unit == crate::Unit::TIME && p.starts.contains(&self.scales.period));
-        let lines = 0.5 * self.scales.duration / self.scales.sample_interval;
-        combinations + if picked { lines } else { 0.0 }
+        let starts_at = |unit, value| {
+            let mut of_unit = parameters.iter().filter(|p| p.unit == unit);
+            of_unit.any(|p| p.starts.contains(&value))
+        };
+        let lines = Picked {
+            value: self.scales.period,
+            of: 0.5 * self.scales.duration / self.scales.sample_interval,
+        };
+        let picked = |unit, from: Option<Picked>| {
+            from.filter(|from| starts_at(unit, from.value))
+                .map_or(0.0, |from| from.of)
+        };
+        combinations
+            + picked(crate::Unit::TIME, Some(lines))
+            + picked(crate::Unit::LEVEL, self.scales.hidden_step)
     }
 
     /// The parameters of one effect here; their starts lie within their bounds, however short or narrow the record.
@@ -333,6 +355,7 @@ impl Scales {
             operating_level: [middle; MAX_VESSELS],
             area: [1.0; MAX_VESSELS],
             reading_step: 0.0,
+            hidden_step: None,
             period: 0.0,
             flow: middle.abs() / (0.1 * duration),
             sample_interval,

@@ -20,6 +20,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
     let span = (high - low).max(f64::MIN_POSITIVE);
     let seen = site.scales.reading_step;
+    let hidden = site.scales.hidden_step.map(|step| step.value);
     vec![ParameterInfo {
         name: "step",
         unit: Unit::LEVEL,
@@ -27,9 +28,13 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         absent: 0.0,
         lower: 0.0,
         upper: 0.5 * span,
-        // Readings in steps show the step themselves, and to more digits than any grid of starts has. Where they show
-        // none there is nothing to find.
-        starts: vec![if seen > 0.0 { seen } else { 0.02 * span }],
+        // Readings in steps show the step themselves, and to more digits than any grid of starts has. Under noise that
+        // comes behind the steps what is not explained shows it.
+        starts: vec![if seen > 0.0 {
+            seen
+        } else {
+            hidden.unwrap_or(0.02 * span)
+        }],
     }]
 }
 

@@ -1,0 +1,177 @@
+//! The step of a coarse sensor under noise: what a model does not explain is a sawtooth of what it reads.
+//!
+//! `D round(y/D) - y` turns once from one multiple of `D` to the next. A fit follows a step only while the highest reading
+//! is as many steps as it really is: one more or less is the minimum of another sawtooth. So the steps are looked
+//! through one by one.
+
+use greybox::Setup;
+use plants::Picked;
+use rayon::prelude::*;
+
+use crate::{Error, node::Node, noise_floor::residual_colour};
+
+/// The effect whose step it is.
+pub(crate) const EFFECT: &str = "coarse_quantisation";
+const STEP: &str = "coarse_quantisation.step";
+
+/// The highest reading turns by this part from one step that is looked at to the next.
+const TURN: f64 = 0.25;
+/// Finer steps that are looked at between two, around the best.
+const FINER: usize = 16;
+/// The fewest and the most steps between the lowest and the highest reading.
+const STEPS: (f64, f64) = (2.0, 300.0);
+
+/// Where the step of a sensor stands in the vector.
+pub(crate) fn step_of(setup: &Setup) -> Option<usize> {
+    setup.names().iter().position(|name| name == STEP)
+}
+
+/// The step that takes most out of what a node does not explain, the model run on the measured command: there
+/// the level is known best.
+pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
+    let models = node.setup.simulate(&node.fit.x)?.output;
+    let residuals = node.setup.residuals(&node.fit.x)?;
+    let noise = residual_colour(&residuals)?;
+    let (low, high) = models
+        .iter()
+        .flatten()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
+            (low.min(y), high.max(y))
+        });
+    let (span, reach) = (high - low, low.abs().max(high.abs()));
+    // A step below the noise is a noise too.
+    let most = (span / noise.sigma()).min(STEPS.1);
+    if !(span > 0.0 && reach.is_finite() && most > STEPS.0) {
+        return Ok(None);
+    }
+    let whitened: Vec<Vec<f64>> = residuals.iter().map(|r| noise.whiten(r)).collect();
+    let left = |turns: f64| -> f64 {
+        let step = 1.0 / turns;
+        let one = |model: &Vec<f64>, residual: &Vec<f64>| -> f64 {
+            let sawtooth: Vec<f64> = model
+                .iter()
+                .map(|y| (y / step).round() * step - y)
+                .collect();
+            let sawtooth = noise.whiten(&sawtooth);
+            let rows = residual.iter().zip(sawtooth);
+            rows.map(|(r, s)| (r - s).powi(2)).sum()
+        };
+        models.iter().zip(&whitened).map(|(m, r)| one(m, r)).sum()
+    };
+    let grid = TURN / reach;
+    let looks = ((most - STEPS.0) / span / grid) as usize + 1;
+    let best_of = |from: f64, grid: f64, count: usize| {
+        (0..count)
+            .into_par_iter()
+            .map(|k| from + grid * k as f64)
+            .map(|turns| (left(turns), turns))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let Some((_, near)) = best_of(STEPS.0 / span, grid, looks) else {
+        return Ok(None);
+    };
+    let finer = grid / FINER as f64;
+    let best = best_of(near - grid, finer, 2 * FINER + 1);
+    Ok(best.map(|(_, turns)| Picked {
+        value: 1.0 / turns,
+        of: looks as f64,
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
+    use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::{
+        Options, Problem,
+        problem::base,
+        proposal::{Parent, singles},
+    };
+
+    const SAMPLES: usize = 600;
+    const NOISE: f64 = 0.05;
+
+    /// A tank whose reading comes in steps, with noise behind them.
+    fn problem(step: f64, colour: f64, seed: u64) -> Problem {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let plant = Plant::SingleTankLinear;
+        let scales = Scales::from_ranges((3.0, 5.0), (5.0, 20.0), 2.0, 1200.0);
+        let structure = Structure::new(plant, Known::default(), scales);
+        let u = excitation::steps(SAMPLES, 20..=60, 3.0, 5.0, &mut rng).unwrap();
+        let mut y = noise::ar1(SAMPLES, NOISE, colour, &mut rng);
+        let mut simulator =
+            Simulator::<f64>::new(&structure, &[4.0, 90.0, 0.0], &[16.0], u[0]).unwrap();
+        for (y, u) in y.iter_mut().zip(&u) {
+            let level = simulator.read();
+            *y += if step > 0.0 {
+                (level / step).round() * step
+            } else {
+                level
+            };
+            simulator.advance(Command::held(*u), 2.0);
+        }
+        Problem {
+            plant,
+            known: Known::default(),
+            effects: Vec::new(),
+            terms: Vec::new(),
+            start: Default::default(),
+            fixed: Vec::new(),
+            records: vec![Record {
+                name: "rig".to_string(),
+                time: (0..SAMPLES).map(|k| 2.0 * k as f64).collect(),
+                input: Signal::new("u", "V", u),
+                output: Signal::new("y", "cm", y),
+                reference: None,
+                hold: Hold::Zero,
+            }],
+            controller: None,
+            test: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_step_is_found_under_noise_of_its_own_size() {
+        // Structural errors of 0.5, 1 and 3 times the noise.
+        for (seed, (part, colour)) in [(1.73, 0.0), (3.46, 0.0), (3.46, 0.8), (10.4, 0.8)]
+            .into_iter()
+            .enumerate()
+        {
+            let step = part * NOISE;
+            let problem = problem(step, colour, seed as u64);
+            let (node, _) = base(&problem, &Options::default()).unwrap();
+            let found = hidden_step(&node).unwrap().unwrap();
+            // Over the range of the readings, of 8 at most, it counts right to less than one. What is below that range is not
+            // seen: at half the noise the whole count may be one off.
+            let counted = |step: f64| 8.0 / step;
+            assert!(
+                (counted(found.value) - counted(step)).abs() < 0.75,
+                "{} for {step}",
+                found.value
+            );
+            // It is what a fit needs to name it.
+            let noise = ArModel::white(1.0);
+            assert_eq!(singles(&node, &noise)[0].added[0].effect.id, EFFECT);
+        }
+    }
+
+    #[test]
+    fn the_steps_that_were_looked_at_are_paid_for() {
+        let problem = problem(0.0, 0.0, 7);
+        let (node, _) = base(&problem, &Options::default()).unwrap();
+        let found = hidden_step(&node).unwrap().unwrap();
+        // From two to as many as the noise leaves room for, over the range of the readings.
+        assert!(found.of > 100.0);
+        let placed = Placed {
+            effect: EffectInfo::find(EFFECT).unwrap(),
+            vessel: 0,
+        };
+        let setup = Parent::new(&node).with(placed).unwrap();
+        assert_eq!(setup.structure.ways(placed), 1.0 + found.of);
+    }
+}

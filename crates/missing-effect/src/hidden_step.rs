@@ -81,58 +81,20 @@ pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
-    use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
+    use ct_signals::ArModel;
+    use plants::{EffectInfo, Placed};
 
     use super::*;
     use crate::{
         Options, Problem,
         problem::base,
         proposal::{Parent, singles},
+        test_rig::{self, NOISE},
     };
 
-    const SAMPLES: usize = 600;
-    const NOISE: f64 = 0.05;
-
-    /// A tank whose reading comes in steps, with noise behind them.
     fn problem(step: f64, colour: f64, seed: u64) -> Problem {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let plant = Plant::SingleTankLinear;
-        let scales = Scales::from_ranges((3.0, 5.0), (5.0, 20.0), 2.0, 1200.0);
-        let structure = Structure::new(plant, Known::default(), scales);
-        let u = excitation::steps(SAMPLES, 20..=60, 3.0, 5.0, &mut rng).unwrap();
-        let mut y = noise::ar1(SAMPLES, NOISE, colour, &mut rng);
-        let mut simulator =
-            Simulator::<f64>::new(&structure, &[4.0, 90.0, 0.0], &[16.0], u[0]).unwrap();
-        for (y, u) in y.iter_mut().zip(&u) {
-            let level = simulator.read();
-            *y += if step > 0.0 {
-                (level / step).round() * step
-            } else {
-                level
-            };
-            simulator.advance(Command::held(*u), 2.0);
-        }
-        Problem {
-            plant,
-            known: Known::default(),
-            effects: Vec::new(),
-            terms: Vec::new(),
-            start: Default::default(),
-            fixed: Vec::new(),
-            records: vec![Record {
-                name: "rig".to_string(),
-                time: (0..SAMPLES).map(|k| 2.0 * k as f64).collect(),
-                input: Signal::new("u", "V", u),
-                output: Signal::new("y", "cm", y),
-                reference: None,
-                hold: Hold::Zero,
-            }],
-            controller: None,
-            test: Vec::new(),
-        }
+        let read = |_, level: f64| (level / step).round() * step;
+        test_rig::problem(|u| u, read, colour, seed)
     }
 
     #[test]
@@ -162,7 +124,7 @@ mod tests {
 
     #[test]
     fn the_steps_that_were_looked_at_are_paid_for() {
-        let problem = problem(0.0, 0.0, 7);
+        let problem = test_rig::problem(|u| u, |_, level| level, 0.0, 7);
         let (node, _) = base(&problem, &Options::default()).unwrap();
         let found = hidden_step(&node).unwrap().unwrap();
         // From two to as many as the noise leaves room for, over the range of the readings.

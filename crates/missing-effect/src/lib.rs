@@ -18,6 +18,7 @@ mod exhausted;
 mod find;
 mod groups;
 mod hidden_step;
+mod judge;
 mod jump;
 mod locate;
 mod minima;
@@ -32,6 +33,8 @@ mod search;
 mod sentences;
 mod spectral_line;
 mod step;
+#[cfg(test)]
+mod test_rig;
 mod trail;
 mod unknown;
 

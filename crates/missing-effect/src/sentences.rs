@@ -1,5 +1,7 @@
 //! The findings in words.
 
+use plants::Placed;
+
 use crate::{
     Diagnosis, Parameter, Problem, Step, Unknown, Verdict,
     node::Node,
@@ -125,6 +127,20 @@ pub(crate) fn of_a_part(last: &Node, unit: &str) -> String {
         list(&names, "and"),
         last.fit.rmse
     )
+}
+
+/// The effects that were taken out because any course of time would do in their place; `None` where there are none.
+pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
+    let names: Vec<String> = dropped
+        .iter()
+        .map(|placed| placed.effect.id.to_string())
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} would explain more, but so would some course of time, and something is left that is not noise: not taken for an answer.",
+            list(&names, "and")
+        )
+    })
 }
 
 /// That the minimum of the last model was not found twice.

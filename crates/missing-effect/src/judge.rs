@@ -1,0 +1,274 @@
+//! Whether a confirmed set of effects is the answer, beside what it leaves.
+
+use ct_signals::ArModel;
+use greybox::{Fit, coloured};
+use plants::{EffectInfo, Placed};
+use rayon::prelude::*;
+
+use crate::{
+    Error, NoiseFloor, Problem, Step,
+    confirm::confirm,
+    groups::groups,
+    node::{Node, refine, without},
+    noise_floor::{NOISE_ORDER, residual_colour, slowness},
+    problem::STOPPING,
+    remains::{Left, Remains, remains},
+    step,
+    trail::trail,
+};
+
+/// Where something remains that is not noise, effects are the answer if they explain this part at least of the mean
+/// square above the noise floor.
+///
+/// The tests that confirm an effect take what remains for noise. Against a disturbance from outside, which is none, their
+/// probabilities do not hold: whatever effect happens to resemble it is "beyond chance". Over records of nine
+/// simulated disturbances such effects imitate up to six sevenths of one as a rule; a true effect beside which something small
+/// remains explains nineteen twentieths and more.
+const FAIR_PART: f64 = 0.9;
+
+/// What a set is judged by.
+pub(crate) struct Judge<'s, 'a> {
+    pub base: &'s Node<'a>,
+    pub noise: &'s ArModel,
+    pub wandering: bool,
+    /// Models are compared and shown by their simulation error.
+    pub by_simulation: bool,
+    /// The set was cut to as many effects as may be added.
+    pub stopped: bool,
+    /// What a jump of the reading leaves, where that is what there is.
+    pub jumped: Option<Left>,
+    /// The single effects, in the metric in which they were refitted last.
+    pub singles: &'s [Node<'a>],
+}
+
+/// What was found of a set.
+pub(crate) struct Judged<'a> {
+    pub course: Course<'a>,
+    /// The set is the answer.
+    pub fair: bool,
+    /// Of an answer: what stands in for each of its effects.
+    pub groups: Vec<Vec<String>>,
+    /// What was taken out of it.
+    pub dropped: Vec<Placed>,
+}
+
+impl<'a> Judge<'_, 'a> {
+    /// The set, or what stays of it.
+    ///
+    /// Beside something that is not noise, an effect that one of the clock stands in for is no answer: it is some course of time, and
+    /// whatever is left may have made it. That speaks against this effect alone. The others stay where they are called for
+    /// without it, and are the answer where they explain enough without it: what was there to mend an imitation is neither.
+    pub fn judge(&self, mut set: Node<'a>) -> Result<Judged<'a>, Error> {
+        let mut judged = self.as_it_is(&set)?;
+        loop {
+            let courses = judged.courses_of_time();
+            if courses.is_empty() {
+                return Ok(judged);
+            }
+            for course in &courses {
+                if let Some(position) = set.added.iter().position(|on| on == course) {
+                    set = without(&set, position, self.noise)?;
+                }
+            }
+            set = confirm(set, self.noise)?;
+            let others = (!set.added.is_empty()).then(|| self.as_it_is(&set));
+            match others.transpose()? {
+                Some(others) if others.fair => {
+                    let mut dropped = judged.dropped;
+                    dropped.extend(courses);
+                    judged = Judged { dropped, ..others };
+                }
+                _ => {
+                    return Ok(Judged {
+                        fair: false,
+                        ..judged
+                    });
+                }
+            }
+        }
+    }
+
+    fn as_it_is(&self, set: &Node<'a>) -> Result<Judged<'a>, Error> {
+        let course = self.course(set)?;
+        // What leaves the greater part of the error to something else is a remark, and not the answer.
+        let fair = match course.left {
+            Some(left) if !self.stopped && !course.last().added.is_empty() => {
+                explained(self.base, course.last(), left.above(self.noise))? >= FAIR_PART
+            }
+            _ => true,
+        };
+        let groups = if fair {
+            self.groups(course.last())?
+        } else {
+            Vec::new()
+        };
+        Ok(Judged {
+            course,
+            fair,
+            groups,
+            dropped: Vec::new(),
+        })
+    }
+
+    fn groups(&self, last: &Node<'a>) -> Result<Vec<Vec<String>>, Error> {
+        let white = ArModel::white(1.0);
+        let (metric, per_sample) = if self.by_simulation || self.stopped {
+            let residuals = last.setup.disturbance(&last.fit.x)?;
+            (&white, slowness(&residual_colour(&residuals)?))
+        } else {
+            (self.noise, 1.0)
+        };
+        let same_metric = self.by_simulation || !self.stopped || self.noise.order() == 0;
+        let singles = same_metric.then_some(self.singles);
+        groups(&refine(last, metric, &[])?, metric, per_sample, singles)
+    }
+
+    /// The trail to a set.
+    fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
+        let mut nodes = trail(self.base, set, &ArModel::white(1.0))?;
+        let mut last = nodes.pop().unwrap_or_else(|| self.base.clone());
+        let in_noise = if self.by_simulation || self.stopped {
+            last.clone()
+        } else {
+            // The trail is shorter where an effect could not be simulated beside the others.
+            let whole = last.added.len() == set.added.len();
+            let ends: Vec<_> = whole.then(|| last.fit.x.clone()).into_iter().collect();
+            refine(set, self.noise, &ends)?
+        };
+        let own = coloured(&in_noise.setup, in_noise.fit, NOISE_ORDER, STOPPING)?;
+        // That the residual wanders says less than that it jumps.
+        let left = match remains(&last, &own)? {
+            Some(left) if !matches!(left.what, Remains::Slow(..)) => Some(left),
+            left => self.jumped.or(left),
+        };
+        // The last model is shown in the noise's metric, where its parameters are best known; a model that lacks
+        // something is not: a metric that takes what it lacks for noise would let its simulation drift off.
+        if !self.wandering && !self.stopped && left.is_none() {
+            last.fit = own.clone().continuing(&last.fit);
+        }
+        nodes.push(last);
+        Ok(Course { nodes, own, left })
+    }
+}
+
+impl Judged<'_> {
+    /// The effects of an answer that one of the clock stands in for, where something remains beside them.
+    fn courses_of_time(&self) -> Vec<Placed> {
+        if !self.fair || self.course.left.is_none() {
+            return Vec::new();
+        }
+        let by_clock = |id: &String| EffectInfo::find(id).is_some_and(|effect| effect.by_clock);
+        let added = self.course.last().added.iter().zip(&self.groups);
+        added
+            .filter(|(_, group)| group.iter().any(by_clock))
+            .map(|(placed, _)| *placed)
+            .collect()
+    }
+}
+
+/// The models from the believed one to the last, and what the last one leaves.
+pub(crate) struct Course<'a> {
+    /// At least the believed one.
+    pub nodes: Vec<Node<'a>>,
+    /// The last one with the colour of its own residual.
+    pub own: Fit,
+    pub left: Option<Left>,
+}
+
+impl<'a> Course<'a> {
+    pub fn last(&self) -> &Node<'a> {
+        &self.nodes[self.nodes.len() - 1]
+    }
+
+    /// What is reported of each model.
+    pub fn steps(
+        &self,
+        floor: &NoiseFloor,
+        problem: &Problem,
+        widen: bool,
+    ) -> Result<Vec<Step>, Error> {
+        let judge = floor.model()?;
+        self.nodes
+            .par_iter()
+            .enumerate()
+            .map(|(k, node)| {
+                let bic = if k + 1 == self.nodes.len() {
+                    self.own.bic()
+                } else {
+                    coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.bic()
+                };
+                step::report(node, bic, &judge, &problem.test, widen)
+            })
+            .collect()
+    }
+}
+
+/// The part of what stands above the noise floor, in mean square, that a model explains of its base.
+fn explained(base: &Node, last: &Node, floor: f64) -> Result<f64, Error> {
+    let mean_square = |node: &Node| -> Result<f64, Error> {
+        let series = node.setup.disturbance(&node.fit.x)?.concat();
+        Ok(series.iter().map(|e| e * e).sum::<f64>() / series.len().max(1) as f64)
+    };
+    let (before, after) = (mean_square(base)?, mean_square(last)?);
+    // A slow noise may be larger in the long run than it was in the record.
+    let floor = after.min(floor * floor);
+    Ok((before - after) / (before - floor).max(f64::MIN_POSITIVE))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::{
+        Options,
+        noise_floor::colour,
+        problem::base,
+        proposal::{Parent, propose, realise, singles},
+        test_rig,
+    };
+
+    /// A pump that saturates beside a swing of the reading that has no name; what stays of the saturation and a drift of the sensor.
+    fn judged(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
+        let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
+        let problem = test_rig::problem(|u| u.min(4.2), read, 0.0, 1);
+        let (base, _) = base(&problem, &Options::default()).unwrap();
+        let white = ArModel::white(1.0);
+        let mut set = base.clone();
+        for id in ["pump_saturation", "sensor_drift"] {
+            let placed = Placed {
+                effect: EffectInfo::find(id).unwrap(),
+                vessel: 0,
+            };
+            let proposal = propose(&Parent::new(&set), placed, &white).unwrap();
+            set = realise(proposal, &white, crate::node::FINE).unwrap();
+        }
+        let judged = Judge {
+            base: &base,
+            noise: &colour(&set).unwrap(),
+            wandering: true,
+            by_simulation: true,
+            stopped: false,
+            jumped: None,
+            singles: &singles(&base, &white),
+        }
+        .judge(set)
+        .unwrap();
+        assert!(judged.course.left.is_some());
+        let ids = |set: &[Placed]| set.iter().map(|placed| placed.effect.id).collect();
+        let kept = ids(&judged.course.last().added);
+        (judged.fair, kept, ids(&judged.dropped))
+    }
+
+    #[test]
+    fn a_course_of_time_is_taken_out_alone_where_the_others_explain_enough() {
+        let (fair, kept, dropped) = judged(0.15);
+        assert!(fair);
+        assert_eq!(
+            (kept, dropped),
+            (vec!["pump_saturation"], vec!["sensor_drift"])
+        );
+        // Where the swing is as large as what the saturation makes, the saturation is no answer either.
+        let (fair, ..) = judged(1.0);
+        assert!(!fair);
+    }
+}

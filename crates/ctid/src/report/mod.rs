@@ -27,7 +27,6 @@ pub use self::identification::html as identification;
 use self::page::{NOTICES, Page, figure, figure_with, section};
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
-use crate::findings;
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.
 pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
@@ -89,7 +88,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
                 0 | 1 => "The missing effect is found",
                 _ => "The missing effects are found",
             };
-            let rest = if findings::something_remains(diagnosis) {
+            let rest = if diagnosis.residual_unexplained {
                 "; something remains"
             } else {
                 ""

@@ -254,6 +254,8 @@ pub(crate) fn two_tanks() -> Diagnosis {
         effects: vec!["overflow".into(), "pump_deadzone".into()],
         groups: vec![
             vec!["overflow".into()],
+        in_doubt: vec![false, false],
+        residual_unexplained: false,
             vec!["pump_deadzone".into(), "pump_nonlinearity".into()],
         ],
         ranked: [
@@ -326,6 +328,8 @@ pub(crate) fn two_tanks() -> Diagnosis {
 pub(crate) fn comparison() -> Diagnosis {
     let mut diagnosis = two_tanks();
     diagnosis.verdict = Verdict::Unexplained;
+    diagnosis.in_doubt.clear();
+    diagnosis.residual_unexplained = true;
     diagnosis.effects.clear();
     diagnosis.groups.clear();
     diagnosis.ranked.clear();

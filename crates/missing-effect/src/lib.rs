@@ -29,6 +29,8 @@ mod remains;
 mod scores;
 mod search;
 mod sentences;
+#[cfg(test)]
+mod simulated;
 mod spectral_line;
 mod step;
 mod trail;

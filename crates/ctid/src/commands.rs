@@ -7,8 +7,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use ct_signals::{Columns, Hold, read_csv};
 use missing_effect::Options;
 
-use crate::column_errors::{of_columns, of_option};
-use crate::design;
+use crate::column_errors::of_option;
+use crate::design::{self, seed};
 use crate::identify::{self, LevelChoice, Method, Order, Request};
 use crate::input::Files;
 use crate::look::Look;
@@ -417,7 +417,7 @@ impl Identify {
         let (columns, hold, controller) = self.layout()?;
         let request = self.request(controller)?;
         let named_by = if self.model.is_some() {
-            of_columns
+            Error::from
         } else {
             of_option
         };

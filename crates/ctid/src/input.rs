@@ -7,7 +7,6 @@ use missing_effect::Problem;
 use plants::controller::Controller;
 use plants::{Outlet, Place, Plant, Scales};
 
-use crate::column_errors::of_columns;
 use crate::model_file::{self, ControllerLaw, ControllerSettings, ModelFile};
 use crate::output::same_file;
 use crate::{Error, numbers};
@@ -55,8 +54,7 @@ impl Files {
             paths
                 .iter()
                 .map(|path| {
-                    let mut record =
-                        read_csv(path, &model.columns, model.hold).map_err(of_columns)?;
+                    let mut record = read_csv(path, &model.columns, model.hold)?;
                     if self.shares_its_name(path) {
                         record.name = path.display().to_string();
                     }

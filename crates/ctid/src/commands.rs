@@ -141,7 +141,12 @@ struct Identify {
     #[arg(long, value_enum)]
     method: Method,
     /// Orders n of A and m of B in A y = B u + d
-    #[arg(long, value_name = "N,M", default_value = "1,0")]
+    #[arg(
+        long,
+        value_name = "N,M",
+        default_value = "1,0",
+        allow_hyphen_values = true
+    )]
     order: Order,
     /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
@@ -200,16 +205,24 @@ struct Tables {
     #[arg(value_enum, default_value_t = Paper::Udink)]
     paper: Paper,
     /// Noises: each table is run once with each; without it as many as a paper's bands are for, 200 or 100
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = runs, allow_negative_numbers = true)]
     runs: Option<usize>,
     /// What the noises are drawn from
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the record of baysse's emulated rig as CSV, for `diagnose` or `identify`
     #[arg(long, value_name = "F.csv")]
     record: Option<PathBuf>,
     #[command(flatten)]
     results: Results,
+}
+
+/// How many runs; which of the limits holds is known with the paper.
+fn runs(text: &str) -> Result<usize, String> {
+    text.parse().map_err(|_| {
+        let (udink, baysse) = (udink::FEWEST, baysse::FEWEST);
+        format!("a whole number is needed, {udink} or more for udink, {baysse} or more for baysse")
+    })
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

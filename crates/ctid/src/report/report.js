@@ -2,7 +2,7 @@
 "use strict";
 (() => {
   const report = JSON.parse(document.getElementById("data").textContent);
-  const { narrow, touch, theme, plain, pretty, named, axis, config } = plots;
+  const { narrow, tight, theme, plain, pretty, named, axis, config } = plots;
   const records = report.records || [];
   const steps = report.steps || [];
   const located = Math.max(0, records.findIndex((record) => !record.held_out));
@@ -277,11 +277,10 @@
 
   // --- drawing -----------------------------------------------------------------------------
 
-  // On a touch screen a finger scrolls the page; the plots worth a zoom show their tools above.
+  // Where the tools stand above, only the plots worth a zoom have them.
   const ZOOMED = /^(record-\d+|by-time|by-level|by-flow|unknown-path)$/;
   function withTools({ data, layout }) {
-    layout.margin.t = 34;
-    Object.assign(layout.legend, { y: 0, yref: "container", yanchor: "bottom" });
+    plots.toolsAbove(layout);
     return [data, layout, Object.assign({}, config, { displayModeBar: true, modeBarButtonsToRemove: [...config.modeBarButtonsToRemove, "toImage"] })];
   }
 
@@ -292,7 +291,7 @@
     if (!box) return;
     const made = steps.length ? figures[id]() : null;
     box.parentElement.hidden = made === null;
-    if (made) Plotly.react(box, ...(touch && ZOOMED.test(id) ? withTools(made) : [made.data, made.layout, config]));
+    if (made) Plotly.react(box, ...(tight() && ZOOMED.test(id) ? withTools(made) : [made.data, made.layout, config]));
   }
 
   const drawAll = () => Object.keys(figures).forEach(draw);

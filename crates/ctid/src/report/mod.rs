@@ -24,7 +24,7 @@ use missing_effect::{Diagnosis, Shown, Step, Verdict};
 pub use self::baysse::html as baysse;
 pub(crate) use self::data::rounded;
 pub use self::identification::html as identification;
-use self::page::{NOTICES, Page, figure, figure_with, section};
+use self::page::{NOTICES, Page, figure, figure_with, items, large, section};
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
 
@@ -124,12 +124,7 @@ fn trail(diagnosis: &Diagnosis) -> String {
                     significant(error, 2)
                 )
             });
-            format!(
-                "<li><span class=\"number\">{} <small>{unit}</small></span>\
-                 <span class=\"label\">{}</span>{held_out}</li>\n",
-                significant(step.rmse, 2),
-                label(step)
-            )
+            large(&significant(step.rmse, 2), &unit, &label(step), &held_out)
         })
         .collect();
     let held_out = if diagnosis.steps.iter().any(|step| step.rmse_test.is_some()) {
@@ -203,12 +198,7 @@ fn failures(diagnosis: &Diagnosis) -> String {
     let Some(last) = diagnosis.steps.last() else {
         return String::new();
     };
-    let sentences: String = last
-        .failures
-        .sentences
-        .iter()
-        .map(|sentence| format!("<li>{}</li>", escape(sentence)))
-        .collect();
+    let sentences = items(&last.failures.sentences);
     let any = |bins: fn(&Step) -> usize| diagnosis.steps.iter().any(|step| bins(step) > 0);
     let mut figures = String::new();
     if !diagnosis.records.is_empty() {

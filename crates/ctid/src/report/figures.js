@@ -66,7 +66,7 @@
     });
     const drawn = layout(narrow.matches ? Math.round(0.85 * figure.height) : figure.height, more);
     if (tight() && !figure.categories) toolsAbove(drawn);
-    return [traces(figure), drawn, tight() ? Object.assign({}, config, { displayModeBar: !figure.categories }) : config];
+    return [traces(figure), drawn, config(tight() ? { displayModeBar: !figure.categories } : {})];
   }
 
   plots.start(() => figures.forEach((figure) => {

@@ -57,10 +57,10 @@ const plots = (() => {
     Object.assign(made.legend, { y: 0, yref: "container", yanchor: "bottom" });
   }
 
-  const config = {
-    displaylogo: false, responsive: true, displayModeBar: touch ? false : "hover",
+  const config = (more) => Object.assign({
+    displaylogo: false, responsive: true, displayModeBar: tight() ? false : "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], toImageButtonOptions: { scale: 2 },
-  };
+  }, more);
 
   async function unpack() {
     const element = document.getElementById("plotly");

@@ -281,7 +281,8 @@
   const ZOOMED = /^(record-\d+|by-time|by-level|by-flow|unknown-path)$/;
   function withTools({ data, layout }) {
     plots.toolsAbove(layout);
-    return [data, layout, Object.assign({}, config, { displayModeBar: true, modeBarButtonsToRemove: [...config.modeBarButtonsToRemove, "toImage"] })];
+    const { modeBarButtonsToRemove } = config();
+    return [data, layout, config({ displayModeBar: true, modeBarButtonsToRemove: [...modeBarButtonsToRemove, "toImage"] })];
   }
 
   const place = (id) => document.getElementById(`plot-${id}`);
@@ -291,7 +292,7 @@
     if (!box) return;
     const made = steps.length ? figures[id]() : null;
     box.parentElement.hidden = made === null;
-    if (made) Plotly.react(box, ...(tight() && ZOOMED.test(id) ? withTools(made) : [made.data, made.layout, config]));
+    if (made) Plotly.react(box, ...(tight() && ZOOMED.test(id) ? withTools(made) : [made.data, made.layout, config()]));
   }
 
   const drawAll = () => Object.keys(figures).forEach(draw);

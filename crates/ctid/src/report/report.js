@@ -203,9 +203,8 @@
         pattern: hatch(best.map((s) => s.equal)) },
       text: best.map((s) => (s.bic_gain === null ? "" : s.bic_gain.toFixed(1).replace("-", "−"))), textposition: "outside", cliponaxis: false,
       hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${sized(s.rmse, OUT)}`), hoverinfo: "text",
-    }], layout: layout(94 + 26 * best.length, {
-      // The tools stand above the first bar.
-      hovermode: "closest", margin: { l: 20, r: 10, t: 34, b: 40 },
+    }], layout: layout(70 + 26 * best.length, {
+      hovermode: "closest", margin: { l: 20, r: tight() ? 10 : 40, t: 10, b: 40 },
       // Room for the numbers at the ends of the bars.
       xaxis: axis("fall of BIC (larger is better)", { range: [low < 0 ? low - room : 0, high + room] }), yaxis: axis("", { type: "category", ticksuffix: " ", nticks: best.length + 1, dtick: 1, fixedrange: true }),
     }) };

@@ -53,7 +53,11 @@ const look = (width) => `(() => {
     const svg = box.querySelector("svg.main-svg");
     return svg && svg.getBoundingClientRect().height > 50 && box.querySelector(".trace path, .trace rect, .points path, canvas");
   });
+  const covers = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  const boxes = (box, what) => [...box.querySelectorAll(what)].map((part) => part.getBoundingClientRect());
+  const covered = drawn.filter((box) => boxes(box, ".modebar-group").some((tools) => boxes(box, ".legend, .nsewdrag").some((part) => covers(tools, part))));
   return {
+    covered: covered.map((box) => box.id),
     marked: document.documentElement.dataset.drawn === "yes",
     shown: shown.length,
     drawn: drawn.length,
@@ -94,6 +98,7 @@ async function check(width, height, mobile) {
   }
   if (seen.shown === 0) problems.push("there is no plot");
   if (seen.missing.length) problems.push(`not drawn: ${seen.missing.join(", ")}`);
+  if (seen.covered.length) problems.push(`the tools cover names or curves: ${seen.covered.join(", ")}`);
   if (seen.wide > seen.window) problems.push(`the page is ${seen.wide} px wide in ${seen.window} px`);
 
   for (const { method, params, sessionId: of } of heard) {

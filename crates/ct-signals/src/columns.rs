@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, unit};
+use crate::{ColumnFault, Error, unit};
 
 /// The names of the columns, as `[columns]` of a model file gives them; what is absent is guessed.
 ///
@@ -131,13 +131,11 @@ impl Columns {
         ] {
             let Some(column) = column else { continue };
             if let Some((_, first)) = taken.iter().find(|(index, _)| *index == column.index) {
-                return Err(Error::SharedColumn {
-                    file: file.into(),
-                    row,
+                return Err(header.fault(ColumnFault::Shared {
                     column: column.header.clone(),
                     first,
                     second: role.name,
-                });
+                }));
             }
             taken.push((column.index, role.name));
         }
@@ -208,13 +206,11 @@ impl Header<'_> {
         };
         let file_unit = file_unit(&self.names[index]);
         if !file_unit.is_empty() && !model_unit.is_empty() && !unit::same(&file_unit, model_unit) {
-            return Err(Error::UnitContradiction {
-                file: self.file.into(),
-                row: self.row,
+            return Err(self.fault(ColumnFault::Unit {
                 column: self.names[index].clone(),
                 file_unit,
-                model_unit: model_unit.into(),
-            });
+                named_unit: model_unit.into(),
+            }));
         }
         if !file_unit.is_empty() {
             Ok(self.found(index, &file_unit))
@@ -271,28 +267,29 @@ impl Header<'_> {
     }
 
     fn missing(&self, role: &Role, wanted: Option<&str>) -> Error {
-        let suggestion = wanted
-            .and_then(|wanted| closest(wanted, self.names))
-            .map(|name| format!("; did you mean \"{name}\"?"))
-            .unwrap_or_default();
-        Error::MissingColumn {
-            file: self.file.into(),
-            row: self.row,
+        self.fault(ColumnFault::Missing {
             role: role.name,
             wanted: match wanted {
                 Some(wanted) => format!("\"{wanted}\""),
                 None => format!("beginning with \"{}\"", role.letter),
             },
-            columns: quoted(self.names.iter()) + &suggestion,
-        }
+            columns: quoted(self.names.iter()),
+            closest: wanted.and_then(|wanted| closest(wanted, self.names).cloned()),
+        })
     }
 
     fn ambiguous(&self, role: &Role, indices: &[usize]) -> Error {
-        Error::AmbiguousColumn {
-            file: self.file.into(),
-            row: self.row,
+        self.fault(ColumnFault::Ambiguous {
             role: role.name,
             candidates: quoted(indices.iter().map(|&index| &self.names[index])),
+        })
+    }
+
+    fn fault(&self, fault: ColumnFault) -> Error {
+        Error::Column {
+            file: self.file.into(),
+            row: self.row,
+            fault: Box::new(fault),
         }
     }
 }

@@ -1,6 +1,8 @@
 //! What can be wrong with a record or a setting: each message names the place, the numbers that
 //! disagree and the mend, in one line.
 
+use crate::ColumnFault;
+
 /// Everything this crate can refuse.
 ///
 /// `row` is always the line number in the file as a text editor shows it, the header's included.
@@ -49,67 +51,15 @@ pub enum Error {
         /// The first row.
         first: String,
     },
-    /// A column that is needed is not in the file.
-    #[error(
-        "{file}, row {row}: no column {wanted} for the {role}; the file has {columns}; set {role} = \"...\" under [columns]"
-    )]
-    MissingColumn {
+    /// The columns of the file are not those that were named or are needed.
+    #[error("{file}, row {row}{}", .fault.in_model())]
+    Column {
         /// The path as it was given.
         file: String,
         /// Line number of the header.
         row: u64,
-        /// `time`, `input`, `output` or `reference`.
-        role: &'static str,
-        /// The name that was looked for.
-        wanted: String,
-        /// All the columns of the file, quoted, and the closest of them where one is close.
-        columns: String,
-    },
-    /// Several columns fit one role.
-    #[error(
-        "{file}, row {row}: {candidates} could each be the {role}; say which with {role} = \"...\" under [columns], and rename columns of the same name"
-    )]
-    AmbiguousColumn {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the header.
-        row: u64,
-        /// `time`, `input`, `output` or `reference`.
-        role: &'static str,
-        /// The columns that fit, quoted.
-        candidates: String,
-    },
-    /// One column was named for two roles.
-    #[error(
-        "{file}, row {row}, column \"{column}\": it is named both as {first} and as {second}; give each its own column under [columns]"
-    )]
-    SharedColumn {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the header.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// The first role.
-        first: &'static str,
-        /// The second role.
-        second: &'static str,
-    },
-    /// The model and the file give the same column different units.
-    #[error(
-        "{file}, row {row}, column \"{column}\": the file says {file_unit} but the model says {model_unit}; convert the column, or write \"{column}\" under [columns] and give the model's constants in {file_unit}"
-    )]
-    UnitContradiction {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the header.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// The unit in the file's header.
-        file_unit: String,
-        /// The unit in the model's `[columns]`.
-        model_unit: String,
+        /// What is wrong.
+        fault: Box<ColumnFault>,
     },
     /// The time column's unit is not a unit of time that is understood.
     #[error(

@@ -58,6 +58,7 @@
 //! ```
 
 mod ar;
+mod column_fault;
 mod columns;
 mod csv_file;
 mod error;
@@ -68,6 +69,7 @@ pub mod residual_tests;
 mod unit;
 
 pub use ar::{ArModel, Whitener};
+pub use column_fault::ColumnFault;
 pub use columns::Columns;
 pub use csv_file::read_csv;
 pub use error::Error;

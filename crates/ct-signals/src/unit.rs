@@ -9,6 +9,9 @@ const SUFFIXES: &[&str] = &[
 /// Units that are understood after an underscore in a time's header only: `u_min` is no time.
 const TIME_SUFFIXES: &[&str] = &["us", "ms", "s", "min", "h", "d"];
 
+/// The units of time that are understood, as a message lists them.
+pub(crate) const TIMES: &str = "us, ms, s, min, h and d";
+
 /// A header's name and unit; the unit is empty where the header does not say.
 pub(crate) fn split(header: &str) -> (&str, &str) {
     let header = header.trim();

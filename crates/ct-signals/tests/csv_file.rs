@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use approx::assert_relative_eq;
-use ct_signals::{Columns, Error, Hold, Record, read_csv};
+use ct_signals::{ColumnFault, Columns, Error, Hold, Record, read_csv};
 
 /// 40 rows of a plausible experiment: time step 2, input and output moving.
 fn rows() -> Vec<[f64; 3]> {
@@ -56,6 +56,19 @@ fn says(error: &Error, words: &[&str]) {
     for word in words {
         assert!(message.contains(word), "no {word:?} in: {message}");
     }
+}
+
+/// What is wrong with the columns, where that is the error.
+fn fault(error: &Error) -> Option<&ColumnFault> {
+    match error {
+        Error::Column { fault, .. } => Some(fault),
+        _ => None,
+    }
+}
+
+/// No column was found for this role.
+fn missing(error: &Error, of: &str) -> bool {
+    matches!(fault(error), Some(ColumnFault::Missing { role, .. }) if *role == of)
 }
 
 /// The plain file with one line (by its number in the file) replaced.
@@ -184,13 +197,7 @@ fn reference_is_optional_unless_named() {
         ..Columns::default()
     };
     let error = read_bytes(text(HEADER, &rows()).as_bytes(), &columns).unwrap_err();
-    assert!(matches!(
-        error,
-        Error::MissingColumn {
-            role: "reference",
-            ..
-        }
-    ));
+    assert!(missing(&error, "reference"));
 }
 
 #[test]
@@ -281,7 +288,7 @@ fn missing_column_lists_those_that_are_there_and_the_closest() {
     let text = text("t [s],pump [V],level [cm]", &rows());
     let columns = named("t [s]", "pump [V]", "leve [cm]");
     let error = read_bytes(text.as_bytes(), &columns).unwrap_err();
-    assert!(matches!(error, Error::MissingColumn { role: "output", .. }));
+    assert!(missing(&error, "output"));
     says(
         &error,
         &[
@@ -289,11 +296,11 @@ fn missing_column_lists_those_that_are_there_and_the_closest() {
             "row 1",
             "\"leve [cm]\"",
             "\"t [s]\", \"pump [V]\", \"level [cm]\"",
-            "did you mean \"level [cm]\"?",
+            "did you mean \"level [cm]\"? Set output = ",
         ],
     );
     let error = read(&text).unwrap_err();
-    assert!(matches!(error, Error::MissingColumn { role: "input", .. }));
+    assert!(missing(&error, "input"));
     says(&error, &["beginning with \"u\"", "input = "]);
     assert!(!error.to_string().contains("did you mean"));
 }
@@ -301,19 +308,19 @@ fn missing_column_lists_those_that_are_there_and_the_closest() {
 #[test]
 fn ambiguous_column() {
     let error = read(&text("t,y1,y2", &rows())).unwrap_err();
-    assert!(matches!(error, Error::MissingColumn { role: "input", .. }));
+    assert!(missing(&error, "input"));
     let mut wide = text("t,u", &[]);
     wide = wide.replace("t,u", "t,u,y1,y2");
     let error = read(&wide).unwrap_err();
     assert!(matches!(
-        error,
-        Error::AmbiguousColumn { role: "output", .. }
+        fault(&error),
+        Some(ColumnFault::Ambiguous { role: "output", .. })
     ));
     says(&error, &["\"y1\", \"y2\"", "output = "]);
     let error = read("t,u,y,y\n").unwrap_err();
     assert!(matches!(
-        error,
-        Error::AmbiguousColumn { role: "output", .. }
+        fault(&error),
+        Some(ColumnFault::Ambiguous { role: "output", .. })
     ));
 }
 
@@ -324,7 +331,7 @@ fn one_column_for_two_roles() {
         &named("t [s]", "y", "y [cm]"),
     )
     .unwrap_err();
-    assert!(matches!(error, Error::SharedColumn { .. }));
+    assert!(matches!(fault(&error), Some(ColumnFault::Shared { .. })));
     says(&error, &["input", "output"]);
 }
 
@@ -332,7 +339,7 @@ fn one_column_for_two_roles() {
 fn unit_contradiction_names_both_units() {
     let text = text("t [s],u [V],y [m]", &rows());
     let error = read_bytes(text.as_bytes(), &named("t [s]", "u [V]", "y [cm]")).unwrap_err();
-    assert!(matches!(error, Error::UnitContradiction { .. }));
+    assert!(matches!(fault(&error), Some(ColumnFault::Unit { .. })));
     says(
         &error,
         &[
@@ -344,8 +351,12 @@ fn unit_contradiction_names_both_units() {
             "convert",
         ],
     );
+    says(&error, &["the model's constants in m"]);
+    // No constant of the model is in the unit of the time.
     let error = read_bytes(text.as_bytes(), &named("t [ms]", "u [V]", "y")).unwrap_err();
-    assert!(matches!(error, Error::UnitContradiction { .. }));
+    assert!(matches!(fault(&error), Some(ColumnFault::Unit { .. })));
+    says(&error, &["\"t [s]\" under [columns]: us, ms, s, min"]);
+    assert!(!error.to_string().contains("constants"));
 }
 
 #[test]

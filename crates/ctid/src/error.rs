@@ -30,7 +30,7 @@ pub enum Error {
     /// The command line asks for something that does not go together.
     #[error("{0}")]
     Usage(String),
-    /// The columns of a record, with a mend for the place where they are named.
+    /// The columns of a record that an option names.
     #[error("{0}")]
     Columns(String),
     /// A record.

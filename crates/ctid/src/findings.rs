@@ -24,19 +24,3 @@ pub(crate) fn fits_as_well(diagnosis: &Diagnosis, score: &Score) -> bool {
 pub(crate) fn tank(diagnosis: &Diagnosis, index: usize) -> Option<&str> {
     diagnosis.steps.get(index + 1)?.place.as_deref()
 }
-
-/// The size of the added effect of this index ends at the edge of what is plausible. The sentences, of which each added
-/// effect has one, alone say so.
-pub(crate) fn in_doubt(diagnosis: &Diagnosis, index: usize) -> bool {
-    index < diagnosis.effects.len()
-        && diagnosis
-            .sentences
-            .get(index)
-            .is_some_and(|sentence| sentence.contains("In doubt:"))
-}
-
-/// The last model leaves more than noise.
-pub(crate) fn something_remains(diagnosis: &Diagnosis) -> bool {
-    let said = |sentence: &String| sentence.starts_with("Something remains");
-    diagnosis.unknown.is_some() || diagnosis.sentences.iter().any(said)
-}

@@ -2,14 +2,17 @@
 //! a fit that begins there finds its parameters again, within their standard errors.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
 use greybox::{Setup, Stopping, fit_from};
-use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
+use plants::{Command, EffectInfo, Placed, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use support::known;
 
 const SAMPLES: usize = 800;
 const INTERVAL: f64 = 4.0;
@@ -103,19 +106,6 @@ impl Case {
         parameters
     }
 
-    fn known(&self) -> Known {
-        let area = match self.plant {
-            Plant::SingleTank => [Some(154.0), None],
-            Plant::CascadedTanks => [Some(154.0), Some(154.0)],
-            _ => [None, None],
-        };
-        Known {
-            area,
-            tank_height: None,
-            input_range: Some(10.0),
-        }
-    }
-
     /// Steps under a slow wander, so that the command turns at many heights.
     fn command(rng: &mut ChaCha8Rng) -> Vec<f64> {
         let steps = excitation::steps(SAMPLES, 10..=40, 3.5, 6.5, rng).unwrap();
@@ -132,7 +122,7 @@ impl Case {
     }
 
     fn record(&self, u: &[f64], noise: &[f64], scales: &Scales) -> Record {
-        let structure = Structure::new(self.plant, self.known(), scales.clone());
+        let structure = Structure::new(self.plant, known(self.plant), scales.clone());
         let structure = structure.with(self.placed()).unwrap();
         let (mut theta, levels) = self.base();
         theta.extend(self.parameters());
@@ -162,12 +152,12 @@ impl Case {
 /// swapped, and which of the two basins is the right one is not for the effect's starts to find.
 fn base_fit<'a>(case: &Case, records: &'a [Record]) -> (Setup<'a>, Vec<f64>, f64) {
     let fixed = BTreeMap::new;
-    let setup = Setup::from_records(case.plant, case.known(), &[], records, fixed()).unwrap();
+    let setup = Setup::from_records(case.plant, known(case.plant), &[], records, fixed()).unwrap();
     let (theta, levels) = case.base();
     let own = [theta, levels].concat();
     let fit = fit_from(&setup, &[own], &ArModel::white(1.0), STOPPING).unwrap();
     let scales = setup.scales_at(&fit.x).unwrap();
-    let structure = Structure::new(case.plant, case.known(), scales);
+    let structure = Structure::new(case.plant, known(case.plant), scales);
     let setup = setup.with_structure(structure).unwrap();
     (setup, fit.x, fit.rmse)
 }

@@ -58,6 +58,7 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     let widen = ControlLoop::widens(control_loop.as_ref());
     let step = step::report(&shown, own.bic(), &floor.model()?, &problem.test, widen)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
+    diagnosis.residual_unexplained = lacking;
     diagnosis.sentences = sentences::of_comparison(&diagnosis, left);
     let held_out = sentences::of_held_out(&diagnosis);
     let minimum = sentences::of_a_minimum(&diagnosis);

@@ -104,6 +104,12 @@ pub fn diagnose(
         .iter()
         .map(|placed| placed.effect.id.to_string())
         .collect();
+    diagnosis.in_doubt = last
+        .added
+        .iter()
+        .map(|placed| last.at_the_edge(*placed))
+        .collect();
+    diagnosis.residual_unexplained = left.is_some() || verdict == Verdict::Unexplained;
     diagnosis.groups = groups;
     diagnosis.ranked = ranked(&scores, verdict);
     diagnosis.scores = scores;
@@ -111,12 +117,7 @@ pub fn diagnose(
         tell("shaping the unknown", 2, 3);
         diagnosis.unknown = unknown(last)?;
     }
-    let doubtful: Vec<bool> = last
-        .added
-        .iter()
-        .map(|placed| last.at_the_edge(*placed))
-        .collect();
-    diagnosis.sentences = sentences::of_diagnosis(&diagnosis, left, &doubtful);
+    diagnosis.sentences = sentences::of_diagnosis(&diagnosis, left);
     let held_out = sentences::of_held_out(&diagnosis);
     let minimum = sentences::of_a_minimum(&diagnosis);
     let terms = sentences::of_terms(problem);
@@ -174,6 +175,8 @@ pub(crate) fn assemble(
         verdict,
         effects: Vec::new(),
         groups: Vec::new(),
+        in_doubt: Vec::new(),
+        residual_unexplained: false,
         ranked: Vec::new(),
         steps,
         noise_floor: noise.level,

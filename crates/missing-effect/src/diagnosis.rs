@@ -226,6 +226,11 @@ pub struct Diagnosis {
     pub effects: Vec<String>,
     /// For each of them all that cannot be told apart from it on these data, best first.
     pub groups: Vec<Vec<String>>,
+    /// For each of them whether it is in doubt: its size ends at the edge of what is plausible, so that it describes the data
+    /// rather than explains them.
+    pub in_doubt: Vec<bool>,
+    /// What the last model leaves is more than noise: something is missing still, or a disturbance acts.
+    pub residual_unexplained: bool,
     /// The single effects, best first, at the first step; `none` first when the model is adequate.
     pub ranked: Vec<String>,
     /// The base model and every model after it.

@@ -94,52 +94,36 @@ pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use ct_signals::{Hold, Signal, excitation, noise};
-    use plants::{Command, Known, Plant, Scales, Simulator, Structure};
+    use plants::{Known, Plant, Scales, Structure};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::{Options, Problem, problem::base};
+    use crate::{
+        Options, Problem,
+        problem::base,
+        simulated::{self, INTERVAL},
+    };
 
     const SAMPLES: usize = 600;
     const AT: usize = 320;
+    /// The records do not begin at zero \[s\].
+    const BEGIN: f64 = 100.0;
 
     /// A linear tank whose reading is another from a sample on.
     fn problem(by: f64, records: usize, seed: u64) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let plant = Plant::SingleTankLinear;
-        let scales = Scales::from_ranges((3.0, 5.0), (5.0, 20.0), 2.0, 1200.0);
+        let scales = Scales::from_ranges((3.0, 5.0), (5.0, 20.0), INTERVAL, 1200.0);
         let structure = Structure::new(plant, Known::default(), scales);
-        let record = |k: usize, rng: &mut ChaCha8Rng| {
-            let u = excitation::steps(SAMPLES, 20..=60, 3.0, 5.0, rng).unwrap();
-            let mut y = noise::white(SAMPLES, 0.05, rng);
-            let mut simulator =
-                Simulator::<f64>::new(&structure, &[4.0, 90.0, 0.0], &[16.0], u[0]).unwrap();
-            for (i, (y, u)) in y.iter_mut().zip(&u).enumerate() {
-                *y += simulator.read() + if i >= AT { by } else { 0.0 };
-                simulator.advance(Command::held(*u), 2.0);
-            }
-            Record {
-                name: format!("record {k}"),
-                time: (0..SAMPLES).map(|k| 100.0 + 2.0 * k as f64).collect(),
-                input: Signal::new("u", "V", u),
-                output: Signal::new("y", "cm", y),
-                reference: None,
-                hold: Hold::Zero,
-            }
-        };
-        Problem {
-            plant,
-            known: Known::default(),
-            effects: Vec::new(),
-            terms: Vec::new(),
-            start: Default::default(),
-            fixed: Vec::new(),
-            records: (0..records).map(|k| record(k, &mut rng)).collect(),
-            controller: None,
-            test: Vec::new(),
-        }
+        let records = (0..records).map(|_| {
+            let theta = [4.0, 90.0, 0.0];
+            let mut record = simulated::record(&structure, &theta, (3.0, 5.0), SAMPLES, &mut rng);
+            record.time.iter_mut().for_each(|t| *t += BEGIN);
+            record.output.values[AT..].iter_mut().for_each(|y| *y += by);
+            record
+        });
+        simulated::problem(plant, Known::default(), records.collect())
     }
 
     #[test]
@@ -151,7 +135,10 @@ mod tests {
             let found = jump(&node, &noise).unwrap().unwrap();
             assert!(found.bic < node.fit.bic() - 100.0);
             let left = found.left(&problem.records[0]);
-            assert_eq!(left.what, Remains::Instant(100.0 + 2.0 * AT as f64, 0.0));
+            assert_eq!(
+                left.what,
+                Remains::Instant(BEGIN + INTERVAL * AT as f64, 0.0)
+            );
         }
         // Where the reading does not jump, the best of several is less than its two parameters cost.
         let worth = (1..=10).filter(|seed| {

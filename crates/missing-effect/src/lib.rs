@@ -31,6 +31,8 @@ mod remains;
 mod scores;
 mod search;
 mod sentences;
+#[cfg(test)]
+mod simulated;
 mod spectral_line;
 mod step;
 #[cfg(test)]

@@ -208,13 +208,8 @@ fn visible(diagnosis: &Diagnosis) -> String {
     sizes.join(", ")
 }
 
-/// What there is to say, the verdict first; `at_the_edge` are the added effects whose size ends where their plausible
-/// range does.
-pub(crate) fn of_diagnosis(
-    diagnosis: &Diagnosis,
-    left: Option<Left>,
-    at_the_edge: &[bool],
-) -> Vec<String> {
+/// What there is to say, the verdict first.
+pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<String> {
     let unit = &diagnosis.output_unit;
     let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
         return Vec::new();
@@ -289,7 +284,7 @@ pub(crate) fn of_diagnosis(
                     .place
                     .as_ref()
                     .map_or(String::new(), |place| format!(" in the {place} tank"));
-                let doubt = if at_the_edge.get(k) == Some(&true) {
+                let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
                     " In doubt: its size ends at the edge of what is plausible, so it describes the data rather than explains them."
                 } else {
                     ""

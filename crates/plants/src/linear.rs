@@ -15,10 +15,15 @@ pub(crate) struct Propagators<T> {
     known: Vec<(T, Vec<[T; N]>)>,
 }
 
-/// Steps that differ by less than this share are one step: times are read from text.
-pub(crate) const SAME_STEP: f64 = 1e-9;
 /// Exponentials that are kept.
 const KEPT: usize = 12;
+
+/// Whether what was computed for a step of length `known` holds for one of length `h`: they differ by less than times that
+/// are read from text do, and have the same derivatives.
+pub(crate) fn same_step<T: Scalar>(known: T, h: T) -> bool {
+    const SHARE: f64 = 1e-9;
+    (known.value() - h.value()).abs() <= SHARE * h.value() && known.same_derivatives(h)
+}
 
 impl<T: Scalar> Propagators<T> {
     pub(crate) fn new(vessels: Vec<(T, T)>) -> Self {
@@ -70,9 +75,10 @@ impl<T: Scalar> Propagators<T> {
 
     /// The exponential's rows for a step of length `h`, which is not zero.
     fn rows(&mut self, h: T) -> &[[T; N]] {
-        let found = self.known.iter().position(|(known, _)| {
-            (known.value() - h.value()).abs() <= SAME_STEP * h.value() && known.same_derivatives(h)
-        });
+        let found = self
+            .known
+            .iter()
+            .position(|&(known, _)| same_step(known, h));
         let at = found.unwrap_or_else(|| {
             if self.known.len() == KEPT {
                 self.known.remove(0);

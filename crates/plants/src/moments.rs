@@ -5,7 +5,7 @@
 //! `M_j = int_0^1 s^j exp(-s/e) ds`; they go to zero with `e`, with the right slope (`M_0 -> e`), so
 //! that a lag does not jump where it vanishes.
 
-use crate::{Scalar, linear::SAME_STEP};
+use crate::{Scalar, linear::same_step};
 
 /// The last moments of one time constant: most steps are as long as the one before.
 pub(crate) struct KeptMoments<T> {
@@ -24,8 +24,7 @@ impl<T: Scalar> KeptMoments<T> {
     /// [`exponential_moments`] over a step of length `h`.
     pub(crate) fn over(&mut self, h: T) -> (T, [T; 3]) {
         if let Some((known, moments)) = self.last
-            && (known.value() - h.value()).abs() <= SAME_STEP * h.value()
-            && known.same_derivatives(h)
+            && same_step(known, h)
         {
             return moments;
         }

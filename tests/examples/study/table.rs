@@ -55,6 +55,76 @@ impl Count {
     }
 }
 
+/// A column of counts.
+struct Column {
+    /// Its name in a terminal, and how wide it is there.
+    short: &'static str,
+    width: usize,
+    /// Its name on a page, and what stands behind its figures there.
+    long: &'static str,
+    unit: &'static str,
+    figure: fn(&Count) -> String,
+}
+
+const COLUMNS: [Column; 8] = [
+    Column {
+        short: "records",
+        width: 7,
+        long: "records",
+        unit: "",
+        figure: |c| c.records.to_string(),
+    },
+    Column {
+        short: "seen",
+        width: 6,
+        long: "seen",
+        unit: " %",
+        figure: |c| c.percent(c.seen),
+    },
+    Column {
+        short: "named",
+        width: 6,
+        long: "named",
+        unit: " %",
+        figure: |c| c.percent(c.named),
+    },
+    Column {
+        short: "in group",
+        width: 8,
+        long: "in the named group",
+        unit: " %",
+        figure: |c| c.percent(c.in_group),
+    },
+    Column {
+        short: "first",
+        width: 5,
+        long: "named itself",
+        unit: " %",
+        figure: |c| c.percent(c.first),
+    },
+    Column {
+        short: "undecided",
+        width: 9,
+        long: "undecided",
+        unit: " %",
+        figure: |c| c.percent(c.undecided),
+    },
+    Column {
+        short: "size",
+        width: 5,
+        long: "group size, median",
+        unit: "",
+        figure: |c| shown(median(&c.sizes)),
+    },
+    Column {
+        short: "seconds",
+        width: 7,
+        long: "seconds, median",
+        unit: "",
+        figure: |c| shown(median(&c.seconds)),
+    },
+];
+
 fn median<T: Copy + PartialOrd>(values: &[T]) -> Option<T> {
     let mut values = values.to_vec();
     values.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
@@ -183,37 +253,19 @@ pub fn text(jobs: &[Job], outcomes: &[Outcome]) -> String {
     let mut out = String::new();
     let cells = cells(jobs, outcomes);
     if !cells.is_empty() {
-        let _ = writeln!(
-            out,
-            "{:<21} {:>5} {:<16} {:>7} {:>6} {:>6} {:>8} {:>5} {:>9} {:>5} {:>7}",
-            "effect",
-            "ratio",
-            "loop, noise",
-            "records",
-            "seen",
-            "named",
-            "in group",
-            "first",
-            "undecided",
-            "size",
-            "seconds"
-        );
+        let _ = write!(out, "{:<21} {:>5} {:<16}", "effect", "ratio", "loop, noise");
+        for Column { short, width, .. } in &COLUMNS {
+            let _ = write!(out, " {short:>width$}");
+        }
+        out.push('\n');
     }
-    for ((_, effect, hundredths, at), c) in &cells {
-        let _ = writeln!(
-            out,
-            "{effect:<21} {:>5} {:<16} {:>7} {:>6} {:>6} {:>8} {:>5} {:>9} {:>5} {:>7}",
-            ratio(*hundredths),
-            named_condition(*at),
-            c.records,
-            c.percent(c.seen),
-            c.percent(c.named),
-            c.percent(c.in_group),
-            c.percent(c.first),
-            c.percent(c.undecided),
-            shown(median(&c.sizes)),
-            shown(median(&c.seconds))
-        );
+    for ((_, effect, hundredths, at), count) in &cells {
+        let (ratio, condition) = (ratio(*hundredths), named_condition(*at));
+        let _ = write!(out, "{effect:<21} {ratio:>5} {condition:<16}");
+        for Column { width, figure, .. } in &COLUMNS {
+            let _ = write!(out, " {:>width$}", figure(count), width = *width);
+        }
+        out.push('\n');
     }
     for (job, outcome) in jobs.iter().zip(outcomes) {
         if let Some(mark) = outcome.answer.as_ref().and_then(|a| a.mark.as_ref()) {
@@ -267,7 +319,7 @@ pub fn markdown(jobs: &[Job], outcomes: &[Outcome]) -> String {
                         "{} / {} ({})",
                         c.percent(c.named),
                         c.percent(c.in_group),
-                        median(&c.sizes).map_or("-".to_string(), |size| size.to_string())
+                        shown(median(&c.sizes))
                     )
                 });
             let _ = write!(out, " {entry} |");
@@ -279,24 +331,19 @@ pub fn markdown(jobs: &[Job], outcomes: &[Outcome]) -> String {
 fn summary(jobs: &[Job], outcomes: &[Outcome], cells: &BTreeMap<Cell, Count>) -> String {
     let mut out = String::new();
     if !cells.is_empty() {
-        out += "\n| structural error / noise | loop, noise | records | seen | named | in the named group | named itself | undecided | group size, median | seconds, median |\n|---|---|---|---|---|---|---|---|---|---|\n";
+        out += "\n| structural error / noise | loop, noise |";
+        for Column { long, .. } in &COLUMNS {
+            let _ = write!(out, " {long} |");
+        }
+        let _ = writeln!(out, "\n|{}", "---|".repeat(2 + COLUMNS.len()));
     }
     let rows = together(cells, |(_, _, hundredths, at)| (*hundredths, *at));
-    for ((hundredths, at), c) in rows {
-        let _ = writeln!(
-            out,
-            "| {} | {} | {} | {} % | {} % | {} % | {} % | {} % | {} | {} |",
-            ratio(hundredths),
-            named_condition(at),
-            c.records,
-            c.percent(c.seen),
-            c.percent(c.named),
-            c.percent(c.in_group),
-            c.percent(c.first),
-            c.percent(c.undecided),
-            median(&c.sizes).map_or("-".to_string(), |size| size.to_string()),
-            shown(median(&c.seconds))
-        );
+    for ((hundredths, at), count) in rows {
+        let _ = write!(out, "| {} | {} |", ratio(hundredths), named_condition(at));
+        for Column { unit, figure, .. } in &COLUMNS {
+            let _ = write!(out, " {}{unit} |", figure(&count));
+        }
+        out.push('\n');
     }
     let (records, claims, doubted) = nulls(jobs, outcomes);
     if records > 0 {

@@ -39,7 +39,7 @@ pub struct Arguments {
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// What sequences are drawn from
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Where the experiment goes as CSV; without it next.csv, or next-2.csv where that is there
     #[arg(long, value_name = "F.csv")]
@@ -47,6 +47,12 @@ pub struct Arguments {
     /// Write the result as JSON
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
+}
+
+/// What random numbers are drawn from.
+pub(crate) fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("a whole number from 0 to {} is needed", u64::MAX))
 }
 
 /// A design, and in what unit of time its CSV is written.

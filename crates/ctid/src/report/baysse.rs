@@ -1,7 +1,7 @@
 //! The page of `ctid tables baysse`.
 
 use super::figures::{self, Colour, Curve, Figure, Panel, Values};
-use super::page::{self, NOTICES, Page, figure, section};
+use super::page::{self, NOTICES, Page, figure, items, large, section};
 use super::tables::table;
 use super::text::{escape, significant};
 use crate::tables::baysse::{Cell, Study, TRUTH};
@@ -38,11 +38,6 @@ pub fn html(study: &Study) -> String {
 }
 
 fn headline(study: &Study) -> String {
-    let items = |sentences: &mut dyn Iterator<Item = &str>| -> String {
-        sentences
-            .map(|sentence| format!("<li>{}</li>\n", escape(sentence)))
-            .collect()
-    };
     let outside: Vec<String> = study
         .outside()
         .map(|cell| format!("Outside: {}, {}.", cell.cell, figure_of(cell)))
@@ -51,12 +46,13 @@ fn headline(study: &Study) -> String {
         .iter()
         .map(|sentence| format!("<p class=\"notice\">{}</p>\n", escape(sentence)))
         .collect();
-    let of = |method: &str, of: &str| {
+    let time_by = |method: &str, label: &str| {
         let cell = study
             .tables
             .iter()
-            .find(|cell| cell.method == method && cell.of == of);
-        cell.map_or(String::new(), |cell| significant(cell.mean, 4))
+            .find(|cell| cell.method == method && cell.of == "mean tau");
+        let mean = cell.map_or(String::new(), |cell| significant(cell.mean, 4));
+        large(&mean, "s", label, "")
     };
     format!(
         "<header>\n<p class=\"kicker\">ctid report · A. Baysse, F. J. Carrillo, A. Habbadi: output error in closed loop</p>\n\
@@ -64,20 +60,20 @@ fn headline(study: &Study) -> String {
          <div class=\"verdict\"><p>A tank level in a loop, identified by least squares, by instruments, and by output error of the loop itself. \
          {} runs of each table, each with another noise.</p></div>\n\
          <ol class=\"trail apart\">\n\
-         <li><span class=\"number\">{} <small>s</small></span><span class=\"label\">time constant by least squares</span></li>\n\
-         <li><span class=\"number\">{} <small>s</small></span><span class=\"label\">by instruments</span></li>\n\
-         <li><span class=\"number\">{} <small>s</small></span><span class=\"label\">by closed-loop output error; the truth is {} s</span></li></ol>\n{outside}\
+         {}{}{}</ol>\n{outside}\
          <ul>\n{}</ul>\n\
          <details><summary>What the paper does not print, and is assumed</summary><ul>\n{}</ul></details>\n{NOTICES}</header>\n",
         study.inside,
         study.of,
         study.runs,
-        of("LS", "mean tau"),
-        of("IV", "mean tau"),
-        of("F-CLOE delta", "mean tau"),
-        TRUTH[1],
-        items(&mut notes(study).iter().map(String::as_str)),
-        items(&mut study.assumptions.iter().map(String::as_str)),
+        time_by("LS", "time constant by least squares"),
+        time_by("IV", "by instruments"),
+        time_by(
+            "F-CLOE delta",
+            &format!("by closed-loop output error; the truth is {} s", TRUTH[1])
+        ),
+        items(notes(study)),
+        items(&study.assumptions),
     )
 }
 
@@ -152,16 +148,12 @@ fn iterations() -> String {
 }
 
 fn misprints(study: &Study) -> String {
-    let items: String = study
-        .misprints
-        .iter()
-        .map(|sentence| format!("<li>{}</li>\n", escape(sentence)))
-        .collect();
+    let misprints = items(&study.misprints);
     section(
         "misprints",
         "What cannot be as it is printed",
         "",
-        &format!("<ul>\n{items}</ul>\n"),
+        &format!("<ul>\n{misprints}</ul>\n"),
     )
 }
 

@@ -1,6 +1,6 @@
 // Draws the figures that a page describes as curves in panels, one above the other.
 (() => {
-  const { narrow, touch, theme, plain, pretty, named, axis, layout, config } = plots;
+  const { narrow, tight, theme, plain, pretty, named, axis, layout, toolsAbove, config } = plots;
   const figures = JSON.parse(document.getElementById("data").textContent).figures || [];
 
   const colour = (name) => (typeof name === "number" ? theme().steps[name % theme().steps.length] : theme()[name]);
@@ -65,13 +65,8 @@
         : { domain: where[k], type: panel.log ? "log" : "linear", range: panel.range || undefined, exponentformat: "power", nticks: panel.log ? undefined : 5 });
     });
     const drawn = layout(narrow.matches ? Math.round(0.85 * figure.height) : figure.height, more);
-    // Where one finger scrolls the page, or room is short, the tools stand above the plot.
-    const tight = touch || narrow.matches;
-    if (tight && !figure.categories) {
-      drawn.margin.t = 34;
-      Object.assign(drawn.legend, { y: 0, yref: "container", yanchor: "bottom" });
-    }
-    return [traces(figure), drawn, tight ? Object.assign({}, config, { displayModeBar: !figure.categories }) : config];
+    if (tight() && !figure.categories) toolsAbove(drawn);
+    return [traces(figure), drawn, config(tight() ? { displayModeBar: !figure.categories } : {})];
   }
 
   plots.start(() => figures.forEach((figure) => {

@@ -1,7 +1,7 @@
 //! The page of `ctid identify`.
 
 use super::figures::{self, Colour, Curve, Figure, Panel, Values};
-use super::page::{self, NOTICES, Page, figure, section};
+use super::page::{self, NOTICES, Page, figure, large, section};
 use super::tables::table;
 use super::text::{code, escape, significant, unit, with_error};
 use crate::identify::text::{self, condition, drift_verdict, model, time_constant_name};
@@ -79,15 +79,18 @@ fn headline(found: &Identification) -> String {
     };
     format!(
         "<header>\n<p class=\"kicker\">ctid report · {}</p>\n<h1>Linear model of order {}</h1>\n\
-         <ol class=\"trail apart\">\n<li><span class=\"number\">{} <small>{output}</small></span>\
-         <span class=\"label\">simulation error, root mean square</span></li>\n\
-         <li><span class=\"number\">{} <small>%</small></span><span class=\"label\">fit</span></li></ol>\n\
+         <ol class=\"trail apart\">\n{}{}</ol>\n\
          <p class=\"caption\">{runs_on} Fit: 100 % less the error over the \
          output's standard deviation.</p>\n{warnings}<dl class=\"facts\">\n{facts}</dl>\n{NOTICES}</header>\n",
         escape(&found.record),
         found.order,
-        significant(found.simulation_rmse, 2),
-        significant(found.fit_percent, 3),
+        large(
+            &significant(found.simulation_rmse, 2),
+            &output,
+            "simulation error, root mean square",
+            ""
+        ),
+        large(&significant(found.fit_percent, 3), "%", "fit", ""),
     )
 }
 

@@ -24,10 +24,9 @@ use missing_effect::{Diagnosis, Shown, Step, Verdict};
 pub use self::baysse::html as baysse;
 pub(crate) use self::data::rounded;
 pub use self::identification::html as identification;
-use self::page::{NOTICES, Page, figure, figure_with, section};
+use self::page::{NOTICES, Page, figure, figure_with, items, large, section};
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
-use crate::findings;
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.
 pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
@@ -89,7 +88,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
                 0 | 1 => "The missing effect is found",
                 _ => "The missing effects are found",
             };
-            let rest = if findings::something_remains(diagnosis) {
+            let rest = if diagnosis.residual_unexplained {
                 "; something remains"
             } else {
                 ""
@@ -125,12 +124,7 @@ fn trail(diagnosis: &Diagnosis) -> String {
                     significant(error, 2)
                 )
             });
-            format!(
-                "<li><span class=\"number\">{} <small>{unit}</small></span>\
-                 <span class=\"label\">{}</span>{held_out}</li>\n",
-                significant(step.rmse, 2),
-                label(step)
-            )
+            large(&significant(step.rmse, 2), &unit, &label(step), &held_out)
         })
         .collect();
     let held_out = if diagnosis.steps.iter().any(|step| step.rmse_test.is_some()) {
@@ -204,12 +198,7 @@ fn failures(diagnosis: &Diagnosis) -> String {
     let Some(last) = diagnosis.steps.last() else {
         return String::new();
     };
-    let sentences: String = last
-        .failures
-        .sentences
-        .iter()
-        .map(|sentence| format!("<li>{}</li>", escape(sentence)))
-        .collect();
+    let sentences = items(&last.failures.sentences);
     let any = |bins: fn(&Step) -> usize| diagnosis.steps.iter().any(|step| bins(step) > 0);
     let mut figures = String::new();
     if !diagnosis.records.is_empty() {

@@ -79,3 +79,19 @@ pub(super) fn figure_with(id: &str, heading: &str, caption: &str) -> String {
          {caption}</figcaption>\n<div class=\"plot\" id=\"plot-{id}\"></div>\n</figure>\n"
     )
 }
+
+/// A number in large type, what it is, and what stands below that: an item of a list of class `trail`; all of it is HTML.
+pub(super) fn large(number: &str, unit: &str, label: &str, below: &str) -> String {
+    format!(
+        "<li><span class=\"number\">{number} <small>{unit}</small></span>\
+         <span class=\"label\">{label}</span>{below}</li>\n"
+    )
+}
+
+/// Sentences as items of a list, each on a line.
+pub(super) fn items<S: AsRef<str>>(sentences: impl IntoIterator<Item = S>) -> String {
+    sentences
+        .into_iter()
+        .map(|sentence| format!("<li>{}</li>\n", escape(sentence.as_ref())))
+        .collect()
+}

@@ -4,6 +4,8 @@ const plots = (() => {
   const narrow = matchMedia("(max-width: 40rem)");
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const touch = matchMedia("(pointer: coarse)").matches;
+  // Where one finger scrolls the page, or room is short, the tools stand above the plot.
+  const tight = () => touch || narrow.matches;
   let printing = false;
 
   // Okabe and Ito's colours, told apart by colour-blind readers; lightened on a dark ground.
@@ -40,18 +42,25 @@ const plots = (() => {
     return Object.assign({
       height, autosize: true, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: FONT, size: narrow.matches ? 11 : 12.5, color: c.text },
-      margin: { l: 52, r: 10, t: 10, b: 40 },
+      // Elsewhere they stand beside it, where neither names nor curves are.
+      margin: { l: 52, r: tight() ? 10 : 40, t: 10, b: 40 },
       legend: { orientation: "h", x: 0, xanchor: "left", y: 1.01, yanchor: "bottom", bgcolor: "rgba(0,0,0,0)" },
       hoverlabel: { bgcolor: c.ground, bordercolor: c.zero, font: { color: c.text, family: FONT } },
-      modebar: { bgcolor: "rgba(0,0,0,0)", color: c.faint, activecolor: c.best },
+      modebar: { orientation: tight() ? "h" : "v", bgcolor: "rgba(0,0,0,0)", color: c.faint, activecolor: c.best },
       dragmode: touch ? false : "zoom", uirevision: "kept", showlegend: false, bargap: 0.12,
     }, more);
   }
 
-  const config = {
-    displaylogo: false, responsive: true, displayModeBar: touch ? false : "hover",
+  // Tools above the plot, the names of the curves below it.
+  function toolsAbove(made) {
+    made.margin.t = 34;
+    Object.assign(made.legend, { y: 0, yref: "container", yanchor: "bottom" });
+  }
+
+  const config = (more) => Object.assign({
+    displaylogo: false, responsive: true, displayModeBar: tight() ? false : "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], toImageButtonOptions: { scale: 2 },
-  };
+  }, more);
 
   async function unpack() {
     const element = document.getElementById("plotly");
@@ -87,5 +96,5 @@ const plots = (() => {
     });
   }
 
-  return { narrow, touch, theme, plain, pretty, named, axis, layout, config, start };
+  return { narrow, tight, theme, plain, pretty, named, axis, layout, toolsAbove, config, start };
 })();

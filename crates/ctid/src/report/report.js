@@ -2,7 +2,7 @@
 "use strict";
 (() => {
   const report = JSON.parse(document.getElementById("data").textContent);
-  const { narrow, touch, theme, plain, pretty, named, axis, config } = plots;
+  const { narrow, tight, theme, plain, pretty, named, axis, config } = plots;
   const records = report.records || [];
   const steps = report.steps || [];
   const located = Math.max(0, records.findIndex((record) => !record.held_out));
@@ -203,9 +203,8 @@
         pattern: hatch(best.map((s) => s.equal)) },
       text: best.map((s) => (s.bic_gain === null ? "" : s.bic_gain.toFixed(1).replace("-", "−"))), textposition: "outside", cliponaxis: false,
       hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${sized(s.rmse, OUT)}`), hoverinfo: "text",
-    }], layout: layout(94 + 26 * best.length, {
-      // The tools stand above the first bar.
-      hovermode: "closest", margin: { l: 20, r: 10, t: 34, b: 40 },
+    }], layout: layout(70 + 26 * best.length, {
+      hovermode: "closest", margin: { l: 20, r: tight() ? 10 : 40, t: 10, b: 40 },
       // Room for the numbers at the ends of the bars.
       xaxis: axis("fall of BIC (larger is better)", { range: [low < 0 ? low - room : 0, high + room] }), yaxis: axis("", { type: "category", ticksuffix: " ", nticks: best.length + 1, dtick: 1, fixedrange: true }),
     }) };
@@ -277,12 +276,12 @@
 
   // --- drawing -----------------------------------------------------------------------------
 
-  // On a touch screen a finger scrolls the page; the plots worth a zoom show their tools above.
+  // Where the tools stand above, only the plots worth a zoom have them.
   const ZOOMED = /^(record-\d+|by-time|by-level|by-flow|unknown-path)$/;
   function withTools({ data, layout }) {
-    layout.margin.t = 34;
-    Object.assign(layout.legend, { y: 0, yref: "container", yanchor: "bottom" });
-    return [data, layout, Object.assign({}, config, { displayModeBar: true, modeBarButtonsToRemove: [...config.modeBarButtonsToRemove, "toImage"] })];
+    plots.toolsAbove(layout);
+    const { modeBarButtonsToRemove } = config();
+    return [data, layout, config({ displayModeBar: true, modeBarButtonsToRemove: [...modeBarButtonsToRemove, "toImage"] })];
   }
 
   const place = (id) => document.getElementById(`plot-${id}`);
@@ -292,7 +291,7 @@
     if (!box) return;
     const made = steps.length ? figures[id]() : null;
     box.parentElement.hidden = made === null;
-    if (made) Plotly.react(box, ...(touch && ZOOMED.test(id) ? withTools(made) : [made.data, made.layout, config]));
+    if (made) Plotly.react(box, ...(tight() && ZOOMED.test(id) ? withTools(made) : [made.data, made.layout, config()]));
   }
 
   const drawAll = () => Object.keys(figures).forEach(draw);

@@ -5,6 +5,8 @@ use missing_effect::{
     Bin, Diagnosis, Failures, NoiseFloor, Parameter, ResidualTests, Score, Shown, Step, Verdict,
 };
 
+use crate::identify::rms;
+
 const PERIOD: f64 = 4.0;
 const NOISE: f64 = 0.08;
 
@@ -52,10 +54,6 @@ fn input(n: usize, shift: f64) -> Vec<f64> {
         .collect()
 }
 
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
 fn bins(by: &[f64], residual: &[f64], edges: &[f64]) -> Vec<Bin> {
     edges
         .windows(2)
@@ -67,7 +65,7 @@ fn bins(by: &[f64], residual: &[f64], edges: &[f64]) -> Vec<Bin> {
                 .map(|(_, r)| *r)
                 .collect();
             let count = inside.len();
-            let rms = rms(&inside);
+            let rms = rms(inside.iter().copied());
             Bin {
                 record: None,
                 from: edge[0],
@@ -97,7 +95,7 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
     for bin in &mut by_time {
         bin.record = Some(0);
     }
-    let level = rms(residual);
+    let level = rms(residual.iter().copied());
     let by_frequency = (0..8)
         .map(|octave| {
             let from = 0.000_25 * f64::from(1 << octave);
@@ -138,7 +136,7 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
 }
 
 fn correlation(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
-    let scale = a.len() as f64 * rms(a) * rms(b);
+    let scale = a.len() as f64 * rms(a.iter().copied()) * rms(b.iter().copied());
     (0..lags)
         .map(|lag| {
             let sum: f64 = a.iter().zip(&b[lag..]).map(|(a, b)| a * b).sum();
@@ -182,7 +180,7 @@ fn step(effects: &[(&str, Parameter)], records: &[Shown], model: (f64, f64, f64)
         .zip(&simulated)
         .map(|(r, s)| r.output.iter().zip(s).map(|(y, s)| y - s).collect())
         .collect();
-    let rmse = rms(&residuals[0]);
+    let rmse = rms(residuals[0].iter().copied());
     let mut parameters = vec![
         parameter("pump_gain", model.2, Some(0.000_31), "V^0.5/s"),
         parameter("alpha_upper", 0.085, Some(0.000_42), "V^0.5/s"),
@@ -196,7 +194,7 @@ fn step(effects: &[(&str, Parameter)], records: &[Shown], model: (f64, f64, f64)
         place: (added.as_deref() == Some("overflow")).then(|| "upper".to_owned()),
         added,
         rmse,
-        rmse_test: Some(rms(&residuals[1])),
+        rmse_test: Some(rms(residuals[1].iter().copied())),
         bic: 2.0 * 600.0 * rmse.ln(),
         parameters,
         starts: 12,
@@ -256,6 +254,8 @@ pub(crate) fn two_tanks() -> Diagnosis {
             vec!["overflow".into()],
             vec!["pump_deadzone".into(), "pump_nonlinearity".into()],
         ],
+        in_doubt: vec![false, false],
+        residual_unexplained: false,
         ranked: [
             "overflow",
             "sensor_saturation",
@@ -328,6 +328,8 @@ pub(crate) fn comparison() -> Diagnosis {
     diagnosis.verdict = Verdict::Unexplained;
     diagnosis.effects.clear();
     diagnosis.groups.clear();
+    diagnosis.in_doubt.clear();
+    diagnosis.residual_unexplained = true;
     diagnosis.ranked.clear();
     diagnosis.scores.clear();
     diagnosis.known_effects.clear();

@@ -59,7 +59,7 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
             };
             let tank = findings::tank(diagnosis, k)
                 .map_or(String::new(), |tank| format!(" ({})", escape(tank)));
-            let doubt = if findings::in_doubt(diagnosis, k) {
+            let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
                 "; in doubt: its size ends at the edge of what is plausible"
             } else {
                 ""

@@ -96,10 +96,8 @@ fn the_headline_counts_and_says_what_remains() {
     };
     headline(&diagnosis, "The missing effects are found");
     assert!(!html(&diagnosis).contains("in doubt: its size"));
-    diagnosis.sentences[1] += " In doubt: its size ends at the edge of what is plausible.";
-    diagnosis
-        .sentences
-        .push("Something remains: a slow part.".to_owned());
+    diagnosis.in_doubt[1] = true;
+    diagnosis.residual_unexplained = true;
     headline(
         &diagnosis,
         "The missing effects are found; something remains",
@@ -110,7 +108,7 @@ fn the_headline_counts_and_says_what_remains() {
         )
     );
     diagnosis.effects.truncate(1);
-    diagnosis.sentences.pop();
+    diagnosis.residual_unexplained = false;
     headline(&diagnosis, "The missing effect is found");
 }
 

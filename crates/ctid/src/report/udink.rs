@@ -1,7 +1,7 @@
 //! The page of `ctid tables udink`.
 
 use super::figures::{self, Colour, Curve, Figure, Panel, Values};
-use super::page::{self, NOTICES, Page, figure, section};
+use super::page::{self, NOTICES, Page, figure, items, large, section};
 use super::tables::table;
 use super::text::{escape, significant};
 use crate::tables::gains::{Gains, Kind, Limits, Row, TRUTH};
@@ -34,18 +34,15 @@ fn headline(study: &Study) -> String {
     let trail: String = [("Euler's rule", &study.euler), ("exact step", &study.exact)]
         .iter()
         .map(|(name, comparison)| {
-            format!(
-                "<li><span class=\"number\">{} <small>of {}</small></span>\
-                 <span class=\"label\">cells inside with {name}</span></li>\n",
-                comparison.inside, comparison.of
+            large(
+                &comparison.inside.to_string(),
+                &format!("of {}", comparison.of),
+                &format!("cells inside with {name}"),
+                "",
             )
         })
         .collect();
-    let assumptions: String = study
-        .assumptions
-        .iter()
-        .map(|sentence| format!("<li>{}</li>\n", escape(sentence)))
-        .collect();
+    let assumptions = items(&study.assumptions);
     format!(
         "<header>\n<p class=\"kicker\">ctid report · A. J. Udink ten Cate, WP-85-54, IIASA, 1985</p>\n\
          <h1>Tables 1 to 4: {}</h1>\n\
@@ -141,19 +138,10 @@ fn of_rule(cell: &Cell) -> String {
 
 fn outside(study: &Study) -> String {
     let list = |name: &str, comparison: &Comparison| {
-        let items: String = comparison
-            .outside
-            .iter()
-            .map(|cell| {
-                format!(
-                    "<li>table {}, {}: {}</li>\n",
-                    cell.table,
-                    cell.cell,
-                    escape(cell.why)
-                )
-            })
-            .collect();
-        format!("<h3>Outside with {name}</h3>\n<ul>\n{items}</ul>\n")
+        let outside = comparison.outside.iter();
+        let cells =
+            items(outside.map(|cell| format!("table {}, {}: {}", cell.table, cell.cell, cell.why)));
+        format!("<h3>Outside with {name}</h3>\n<ul>\n{cells}</ul>\n")
     };
     list("Euler's rule", &study.euler) + &list("the exact step", &study.exact)
 }
@@ -194,17 +182,10 @@ fn larger_p(rows: &[LargerP]) -> String {
 }
 
 fn gains(gains: &Gains) -> String {
-    let checked: String = gains
-        .checked
-        .iter()
-        .map(|checked| {
-            format!(
-                "<li>{} bounds: {}.</li>\n",
-                checked.bounds.name(),
-                escape(&checked.says)
-            )
-        })
-        .collect();
+    let checked = gains.checked.iter();
+    let checked = items(
+        checked.map(|checked| format!("{} bounds: {}.", checked.bounds.name(), checked.says)),
+    );
     let rows: String = gains
         .rows
         .iter()

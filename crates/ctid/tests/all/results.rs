@@ -57,6 +57,17 @@ fn fulfils_the_contract(json: &Value, held_out: bool) {
         assert!(known.contains(id), "{id} is not in the catalogue");
     }
     assert_eq!(effects.len(), groups.len());
+    let in_doubt = json["in_doubt"].as_array().unwrap();
+    assert_eq!(effects.len(), in_doubt.len());
+    let sentences = texts(&json["sentences"]);
+    for (said, doubted) in sentences.iter().zip(in_doubt) {
+        assert_eq!(said.contains("In doubt:"), doubted.as_bool().unwrap());
+    }
+    let unexplained = json["residual_unexplained"].as_bool().unwrap();
+    let remains = sentences
+        .iter()
+        .any(|said| said.starts_with("Something remains"));
+    assert_eq!(unexplained, verdict == "unexplained" || remains);
     for (effect, group) in effects.iter().zip(&groups) {
         assert!(group.contains(effect), "{effect} is not in {group:?}");
     }

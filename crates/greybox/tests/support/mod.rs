@@ -9,6 +9,20 @@ use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Struc
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+/// What is known of a plant: tanks of 154 cm^2, a pump that runs to 10 V.
+pub fn known(plant: Plant) -> Known {
+    let area = match plant {
+        Plant::SingleTank => [Some(154.0), None],
+        Plant::CascadedTanks => [Some(154.0), Some(154.0)],
+        _ => [None, None],
+    };
+    Known {
+        area,
+        tank_height: None,
+        input_range: Some(10.0),
+    }
+}
+
 /// A plant, what is built into it, and the noise on its sensor.
 #[derive(Debug, Clone)]
 pub struct Rig {
@@ -87,15 +101,9 @@ impl Rig {
     }
 
     pub fn known(&self) -> Known {
-        let area = match self.plant {
-            Plant::SingleTank => [Some(154.0), None],
-            Plant::CascadedTanks => [Some(154.0), Some(154.0)],
-            _ => [None, None],
-        };
         Known {
-            area,
             tank_height: Some(60.0),
-            input_range: Some(10.0),
+            ..known(self.plant)
         }
     }
 

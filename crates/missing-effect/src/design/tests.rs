@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used)]
 
-use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
+use ct_signals::{ArModel, Record, excitation, noise};
 use greybox::{Triangle, fit_from};
-use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
+use plants::{EffectInfo, Known, Placed, Plant, Scales, Structure};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 
@@ -11,10 +11,11 @@ use super::{
     play::{Loop, play},
     separation::{imagined, information, linear, misfit_before, refitted, unlooped, vector},
 };
-use crate::{Error, Options, Problem, node::FINE};
-
-const NOISE: f64 = 0.05;
-const INTERVAL: f64 = 2.0;
+use crate::{
+    Error, Options, Problem,
+    node::FINE,
+    simulated::{self, INTERVAL, NOISE},
+};
 
 /// A tank that hides an effect, under a command that hardly moves.
 fn problem(plant: Plant, hidden: (&str, f64), samples: usize) -> Problem {
@@ -23,9 +24,8 @@ fn problem(plant: Plant, hidden: (&str, f64), samples: usize) -> Problem {
         tank_height: Some(60.0),
         input_range: Some(10.0),
     };
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let u = excitation::steps(samples, 20..=60, 4.3, 5.7, &mut rng).unwrap();
-    let mut scales = Scales::from_ranges((4.3, 5.7), (10.0, 22.0), INTERVAL, 600.0);
+    let command = (4.3, 5.7);
+    let mut scales = Scales::from_ranges(command, (10.0, 22.0), INTERVAL, 600.0);
     scales.input_range = 10.0;
     let effect = EffectInfo::find(hidden.0).unwrap();
     let structure = Structure::new(plant, known.clone(), scales)
@@ -37,30 +37,9 @@ fn problem(plant: Plant, hidden: (&str, f64), samples: usize) -> Problem {
         vec![6.4, 100.0, -16.0]
     };
     theta.push(hidden.1);
-    let mut simulator = Simulator::<f64>::new(&structure, &theta, &[16.0], u[0]).unwrap();
-    let mut y = noise::white(samples, NOISE, &mut rng);
-    for (y, u) in y.iter_mut().zip(&u) {
-        *y += simulator.read();
-        simulator.advance(Command::held(*u), INTERVAL);
-    }
-    Problem {
-        plant,
-        known,
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        records: vec![Record {
-            name: "narrow".to_string(),
-            time: (0..samples).map(|k| k as f64 * INTERVAL).collect(),
-            input: Signal::new("u", "V", u),
-            output: Signal::new("y", "cm", y),
-            reference: None,
-            hold: Hold::Zero,
-        }],
-        controller: None,
-        test: Vec::new(),
-    }
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let record = simulated::record(&structure, &theta, command, samples, &mut rng);
+    simulated::problem(plant, known, vec![record])
 }
 
 fn between(a: &str, b: &str) -> [Candidacy; 2] {
@@ -70,11 +49,15 @@ fn between(a: &str, b: &str) -> [Candidacy; 2] {
     })
 }
 
-fn white(fitted: &mut Fitted) {
+/// A leak and a nonlinearity of the pump on the records, in the metric of the noise as it is.
+fn leak_or_curve(problem: &Problem) -> Fitted<'_> {
+    let two = between("const_leak", "pump_nonlinearity");
+    let mut fitted = fitted(problem, two, &Options::default()).unwrap();
     fitted.metric = Metric {
         noise: ArModel::white(1.0),
         variance: NOISE * NOISE,
     };
+    fitted
 }
 
 fn noisy(records: &[Record], seed: u64) -> Vec<Record> {
@@ -93,13 +76,7 @@ fn noisy(records: &[Record], seed: u64) -> Vec<Record> {
 #[test]
 fn the_power_is_the_mean_of_the_likelihood_ratio() {
     let problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);
-    let mut fitted = fitted(
-        &problem,
-        between("const_leak", "pump_nonlinearity"),
-        &Options::default(),
-    )
-    .unwrap();
-    white(&mut fitted);
+    let fitted = leak_or_curve(&problem);
     let metric = &fitted.metric;
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let values = excitation::steps(300, 30..=60, 3.9, 6.1, &mut rng).unwrap();
@@ -157,13 +134,7 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
 #[test]
 fn for_a_small_effect_the_power_is_that_of_the_signatures() {
     let problem = problem(Plant::SingleTank, ("const_leak", 8.0), 300);
-    let mut fitted = fitted(
-        &problem,
-        between("const_leak", "pump_nonlinearity"),
-        &Options::default(),
-    )
-    .unwrap();
-    white(&mut fitted);
+    let mut fitted = leak_or_curve(&problem);
     let size = 0.02;
     let base = fitted.base.fit.x.clone();
     for (node, own) in fitted.nodes.iter_mut().zip([size, 0.0]) {

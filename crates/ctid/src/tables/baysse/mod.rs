@@ -25,7 +25,7 @@ pub use linear::{Counts, FirstTable, TRUTH};
 pub use rig::{Figure, Fits, Rig, SecondTable};
 
 /// The fewest runs of which variances can be told.
-const LEAST_RUNS: usize = 10;
+pub const FEWEST: usize = 10;
 
 /// The runs that the bands are for.
 const BAND_RUNS: f64 = 100.0;
@@ -190,9 +190,9 @@ pub fn study(
     seed: u64,
     progress: &(impl Fn(Progress) + Sync),
 ) -> Result<Study, Error> {
-    if runs < LEAST_RUNS {
+    if runs < FEWEST {
         return Err(Error::Usage(format!(
-            "--runs is {runs}, but variances need {LEAST_RUNS} or more"
+            "--runs is {runs}, but variances need {FEWEST} or more"
         )));
     }
     let first = FirstTable::new(runs, seed, progress)?;

@@ -71,6 +71,25 @@ fn wrong_usage() {
             ["-1 is not in 1..", "--max-effects"],
         ),
         (
+            "identify tour.csv --method ls --order -1,0",
+            ["'--order <N,M>'", "n from 1 to 4 and m from 0 to n"],
+        ),
+        (
+            "tables --runs -1",
+            [
+                "'-1' for '--runs <N>'",
+                "20 or more for udink, 10 or more for baysse",
+            ],
+        ),
+        (
+            "tables --seed -1",
+            ["'-1' for '--seed <S>'", "from 0 to 18446744073709551615"],
+        ),
+        (
+            "design tour.csv --model tour.toml --between pump_lag sensor_lag --seed -1",
+            ["'-1' for '--seed <S>'", "from 0 to 18446744073709551615"],
+        ),
+        (
             "identify tour.csv --method ct-rls --memory -3",
             ["memory", "-3"],
         ),

@@ -1,15 +1,16 @@
 //! What a person reads in the terminal; all of it is derived from the [`Diagnosis`] that `--json` writes.
 
-use console::Style;
-use missing_effect::{Diagnosis, Parameter, ResidualTests, Score, Shown, Step, Verdict};
+mod curves;
+mod ranking;
 
-use crate::findings;
+use missing_effect::{Diagnosis, ResidualTests, Shown, Step, Verdict};
+
+pub(crate) use self::curves::{overlay, residuals};
+pub(crate) use self::ranking::ranking;
 use crate::look::{Look, Side, table};
 use crate::numbers;
-use crate::plot::{self, Curve, plot};
+use crate::plot;
 
-/// How many effects the ranking shows.
-const RANKED: usize = 8;
 /// How many findings say where a model fails.
 const FAILURES: usize = 5;
 const BAR: usize = 20;
@@ -211,93 +212,6 @@ fn bar(value: f64, largest: f64) -> String {
     "█".repeat(eighths / 8) + rest
 }
 
-/// Measurement and model over time, in the first record.
-pub(crate) fn overlay(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
-    let Some((record, model)) = first_record(diagnosis, step) else {
-        return String::new();
-    };
-    let curves = [
-        Curve {
-            values: &record.output,
-            colour: plot::MEASURED,
-        },
-        Curve {
-            values: model,
-            colour: plot::MODEL,
-        },
-    ];
-    let key = if look.colour {
-        format!(
-            "measured {} and model {}",
-            look.paint(Style::new().fg(plot::MEASURED), "━━"),
-            look.paint(Style::new().fg(plot::MODEL), "━━")
-        )
-    } else {
-        "measured and model".to_string()
-    };
-    let limits = plot::limits([record.output.as_slice(), model]);
-    format!(
-        "{} {key}{}\n{}\n",
-        look.heading(&format!("{}:", record.name)),
-        in_unit(&diagnosis.output_unit),
-        plot(&curves, (0.0, length(record)), limits, 9, look)
-    )
-}
-
-fn in_unit(unit: &str) -> String {
-    if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" [{unit}]")
-    }
-}
-
-/// The residual of each of these steps over time in the first record, all on one scale.
-pub(crate) fn residuals(diagnosis: &Diagnosis, steps: &[&Step], look: Look) -> String {
-    let residuals: Vec<(&&Step, &Shown, Vec<f64>)> = steps
-        .iter()
-        .filter_map(|step| {
-            let (record, model) = first_record(diagnosis, step)?;
-            let residual = record
-                .output
-                .iter()
-                .zip(model)
-                .map(|(y, model)| y - model)
-                .collect();
-            Some((step, record, residual))
-        })
-        .collect();
-    let (low, high) = plot::limits(residuals.iter().map(|(_, _, residual)| residual.as_slice()));
-    let largest = low.abs().max(high.abs());
-    let mut text = String::new();
-    for (step, record, residual) in &residuals {
-        let curve = Curve {
-            values: residual,
-            colour: plot::RESIDUAL,
-        };
-        let title = format!("Measured minus model{}:", in_unit(&diagnosis.output_unit));
-        text += &format!(
-            "{} {}\n{}\n",
-            look.heading(&title),
-            model_name(diagnosis, step),
-            plot(
-                &[curve],
-                (0.0, length(record)),
-                (-largest, largest),
-                5,
-                look
-            )
-        );
-    }
-    text
-}
-
-fn first_record<'a>(diagnosis: &'a Diagnosis, step: &'a Step) -> Option<(&'a Shown, &'a [f64])> {
-    let record = diagnosis.records.first()?;
-    let model = step.simulated.first()?;
-    (model.len() == record.output.len() && model.len() > 1).then_some((record, model))
-}
-
 /// Where a model fails, in words.
 pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
     let name = step_name(diagnosis, step);
@@ -345,130 +259,6 @@ fn residual_tests(tests: &ResidualTests) -> String {
         ),
     };
     format!("{input}; {white}")
-}
-
-/// The columns of the ranking, in order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ranked {
-    Place,
-    Effect,
-    Gain,
-    Error,
-    Size,
-    SizeAlone,
-    Visible,
-}
-
-/// The single effects at the first step, best first.
-pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
-    use Ranked::{Effect, Error, Gain, Place, Size, SizeAlone, Visible};
-    if diagnosis.scores.is_empty() {
-        return String::new();
-    }
-    // As much as the width takes. The verdict refers to what would have been visible: sizes go before it. What an effect does
-    // to the error goes last.
-    let variants: [&[Ranked]; 7] = [
-        &[Place, Effect, Gain, Error, Size, Visible],
-        &[Place, Effect, Gain, Error, SizeAlone, Visible],
-        &[Place, Effect, Error, SizeAlone, Visible],
-        &[Place, Effect, Gain, Error, Visible],
-        &[Place, Effect, Error, Visible],
-        &[Place, Effect, Error],
-        &[Effect, Error],
-    ];
-    let fits = |lines: &Vec<String>| {
-        lines
-            .iter()
-            .all(|line| console::measure_text_width(line) + 2 <= look.width)
-    };
-    let tables = variants.map(|columns| ranking_table(diagnosis, columns, look));
-    let lines = tables
-        .iter()
-        .find(|lines| fits(lines))
-        .unwrap_or(&tables[6]);
-
-    let title = match diagnosis.verdict {
-        Verdict::Adequate => "The catalogue, one effect at a time: none is called for",
-        _ => "The catalogue, one effect at a time, refitted: simulation error on fitted data",
-    };
-    let mut text = format!("{}\n", look.heading(title));
-    for line in lines {
-        text += &format!("  {line}\n");
-    }
-    if diagnosis.scores.len() > RANKED {
-        let more = format!("and {} more", diagnosis.scores.len() - RANKED);
-        text += &format!("  {}\n", look.faint(more));
-    }
-    text.push('\n');
-    text
-}
-
-fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<String> {
-    let scores: Vec<&Score> = diagnosis.scores.iter().take(RANKED).collect();
-    let errors: Vec<Option<f64>> = scores.iter().map(|score| Some(score.rmse)).collect();
-    let errors = numbers::column(&errors);
-    let heading = |column: &Ranked| match column {
-        Ranked::Place => String::new(),
-        Ranked::Effect => look.faint("effect"),
-        Ranked::Gain => look.faint("BIC falls"),
-        Ranked::Error => look.faint("error after"),
-        Ranked::Size | Ranked::SizeAlone => look.faint("size found"),
-        Ranked::Visible => look.faint("visible from"),
-    };
-    let mut rows = vec![columns.iter().map(heading).collect::<Vec<_>>()];
-    for (index, score) in scores.iter().enumerate() {
-        let size = |with_error: bool| {
-            score
-                .size
-                .as_ref()
-                .map_or(String::new(), |found| size(found, with_error))
-        };
-        let cell = |column: &Ranked| match column {
-            Ranked::Place => (index + 1).to_string(),
-            Ranked::Effect => {
-                let name = placed(&score.effect, score.place.as_deref());
-                if findings::is_added(diagnosis, score) {
-                    look.good(name)
-                } else {
-                    name
-                }
-            }
-            Ranked::Gain => numbers::whole(score.bic_gain),
-            Ranked::Error => with_unit(&errors[index], &diagnosis.output_unit),
-            Ranked::Size => size(true),
-            Ranked::SizeAlone => size(false),
-            Ranked::Visible => visible_from(score),
-        };
-        rows.push(columns.iter().map(cell).collect());
-    }
-    let sides: Vec<Side> = columns
-        .iter()
-        .map(|column| match column {
-            Ranked::Place | Ranked::Gain | Ranked::Error => Side::Right,
-            _ => Side::Left,
-        })
-        .collect();
-    table(&sides, &rows)
-}
-
-/// `rim 21.30 ± 0.12 cm`, or without the error, to the digits that it leaves.
-fn size(parameter: &Parameter, with_error: bool) -> String {
-    let name = parameter.name.rsplit('.').next().unwrap_or_default();
-    let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
-    let value = match error.filter(|_| with_error) {
-        Some(error) => format!("{value} ± {error}"),
-        None => value,
-    };
-    format!("{name} {}", with_unit(&value, &parameter.unit))
-}
-
-/// The smallest size that the data would have shown.
-fn visible_from(score: &Score) -> String {
-    match (score.smallest_visible, &score.size) {
-        (Some(smallest), Some(size)) => with_unit(&numbers::significant(smallest, 2), &size.unit),
-        (Some(smallest), None) => numbers::significant(smallest, 2),
-        (None, _) => String::new(),
-    }
 }
 
 /// The parameters of a step.
@@ -564,31 +354,4 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
         text += &look.paragraph("  ", sentence);
     }
     text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::sample;
-
-    #[test]
-    fn a_narrow_ranking_keeps_what_would_have_been_visible() {
-        let mut diagnosis = sample::two_tanks();
-        diagnosis.scores[0].effect = "an_effect_whose_name_is_rather_long".to_owned();
-        let seen = |width: usize| {
-            let text = ranking(
-                &diagnosis,
-                Look {
-                    width,
-                    ..Look::plain()
-                },
-            );
-            let widest = text.lines().skip(1).map(|line| line.chars().count()).max();
-            assert!(widest <= Some(width), "{text}");
-            ["size found", "visible from", "error after"].map(|column| text.contains(column))
-        };
-        assert_eq!(seen(200), [true, true, true]);
-        assert_eq!(seen(80), [false, true, true]);
-        assert_eq!(seen(65), [false, false, true]);
-    }
 }

@@ -1,11 +1,14 @@
 //! `ctid add` and `ctid remove`: they edit the `effects = [...]` line of a model file and leave
 //! everything else as it stands, comments and layout included.
 
+mod layout;
+
 use std::path::Path;
 
 use plants::{Fitted, Place, Placed, Term};
-use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
+use toml_edit::{Array, DocumentMut, Item, Table, value};
 
+use self::layout::{document, push, set_place, take_out};
 use crate::model_file::{self, ModelFile};
 use crate::report::rounded;
 use crate::term_file::{self, TermFile};
@@ -277,87 +280,6 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
     Ok(Edited { text, done })
 }
 
-fn document(file: &str, text: &str) -> Result<DocumentMut, Error> {
-    text.parse()
-        .map_err(|error: toml_edit::TomlError| Error::File {
-            file: file.to_string(),
-            what: error.message().replace('\n', "; "),
-        })
-}
-
-/// Appends to the list, in the list's own layout; makes the list where there is none.
-fn push(document: &mut DocumentMut, id: &str) {
-    let Some(effects) = document.get_mut("effects").and_then(Item::as_array_mut) else {
-        document.insert("effects", value(Array::from_iter([id])));
-        return;
-    };
-    let trailing = effects.trailing().as_str().unwrap_or_default().to_string();
-    let multiline = trailing.contains('\n') && !effects.is_empty();
-    if !multiline {
-        effects.push(id);
-        return;
-    }
-    // One effect a line: a comment behind the last one stays behind it.
-    let indent = effects
-        .iter()
-        .last()
-        .and_then(|last| last.decor().prefix()?.as_str())
-        .and_then(|prefix| prefix.rsplit('\n').next())
-        .unwrap_or_default();
-    let comma = effects.trailing_comma();
-    let newline = trailing.rfind('\n').unwrap_or(0);
-    let item = Value::from(id).decorated(format!("{}\n{indent}", &trailing[..newline]), "");
-    effects.push_formatted(item);
-    effects.set_trailing(&trailing[newline..]);
-    effects.set_trailing_comma(comma);
-}
-
-/// Takes an effect out of the list. What stands before an entry may be the comment of the entry
-/// above it, so it is handed on to what follows.
-fn take_out(effects: &mut Array, id: &str) -> bool {
-    let Some(index) = effects.iter().position(|on| on.as_str() == Some(id)) else {
-        return false;
-    };
-    let removed = effects.remove(index);
-    let prefix = removed.decor().prefix().and_then(|prefix| prefix.as_str());
-    let before = prefix.unwrap_or_default().to_string();
-    let joined = |after: &str| match (before.contains('#'), after.contains('#')) {
-        (true, true) => format!("{}{after}", before.trim_end()),
-        (false, true) => after.to_string(),
-        (_, false) => before.clone(),
-    };
-    if let Some(next) = effects.get_mut(index) {
-        let after = next.decor().prefix().and_then(|prefix| prefix.as_str());
-        let prefix = joined(after.unwrap_or_default());
-        next.decor_mut().set_prefix(prefix);
-    } else if before.contains('#') {
-        let trailing = effects.trailing().as_str().unwrap_or_default();
-        let trailing = format!("{}{trailing}", before.trim_end());
-        effects.set_trailing(trailing);
-    }
-    if effects.is_empty() {
-        effects.set_trailing_comma(false);
-    }
-    true
-}
-
-/// Writes `where = "..."` into the `[effect.X]` table, made where there is none.
-fn set_place(document: &mut DocumentMut, id: &str, word: &str) -> Option<()> {
-    let mut tables = Table::new();
-    tables.set_implicit(true);
-    let mut settings = Table::new();
-    settings.decor_mut().set_prefix("\n");
-    document
-        .entry("effect")
-        .or_insert(Item::Table(tables))
-        .as_table_like_mut()?
-        .entry(id)
-        .or_insert(Item::Table(settings))
-        .as_table_like_mut()?
-        .insert("where", value(word));
-    Some(())
-}
-
 /// ` at the upper tank`, where the plant has two; `assumed` when nobody said which.
 fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
     match model.plant.vessel_name(placed.vessel) {
@@ -381,137 +303,4 @@ fn list(model: &ModelFile) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn added(text: &str, effect: &str) -> String {
-        with_effect("tank.toml", text, effect, None).unwrap().text
-    }
-
-    fn removed(text: &str, effect: &str) -> String {
-        without_effect("tank.toml", text, effect).unwrap().text
-    }
-
-    const COMMENTED: &str = r#"# The tank in hall 3.
-plant = "single-tank"   # as built
-effects = []            # none yet
-
-[known]  # measured with a tape
-area = 154.0
-"#;
-
-    #[test]
-    fn comments_and_layout_stay() {
-        let with = added(COMMENTED, "overflow");
-        assert_eq!(with, COMMENTED.replace("[]", "[\"overflow\"]"));
-        assert_eq!(removed(&with, "overflow"), COMMENTED);
-        let both = added(&with, "pump_lag");
-        assert_eq!(
-            both,
-            COMMENTED.replace("[]", "[\"overflow\", \"pump_lag\"]")
-        );
-        assert_eq!(removed(&both, "overflow"), added(COMMENTED, "pump_lag"));
-        assert_eq!(removed(&both, "pump_lag"), with);
-    }
-
-    #[test]
-    fn a_list_over_several_lines_keeps_its_lines() {
-        let text = r#"plant = "single-tank"
-effects = [
-    "overflow",   # seen in May
-    "pump_lag",   # the new drive
-    # perhaps more
-]
-"#;
-        let more = added(text, "sensor_lag");
-        let expected = text.replace("more\n", "more\n    \"sensor_lag\",\n");
-        assert_eq!(more, expected);
-        assert_eq!(removed(&more, "sensor_lag"), text);
-        let without = removed(text, "pump_lag");
-        for comment in ["# seen in May", "# the new drive", "# perhaps more"] {
-            assert!(without.contains(comment), "{without}");
-        }
-        let none = removed(&without, "overflow");
-        for comment in ["# seen in May", "# the new drive", "# perhaps more"] {
-            assert!(none.contains(comment), "{none}");
-        }
-        assert_eq!(model_file::parse("", &none).unwrap().effects, []);
-    }
-
-    #[test]
-    fn a_missing_line_is_made() {
-        let text = "plant = \"single-tank\" # as built\n\n# sizes\n[known]\narea = 1.0\n";
-        let with = added(text, "overflow");
-        let line = "# as built\neffects = [\"overflow\"]\n";
-        assert_eq!(with, text.replace("# as built\n", line));
-    }
-
-    #[test]
-    fn the_place_is_written_where_there_is_a_choice() {
-        let text = "plant = \"cascaded-tanks\"\neffects = []\n";
-        let edited = with_effect("tank.toml", text, "overflow", Some("lower")).unwrap();
-        assert_eq!(
-            edited.text,
-            "plant = \"cascaded-tanks\"\neffects = [\"overflow\"]\n\n[effect.overflow]\nwhere = \"lower\"\n"
-        );
-        assert_eq!(
-            edited.done,
-            "tank.toml: added overflow at the lower vessel; effects = [\"overflow\"]"
-        );
-        let done = without_effect("tank.toml", &edited.text, "overflow").unwrap();
-        assert!(
-            done.done.contains("[effect.overflow] stays"),
-            "{}",
-            done.done
-        );
-        // The table has waited: nobody need say again where.
-        let again = with_effect("tank.toml", &done.text, "overflow", None).unwrap();
-        assert_eq!(
-            model_file::parse("", &again.text).unwrap().effects[0].vessel,
-            1
-        );
-        let upper = with_effect("tank.toml", &done.text, "overflow", Some("upper")).unwrap();
-        assert_eq!(upper.text.matches("where").count(), 1);
-    }
-
-    #[test]
-    fn what_cannot_be_done_is_refused() {
-        let text = "plant = \"single-tank\"\neffects = [\"overflow\"]\n";
-        let add = |effect, place| match with_effect("tank.toml", text, effect, place) {
-            Err(error) => error.to_string(),
-            Ok(edited) => edited.text,
-        };
-        assert_eq!(
-            add("overflow", None),
-            "tank.toml: overflow is on already; `ctid remove overflow` takes it out"
-        );
-        assert!(add("overflo", None).contains("did you mean overflow?"));
-        assert!(add("sqrt_outflow", None).contains("does not act on plant"));
-        assert!(add("const_leak", Some("upper")).contains("one vessel"));
-        assert!(add("pump_lag", Some("upper")).contains("acts at the actuator"));
-        let remove = without_effect("tank.toml", text, "pump_lag");
-        assert_eq!(
-            remove.err().unwrap().to_string(),
-            "tank.toml: pump_lag is not on, so it cannot be removed; effects = [\"overflow\"]"
-        );
-    }
-
-    #[test]
-    fn a_refused_change_leaves_the_file_as_it_was() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("tank.toml");
-        std::fs::write(&path, "plant = \"single-tank\"\r\neffects = []\r\n").unwrap();
-        assert!(add(&path, "overfow", None).is_err());
-        assert_eq!(
-            std::fs::read(&path).unwrap(),
-            b"plant = \"single-tank\"\r\neffects = []\r\n"
-        );
-        add(&path, "overflow", None).unwrap();
-        assert_eq!(
-            std::fs::read(&path).unwrap(),
-            b"plant = \"single-tank\"\r\neffects = [\"overflow\"]\r\n"
-        );
-        // Nothing is left beside it.
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
-}
+mod tests;

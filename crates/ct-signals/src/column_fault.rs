@@ -1,0 +1,120 @@
+//! What can be wrong with the columns of a file. The mend depends on where the columns were named, which a caller may know
+//! better.
+
+use crate::unit;
+
+/// What is wrong with a column, without the mend.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum ColumnFault {
+    /// A column that is needed is not in the file.
+    Missing {
+        /// `time`, `input`, `output` or `reference`.
+        role: &'static str,
+        /// The name that was looked for, quoted, or the letter it was to begin with.
+        wanted: String,
+        /// All the columns of the file, quoted.
+        columns: String,
+        /// The column whose name is close to the one that was looked for.
+        closest: Option<String>,
+    },
+    /// Several columns fit one role.
+    Ambiguous {
+        /// `time`, `input`, `output` or `reference`.
+        role: &'static str,
+        /// The columns that fit, quoted.
+        candidates: String,
+    },
+    /// One column was named for two roles.
+    Shared {
+        /// The column's header.
+        column: String,
+        /// The first role.
+        first: &'static str,
+        /// The second role.
+        second: &'static str,
+    },
+    /// The name and the file give the same column different units.
+    Unit {
+        /// The column's header.
+        column: String,
+        /// The unit in the file's header.
+        file_unit: String,
+        /// The unit in the name.
+        named_unit: String,
+    },
+}
+
+impl ColumnFault {
+    /// The fault and its mend as they follow the place in a message: `namer` is what named the columns, `mend` begins in small
+    /// letters.
+    #[must_use]
+    pub fn said(&self, namer: &str, mend: &str) -> String {
+        match self {
+            Self::Missing {
+                role,
+                wanted,
+                columns,
+                closest,
+            } => {
+                let what = format!(": no column {wanted} for the {role}; the file has {columns}");
+                match closest {
+                    Some(name) => format!("{what}; did you mean \"{name}\"? {}", capital(mend)),
+                    None => format!("{what}; {mend}"),
+                }
+            }
+            Self::Ambiguous { role, candidates } => {
+                format!(": {candidates} could each be the {role}; {mend}")
+            }
+            Self::Shared {
+                column,
+                first,
+                second,
+            } => format!(
+                ", column \"{column}\": it is named both as {first} and as {second}; {mend}"
+            ),
+            Self::Unit {
+                column,
+                file_unit,
+                named_unit,
+            } => format!(
+                ", column \"{column}\": the file says {file_unit} but {namer} says {named_unit}; {mend}"
+            ),
+        }
+    }
+
+    /// With the mend for a model file, whose `[columns]` names them.
+    pub(crate) fn in_model(&self) -> String {
+        let mend = match self {
+            Self::Missing { role, .. } => format!("set {role} = \"...\" under [columns]"),
+            Self::Ambiguous { role, .. } => format!(
+                "say which with {role} = \"...\" under [columns], and rename columns of the same name"
+            ),
+            Self::Shared { .. } => "give each its own column under [columns]".to_string(),
+            Self::Unit {
+                column,
+                file_unit,
+                named_unit,
+            } => {
+                // No constant of a model is in the unit of the time.
+                let of_time = [file_unit, named_unit]
+                    .iter()
+                    .all(|unit| unit::seconds(unit).is_some());
+                let then = if of_time {
+                    format!(": {} are understood", unit::TIMES)
+                } else {
+                    format!(" and give the model's constants in {file_unit}")
+                };
+                format!("convert the column, or write \"{column}\" under [columns]{then}")
+            }
+        };
+        self.said("the model", &mend)
+    }
+}
+
+fn capital(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    letters.next().map_or(String::new(), |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
+}

@@ -1,0 +1,203 @@
+//! The command line: what may be typed, and what is then called.
+
+mod compare;
+mod identify;
+mod tables;
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use self::compare::{Compare, Diagnose};
+use self::identify::Identify;
+use self::tables::Tables;
+use crate::look::Look;
+use crate::output::{self, Found, Kind, Output};
+use crate::progress::Bar;
+use crate::{Error, catalogue, design, edit, tour};
+
+/// Says which physical effect a model of measured data is missing.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Without a command: a tour on a bundled record with a hidden effect; it writes report.html here."
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Fit the model and show it over the measurements, and where it fails
+    Compare(Compare),
+    /// Find the missing effect: score the catalogue, confirm by refit, say what the data can tell
+    Diagnose(Diagnose),
+    /// Add an effect to a model file; comments and layout stay
+    Add(Add),
+    /// Remove an effect from a model file; comments and layout stay
+    Remove(Remove),
+    /// List the catalogue of effects, or say all about one
+    Effects(Effects),
+    /// Propose the next experiment, which tells two effects apart
+    Design(design::Arguments),
+    /// Identify a linear model in continuous time from a record
+    Identify(Identify),
+    /// Compute the tables of a paper again, with many noises, and say which printed figures agree
+    Tables(Tables),
+}
+
+/// Where results go besides the terminal.
+#[derive(Debug, Args)]
+struct Results {
+    /// Write the result as JSON
+    #[arg(long, value_name = "F")]
+    json: Option<PathBuf>,
+    /// Write an interactive page that needs no network
+    #[arg(long, value_name = "F.html")]
+    report: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct Add {
+    /// The effect, as `ctid effects` lists it, or with --from a name of your own
+    effect: String,
+    /// Model file
+    #[arg(long, value_name = "M.toml")]
+    model: PathBuf,
+    /// The shape of a term of your own, as `ctid diagnose --unknown` writes it
+    #[arg(long, value_name = "F.csv", conflicts_with = "place")]
+    from: Option<PathBuf>,
+    /// The vessel it acts in, where the plant has two
+    #[arg(long = "where", value_enum)]
+    place: Option<Vessel>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Vessel {
+    Upper,
+    Lower,
+}
+
+#[derive(Debug, Args)]
+struct Remove {
+    /// The effect
+    effect: String,
+    /// Model file
+    #[arg(long, value_name = "M.toml")]
+    model: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct Effects {
+    /// One effect to say all about
+    effect: Option<String>,
+}
+
+/// Does what the command line asks for; what a person reads goes to `out`.
+///
+/// # Errors
+/// On any wrong usage or input, in one line; nothing has been overwritten then.
+pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+    match cli.command {
+        None => tour::run(Path::new("."), out, look, &Bar::new()).map(|_| ()),
+        Some(Command::Compare(arguments)) => arguments.run(out, look),
+        Some(Command::Diagnose(arguments)) => arguments.run(out, look),
+        Some(Command::Add(Add {
+            effect,
+            model,
+            from: Some(shape),
+            ..
+        })) => say(out, &(edit::add_term(&model, &effect, &shape)? + "\n")),
+        Some(Command::Add(Add {
+            effect,
+            model,
+            place,
+            from: None,
+        })) => {
+            let place = place.map(|vessel| match vessel {
+                Vessel::Upper => "upper",
+                Vessel::Lower => "lower",
+            });
+            say(out, &(edit::add(&model, &effect, place)? + "\n"))
+        }
+        Some(Command::Remove(Remove { effect, model })) => {
+            say(out, &(edit::remove(&model, &effect)? + "\n"))
+        }
+        Some(Command::Effects(Effects { effect: None })) => say(out, &catalogue::list(look)),
+        Some(Command::Effects(Effects {
+            effect: Some(effect),
+        })) => say(out, &catalogue::describe(&effect, look)?),
+        Some(Command::Design(arguments)) => {
+            let (proposal, outputs) = arguments.run()?;
+            let text = design::text::design(&proposal.design, look);
+            finish(&proposal, &text, &outputs, out, look)
+        }
+        Some(Command::Identify(arguments)) => arguments.run(out, look),
+        Some(Command::Tables(arguments)) => arguments.run(out, look),
+    }
+}
+
+impl Results {
+    /// Where the results go, checked.
+    fn plan(&self, inputs: &[&Path], unknown: Option<&Path>) -> Result<Vec<Output>, Error> {
+        let unknown = unknown.map(|path| (Kind::Unknown, path));
+        let wanted: Vec<_> = self.wanted().chain(unknown).collect();
+        output::plan(&wanted, inputs)
+    }
+
+    fn wanted(&self) -> impl Iterator<Item = (Kind, &Path)> {
+        let json = self.json.as_deref().map(|path| (Kind::Json, path));
+        let report = self.report.as_deref().map(|path| (Kind::Report, path));
+        json.into_iter().chain(report)
+    }
+}
+
+/// Writes the files, then says what was found and what was written.
+fn finish(
+    found: &impl Found,
+    text: &str,
+    outputs: &[Output],
+    out: &mut dyn Write,
+    look: Look,
+) -> Result<(), Error> {
+    // The files first: whoever pipes the text into `head` still gets them.
+    let mut written = Vec::with_capacity(outputs.len());
+    for output in outputs {
+        written.push(output.write(found)?);
+    }
+    let mut text = text.to_string();
+    if !outputs.is_empty() {
+        text.push('\n');
+    }
+    for (output, written) in outputs.iter().zip(written) {
+        let path = output.path().display();
+        text += &look.faint(if written {
+            format!("wrote {path}")
+        } else {
+            format!("{path} is not written: nothing is left unexplained that has a shape")
+        });
+        text.push('\n');
+    }
+    say(out, &text)
+}
+
+/// Writes text; a reader that has seen enough and gone is no error.
+pub(crate) fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+}

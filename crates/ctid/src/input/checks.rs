@@ -1,0 +1,262 @@
+//! Whether records fit each other, the model's units and sizes, and its parameters.
+
+use ct_signals::{ROWS_PER_PARAMETER, Record};
+use plants::controller::Controller;
+use plants::{Outlet, Place, Plant, Scales};
+
+use crate::model_file::{ControllerLaw, ControllerSettings, ModelFile};
+use crate::{Error, numbers};
+
+/// Readings above the tank's height by this part, and commands above their range, are noise.
+const BEYOND_THE_RANGE: f64 = 1.01;
+
+/// Where an effect of the sensor is in the model a full tank may read this many times its height; a reading beyond is in
+/// another unit.
+const BEYOND_THE_TANK: f64 = 1.5;
+
+/// Readings this far below zero, as a part of what the record spans, are no noise about an empty tank.
+const BELOW_THE_OUTLET: f64 = 0.1;
+
+/// Sampling intervals that differ by less than this part are one: times are read from text.
+const SAME_INTERVAL: f64 = 0.01;
+
+/// The controller as it ran in the records.
+pub(super) fn controller(
+    model_name: &str,
+    settings: &ControllerSettings,
+    records: &[Record],
+) -> Result<Controller, Error> {
+    let interval = records.first().map_or(1.0, Record::sample_interval);
+    for record in records {
+        if let Some(reference) = &record.reference
+            && !reference.unit.is_empty()
+            && !record.output.unit.is_empty()
+            && reference.unit != record.output.unit
+        {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "the reference is in {}, the output in {}: a controller compares the two; convert one of them, or correct its header",
+                    reference.unit, record.output.unit
+                ),
+            });
+        }
+        if matches!(settings.law, ControllerLaw::Pi { .. }) {
+            continue;
+        }
+        let uneven = record
+            .time
+            .windows(2)
+            .find(|pair| (pair[1] - pair[0] - interval).abs() > SAME_INTERVAL * interval);
+        if let Some(pair) = uneven {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "a controller of type \"RS\" runs at one interval, {interval} s, but {} s follow t = {} s; resample the record, or delete [controller] from {model_name}",
+                    numbers::significant(pair[1] - pair[0], 4),
+                    pair[0]
+                ),
+            });
+        }
+    }
+    settings.controller(interval).map_err(|error| Error::File {
+        file: model_name.to_string(),
+        what: error.to_string(),
+    })
+}
+
+/// Records that are fitted by one model are in one unit.
+pub(super) fn check_units(records: &[Record], test: &[Record]) -> Result<(), Error> {
+    let Some((first, others)) = records.split_first() else {
+        return Err(Error::Usage(
+            "no record is given; name a CSV file".to_string(),
+        ));
+    };
+    for other in others.iter().chain(test) {
+        for (here, there) in [(&other.input, &first.input), (&other.output, &first.output)] {
+            if here.unit != there.unit {
+                let named = |unit: &str| match unit {
+                    "" => "without a unit".to_string(),
+                    unit => format!("in {unit}"),
+                };
+                return Err(Error::File {
+                    file: other.name.clone(),
+                    what: format!(
+                        "column \"{}\" is {}, but {} has it {}; convert one of them, or write the unit in its header",
+                        here.name,
+                        named(&here.unit),
+                        first.name,
+                        named(&there.unit)
+                    ),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A level above the tank is in another unit than the tank, or its sensor is not right.
+pub(super) fn check_height<'a>(
+    model_name: &str,
+    model: &ModelFile,
+    records: impl Iterator<Item = &'a Record>,
+) -> Result<(), Error> {
+    let Some(height) = model.known.tank_height else {
+        return Ok(());
+    };
+    let of_sensor = model
+        .effects
+        .iter()
+        .any(|placed| placed.effect.place == Place::Sensor);
+    let (most, mend) = if of_sensor {
+        (BEYOND_THE_TANK, "")
+    } else {
+        (
+            BEYOND_THE_RANGE,
+            ", or, where the sensor reads too high, run `ctid add sensor_offset`",
+        )
+    };
+    for record in records {
+        let (_, highest) = record.output_range();
+        if highest > most * height {
+            return Err(Error::File {
+                file: model_name.to_string(),
+                what: format!(
+                    "tank_height = {height}, but column \"{}\" of {} reaches {}{}; give the height in the output's unit{mend}",
+                    record.output.name,
+                    record.name,
+                    numbers::significant(highest, 3),
+                    after_space(&record.output.unit)
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// A command beyond its full range is in another unit, or the range is that of another actuator.
+pub(super) fn check_input<'a>(
+    model_name: &str,
+    model: &ModelFile,
+    records: impl Iterator<Item = &'a Record>,
+) -> Result<(), Error> {
+    let Some(range) = model.known.input_range else {
+        return Ok(());
+    };
+    for record in records {
+        let (low, high) = record.input_range();
+        let furthest = if -low > high { low } else { high };
+        if furthest.abs() > BEYOND_THE_RANGE * range {
+            return Err(Error::File {
+                file: model_name.to_string(),
+                what: format!(
+                    "input_range = {range}, but column \"{}\" of {} reaches {}{}; give the full range of the command in its unit, or delete the line",
+                    record.input.name,
+                    record.name,
+                    numbers::significant(furthest, 3),
+                    after_space(&record.input.unit)
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// A unit behind a number.
+fn after_space(unit: &str) -> String {
+    match unit {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    }
+}
+
+/// Where the outflow is a square root of the level a reading far below zero has another zero than the outlet: no such
+/// level can be simulated. Noise about an empty tank may reach below it, and so may a sensor whose offset is in the model.
+pub(super) fn check_levels<'a>(
+    model: &ModelFile,
+    mut records: impl Iterator<Item = &'a Record>,
+) -> Result<(), Error> {
+    let offset = model
+        .effects
+        .iter()
+        .any(|placed| placed.effect.id == "sensor_offset");
+    if model.plant.outlet() != Outlet::Torricelli || offset {
+        return Ok(());
+    }
+    let below = records.find_map(|record| {
+        let (low, high) = record.output_range();
+        (low < -BELOW_THE_OUTLET * (high - low)).then_some((record, low))
+    });
+    let Some((record, low)) = below else {
+        return Ok(());
+    };
+    let unit = after_space(&record.output.unit);
+    Err(Error::File {
+        file: record.name.clone(),
+        what: format!(
+            "column \"{}\" falls to {}{unit}, but {} lets out by the square root of the level, which is not below zero: \
+             add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, where the \
+             offset is to be fitted, run `ctid add sensor_offset`",
+            record.output.name,
+            numbers::significant(low, 3),
+            model.plant.id()
+        ),
+    })
+}
+
+/// A term is written in the units of the record that it was found on.
+pub(super) fn check_terms(
+    model_name: &str,
+    model: &ModelFile,
+    record: &Record,
+) -> Result<(), Error> {
+    let area_known =
+        model.plant.outlet() == plants::Outlet::Torricelli && model.known.area[0].is_some();
+    for own in &model.terms {
+        for (written, unit, what) in [
+            (&own.at_unit, own.term.variable.unit(), "at"),
+            (&own.unit, own.term.unit(), "value"),
+        ] {
+            let here = unit.label(&record.output.unit, &record.input.unit, area_known);
+            if !written.is_empty() && *written != here {
+                return Err(Error::File {
+                    file: model_name.to_string(),
+                    what: format!(
+                        "[term.{}] has {what} in {written}, but with {} it would be in {here}; convert its numbers and its unit",
+                        own.term.name, record.name
+                    ),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Enough rows for the parameters; every record brings initial levels of its own.
+pub(super) fn check_rows(model: &ModelFile, records: &[Record]) -> Result<(), Error> {
+    let [first, others @ ..] = records else {
+        return Ok(());
+    };
+    let scales = Scales::from_ranges(
+        first.input_range(),
+        first.output_range(),
+        first.sample_interval(),
+        first.duration(),
+    );
+    let parameters = model.structure(scales)?.parameters().len() - model.fixed.len();
+    let needed = parameters + records.len() * Plant::vessels(model.plant);
+    if others.is_empty() {
+        return Ok(first.require_rows(needed)?);
+    }
+    let rows: usize = records.iter().map(Record::len).sum();
+    if rows >= needed * ROWS_PER_PARAMETER {
+        return Ok(());
+    }
+    let names: Vec<&str> = records.iter().map(|record| record.name.as_str()).collect();
+    Err(Error::Record(ct_signals::Error::TooFewRows {
+        record: names.join(" and "),
+        rows,
+        needed: needed * ROWS_PER_PARAMETER,
+        why: format!(" to fit {needed} parameters"),
+    }))
+}

@@ -1,0 +1,161 @@
+//! The catalogue, one effect at a time, as wide as the terminal allows.
+
+use missing_effect::{Diagnosis, Parameter, Score, Verdict};
+
+use super::{placed, with_unit};
+use crate::look::{Look, Side, table};
+use crate::{findings, numbers};
+
+/// How many effects the ranking shows.
+const RANKED: usize = 8;
+
+/// The columns of the ranking, in order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ranked {
+    Place,
+    Effect,
+    Gain,
+    Error,
+    Size,
+    SizeAlone,
+    Visible,
+}
+
+/// The single effects at the first step, best first.
+pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
+    use Ranked::{Effect, Error, Gain, Place, Size, SizeAlone, Visible};
+    if diagnosis.scores.is_empty() {
+        return String::new();
+    }
+    // As much as the width takes. The verdict refers to what would have been visible: sizes go before it. What an effect does
+    // to the error goes last.
+    let variants: [&[Ranked]; 7] = [
+        &[Place, Effect, Gain, Error, Size, Visible],
+        &[Place, Effect, Gain, Error, SizeAlone, Visible],
+        &[Place, Effect, Error, SizeAlone, Visible],
+        &[Place, Effect, Gain, Error, Visible],
+        &[Place, Effect, Error, Visible],
+        &[Place, Effect, Error],
+        &[Effect, Error],
+    ];
+    let fits = |lines: &Vec<String>| {
+        lines
+            .iter()
+            .all(|line| console::measure_text_width(line) + 2 <= look.width)
+    };
+    let tables = variants.map(|columns| ranking_table(diagnosis, columns, look));
+    let lines = tables
+        .iter()
+        .find(|lines| fits(lines))
+        .unwrap_or(&tables[6]);
+
+    let title = match diagnosis.verdict {
+        Verdict::Adequate => "The catalogue, one effect at a time: none is called for",
+        _ => "The catalogue, one effect at a time, refitted: simulation error on fitted data",
+    };
+    let mut text = format!("{}\n", look.heading(title));
+    for line in lines {
+        text += &format!("  {line}\n");
+    }
+    if diagnosis.scores.len() > RANKED {
+        let more = format!("and {} more", diagnosis.scores.len() - RANKED);
+        text += &format!("  {}\n", look.faint(more));
+    }
+    text.push('\n');
+    text
+}
+
+fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<String> {
+    let scores: Vec<&Score> = diagnosis.scores.iter().take(RANKED).collect();
+    let errors: Vec<Option<f64>> = scores.iter().map(|score| Some(score.rmse)).collect();
+    let errors = numbers::column(&errors);
+    let heading = |column: &Ranked| match column {
+        Ranked::Place => String::new(),
+        Ranked::Effect => look.faint("effect"),
+        Ranked::Gain => look.faint("BIC falls"),
+        Ranked::Error => look.faint("error after"),
+        Ranked::Size | Ranked::SizeAlone => look.faint("size found"),
+        Ranked::Visible => look.faint("visible from"),
+    };
+    let mut rows = vec![columns.iter().map(heading).collect::<Vec<_>>()];
+    for (index, score) in scores.iter().enumerate() {
+        let size = |with_error: bool| {
+            score
+                .size
+                .as_ref()
+                .map_or(String::new(), |found| size(found, with_error))
+        };
+        let cell = |column: &Ranked| match column {
+            Ranked::Place => (index + 1).to_string(),
+            Ranked::Effect => {
+                let name = placed(&score.effect, score.place.as_deref());
+                if findings::is_added(diagnosis, score) {
+                    look.good(name)
+                } else {
+                    name
+                }
+            }
+            Ranked::Gain => numbers::whole(score.bic_gain),
+            Ranked::Error => with_unit(&errors[index], &diagnosis.output_unit),
+            Ranked::Size => size(true),
+            Ranked::SizeAlone => size(false),
+            Ranked::Visible => visible_from(score),
+        };
+        rows.push(columns.iter().map(cell).collect());
+    }
+    let sides: Vec<Side> = columns
+        .iter()
+        .map(|column| match column {
+            Ranked::Place | Ranked::Gain | Ranked::Error => Side::Right,
+            _ => Side::Left,
+        })
+        .collect();
+    table(&sides, &rows)
+}
+
+/// `rim 21.30 ± 0.12 cm`, or without the error, to the digits that it leaves.
+fn size(parameter: &Parameter, with_error: bool) -> String {
+    let name = parameter.name.rsplit('.').next().unwrap_or_default();
+    let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
+    let value = match error.filter(|_| with_error) {
+        Some(error) => format!("{value} ± {error}"),
+        None => value,
+    };
+    format!("{name} {}", with_unit(&value, &parameter.unit))
+}
+
+/// The smallest size that the data would have shown.
+fn visible_from(score: &Score) -> String {
+    match (score.smallest_visible, &score.size) {
+        (Some(smallest), Some(size)) => with_unit(&numbers::significant(smallest, 2), &size.unit),
+        (Some(smallest), None) => numbers::significant(smallest, 2),
+        (None, _) => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn a_narrow_ranking_keeps_what_would_have_been_visible() {
+        let mut diagnosis = sample::two_tanks();
+        diagnosis.scores[0].effect = "an_effect_whose_name_is_rather_long".to_owned();
+        let seen = |width: usize| {
+            let text = ranking(
+                &diagnosis,
+                Look {
+                    width,
+                    ..Look::plain()
+                },
+            );
+            let widest = text.lines().skip(1).map(|line| line.chars().count()).max();
+            assert!(widest <= Some(width), "{text}");
+            ["size found", "visible from", "error after"].map(|column| text.contains(column))
+        };
+        assert_eq!(seen(200), [true, true, true]);
+        assert_eq!(seen(80), [false, true, true]);
+        assert_eq!(seen(65), [false, false, true]);
+    }
+}

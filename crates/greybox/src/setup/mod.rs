@@ -1,0 +1,376 @@
+//! A structure set against records: the vector that is fitted, and its bounds.
+
+mod rows;
+mod simulation;
+
+use std::collections::BTreeMap;
+
+use ct_signals::{Hold, Record};
+use plants::{Command, Scales, Structure, controller::Controller};
+
+pub use self::{
+    rows::Rows,
+    simulation::{LoopRun, Simulated},
+};
+use crate::{Error, LinearPlant, Replay, feedback::Feedback, reading_step::reading_step};
+
+/// A structure, the records, and which parameters are free.
+///
+/// The fitted vector holds the structure's parameters (free ones and fixed ones), then for every record the initial
+/// level of every vessel and what stood behind every lag ([`Structure::lags`]) and, where the loop is simulated
+/// ([`Setup::in_loop`]), the states of the controller.
+#[derive(Debug, Clone)]
+pub struct Setup<'a> {
+    /// The structure.
+    pub structure: Structure,
+    /// The records that are fitted together.
+    pub records: &'a [Record],
+    /// Parameters that are not fitted, with their values.
+    pub fixed: BTreeMap<String, f64>,
+    /// Equal parts of a sampling interval in the simulation.
+    pub substeps: usize,
+    names: Vec<String>,
+    bounds: Vec<(f64, f64)>,
+    /// Positions of the parameters that are fitted.
+    free: Vec<usize>,
+    /// How many entries come before the initial states.
+    parameters: usize,
+    /// The controller, where the loop is simulated.
+    feedback: Option<Feedback>,
+}
+
+/// What an initial state costs in [`Setup::price`].
+///
+/// The logarithm of the samples stands for what a record tells of a parameter, which grows with its length. An initial state is
+/// forgotten after a few time constants, and a longer record tells no more of it. Two is the price of Akaike's criterion. Where
+/// it costs the logarithm, a lag, whose state before the record is unknown, is handicapped against a dead time.
+const STATE_PRICE: f64 = 2.0;
+
+/// Scales of records as the structure meets them first.
+pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<Scales> {
+    let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    let input = records.iter().map(Record::input_range).reduce(wider)?;
+    let output = records.iter().map(Record::output_range).reduce(wider)?;
+    let sample = records
+        .iter()
+        .map(Record::sample_interval)
+        .fold(f64::INFINITY, f64::min);
+    let duration = records.iter().map(Record::duration).fold(0.0, f64::max);
+    let mut scales = Scales::from_ranges(input, output, sample, duration);
+    if let Some(range) = input_range {
+        scales.input_range = range;
+    }
+    scales.reading_step = reading_step(records).unwrap_or(0.0);
+    Some(scales)
+}
+
+impl<'a> Setup<'a> {
+    /// A structure against records.
+    ///
+    /// # Errors
+    /// Where there is no record, a record is not sound, or `fixed` names a parameter that there is not.
+    pub fn new(
+        structure: Structure,
+        records: &'a [Record],
+        fixed: BTreeMap<String, f64>,
+    ) -> Result<Self, Error> {
+        Self::build(structure, records, fixed, None)
+    }
+
+    fn build(
+        structure: Structure,
+        records: &'a [Record],
+        fixed: BTreeMap<String, f64>,
+        feedback: Option<Feedback>,
+    ) -> Result<Self, Error> {
+        if records.is_empty() {
+            return Err(Error::NoRecord);
+        }
+        for record in records {
+            record.validate()?;
+        }
+        let plant = structure.plant;
+        let mut names = structure.parameter_names();
+        let mut bounds: Vec<(f64, f64)> = structure
+            .parameters()
+            .iter()
+            .map(|p| (p.lower, p.upper))
+            .collect();
+        for name in fixed.keys() {
+            // A name of an effect that is not on in this structure is no mistake: it waits.
+            let effect_known = name
+                .split_once('.')
+                .is_some_and(|(effect, _)| plants::EffectInfo::find(effect).is_some());
+            if !names.contains(name) && !effect_known {
+                return Err(Error::UnknownParameter {
+                    name: name.clone(),
+                    known: names.join(", "),
+                });
+            }
+        }
+        let mut free: Vec<usize> = (0..names.len())
+            .filter(|&i| !fixed.contains_key(&names[i]))
+            .collect();
+        let reach = structure.scales.largest_level().max(f64::MIN_POSITIVE);
+        // An empty tank is a trap: the outflow's slope is infinite there, and a step that overshot to it would stay.
+        let lowest = if plant.outlet() == plants::Outlet::Torricelli {
+            1e-6 * reach
+        } else {
+            -1e3 * reach
+        };
+        let lags = structure.lags();
+        let parameters = names.len();
+        for (r, record) in records.iter().enumerate() {
+            let of = if records.len() > 1 {
+                format!(", record {}", r + 1)
+            } else {
+                String::new()
+            };
+            for vessel in 0..plant.vessels() {
+                free.push(names.len());
+                names.push(format!("{}(0){of}", plant.level_name(vessel)));
+                bounds.push((lowest, 1e3 * reach));
+            }
+            // Before the record anything may have happened, and a lag remembers it.
+            for &lag in &lags {
+                let (name, range) = structure.lag_before(lag, record.input.values[0]);
+                let name = name + &of;
+                if !fixed.contains_key(&name) {
+                    free.push(names.len());
+                }
+                names.push(name);
+                bounds.push(range);
+            }
+            if let Some(feedback) = &feedback {
+                for (name, range) in feedback.entries(r, structure.scales.input) {
+                    let name = name + &of;
+                    if feedback.released && !fixed.contains_key(&name) {
+                        free.push(names.len());
+                    }
+                    names.push(name);
+                    bounds.push(range);
+                }
+            }
+        }
+        Ok(Self {
+            structure,
+            records,
+            fixed,
+            substeps: 1,
+            names,
+            bounds,
+            free,
+            parameters,
+            feedback,
+        })
+    }
+
+    /// The same structure and records in the loop of a controller, simulated from the reference, and the vector `x` with
+    /// the controller's initial states: those with which it gives the measured command.
+    ///
+    /// From here on [`Setup::rows`], [`Setup::linearise`] and all fits take the loop for the model, and their rows are
+    /// filtered so that the residual is the disturbance at the plant's output (the head of `feedback.rs` says how and
+    /// why). [`Setup::simulate`] and [`Setup::residuals`] go on to run on the measured command, so that errors compare.
+    ///
+    /// # Errors
+    /// Where a record has no reference or a constant one, or its command is not held.
+    pub fn in_loop(&self, controller: &Controller, x: &[f64]) -> Result<(Self, Vec<f64>), Error> {
+        let (sum, count) = self
+            .records
+            .iter()
+            .flat_map(|record| &record.input.values)
+            .fold((0.0, 0.0), |(sum, count), u| (sum + u, count + 1.0));
+        let plant = LinearPlant::at(&self.structure, &x[..self.parameter_count()], sum / count)?;
+        let feedback = Feedback::new(controller, self.records, plant)?;
+        let mut with = x[..self.parameter_count()].to_vec();
+        for (r, replay) in feedback.replays.iter().enumerate() {
+            with.extend(&x[self.plant_states_of(r)]);
+            with.extend(&replay.states);
+        }
+        Ok((self.rebuilt(self.structure.clone(), Some(feedback))?, with))
+    }
+
+    fn rebuilt(&self, structure: Structure, feedback: Option<Feedback>) -> Result<Self, Error> {
+        let mut setup = Self::build(structure, self.records, self.fixed.clone(), feedback)?;
+        setup.substeps = self.substeps;
+        Ok(setup)
+    }
+
+    /// The same setup with the controller's initial states fitted like the others.
+    ///
+    /// They are known from the measured command, and by default they stay there: the knowledge of where the command
+    /// stood is worth much. Let go, they take the offset of a linear tank with them, whose standard error is then gone, and
+    /// a static coefficient of a tank is known half as well.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn with_unknown_controller_states(&self) -> Result<Self, Error> {
+        let mut feedback = self.feedback.clone();
+        if let Some(feedback) = &mut feedback {
+            feedback.released = true;
+        }
+        self.rebuilt(self.structure.clone(), feedback)
+    }
+
+    /// What the controller gives on the measured reading of each record; empty where the loop is not simulated.
+    #[must_use]
+    pub fn replays(&self) -> &[Replay] {
+        self.feedback.as_ref().map_or(&[], |f| &f.replays)
+    }
+
+    /// A setup from records alone: the scales are taken from them.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn from_records(
+        plant: plants::Plant,
+        known: plants::Known,
+        effects: &[plants::Placed],
+        records: &'a [Record],
+        fixed: BTreeMap<String, f64>,
+    ) -> Result<Self, Error> {
+        let scales = scales_of(records, known.input_range).ok_or(Error::NoRecord)?;
+        let mut structure = Structure::new(plant, known, scales);
+        for &effect in effects {
+            structure = structure.with(effect)?;
+        }
+        Self::new(structure, records, fixed)
+    }
+
+    /// The same records against another structure.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn with_structure(&self, structure: Structure) -> Result<Self, Error> {
+        self.rebuilt(structure, self.feedback.clone())
+    }
+
+    /// The same structure against other records, in the same scales, run on the measured command.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn with_records<'b>(&self, records: &'b [Record]) -> Result<Setup<'b>, Error> {
+        let mut setup = Setup::new(self.structure.clone(), records, self.fixed.clone())?;
+        setup.substeps = self.substeps;
+        Ok(setup)
+    }
+
+    /// Names of the vector's entries.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Bounds of the vector's entries.
+    #[must_use]
+    pub fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
+    }
+
+    /// Positions of the entries that are fitted.
+    #[must_use]
+    pub fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    /// How many of the vector's entries are parameters, before the initial states.
+    #[must_use]
+    pub fn parameter_count(&self) -> usize {
+        self.parameters
+    }
+
+    /// The unit of every entry in words.
+    #[must_use]
+    pub fn unit_labels(&self) -> Vec<String> {
+        let record = &self.records[0];
+        let (level, input) = (&record.output.unit, &record.input.unit);
+        let parameters = self.structure.parameters();
+        let mut units: Vec<String> = parameters
+            .iter()
+            .map(|info| self.structure.unit_label(info, level, input))
+            .collect();
+        for _ in self.records {
+            units.extend((0..self.structure.plant.vessels()).map(|_| level.clone()));
+            units.extend(self.structure.lags().iter().map(|lag| {
+                if lag.effect.place == plants::Place::Actuator {
+                    input.clone()
+                } else {
+                    level.clone()
+                }
+            }));
+            let controller = self.feedback.as_ref().map_or(0, |f| f.controller.states());
+            units.extend((0..controller).map(|_| input.clone()));
+        }
+        units
+    }
+
+    /// Entries of one record: its initial levels, what its lags begin with, the controller's states.
+    pub(crate) fn states(&self) -> usize {
+        (self.names.len() - self.parameters) / self.records.len()
+    }
+
+    /// Puts the fixed parameters' values in their places.
+    pub(crate) fn impose_fixed(&self, x: &mut [f64]) {
+        for (name, value) in self.names.iter().zip(x) {
+            if let Some(fixed) = self.fixed.get(name) {
+                *value = *fixed;
+            }
+        }
+    }
+
+    /// Holds every parameter; only initial levels stay free.
+    pub(crate) fn freeze_parameters(&mut self) {
+        let count = self.parameter_count();
+        self.free.retain(|&i| i >= count);
+    }
+
+    /// What the fitted numbers cost in the Bayesian information criterion, with a noise of so many coefficients and its variance:
+    /// the logarithm of the samples each, but [`STATE_PRICE`] for an initial state.
+    #[must_use]
+    pub fn price(&self, noise_order: usize) -> f64 {
+        let (parameters, states): (Vec<usize>, Vec<usize>) =
+            self.free.iter().partition(|&&i| i < self.parameters);
+        let lasting = parameters.len() + 1 + noise_order;
+        lasting as f64 * (self.samples() as f64).ln() + STATE_PRICE * states.len() as f64
+    }
+
+    /// Samples in all records.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.records.iter().map(Record::len).sum()
+    }
+
+    /// Positions of the initial states of record `r`.
+    fn states_of(&self, r: usize) -> std::ops::Range<usize> {
+        let n = self.states();
+        let from = self.parameter_count() + r * n;
+        from..from + n
+    }
+
+    /// Positions of the plant's initial states of record `r`, from 0, without those of the controller.
+    #[must_use]
+    pub fn plant_states_of(&self, r: usize) -> std::ops::Range<usize> {
+        let own = self.states_of(r);
+        let controller = self.feedback.as_ref().map_or(0, |f| f.controller.states());
+        own.start..own.end - controller
+    }
+
+    /// The controller's initial states as they give the measured command of record `r`.
+    pub(crate) fn controller_states(&self, r: usize) -> &[f64] {
+        self.feedback.as_ref().map_or(&[], |f| &f.replays[r].states)
+    }
+}
+
+/// The command from sample `k` to the next one.
+fn command(record: &Record, k: usize) -> Command {
+    let u = &record.input.values;
+    match record.hold {
+        Hold::Zero => Command::held(u[k]),
+        Hold::First => Command::ramp(u[k], u[k + 1]),
+    }
+}
+
+/// The set point at sample `k`; not a number where the record has none.
+fn reference(record: &Record, k: usize) -> f64 {
+    record.reference.as_ref().map_or(f64::NAN, |r| r.values[k])
+}

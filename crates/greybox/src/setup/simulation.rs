@@ -1,0 +1,250 @@
+//! What a setup shows at a vector: simulations on the measured command or in the loop, and what is left of the records.
+
+use ct_signals::Record;
+use plants::{MAX_VESSELS, Scalar, Scales, Simulator};
+
+use super::{Setup, command, reference};
+use crate::{Error, feedback::step};
+
+/// A loop that ran on its reference.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopRun {
+    /// The reading, a series for each record.
+    pub output: Vec<Vec<f64>>,
+    /// The controller's command, a series for each record.
+    pub command: Vec<Vec<f64>>,
+}
+
+/// What a simulation shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    /// The reading, a series for each record.
+    pub output: Vec<Vec<f64>>,
+    /// Smallest and largest level of each vessel over all records.
+    pub level: [(f64, f64); MAX_VESSELS],
+    /// Mean level of each vessel over all records.
+    pub mean_level: [f64; MAX_VESSELS],
+}
+
+impl Setup<'_> {
+    /// Runs one record on any scalar; `each` sees every sample's reading and the levels; it may stop the run.
+    fn run<T: Scalar>(
+        &self,
+        record: &Record,
+        simulator: &mut Simulator<T>,
+        mut each: impl FnMut(usize, T, &Simulator<T>) -> bool,
+    ) {
+        simulator.set_substeps(self.substeps);
+        let n = record.len();
+        for k in 0..n {
+            let y = simulator.read();
+            if !each(k, y, simulator) {
+                return;
+            }
+            if k + 1 < n {
+                simulator.advance(command(record, k), record.time[k + 1] - record.time[k]);
+            }
+        }
+    }
+
+    /// Simulates all records on their measured commands.
+    ///
+    /// # Errors
+    /// Where the vector has the wrong length.
+    pub fn simulate(&self, x: &[f64]) -> Result<Simulated, Error> {
+        let mut simulated = Simulated {
+            output: Vec::with_capacity(self.records.len()),
+            level: [(f64::INFINITY, f64::NEG_INFINITY); MAX_VESSELS],
+            mean_level: [0.0; MAX_VESSELS],
+        };
+        for (r, record) in self.records.iter().enumerate() {
+            let mut simulator = Simulator::new(
+                &self.structure,
+                &x[..self.parameter_count()],
+                &x[self.plant_states_of(r)],
+                record.input.values[0],
+            )?;
+            let mut output = Vec::with_capacity(record.len());
+            self.run(record, &mut simulator, |_, y, simulator| {
+                output.push(y);
+                for (i, level) in simulator.levels().into_iter().enumerate() {
+                    simulated.level[i].0 = simulated.level[i].0.min(level);
+                    simulated.level[i].1 = simulated.level[i].1.max(level);
+                    simulated.mean_level[i] += level;
+                }
+                true
+            });
+            simulated.output.push(output);
+        }
+        let samples = self.samples() as f64;
+        for mean in &mut simulated.mean_level {
+            *mean /= samples;
+        }
+        Ok(simulated)
+    }
+
+    /// The loop that runs on its reference; `None` where no controller is known.
+    ///
+    /// # Errors
+    /// Where the vector has the wrong length.
+    pub fn simulate_loop(&self, x: &[f64]) -> Result<Option<LoopRun>, Error> {
+        let Some(feedback) = &self.feedback else {
+            return Ok(None);
+        };
+        let mut run = LoopRun {
+            output: Vec::with_capacity(self.records.len()),
+            command: Vec::with_capacity(self.records.len()),
+        };
+        for (r, record) in self.records.iter().enumerate() {
+            let states = self.plant_states_of(r);
+            let theta = &x[..self.parameter_count()];
+            let at_rest = record.input.values[0];
+            let mut simulator =
+                Simulator::new(&self.structure, theta, &x[states.clone()], at_rest)?;
+            simulator.set_substeps(self.substeps);
+            let mut regulator = feedback
+                .controller
+                .start(&x[states.end..self.states_of(r).end]);
+            let (mut output, mut command) = (Vec::new(), Vec::new());
+            for k in 0..record.len() {
+                let y = simulator.read();
+                let h = step(record, k);
+                let beside = feedback.replays[r].beside[k];
+                let u = regulator.command_beside(reference(record, k), y, beside, h);
+                simulator.advance_held(u, h);
+                output.push(y);
+                command.push(u);
+            }
+            run.output.push(output);
+            run.command.push(command);
+        }
+        Ok(Some(run))
+    }
+
+    /// What is taken for noise, a series for each record: measured minus model or, where the loop is simulated, the
+    /// disturbance at the plant's output that explains it.
+    ///
+    /// # Errors
+    /// As [`Setup::simulate`].
+    pub fn disturbance(&self, x: &[f64]) -> Result<Vec<Vec<f64>>, Error> {
+        let (Some(feedback), Some(run)) = (&self.feedback, self.simulate_loop(x)?) else {
+            return self.residuals(x);
+        };
+        let mut response = feedback.response(1);
+        let series = self.records.iter().zip(run.output).zip(run.command);
+        Ok(series
+            .map(|((record, model), command)| {
+                response.reset();
+                let measured = record.output.values.iter().zip(&record.input.values);
+                measured
+                    .zip(model.iter().zip(&command))
+                    .map(|((y, u), (ym, um))| {
+                        let mut row = [y - ym];
+                        response.add_to(&mut row);
+                        response.advance(&[um - u]);
+                        row[0]
+                    })
+                    .collect()
+            })
+            .collect())
+    }
+
+    /// Measured minus model, both on the measured command, a series for each record.
+    ///
+    /// # Errors
+    /// As [`Setup::simulate`].
+    pub fn residuals(&self, x: &[f64]) -> Result<Vec<Vec<f64>>, Error> {
+        let simulated = self.simulate(x)?;
+        Ok(self
+            .records
+            .iter()
+            .zip(simulated.output)
+            .map(|(record, model)| {
+                record
+                    .output
+                    .values
+                    .iter()
+                    .zip(model)
+                    .map(|(y, m)| y - m)
+                    .collect()
+            })
+            .collect())
+    }
+
+    /// Takes the smallest number of substeps for which halving the step moves no reading by more than `1e-6` of the
+    /// output's range.
+    ///
+    /// # Errors
+    /// As [`Setup::simulate`].
+    pub fn choose_substeps(&mut self, x: &[f64]) -> Result<(), Error> {
+        let (low, high) = self
+            .records
+            .iter()
+            .map(Record::output_range)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), range| {
+                (low.min(range.0), high.max(range.1))
+            });
+        let tolerance = 1e-6 * (high - low);
+        // The simulator itself cuts steps that are long against a time constant: until its cuts are the longer ones,
+        // halving changes nothing, which says nothing.
+        let rounding = 1e-13 * low.abs().max(high.abs());
+        let mut enough = None;
+        self.substeps = 1;
+        let mut coarse = self.simulate(x)?;
+        while self.substeps < 64 {
+            let n = self.substeps;
+            self.substeps = 2 * n;
+            let fine = self.simulate(x)?;
+            let moved = coarse
+                .output
+                .iter()
+                .flatten()
+                .zip(fine.output.iter().flatten())
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
+            if moved > tolerance {
+                enough = None;
+            } else {
+                enough = enough.or(Some(n));
+                if moved > rounding {
+                    break;
+                }
+            }
+            coarse = fine;
+        }
+        self.substeps = enough.unwrap_or(self.substeps);
+        Ok(())
+    }
+
+    /// The scales that a simulation shows: levels of every vessel and the throughput.
+    ///
+    /// A level that is not measured is what the model makes it, a wrong model several times too high or too low: its
+    /// range reaches down to an empty vessel.
+    ///
+    /// # Errors
+    /// As [`Setup::simulate`].
+    pub fn scales_at(&self, x: &[f64]) -> Result<Scales, Error> {
+        let simulated = self.simulate(x)?;
+        let plant = self.structure.plant;
+        let mut scales = self.structure.scales.clone();
+        for vessel in 0..plant.vessels() {
+            let (low, high) = simulated.level[vessel];
+            if low.is_finite() && high.is_finite() && high > low {
+                let measured = vessel + 1 == plant.vessels();
+                scales.level[vessel] = if measured {
+                    (low, high)
+                } else {
+                    (low.min(0.0), high.max(0.0))
+                };
+                scales.operating_level[vessel] = simulated.mean_level[vessel];
+            }
+        }
+        let (sum, n) = self
+            .records
+            .iter()
+            .flat_map(|record| &record.input.values)
+            .fold((0.0, 0usize), |(sum, n), u| (sum + u.abs(), n + 1));
+        scales.flow = (x[0] * sum / n as f64).abs();
+        Ok(scales)
+    }
+}

@@ -1,0 +1,118 @@
+//! What a noise shows of itself, and what is more than that.
+//!
+//! A bin fails where its mean square is clearly above what the noise would show there. A coloured noise has fewer
+//! independent samples than samples, and more at some frequencies than at others; with its autocovariance `r(h)` and
+//! autocorrelation `rho(h)` over a record of `n` samples
+//! ```text
+//! samples for one that is independent   1 + 2 sum_h (1 - h/n) rho(h)^2              (the variance of a mean square)
+//! E |X_k|^2/n                           r(0) + 2 sum_h (1 - h/n) r(h) cos(2 pi h k/n)   (a line of the periodogram)
+//! ```
+//! both exact for Gaussian noise, the second with what leaks from other frequencies. Sums of squares are then taken for
+//! chi-square with as many degrees of freedom as have their variance.
+//!
+//! **Reference**: M. B. Priestley, Spectral Analysis and Time Series (1981), 5.3.3 and 6.2.2.
+
+use std::f64::consts::TAU;
+
+use ct_signals::ArModel;
+use realfft::{RealFftPlanner, num_complex::Complex};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// A bin fails where its mean square exceeds that of the noise by this factor ...
+const FACTOR: f64 = 3.0;
+/// ... a band by this one, since a noise's spectrum is known less well than its size ...
+pub(super) const FACTOR_OF_A_BAND: f64 = 6.0;
+/// ... and where chance would do it less often than this: one in ten thousand over some fifty bins.
+const CHANCE: f64 = 2e-6;
+
+/// What a noise shows in a record of `n` samples.
+pub(super) struct Expected {
+    /// Its mean square.
+    square: f64,
+    /// Samples for one that is independent.
+    spacing: f64,
+    /// `E |X_k|^2/n` from zero to half the sampling rate.
+    pub lines: Vec<f64>,
+}
+
+impl Expected {
+    pub fn of(noise: &ArModel, n: usize) -> Self {
+        let square = noise.stationary_std().powi(2);
+        if noise.order() == 0 {
+            return Self {
+                square,
+                spacing: 1.0,
+                lines: vec![square; n / 2 + 1],
+            };
+        }
+        let r = autocovariance(noise, n);
+        let spacing = 1.0
+            + 2.0
+                * (1..n)
+                    .map(|h| (1.0 - h as f64 / n as f64) * (r[h] / square).powi(2))
+                    .sum::<f64>();
+        let folded: Vec<f64> = (0..n)
+            .map(|h| {
+                let part = h as f64 / n as f64;
+                (1.0 - part) * r[h] + if h > 0 { part * r[n - h] } else { 0.0 }
+            })
+            .collect();
+        Self {
+            square,
+            spacing,
+            lines: transform(&folded)
+                .iter()
+                .map(|line| line.re.max(0.0))
+                .collect(),
+        }
+    }
+
+    /// Whether so large a mean square is more than so many samples of the noise would show.
+    pub fn exceeded(&self, mean_square: f64, samples: usize) -> bool {
+        let ratio = mean_square / self.square.max(f64::MIN_POSITIVE);
+        ratio > FACTOR && beyond_chance(ratio, samples as f64 / self.spacing)
+    }
+}
+
+/// `r(0)` to `r(n - 1)`, from the spectrum on a grid four times as fine as the record's.
+fn autocovariance(noise: &ArModel, n: usize) -> Vec<f64> {
+    let grid = 4 * n;
+    let mut spectrum: Vec<Complex<f64>> = (0..=grid / 2)
+        .map(|j| {
+            let w = TAU * j as f64 / grid as f64;
+            let filter = noise
+                .coefficients()
+                .iter()
+                .enumerate()
+                .fold(Complex::new(1.0, 0.0), |sum, (i, a)| {
+                    sum - Complex::from_polar(*a, -w * (i + 1) as f64)
+                });
+            Complex::new(noise.sigma().powi(2) / filter.norm_sqr() / grid as f64, 0.0)
+        })
+        .collect();
+    let plan = RealFftPlanner::<f64>::new().plan_fft_inverse(grid);
+    let mut r = plan.make_output_vec();
+    // The lengths are the plan's, and a spectrum that is real throughout is that of a real signal.
+    if plan.process(&mut spectrum, &mut r).is_err() {
+        r.fill(0.0);
+    }
+    r.truncate(n);
+    r
+}
+
+/// Whether a mean square over its expectation is too large for chance.
+pub(super) fn beyond_chance(ratio: f64, independent: f64) -> bool {
+    let freedom = independent.max(1.0);
+    ChiSquared::new(freedom).is_ok_and(|chi| chi.sf(freedom * ratio) < CHANCE)
+}
+
+/// The Fourier transform from zero to half the sampling rate.
+pub(super) fn transform(x: &[f64]) -> Vec<Complex<f64>> {
+    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(x.len());
+    let mut output = plan.make_output_vec();
+    // The lengths are the plan's.
+    if plan.process(&mut x.to_vec(), &mut output).is_err() {
+        output.clear();
+    }
+    output
+}

@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, sync::OnceLock};
 
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Start, Stopping, Triangle, fit_onward};
-use plants::{Picked, Place, Placed};
+use plants::{Picked, Place, Placed, Plant};
 use rayon::prelude::*;
 
 use crate::{
@@ -21,6 +21,9 @@ const FOLLOWED: usize = 2;
 /// The parameter that has as many minima as a spectrum has lines, and how many of its starts are looked at.
 const PERIOD: &str = "periodic_disturbance.period";
 const PERIODS_SHOWN: usize = 6;
+
+/// Two tanks that push on each other.
+const COUPLED: &str = "coupled_tank";
 
 /// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
 /// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
@@ -43,6 +46,8 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
             begun.push(exchanged);
         }
     }
+
+    begun.extend(with_less_throughput(&begun[0], child, placed));
 
     let parameters = child.structure.effect_parameters(placed);
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
@@ -71,6 +76,35 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
             x
         })
         .collect()
+}
+
+/// Parts of the throughput, where a fit may have taken it several times too high.
+const LESS_THROUGHPUT: [f64; 2] = [0.4, 0.2];
+
+/// Two tanks with a part of their throughput: the lower level stays, the upper tank is as much lower.
+///
+/// Two tanks that push on each other have time constants far apart. The model without the push imitates that by a high upper tank above a
+/// quick lower one, with several times the throughput, and from there a fit of the push ends at another minimum.
+fn with_less_throughput(x: &[f64], child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
+    let plant = child.structure.plant;
+    let pushes = placed.effect.id == COUPLED && plant == Plant::CascadedTanks;
+    let at = |name| child.names().iter().position(|known| known == name);
+    let (Some(gain), Some(lower)) = (at("pump_gain"), at("alpha_lower")) else {
+        return Vec::new();
+    };
+    if !pushes || [gain, lower].iter().any(|at| !child.free().contains(at)) {
+        return Vec::new();
+    }
+    let less = |part: f64| {
+        let mut x = x.to_vec();
+        x[gain] *= part;
+        x[lower] *= part;
+        for record in 0..child.records.len() {
+            x[child.plant_states_of(record).start] *= part.powi(2);
+        }
+        x
+    };
+    LESS_THROUGHPUT.map(less).to_vec()
 }
 
 /// The cost after one step from a start, as the linearised model there predicts it.

@@ -39,8 +39,7 @@ const LARGEST: f64 = 1e15;
 ///
 /// # Errors
 /// [`Error::CannotOpen`], [`Error::Folder`], [`Error::NotText`], [`Error::EmptyFile`],
-/// [`Error::NoHeader`], [`Error::MissingColumn`], [`Error::AmbiguousColumn`], [`Error::SharedColumn`],
-/// [`Error::UnitContradiction`], [`Error::UnknownTimeUnit`], [`Error::WrongFieldCount`],
+/// [`Error::NoHeader`], [`Error::Column`], [`Error::UnknownTimeUnit`], [`Error::WrongFieldCount`],
 /// [`Error::EmptyCell`], [`Error::TextInCell`], [`Error::NotFinite`], [`Error::MixedDecimalMarks`],
 /// [`Error::RepeatedTime`], [`Error::BackwardTime`], [`Error::TooFewRows`] (below
 /// [`MIN_ROWS`]), [`Error::Gap`], [`Error::ConstantInput`],

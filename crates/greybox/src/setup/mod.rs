@@ -325,7 +325,7 @@ impl<'a> Setup<'a> {
     }
 
     /// What the fitted numbers cost in the Bayesian information criterion, with a noise of so many coefficients and its variance:
-    /// the logarithm of the samples each, but [`STATE_PRICE`] for an initial state.
+    /// the logarithm of the samples each, but two for an initial state.
     #[must_use]
     pub fn price(&self, noise_order: usize) -> f64 {
         let (parameters, states): (Vec<usize>, Vec<usize>) =

@@ -89,12 +89,12 @@ mod tests {
         Options, Problem,
         problem::base,
         proposal::{Parent, singles},
-        test_rig::{self, NOISE},
+        simulated::{self, NOISE},
     };
 
     fn problem(step: f64, colour: f64, seed: u64) -> Problem {
         let read = |_, level: f64| (level / step).round() * step;
-        test_rig::problem(|u| u, read, colour, seed)
+        simulated::tank(|u| u, read, colour, seed)
     }
 
     #[test]
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn the_steps_that_were_looked_at_are_paid_for() {
-        let problem = test_rig::problem(|u| u, |_, level| level, 0.0, 7);
+        let problem = simulated::tank(|u| u, |_, level| level, 0.0, 7);
         let (node, _) = base(&problem, &Options::default()).unwrap();
         let found = hidden_step(&node).unwrap().unwrap();
         // From two to as many as the noise leaves room for, over the range of the readings.

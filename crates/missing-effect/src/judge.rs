@@ -224,13 +224,13 @@ mod tests {
         noise_floor::colour,
         problem::base,
         proposal::{Parent, propose, realise, singles},
-        test_rig,
+        simulated,
     };
 
     /// A pump that saturates beside a swing of the reading that has no name; what stays of the saturation and a drift of the sensor.
     fn judged(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
         let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
-        let problem = test_rig::problem(|u| u.min(4.2), read, 0.0, 1);
+        let problem = simulated::tank(|u| u.min(4.2), read, 0.0, 1);
         let (base, _) = base(&problem, &Options::default()).unwrap();
         let white = ArModel::white(1.0);
         let mut set = base.clone();

@@ -35,8 +35,6 @@ mod sentences;
 mod simulated;
 mod spectral_line;
 mod step;
-#[cfg(test)]
-mod test_rig;
 mod trail;
 mod unknown;
 

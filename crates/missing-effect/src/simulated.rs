@@ -2,12 +2,13 @@
 #![allow(clippy::unwrap_used)]
 
 use ct_signals::{Hold, Record, Signal, excitation, noise};
-use plants::{Command, Known, Plant, Simulator, Structure};
+use plants::{Command, Known, Plant, Scales, Simulator, Structure};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::Problem;
 
-/// Standard deviation of the white noise on the reading \[cm\].
+/// Standard deviation of the noise on the reading \[cm\].
 pub(crate) const NOISE: f64 = 0.05;
 /// Sampling interval \[s\].
 pub(crate) const INTERVAL: f64 = 2.0;
@@ -20,16 +21,60 @@ pub(crate) fn record(
     samples: usize,
     rng: &mut ChaCha8Rng,
 ) -> Record {
+    let rig = |u| u;
+    through(
+        structure,
+        theta,
+        command,
+        samples,
+        rig,
+        |_, level| level,
+        0.0,
+        rng,
+    )
+}
+
+/// The same for a linear tank at levels of 12 to 20 cm, believed to be one; what the pump makes of the command, what the sensor reads
+/// at a time and a level, and the noise's correlation from sample to sample.
+pub(crate) fn tank(
+    pump: impl Fn(f64) -> f64,
+    sensor: impl Fn(f64, f64) -> f64,
+    colour: f64,
+    seed: u64,
+) -> Problem {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (plant, range, samples) = (Plant::SingleTankLinear, (3.0, 5.0), 600);
+    let scales = Scales::from_ranges(range, (5.0, 20.0), INTERVAL, INTERVAL * samples as f64);
+    let structure = Structure::new(plant, Known::default(), scales);
+    let theta = [4.0, 90.0, 0.0];
+    let record = through(
+        &structure, &theta, range, samples, pump, sensor, colour, &mut rng,
+    );
+    problem(plant, Known::default(), vec![record])
+}
+
+#[allow(clippy::too_many_arguments)]
+fn through(
+    structure: &Structure,
+    theta: &[f64],
+    command: (f64, f64),
+    samples: usize,
+    pump: impl Fn(f64) -> f64,
+    sensor: impl Fn(f64, f64) -> f64,
+    colour: f64,
+    rng: &mut ChaCha8Rng,
+) -> Record {
     let u = excitation::steps(samples, 20..=60, command.0, command.1, rng).unwrap();
-    let mut y = noise::white(samples, NOISE, rng);
+    let time: Vec<f64> = (0..samples).map(|k| k as f64 * INTERVAL).collect();
+    let mut y = noise::ar1(samples, NOISE, colour, rng);
     let mut simulator = Simulator::<f64>::new(structure, theta, &[16.0], u[0]).unwrap();
-    for (y, u) in y.iter_mut().zip(&u) {
-        *y += simulator.read();
-        simulator.advance(Command::held(*u), INTERVAL);
+    for (y, (u, t)) in y.iter_mut().zip(u.iter().zip(&time)) {
+        *y += sensor(*t, simulator.read());
+        simulator.advance(Command::held(pump(*u)), INTERVAL);
     }
     Record {
         name: "simulated".to_string(),
-        time: (0..samples).map(|k| k as f64 * INTERVAL).collect(),
+        time,
         input: Signal::new("u", "V", u),
         output: Signal::new("y", "cm", y),
         reference: None,

@@ -21,13 +21,12 @@ pub(crate) fn record(
     samples: usize,
     rng: &mut ChaCha8Rng,
 ) -> Record {
-    let rig = |u| u;
     through(
         structure,
         theta,
         command,
         samples,
-        rig,
+        |u| u,
         |_, level| level,
         0.0,
         rng,

@@ -62,7 +62,8 @@ impl<'a> Judge<'_, 'a> {
         let mut judged = self.as_it_is(&set)?;
         loop {
             let courses = judged.courses_of_time();
-            if courses.is_empty() {
+            // What remains beside a set that was cut is what was cut off, and the result says so.
+            if self.stopped || courses.is_empty() {
                 return Ok(judged);
             }
             for course in &courses {

@@ -20,6 +20,9 @@ const TURN: f64 = 0.25;
 const FINER: usize = 16;
 /// The fewest and the most steps between the lowest and the highest reading.
 const STEPS: (f64, f64) = (2.0, 300.0);
+/// Steps that are looked at times samples, at most. Readings far from zero turn often from one step to the next, and long records
+/// take long: then only coarse steps are looked for.
+const LOOKED_AT: f64 = 3e8;
 
 /// Where the step of a sensor stands in the vector.
 pub(crate) fn step_of(setup: &Setup) -> Option<usize> {
@@ -39,8 +42,10 @@ pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
             (low.min(y), high.max(y))
         });
     let (span, reach) = (high - low, low.abs().max(high.abs()));
+    let grid = TURN / reach;
+    let affordable = STEPS.0 + LOOKED_AT / node.setup.samples() as f64 * grid * span;
     // A step below the noise is a noise too.
-    let most = (span / noise.sigma()).min(STEPS.1);
+    let most = (span / noise.sigma()).min(STEPS.1).min(affordable);
     if !(span > 0.0 && reach.is_finite() && most > STEPS.0) {
         return Ok(None);
     }
@@ -58,7 +63,6 @@ pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
         };
         models.iter().zip(&whitened).map(|(m, r)| one(m, r)).sum()
     };
-    let grid = TURN / reach;
     let looks = ((most - STEPS.0) / span / grid) as usize + 1;
     let best_of = |from: f64, grid: f64, count: usize| {
         (0..count)
@@ -72,8 +76,12 @@ pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
     };
     let finer = grid / FINER as f64;
     let best = best_of(near - grid, finer, 2 * FINER + 1);
+    // No coarser than a fit may take it: the start that was picked is known by its value (`Structure::ways`).
+    let structure = &node.setup.structure;
+    let visited = structure.scales.level[structure.plant.vessels() - 1];
+    let coarsest = 0.5 * (visited.1 - visited.0);
     Ok(best.map(|(_, turns)| Picked {
-        value: 1.0 / turns,
+        value: (1.0 / turns).min(coarsest),
         of: looks as f64,
     }))
 }

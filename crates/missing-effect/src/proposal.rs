@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, sync::OnceLock};
 
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Start, Stopping, Triangle, fit_onward};
-use plants::{Picked, Place, Placed, Plant};
+use plants::{Place, Placed, Plant};
 use rayon::prelude::*;
 
 use crate::{
@@ -28,6 +28,7 @@ const COUPLED: &str = "coupled_tank";
 /// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
 /// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
 const BY_CLOCK: usize = 1;
+
 /// A child's starts: the vector of a node, with the new effect's parameters on the grid of its starts.
 ///
 /// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel tells
@@ -135,12 +136,10 @@ pub(crate) struct Proposal<'a> {
     pub promise: f64,
 }
 
-/// A node that is extended, and the period and the step of the reading that show most in what it does not explain, once they were
-/// asked for.
+/// A node that is extended, and the period that shows most in what it does not explain, once it was asked for.
 pub(crate) struct Parent<'n, 'a> {
     pub node: &'n Node<'a>,
     period: OnceLock<Option<f64>>,
-    step: OnceLock<Option<Picked>>,
 }
 
 impl<'n, 'a> Parent<'n, 'a> {
@@ -148,7 +147,6 @@ impl<'n, 'a> Parent<'n, 'a> {
         Self {
             node,
             period: OnceLock::new(),
-            step: OnceLock::new(),
         }
     }
 
@@ -159,8 +157,9 @@ impl<'n, 'a> Parent<'n, 'a> {
             structure.scales.period = (*self.period.get_or_init(|| strongest_period(self.node)))?;
         }
         if placed.effect.id == hidden_step::EFFECT && structure.scales.reading_step == 0.0 {
-            let find = || hidden_step(self.node).ok().flatten();
-            structure.scales.hidden_step = *self.step.get_or_init(find);
+            // One effect asks for it. It is looked for by all threads, and must not be kept in a cell: a thread that waits for the
+            // others may take up the next proposal, which would ask the cell that it is filling.
+            structure.scales.hidden_step = hidden_step(self.node).ok().flatten();
         }
         self.node.setup.with_structure(structure).ok()
     }
@@ -232,7 +231,12 @@ fn keep_shown_periods(from: &Node, setup: &Setup, starts: &mut Vec<Vec<f64>>, no
         .collect();
     shown.sort_by(|a, b| b.0.total_cmp(&a.0));
     shown.truncate(PERIODS_SHOWN);
-    starts.retain(|start| shown.iter().any(|(_, period)| *period == start[at]));
+    // The strongest line stands out of its neighbours, and may yet be lower than what wanders; its choice is paid for.
+    let strongest = setup.structure.scales.period;
+    starts.retain(|start| {
+        let of = |period: f64| period == start[at];
+        of(strongest) || shown.iter().any(|(_, period)| of(*period))
+    });
 }
 
 /// The power of series at a frequency \[rad/s\].

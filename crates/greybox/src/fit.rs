@@ -364,10 +364,11 @@ pub fn coloured(setup: &Setup, fit: Fit, order: usize, stopping: Stopping) -> Re
     // The likelihood, by which models are compared, is at its best now; the errors follow from the colour that
     // the fit has not bent.
     if fit.noise.order() > 0 {
-        let deviance = fit.deviance;
+        let (deviance, parameters, price) = (fit.deviance, fit.parameters, fit.price);
         let noise = noise_of(setup, &fit, order)?;
         fit = fit_from(setup, std::slice::from_ref(&fit.x), &noise, stopping)?;
-        fit.deviance = deviance;
+        // A likelihood is paid for with the coefficients that it had.
+        (fit.deviance, fit.parameters, fit.price) = (deviance, parameters, price);
         if let Some(rows) = setup.rows(&fit.x) {
             let own: Vec<usize> = (0..fit.interior.len()).collect();
             let mut order = fit.interior.clone();

@@ -328,10 +328,9 @@ impl<'a> Setup<'a> {
     /// the logarithm of the samples each, but two for an initial state.
     #[must_use]
     pub fn price(&self, noise_order: usize) -> f64 {
-        let (parameters, states): (Vec<usize>, Vec<usize>) =
-            self.free.iter().partition(|&&i| i < self.parameters);
-        let lasting = parameters.len() + 1 + noise_order;
-        lasting as f64 * (self.samples() as f64).ln() + STATE_PRICE * states.len() as f64
+        let states = self.free.iter().filter(|&&i| i >= self.parameters).count();
+        let lasting = self.free.len() - states + 1 + noise_order;
+        lasting as f64 * (self.samples() as f64).ln() + STATE_PRICE * states as f64
     }
 
     /// Samples in all records.

@@ -4,6 +4,7 @@
 //! is as many steps as it really is: one more or less is the minimum of another sawtooth. So the steps are looked
 //! through one by one.
 
+use ct_signals::ArModel;
 use greybox::Setup;
 use plants::Picked;
 use rayon::prelude::*;
@@ -49,19 +50,11 @@ pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
     if !(span > 0.0 && reach.is_finite() && most > STEPS.0) {
         return Ok(None);
     }
-    let whitened: Vec<Vec<f64>> = residuals.iter().map(|r| noise.whiten(r)).collect();
     let left = |turns: f64| -> f64 {
-        let step = 1.0 / turns;
-        let one = |model: &Vec<f64>, residual: &Vec<f64>| -> f64 {
-            let sawtooth: Vec<f64> = model
-                .iter()
-                .map(|y| (y / step).round() * step - y)
-                .collect();
-            let sawtooth = noise.whiten(&sawtooth);
-            let rows = residual.iter().zip(sawtooth);
-            rows.map(|(r, s)| (r - s).powi(2)).sum()
+        let one = |(model, residual): (&Vec<f64>, &Vec<f64>)| {
+            innovations(&without_sawtooth(model, residual, turns), &noise)
         };
-        models.iter().zip(&whitened).map(|(m, r)| one(m, r)).sum()
+        models.iter().zip(&residuals).map(one).sum()
     };
     let looks = ((most - STEPS.0) / span / grid) as usize + 1;
     let best_of = |from: f64, grid: f64, count: usize| {
@@ -86,10 +79,32 @@ pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
     }))
 }
 
+/// What is left of a residual beside the sawtooth of a step, which is so many turns for a unit of the level.
+fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
+    // Added and taken off again, it leaves the nearest whole number; `f64::round` is a call for every sample.
+    const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
+    let step = 1.0 / turns;
+    model
+        .iter()
+        .zip(residual)
+        .map(|(y, r)| r - (((y * turns + WHOLE) - WHOLE) * step - y))
+        .collect()
+}
+
+/// Sum of squares of what a noise's past does not foretell, from where it has a whole past.
+fn innovations(series: &[f64], noise: &ArModel) -> f64 {
+    let mut new = series.to_vec();
+    for (lag, coefficient) in (1..).zip(noise.coefficients()) {
+        for (new, past) in new.iter_mut().skip(lag).zip(series) {
+            *new -= coefficient * past;
+        }
+    }
+    new.iter().skip(noise.order()).map(|e| e * e).sum()
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use ct_signals::ArModel;
     use plants::{EffectInfo, Placed};
 
     use super::*;

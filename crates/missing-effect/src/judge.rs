@@ -59,7 +59,7 @@ impl<'a> Judge<'_, 'a> {
     /// whatever is left may have made it. That speaks against this effect alone. The others stay where they are called for
     /// without it, and are the answer where they explain enough without it: what was there to mend an imitation is neither.
     pub fn judge(&self, mut set: Node<'a>) -> Result<Judged<'a>, Error> {
-        let mut judged = self.as_it_is(&set)?;
+        let mut judged = self.as_it_is(&set, None)?;
         loop {
             let courses = judged.courses_of_time();
             // What remains beside a set that was cut is what was cut off, and the result says so.
@@ -72,7 +72,7 @@ impl<'a> Judge<'_, 'a> {
                 }
             }
             set = confirm(set, self.noise)?;
-            let others = (!set.added.is_empty()).then(|| self.as_it_is(&set));
+            let others = (!set.added.is_empty()).then(|| self.as_it_is(&set, judged.course.left));
             match others.transpose()? {
                 Some(others) if others.fair => {
                     let mut dropped = judged.dropped;
@@ -89,8 +89,10 @@ impl<'a> Judge<'_, 'a> {
         }
     }
 
-    fn as_it_is(&self, set: &Node<'a>) -> Result<Judged<'a>, Error> {
-        let course = self.course(set)?;
+    /// `beside`: what remains beside a larger set. A colour that takes it up, with what that set explained, makes no noise of it.
+    fn as_it_is(&self, set: &Node<'a>, beside: Option<Left>) -> Result<Judged<'a>, Error> {
+        let mut course = self.course(set)?;
+        course.left = course.left.or(beside);
         // What leaves the greater part of the error to something else is a remark, and not the answer.
         let fair = match course.left {
             Some(left) if !self.stopped && !course.last().added.is_empty() => {

@@ -190,7 +190,7 @@ pub(crate) fn promising(
     noise: &ArModel,
 ) -> Option<(f64, Vec<Start>)> {
     let mut starts = grid(from, setup, placed);
-    keep_shown_periods(from, setup, &mut starts, noise);
+    keep_shown_periods(setup, placed, &mut starts, noise);
     let mut ranked: Vec<(f64, Start)> = starts
         .into_par_iter()
         .filter_map(|x| {
@@ -207,16 +207,26 @@ pub(crate) fn promising(
     Some((promise, starts))
 }
 
-/// Of starts with many periods keeps those whose periods show most in what a node does not explain: a plant answers a swing with
-/// a swing of that period, and a Fourier sum costs far less than a simulation.
-fn keep_shown_periods(from: &Node, setup: &Setup, starts: &mut Vec<Vec<f64>>, noise: &ArModel) {
-    let Some(at) = period_of(setup) else {
+/// Of starts with many periods keeps those whose periods show most in what is not explained without the effect: a plant answers a
+/// swing with a swing of that period, and a Fourier sum costs far less than a simulation.
+fn keep_shown_periods(setup: &Setup, placed: Placed, starts: &mut Vec<Vec<f64>>, noise: &ArModel) {
+    let (Some(at), Some(mut without)) = (period_of(setup), starts.first().cloned()) else {
         return;
     };
     let mut periods: Vec<f64> = starts.iter().map(|start| start[at]).collect();
     periods.sort_by(f64::total_cmp);
     periods.dedup();
-    let Ok(residuals) = from.setup.disturbance(&from.fit.x) else {
+    if periods.len() <= PERIODS_SHOWN {
+        return;
+    }
+    for parameter in setup.structure.effect_parameters(placed) {
+        let name = format!("{}.{}", placed.effect.id, parameter.name);
+        let own = setup.names().iter().position(|known| *known == name);
+        if let Some(own) = own.filter(|_| parameter.absent.is_finite()) {
+            without[own] = parameter.absent;
+        }
+    }
+    let Ok(residuals) = setup.disturbance(&without) else {
         return;
     };
     let whitened: Vec<(&Record, Vec<f64>)> = setup

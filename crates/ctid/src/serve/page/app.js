@@ -12,6 +12,7 @@ const WORK = { compare: "fitting the model", diagnose: "searching what is missin
 
 let version = null;
 let before = null;
+let cancelled = null;
 let said = "";
 
 function fail(what) {
@@ -65,20 +66,35 @@ function fall(state) {
   if (state.current === last.id) say(`${last.name}: simulation error ${last.rmse_text} ${unit}`);
 }
 
-/** What the state asks for by itself: a model that is not fitted yet is. */
+const compare = () => server.run("compare").catch((e) => fail(e.message));
+const task = (state) => JSON.stringify([state.text, state.records.map((one) => [one.name, one.held_out])]);
+
+/** What the state asks for by itself: a model that is not fitted yet is, but where somebody has cancelled just that. */
 function compareIfNeeded(state) {
   const fitted = state.records.filter((one) => !one.held_out);
   const ready = state.text && !state.model_error && fitted.length && state.records.every((one) => one.read);
-  if (ready && state.current === null && !state.job && !state.failure && before !== state.version) {
+  const waits = ready && state.current === null && !state.job && !state.failure;
+  $("fit").hidden = !(waits && cancelled === task(state));
+  if (waits && cancelled !== task(state) && before !== state.version) {
     before = state.version;
-    server.run("compare").catch((e) => fail(e.message));
+    compare();
   }
 }
 
-function show(state, now, trouble) {
+function cancel() {
+  cancelled = task(server.current());
+  chains.forget();
+  server.send("/api/cancel").catch((e) => fail(e.message));
+}
+
+function show(state, trouble) {
   job(state.job);
-  if (trouble) { fail(trouble); return; }
-  if (now || state.version === version) { if (now) return; }
+  if (trouble) {
+    fail(trouble);
+    version = null;
+    return;
+  }
+  if (state.version === version) return;
   version = state.version;
   fail(state.failure);
   $("place").textContent = state.file ? `edits ${state.file}` : "model kept in this tab";
@@ -103,8 +119,9 @@ try {
   findings.start(fail);
   chains.start(fail);
   experiment.start(fail);
-  $("cancel").addEventListener("click", () => server.send("/api/cancel").catch((e) => fail(e.message)));
-  show(opened.state, null);
+  $("cancel").addEventListener("click", cancel);
+  $("fit").addEventListener("click", compare);
+  show(opened.state);
   plots.start(() => { fit.draw(); chains.draw(); experiment.draw(); });
 } catch (error) {
   fail(error.message);

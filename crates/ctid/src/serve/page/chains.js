@@ -35,6 +35,8 @@ export function start(fail) {
   }));
 }
 
+export const forget = () => { wanted = null; };
+
 export async function show(state) {
   $("chains-part").hidden = !state.models.length;
   const all = choices(state);
@@ -49,6 +51,8 @@ export async function show(state) {
       $(id).value = kept ? before : JSON.stringify(all[Math.min(k, all.length - 1)]);
     });
   }
+  // What cannot be fitted is not tried again.
+  if (state.failure) wanted = null;
   if (!wanted) return;
   const fitted = (chain) => state.models.find((one) => same(one.effects, chain));
   const missing = wanted.pair.find((chain) => !fitted(chain));

@@ -51,6 +51,8 @@ function row(state, one, k, widest, fail) {
 
 let all = false;
 let shown = null;
+// What stands there: what was unfolded stays so while that does.
+let written = "";
 // Somebody waits for what is found.
 let asked = false;
 
@@ -61,6 +63,9 @@ export function show(state, fail) {
   $("diagnose").textContent = found ? "Diagnose again" : "Diagnose";
   $("diagnose").classList.toggle("primary", !found);
   $("diagnose-hint").hidden = Boolean(found);
+  const wanted = JSON.stringify([found, state.effects, all]);
+  if (wanted === written) return;
+  written = wanted;
   if (!found) { fill($("findings")); shown = null; return; }
   const gains = found.ranking.map((one) => one.gain ?? 0);
   const widest = Math.max(1, ...gains);

@@ -6,6 +6,8 @@ import * as data from "./data.js";
 let plants = [];
 // What was typed and refused stays until it is mended.
 let draft = false;
+// The list of effects as it stands there.
+let written = "";
 
 const KNOWN = {
   area: "Area", area_upper: "Area of the upper tank", area_lower: "Area of the lower tank", tank_height: "Height of the tank", input_range: "Full range of the command",
@@ -128,7 +130,9 @@ export function show(state, fail) {
   $("model").hidden = !state.records.length && !state.file;
   const known = plant(state.settings.plant);
   $("h-effects").hidden = !known;
-  if (known) {
+  const wanted = JSON.stringify([state.effects, known]);
+  if (known && wanted !== written) {
+    written = wanted;
     fill($("effects"), state.effects.map((one) => effect(one, fail)), state.effects.length ? null : make("li", { className: "caption" }, "none"), more(state, known, fail));
   }
   $("text").textContent = state.text || "(written once a plant is chosen)";

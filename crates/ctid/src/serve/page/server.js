@@ -34,10 +34,10 @@ async function post(path, body, more = null) {
 function take(next) {
   if (next.records) {
     state = next;
-    told(state, null);
+    told(state);
   } else if (state) {
     state.job = next.job;
-    told(state, next.job);
+    told(state);
   }
 }
 
@@ -53,10 +53,10 @@ let lost = false;
 async function poll() {
   try {
     take(await ask("/api/state", { since: state ? state.version : 0 }));
-    if (lost) { lost = false; told(state, null); }
+    if (lost) { lost = false; told(state); }
   } catch (error) {
     lost = true;
-    told(state, null, /fetch/i.test(error.message) ? "ctid does not answer; is it still running? The page tries again." : error.message);
+    told(state, /fetch/i.test(error.message) ? "ctid does not answer; is it still running? The page tries again." : error.message);
   }
   later();
 }

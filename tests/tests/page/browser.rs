@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
-const PATIENCE: Duration = Duration::from_secs(120);
+/// Far longer than anything here takes on a machine that is not busy.
+const PATIENCE: Duration = Duration::from_secs(600);
 
 /// One page in a browser of its own.
 pub struct Browser {

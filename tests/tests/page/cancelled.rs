@@ -23,7 +23,7 @@ fn long_record() -> String {
         colour: 0.9,
         hidden: vec![
             ("pump_deadzone", 0, vec![1.0]),
-            ("sensor_lag", 1, vec![15.0]),
+            ("sensor_lag", 0, vec![15.0]),
         ],
         ..Rig::cascaded_tanks()
     };
@@ -53,7 +53,7 @@ fn what_is_cancelled_stops() {
         });
     };
     let gone = |why: &str| {
-        for _ in 0..600 {
+        for _ in 0..2400 {
             match computing() {
                 None => return println!("skipped: this system does not list threads"),
                 Some(0) => return,

@@ -195,7 +195,7 @@ impl Tab {
 
     /// The state once it satisfies something.
     pub fn until(&self, what: &str, holds: impl Fn(&Value) -> bool) -> Value {
-        for _ in 0..1200 {
+        for _ in 0..6000 {
             let state = self.state();
             if holds(&state) {
                 return state;

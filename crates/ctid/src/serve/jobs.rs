@@ -42,7 +42,7 @@ pub(super) enum Task {
 enum Outcome {
     Fitted(Diagnosis),
     Diagnosed(Diagnosis),
-    Designed(Design, Columns),
+    Designed(Box<Design>, Columns),
 }
 
 /// What a computation works on.
@@ -185,7 +185,7 @@ fn compute(
             let of = |name: &str| candidacy(&work.model, &work.files.model, name);
             let between = [of(a)?, of(b)?];
             design(problem, between, limits, &options, show)
-                .map(|design| Outcome::Designed(design, work.model.columns.clone()))
+                .map(|design| Outcome::Designed(Box::new(design), work.model.columns.clone()))
         }
     };
     outcome.map_err(|error| work.files.blame(error))
@@ -230,7 +230,7 @@ fn settle(session: &mut Session, work: Work, outcome: Outcome) {
             }));
         }
         Outcome::Designed(design, columns) => {
-            let found = (design, columns);
+            let found = (*design, columns);
             session.design = Some(Arc::new(Found {
                 id,
                 model,

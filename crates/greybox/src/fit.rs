@@ -1,7 +1,5 @@
 //! Fits from many starts, the noise's colour, and the uncertainty of what was fitted.
 
-use std::sync::atomic::Ordering;
-
 use ct_signals::ArModel;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -254,7 +252,6 @@ pub fn fit_onward(
     noise: &ArModel,
     stopping: Stopping,
 ) -> Result<Fit, Error> {
-    let stopped = || setup.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
     let free = setup.free();
     let bounds: Vec<(f64, f64)> = free.iter().map(|&i| setup.bounds()[i]).collect();
     let count = starts.len();
@@ -280,18 +277,14 @@ pub fn fit_onward(
                 known,
                 &bounds,
                 stopping,
-                // Nothing is better than where it stands: soon the iteration ends.
-                |x, limit| match stopped() {
-                    true => None,
-                    false => setup.linearise_below(&full(x), noise, limit),
-                },
+                |x, limit| setup.linearise_below(&full(x), noise, limit),
                 |x, limit| setup.costs_more(&full(x), noise, limit),
             );
             (full(&minimum.x), minimum)
         })
         .filter(|(_, minimum)| minimum.stop != Stop::NotFinite)
         .collect();
-    if stopped() {
+    if setup.stopped() {
         return Err(Error::Stopped);
     }
     let best = minima

@@ -19,7 +19,7 @@ fn computing() -> Option<usize> {
 /// A record whose diagnosis takes far longer than this test.
 fn long_record() -> String {
     let rig = Rig {
-        samples: 30_000,
+        samples: 4000,
         colour: 0.9,
         hidden: vec![
             ("pump_deadzone", 0, vec![1.0]),

@@ -4,7 +4,7 @@ mod rows;
 mod simulation;
 
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_signals::{Hold, Record};
 use plants::{Command, Scales, Structure, controller::Controller};
@@ -30,7 +30,7 @@ pub struct Setup<'a> {
     pub fixed: BTreeMap<String, f64>,
     /// Equal parts of a sampling interval in the simulation.
     pub substeps: usize,
-    /// Where somebody may say that nobody waits any more: every fit then ends soon with [`Error::Stopped`].
+    /// Where somebody may say that nobody waits any more: nothing is simulated then, and every fit ends with [`Error::Stopped`].
     pub stop: Option<&'a AtomicBool>,
     names: Vec<String>,
     bounds: Vec<(f64, f64)>,
@@ -248,6 +248,11 @@ impl<'a> Setup<'a> {
     /// As [`Setup::new`].
     pub fn with_structure(&self, structure: Structure) -> Result<Self, Error> {
         self.rebuilt(structure, self.feedback.clone())
+    }
+
+    /// Nobody waits any more.
+    pub(crate) fn stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
     /// The same structure against other records, in the same scales, run on the measured command.

@@ -52,6 +52,9 @@ impl Setup<'_> {
     /// # Errors
     /// Where the vector has the wrong length.
     pub fn simulate(&self, x: &[f64]) -> Result<Simulated, Error> {
+        if self.stopped() {
+            return Err(Error::Stopped);
+        }
         let mut simulated = Simulated {
             output: Vec::with_capacity(self.records.len()),
             level: [(f64::INFINITY, f64::NEG_INFINITY); MAX_VESSELS],

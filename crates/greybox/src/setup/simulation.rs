@@ -50,7 +50,7 @@ impl Setup<'_> {
     /// Simulates all records on their measured commands.
     ///
     /// # Errors
-    /// Where the vector has the wrong length.
+    /// Where the vector has the wrong length, or nobody waits any more.
     pub fn simulate(&self, x: &[f64]) -> Result<Simulated, Error> {
         if self.stopped() {
             return Err(Error::Stopped);

@@ -85,6 +85,7 @@ fn links_lead_to_files() {
         "docs/gallery.md",
         "docs/hidden-dead-zone.md",
         "docs/model-file.md",
+        "docs/page.md",
     ] {
         let page = root.join(page);
         let text = std::fs::read_to_string(&page).unwrap();

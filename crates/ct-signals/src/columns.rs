@@ -29,6 +29,28 @@ pub struct Columns {
     pub reference: Option<String>,
 }
 
+/// What stands above a column.
+#[derive(Serialize, Clone, Debug, PartialEq, Eq)]
+pub struct Heading {
+    /// All of it.
+    pub header: String,
+    /// Without the unit.
+    pub name: String,
+    /// The unit; empty where the header does not say.
+    pub unit: String,
+}
+
+impl Heading {
+    pub(crate) fn of(header: &str) -> Self {
+        let (name, unit) = unit::split(header);
+        Self {
+            header: header.into(),
+            name: name.into(),
+            unit: unit.into(),
+        }
+    }
+}
+
 /// One column that was found.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Found {
@@ -95,6 +117,29 @@ impl Columns {
             Some((name, "", seconds)) => (format!("{name} [s]"), seconds),
             Some((name, unit, seconds)) => (format!("{name} [{unit}]"), seconds),
             None => ("t [s]".to_string(), 1.0),
+        }
+    }
+
+    /// The columns that would be taken where none is named; what is not plain is left out.
+    #[must_use]
+    pub fn guessed(headings: &[Heading]) -> Self {
+        let names: Vec<String> = headings.iter().map(|h| h.header.clone()).collect();
+        let header = Header {
+            file: "",
+            row: 0,
+            names: &names,
+        };
+        let mut taken = Vec::new();
+        let mut guess = |role: &Role| {
+            let found = header.guess(role, &taken).ok().flatten()?;
+            taken.push((found.index, role.name));
+            Some(found.header)
+        };
+        Self {
+            time: guess(&TIME),
+            input: guess(&INPUT),
+            output: guess(&OUTPUT),
+            reference: guess(&REFERENCE),
         }
     }
 

@@ -7,9 +7,9 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use csv::{ReaderBuilder, StringRecord, Trim};
+use csv::{Reader, ReaderBuilder, StringRecord, Trim};
 
-use crate::columns::{Columns, Found, Layout};
+use crate::columns::{Columns, Found, Heading, Layout};
 use crate::record::{MIN_ROWS, median_step, quantile_of_steps};
 use crate::{Error, Hold, Record, Signal, unit};
 
@@ -54,15 +54,30 @@ pub fn read_csv(path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Er
         file: file.clone(),
         source,
     })?;
-    let text = decode(&file, &bytes)?;
-    let (layout, table) = read_table(&file, text, columns)?;
-    table.check(&file, &layout)?;
+    let record = parse_csv(&file, &bytes, columns, hold)?;
+    let name = path.file_name().map(|name| name.to_string_lossy());
+    Ok(Record {
+        name: name.map_or(file, |name| name.into_owned()),
+        ..record
+    })
+}
+
+/// As [`read_csv`], from the content of a file; `file` names it in messages and is the record's name.
+///
+/// # Errors
+/// As [`read_csv`], but for those of opening.
+pub fn parse_csv(
+    file: &str,
+    content: &[u8],
+    columns: &Columns,
+    hold: Hold,
+) -> Result<Record, Error> {
+    let (layout, table) = read_table(file, decode(file, content)?, columns)?;
+    table.check(file, &layout)?;
 
     let signal = |found: &Found, values: Vec<f64>| Signal::new(&*found.name, &*found.unit, values);
     Ok(Record {
-        name: path
-            .file_name()
-            .map_or(file, |name| name.to_string_lossy().into_owned()),
+        name: file.into(),
         time: table.time.iter().map(|t| t * layout.seconds).collect(),
         input: signal(&layout.input, table.input),
         output: signal(&layout.output, table.output),
@@ -72,6 +87,25 @@ pub fn read_csv(path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Er
             .map(|found| signal(found, table.reference)),
         hold,
     })
+}
+
+/// The header of a file: what there is to choose from, before anything is read.
+///
+/// # Errors
+/// Where the file is not text, is empty, or has no header.
+pub fn csv_header(file: &str, content: &[u8]) -> Result<Vec<Heading>, Error> {
+    let text = decode(file, content)?;
+    let mut reader = reader(text);
+    let mut lines = LineCounter::new(text);
+    let mut record = StringRecord::new();
+    while read(file, &mut reader, &mut record)? {
+        let row = lines.advance(reader.position().byte());
+        if !record.iter().all(str::is_empty) {
+            check_header(file, row, &record)?;
+            return Ok(record.iter().map(Heading::of).collect());
+        }
+    }
+    Err(Error::EmptyFile { file: file.into() })
 }
 
 /// The columns in use, in the file's units, with the line number of each row.
@@ -104,13 +138,7 @@ fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Error> {
 
 fn read_table(file: &str, text: &str, columns: &Columns) -> Result<(Layout, Table), Error> {
     let delimiter = delimiter(text);
-    let mut reader = ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(delimiter)
-        .comment(Some(b'#'))
-        .trim(Trim::All)
-        .from_reader(text.as_bytes());
+    let mut reader = reader(text);
     let mut lines = LineCounter::new(text);
     let mut record = StringRecord::new();
     let mut header: Option<(Layout, usize)> = None;
@@ -121,13 +149,7 @@ fn read_table(file: &str, text: &str, columns: &Columns) -> Result<(Layout, Tabl
     };
     let mut table = Table::default();
 
-    while reader
-        .read_record(&mut record)
-        .map_err(|error| Error::CannotOpen {
-            file: file.into(),
-            source: error.into(),
-        })?
-    {
+    while read(file, &mut reader, &mut record)? {
         let row = lines.advance(reader.position().byte());
         if record.iter().all(str::is_empty) {
             continue;
@@ -191,12 +213,37 @@ fn numbers_time(
     })
 }
 
+fn reader(text: &str) -> Reader<&[u8]> {
+    ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(delimiter(text))
+        .comment(Some(b'#'))
+        .trim(Trim::All)
+        .from_reader(text.as_bytes())
+}
+
+/// The next row, if there is one.
+fn read(file: &str, reader: &mut Reader<&[u8]>, row: &mut StringRecord) -> Result<bool, Error> {
+    reader.read_record(row).map_err(|error| Error::CannotOpen {
+        file: file.into(),
+        source: error.into(),
+    })
+}
+
 fn resolve(
     file: &str,
     row: u64,
     record: &StringRecord,
     columns: &Columns,
 ) -> Result<Layout, Error> {
+    check_header(file, row, record)?;
+    let headers: Vec<String> = record.iter().map(str::to_string).collect();
+    columns.resolve(file, row, &headers)
+}
+
+/// Numbers alone are no header.
+fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error> {
     let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
     if record.iter().all(|cell| cell.is_empty() || is_number(cell)) {
         return Err(Error::NoHeader {
@@ -205,8 +252,7 @@ fn resolve(
             first: unit::shown(&record.iter().collect::<Vec<_>>().join(", ")),
         });
     }
-    let headers: Vec<String> = record.iter().map(str::to_string).collect();
-    columns.resolve(file, row, &headers)
+    Ok(())
 }
 
 /// The one of comma, semicolon and tab that the first row has most of.

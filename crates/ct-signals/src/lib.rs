@@ -70,7 +70,7 @@ mod unit;
 
 pub use ar::{ArModel, Whitener};
 pub use column_fault::ColumnFault;
-pub use columns::Columns;
-pub use csv_file::read_csv;
+pub use columns::{Columns, Heading};
+pub use csv_file::{csv_header, parse_csv, read_csv};
 pub use error::Error;
 pub use record::{Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, Signal};

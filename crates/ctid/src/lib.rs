@@ -9,6 +9,7 @@
 //! | the next experiment | [`mod@design`] |
 //! | the tour | [`tour`] |
 //! | linear models from a record | [`mod@identify`] |
+//! | the page | [`mod@serve`] |
 //! | a paper's tables, computed again | [`tables`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
@@ -32,6 +33,7 @@ pub mod output;
 mod plot;
 pub mod progress;
 pub mod report;
+pub mod serve;
 mod signature;
 pub mod tables;
 pub mod term_file;

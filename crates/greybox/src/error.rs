@@ -29,6 +29,9 @@ pub enum Error {
         /// How many were tried.
         starts: usize,
     },
+    /// Somebody said so by [`Setup::stop`](crate::Setup::stop).
+    #[error("stopped before it was done")]
+    Stopped,
     /// The loop cannot be simulated without what it was to follow.
     #[error(
         "{record}: the record holds no reference, which a controller follows: name its column as reference under [columns]"

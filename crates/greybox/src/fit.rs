@@ -284,6 +284,9 @@ pub fn fit_onward(
         })
         .filter(|(_, minimum)| minimum.stop != Stop::NotFinite)
         .collect();
+    if setup.stopped() {
+        return Err(Error::Stopped);
+    }
     let best = minima
         .iter()
         .map(|(_, minimum)| minimum.triangle.cost())

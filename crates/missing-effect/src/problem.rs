@@ -1,6 +1,7 @@
 //! What is to be diagnosed and how, and the fit of the believed model.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, fit_from, random_starts};
@@ -38,8 +39,8 @@ pub struct Problem {
 }
 
 /// How to search.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+#[derive(Debug, Clone, Copy)]
+pub struct Options<'a> {
     /// Largest number of effects to add.
     pub max_effects: usize,
     /// Random starts of the base fit, at least ten; more are drawn until the best minimum is found twice.
@@ -49,15 +50,18 @@ pub struct Options {
     /// Where a controller is known and the records hold its reference: the loop is simulated; otherwise the model runs on
     /// the measured command.
     pub simulate_loop: bool,
+    /// Set by whoever does not wait any longer: the computation ends soon, and what it gives then is of no use.
+    pub stop: Option<&'a AtomicBool>,
 }
 
-impl Default for Options {
+impl Default for Options<'_> {
     fn default() -> Self {
         Self {
             max_effects: 6,
             starts: 12,
             seed: 1,
             simulate_loop: true,
+            stop: None,
         }
     }
 }
@@ -77,7 +81,7 @@ pub struct Progress {
 /// loop that is known it is then fitted there.
 pub(crate) fn base<'a>(
     problem: &'a Problem,
-    options: &Options,
+    options: &Options<'a>,
 ) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
     let fixed: BTreeMap<String, f64> = problem
         .fixed
@@ -98,6 +102,7 @@ pub(crate) fn base<'a>(
             structure.with_term(term.clone())
         })?;
     let mut setup = Setup::new(structure, &problem.records, fixed)?;
+    setup.stop = options.stop;
     for record in &problem.records {
         record.require_rows(setup.free().len())?;
     }

@@ -70,7 +70,7 @@ impl Compare {
         Ok(waiting.iter().map(note).collect())
     }
 
-    fn options(&self) -> Options {
+    fn options(&self) -> Options<'static> {
         Options {
             simulate_loop: self.way == LoopWay::Simulated,
             ..Options::default()

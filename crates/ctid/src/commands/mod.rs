@@ -15,7 +15,7 @@ use self::tables::Tables;
 use crate::look::Look;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
-use crate::{Error, catalogue, design, edit, tour};
+use crate::{Error, catalogue, design, edit, serve, tour};
 
 /// Says which physical effect a model of measured data is missing.
 #[derive(Debug, Parser)]
@@ -44,6 +44,8 @@ enum Command {
     Design(design::Arguments),
     /// Identify a linear model in continuous time from a record
     Identify(Identify),
+    /// Serve the page: the same with the mouse, on this machine alone
+    Serve(serve::Arguments),
     /// Compute the tables of a paper again, with many noises, and say which printed figures agree
     Tables(Tables),
 }
@@ -135,6 +137,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
             finish(&proposal, &text, &outputs, out, look)
         }
         Some(Command::Identify(arguments)) => arguments.run(out, look),
+        Some(Command::Serve(arguments)) => arguments.run(out),
         Some(Command::Tables(arguments)) => arguments.run(out, look),
     }
 }

@@ -106,7 +106,7 @@ impl Found for Proposal {
 }
 
 /// The effect of one of the two names, and the tank that it is to act in.
-fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
+pub(crate) fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
     let (id, place) = match name.split_once(':') {
         Some((id, place)) => (id, Some(place)),
         None => (name, None),

@@ -8,7 +8,8 @@ use std::path::Path;
 use plants::{Fitted, Place, Placed, Term};
 use toml_edit::{Array, DocumentMut, Item, Table, value};
 
-use self::layout::{document, push, set_place, take_out};
+pub(crate) use self::layout::document;
+use self::layout::{push, set_place, take_out};
 use crate::model_file::{self, ModelFile};
 use crate::report::rounded;
 use crate::term_file::{self, TermFile};
@@ -53,7 +54,11 @@ pub struct Edited {
     pub done: String,
 }
 
-fn change(path: &Path, edit: impl FnOnce(&str) -> Result<Edited, Error>) -> Result<String, Error> {
+/// Changes a file's text; its kind of line ends stays. Returns what was done, in one line.
+pub(crate) fn change(
+    path: &Path,
+    edit: impl FnOnce(&str) -> Result<Edited, Error>,
+) -> Result<String, Error> {
     let text = model_file::read_text(path)?;
     let edited = edit(&text)?;
     // The editor writes LF; a file from an editor that writes CRLF keeps it.

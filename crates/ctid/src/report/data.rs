@@ -70,7 +70,7 @@ struct Curve {
 }
 
 /// The JSON of the report, safe inside a `<script>` element. What is not finite becomes `null`.
-pub(super) fn json(diagnosis: &Diagnosis) -> String {
+pub(crate) fn json(diagnosis: &Diagnosis) -> String {
     let report = Report {
         input_unit: &diagnosis.input_unit,
         output_unit: &diagnosis.output_unit,
@@ -87,6 +87,21 @@ pub(super) fn json(diagnosis: &Diagnosis) -> String {
         unknown: diagnosis.unknown.as_ref(),
     };
     script_safe(&report)
+}
+
+/// The same of records alone, before there is a model.
+pub(crate) fn records(records: &[Shown], input_unit: &str, output_unit: &str) -> String {
+    script_safe(&Report {
+        input_unit,
+        output_unit,
+        noise_floor: f64::NAN,
+        records: records.iter().map(record).collect(),
+        steps: Vec::new(),
+        scores: &[],
+        added: Vec::new(),
+        equal: Vec::new(),
+        unknown: None,
+    })
 }
 
 fn scores(diagnosis: &Diagnosis, are: fn(&Diagnosis, &Score) -> bool) -> Vec<bool> {

@@ -22,16 +22,22 @@ mod udink;
 use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
 pub use self::baysse::html as baysse;
-pub(crate) use self::data::rounded;
+pub(crate) use self::data::{json as drawing, records as drawing_of_records, rounded};
 pub use self::identification::html as identification;
 use self::page::{NOTICES, Page, figure, figure_with, items, large, section};
+pub(crate) use self::page::{PLOTLY, PLOTS, STYLE};
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.
 pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
 
-const SCRIPT: &str = include_str!("report.js");
+/// Draws a diagnosis, here and on the page that is served.
+pub(crate) const DIAGNOSIS_FIGURES: &str = include_str!("diagnosis_figures.js");
+const SCRIPT: &str = concat!(
+    include_str!("diagnosis_figures.js"),
+    include_str!("report.js")
+);
 
 /// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and
 /// no scores; what is empty is left out.

@@ -5,11 +5,11 @@ use super::text::escape;
 
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'";
-const STYLE: &str = include_str!("report.css");
+pub(crate) const STYLE: &str = include_str!("report.css");
 /// Colours, axes and the unpacking of plotly.js: comes before the page's own script.
-const PLOTS: &str = include_str!("plots.js");
+pub(crate) const PLOTS: &str = include_str!("plots.js");
 /// plotly.js, gzipped, in base64.
-pub(super) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
+pub(crate) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
 
 /// Stands where the plots need a script.
 pub(super) const NOTICES: &str = "<noscript><p class=\"notice\">The plots need a browser that runs scripts; \

@@ -62,7 +62,18 @@ const plots = (() => {
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], toImageButtonOptions: { scale: 2 },
   }, more);
 
+  // Where the tools stand above, only the plots worth a zoom have them.
+  const ZOOMED = /^(record-\d+|by-time|by-level|by-flow|unknown-path)$/;
+  function tooled(id, { data, layout }) {
+    if (!tight() || !ZOOMED.test(id)) return [data, layout, config()];
+    toolsAbove(layout);
+    const { modeBarButtonsToRemove } = config();
+    return [data, layout, config({ displayModeBar: true, modeBarButtonsToRemove: [...modeBarButtonsToRemove, "toImage"] })];
+  }
+
   async function unpack() {
+    // Where it is served it is there already.
+    if (window.Plotly) return;
     const element = document.getElementById("plotly");
     const bytes = Uint8Array.from(atob(element.textContent), (c) => c.charCodeAt(0));
     element.remove();
@@ -96,5 +107,5 @@ const plots = (() => {
     });
   }
 
-  return { narrow, tight, theme, plain, pretty, named, axis, layout, toolsAbove, config, start };
+  return { narrow, tight, theme, plain, pretty, named, axis, layout, toolsAbove, config, tooled, start };
 })();

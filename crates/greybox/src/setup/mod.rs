@@ -4,6 +4,7 @@ mod rows;
 mod simulation;
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_signals::{Hold, Record};
 use plants::{Command, Scales, Structure, controller::Controller};
@@ -29,6 +30,8 @@ pub struct Setup<'a> {
     pub fixed: BTreeMap<String, f64>,
     /// Equal parts of a sampling interval in the simulation.
     pub substeps: usize,
+    /// Where somebody may say that nobody waits any more: nothing is simulated then, and every fit ends with [`Error::Stopped`].
+    pub stop: Option<&'a AtomicBool>,
     names: Vec<String>,
     bounds: Vec<(f64, f64)>,
     /// Positions of the parameters that are fitted.
@@ -157,6 +160,7 @@ impl<'a> Setup<'a> {
             records,
             fixed,
             substeps: 1,
+            stop: None,
             names,
             bounds,
             free,
@@ -193,6 +197,7 @@ impl<'a> Setup<'a> {
     fn rebuilt(&self, structure: Structure, feedback: Option<Feedback>) -> Result<Self, Error> {
         let mut setup = Self::build(structure, self.records, self.fixed.clone(), feedback)?;
         setup.substeps = self.substeps;
+        setup.stop = self.stop;
         Ok(setup)
     }
 
@@ -245,13 +250,22 @@ impl<'a> Setup<'a> {
         self.rebuilt(structure, self.feedback.clone())
     }
 
+    /// Nobody waits any more.
+    pub(crate) fn stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+
     /// The same structure against other records, in the same scales, run on the measured command.
     ///
     /// # Errors
     /// As [`Setup::new`].
-    pub fn with_records<'b>(&self, records: &'b [Record]) -> Result<Setup<'b>, Error> {
+    pub fn with_records<'b>(&self, records: &'b [Record]) -> Result<Setup<'b>, Error>
+    where
+        'a: 'b,
+    {
         let mut setup = Setup::new(self.structure.clone(), records, self.fixed.clone())?;
         setup.substeps = self.substeps;
+        setup.stop = self.stop;
         Ok(setup)
     }
 

@@ -145,6 +145,9 @@ impl Setup<'_> {
         by: &[usize],
         mut each: impl FnMut(bool, &mut [f64]) -> bool,
     ) -> Option<()> {
+        if self.stopped() {
+            return None;
+        }
         let columns = by.len() + 1;
         let mut row = vec![0.0; columns];
         let count = self.parameter_count();

@@ -50,8 +50,11 @@ impl Setup<'_> {
     /// Simulates all records on their measured commands.
     ///
     /// # Errors
-    /// Where the vector has the wrong length.
+    /// Where the vector has the wrong length, or nobody waits any more.
     pub fn simulate(&self, x: &[f64]) -> Result<Simulated, Error> {
+        if self.stopped() {
+            return Err(Error::Stopped);
+        }
         let mut simulated = Simulated {
             output: Vec::with_capacity(self.records.len()),
             level: [(f64::INFINITY, f64::NEG_INFINITY); MAX_VESSELS],

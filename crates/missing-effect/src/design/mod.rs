@@ -154,7 +154,7 @@ impl<'a> Fitted<'a> {
 fn fitted<'a>(
     problem: &'a Problem,
     between: [Candidacy; 2],
-    options: &Options,
+    options: &Options<'a>,
 ) -> Result<Fitted<'a>, Error> {
     let (base, _) = base(problem, options)?;
     for Candidacy { effect, vessel } in between {

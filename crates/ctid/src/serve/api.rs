@@ -1,0 +1,298 @@
+//! The routes of the page's requests; the head of the module `serve` says what each takes and gives.
+
+use std::sync::Arc;
+
+use axum::body::{Body, Bytes};
+use axum::extract::{DefaultBodyLimit, Query, State};
+use axum::http::StatusCode;
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use missing_effect::design::Limits;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tokio::task::spawn_blocking;
+
+use super::guard::{LARGEST_BODY, Refusal};
+use super::jobs::{self, Task};
+use super::session::{Session, Upload, lock};
+use super::sessions::Shared;
+use super::settings::Settings;
+use super::{App, downloads, state};
+use crate::edit;
+
+/// Requests in JSON are no larger \[bytes\].
+const LARGEST_REQUEST: usize = 1 << 20;
+/// Characters of a record's name at most.
+const LONGEST_NAME: usize = 100;
+
+type Answer = Result<Json<Value>, Refusal>;
+
+pub(super) fn routes() -> Router<Arc<App>> {
+    Router::new()
+        .route("/api/session", post(open))
+        .route("/api/state", get(show))
+        .route("/api/settings", post(settings))
+        .route("/api/text", post(text))
+        .route("/api/effect", post(effect))
+        .route("/api/run", post(run))
+        .route("/api/cancel", post(cancel))
+        .route("/api/forget", post(forget))
+        .merge(downloads::routes())
+        .layer(DefaultBodyLimit::max(LARGEST_REQUEST))
+        // It limits its body itself.
+        .route("/api/record", post(record))
+}
+
+/// Which tab asks.
+#[derive(Debug, Deserialize)]
+pub(super) struct Tab {
+    pub session: String,
+}
+
+/// The session of a request.
+pub(super) fn find(app: &App, id: &str) -> Result<Shared, Refusal> {
+    app.sessions.find(id).ok_or_else(|| {
+        Refusal::new(
+            StatusCode::GONE,
+            "this tab's work is no longer kept: ctid was started anew, or other tabs needed the room; load the page again",
+        )
+    })
+}
+
+/// Something that may take a while, such as reading a large file, away from the threads that serve.
+pub(super) async fn aside<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
+) -> Result<T, Refusal> {
+    let broke = |_| {
+        Refusal::new(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            "the request broke off, which is a fault of ctid",
+        )
+    };
+    spawn_blocking(work).await.map_err(broke)?
+}
+
+/// Does something with the session, and answers with its state.
+async fn with(
+    app: &App,
+    id: &str,
+    work: impl FnOnce(&mut Session) -> Result<(), Refusal> + Send + 'static,
+) -> Answer {
+    let session = find(app, id)?;
+    aside(move || {
+        let mut session = lock(&session);
+        work(&mut session)?;
+        Ok(Json(state::state(&mut session)))
+    })
+    .await
+}
+
+#[derive(Debug, Deserialize)]
+struct Open {
+    session: Option<String>,
+}
+
+async fn open(State(app): State<Arc<App>>, Json(open): Json<Open>) -> Answer {
+    let known = open
+        .session
+        .and_then(|id| Some((id.clone(), app.sessions.find(&id)?)));
+    let (id, session) = known.unwrap_or_else(|| app.sessions.open());
+    aside(move || {
+        let mut session = lock(&session);
+        session.refresh();
+        let state = state::state(&mut session);
+        Ok(Json(
+            json!({ "session": id, "state": state, "plants": state::plants() }),
+        ))
+    })
+    .await
+}
+
+#[derive(Debug, Deserialize)]
+struct Since {
+    session: String,
+    since: Option<u64>,
+}
+
+async fn show(State(app): State<Arc<App>>, Query(asked): Query<Since>) -> Answer {
+    let session = find(&app, &asked.session)?;
+    aside(move || {
+        let mut session = lock(&session);
+        session.refresh();
+        if asked.since == Some(session.version) {
+            return Ok(Json(
+                json!({ "version": session.version, "job": state::job(&session) }),
+            ));
+        }
+        Ok(Json(state::state(&mut session)))
+    })
+    .await
+}
+
+#[derive(Debug, Deserialize)]
+struct NewRecord {
+    session: String,
+    name: String,
+    #[serde(default)]
+    held_out: bool,
+}
+
+/// A name for messages and tables; it names no file of this machine.
+pub(super) fn plain_name(name: &str) -> String {
+    let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
+    let printable = last.chars().filter(|c| !c.is_control());
+    let name: String = printable.take(LONGEST_NAME).collect();
+    match name.trim() {
+        "" => "record.csv".to_string(),
+        name => name.to_string(),
+    }
+}
+
+async fn record(State(app): State<Arc<App>>, Query(new): Query<NewRecord>, body: Body) -> Answer {
+    // Files are taken one after the other: so many bytes are held at once, and no more.
+    let closed = |_| Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the server is closing");
+    let _turn = app.uploading.acquire().await.map_err(closed)?;
+    let session = find(&app, &new.session)?;
+    let content: Bytes = axum::body::to_bytes(body, LARGEST_BODY)
+        .await
+        .map_err(|_| Refusal::too_large())?;
+    let taken = aside(move || {
+        let upload = Upload::new(&plain_name(&new.name), new.held_out, content)?;
+        let mut session = lock(&session);
+        session.take(upload)?;
+        Ok((Json(state::state(&mut session)), new.session))
+    });
+    let (answer, id) = taken.await?;
+    app.sessions.make_room(&id);
+    Ok(answer)
+}
+
+#[derive(Debug, Deserialize)]
+struct Forget {
+    name: String,
+}
+
+async fn forget(
+    State(app): State<Arc<App>>,
+    Query(tab): Query<Tab>,
+    Json(forget): Json<Forget>,
+) -> Answer {
+    with(&app, &tab.session, move |session| {
+        session.drop_record(&forget.name);
+        Ok(())
+    })
+    .await
+}
+
+async fn settings(
+    State(app): State<Arc<App>>,
+    Query(tab): Query<Tab>,
+    Json(settings): Json<Settings>,
+) -> Answer {
+    with(&app, &tab.session, move |session| {
+        session.change(|file, text| settings.into_text(file, text))?;
+        Ok(())
+    })
+    .await
+}
+
+#[derive(Debug, Deserialize)]
+struct Text {
+    text: String,
+}
+
+async fn text(
+    State(app): State<Arc<App>>,
+    Query(tab): Query<Tab>,
+    Json(text): Json<Text>,
+) -> Answer {
+    with(&app, &tab.session, move |session| {
+        Ok(session.replace(text.text)?)
+    })
+    .await
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Way {
+    Add,
+    Remove,
+}
+
+#[derive(Debug, Deserialize)]
+struct Effect {
+    #[serde(rename = "do")]
+    way: Way,
+    effect: String,
+    place: Option<String>,
+}
+
+async fn effect(
+    State(app): State<Arc<App>>,
+    Query(tab): Query<Tab>,
+    Json(Effect { way, effect, place }): Json<Effect>,
+) -> Answer {
+    with(&app, &tab.session, move |session| {
+        session.change(|file, text| match way {
+            Way::Add => edit::with_effect(file, text, &effect, place.as_deref()),
+            Way::Remove => edit::without_effect(file, text, &effect),
+        })?;
+        Ok(())
+    })
+    .await
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(tag = "what", rename_all = "lowercase")]
+enum Run {
+    Compare,
+    Chain {
+        effects: Vec<(String, Option<String>)>,
+    },
+    Diagnose,
+    Design {
+        group: usize,
+        between: [String; 2],
+        range: Option<(f64, f64)>,
+        slew: Option<f64>,
+        duration: Option<f64>,
+    },
+}
+
+async fn run(State(app): State<Arc<App>>, Query(tab): Query<Tab>, Json(run): Json<Run>) -> Answer {
+    let session = find(&app, &tab.session)?;
+    let task = match run {
+        Run::Compare => Task::Compare,
+        Run::Chain { effects } => Task::Chain(effects),
+        Run::Diagnose => Task::Diagnose,
+        Run::Design {
+            group,
+            between,
+            range,
+            slew,
+            duration,
+        } => Task::Design {
+            group,
+            between,
+            limits: Limits {
+                range,
+                slew,
+                duration,
+                ..Limits::default()
+            },
+        },
+    };
+    aside(move || {
+        jobs::begin(&session, task)?;
+        Ok(Json(state::state(&mut lock(&session))))
+    })
+    .await
+}
+
+async fn cancel(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Answer {
+    with(&app, &tab.session, |session| {
+        session.stop();
+        Ok(())
+    })
+    .await
+}

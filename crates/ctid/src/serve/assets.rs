@@ -1,0 +1,68 @@
+//! What the page is made of. Every file is in the program; the plots' script is that of the report.
+
+use std::sync::{Arc, LazyLock};
+
+use axum::Router;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::IntoResponse;
+use axum::routing::get;
+use base64::Engine;
+
+use super::App;
+use crate::report;
+
+const PAGE: &str = include_str!("page/index.html");
+/// Stands in the page where the token goes.
+const TOKEN: &str = "{{token}}";
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const STYLE: &str = "text/css; charset=utf-8";
+
+/// Path, kind and content of what does not change.
+const FILES: [(&str, &str, &str); 13] = [
+    ("/report.css", STYLE, report::STYLE),
+    ("/page.css", STYLE, include_str!("page/page.css")),
+    ("/plots.js", SCRIPT, report::PLOTS),
+    ("/diagnosis_figures.js", SCRIPT, report::DIAGNOSIS_FIGURES),
+    ("/app.js", SCRIPT, include_str!("page/app.js")),
+    ("/server.js", SCRIPT, include_str!("page/server.js")),
+    ("/dom.js", SCRIPT, include_str!("page/dom.js")),
+    ("/data.js", SCRIPT, include_str!("page/data.js")),
+    ("/model.js", SCRIPT, include_str!("page/model.js")),
+    ("/fit.js", SCRIPT, include_str!("page/fit.js")),
+    ("/chains.js", SCRIPT, include_str!("page/chains.js")),
+    ("/findings.js", SCRIPT, include_str!("page/findings.js")),
+    ("/experiment.js", SCRIPT, include_str!("page/experiment.js")),
+];
+
+/// plotly.js, gzipped.
+static PLOTLY: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    // The build script has written it: it can be read.
+    let packed = base64::engine::general_purpose::STANDARD.decode(report::PLOTLY);
+    packed.unwrap_or_default()
+});
+
+pub(super) fn routes() -> Router<Arc<App>> {
+    let mut router = Router::new()
+        .route("/", get(page))
+        .route("/plotly.js", get(plotly));
+    for (path, kind, content) in FILES {
+        let file = move || async move { ([(header::CONTENT_TYPE, kind)], content) };
+        router = router.route(path, get(file));
+    }
+    router
+}
+
+async fn page(State(app): State<Arc<App>>) -> impl IntoResponse {
+    let page = PAGE.replace(TOKEN, app.guard.token());
+    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], page)
+}
+
+async fn plotly() -> impl IntoResponse {
+    let headers = [
+        (header::CONTENT_TYPE, SCRIPT),
+        (header::CONTENT_ENCODING, "gzip"),
+    ];
+    (headers, PLOTLY.as_slice())
+}

@@ -1,0 +1,147 @@
+//! What the page draws and what can be downloaded.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::{Query, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use missing_effect::Shown;
+use serde::Deserialize;
+
+use super::App;
+use super::api::{Tab, aside, find, plain_name};
+use super::guard::Refusal;
+use super::session::{UNNAMED, lock};
+use crate::design::Proposal;
+use crate::output::Found as _;
+use crate::report;
+
+pub(super) fn routes() -> Router<Arc<App>> {
+    Router::new()
+        .route("/api/data", get(data))
+        .route("/api/model", get(model))
+        .route("/api/file", get(file))
+}
+
+/// The records as they are, before anything is fitted.
+async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Response, Refusal> {
+    let session = find(&app, &tab.session)?;
+    let text = aside(move || {
+        let mut session = lock(&session);
+        let (columns, hold) = session.layout();
+        let (mut shown, mut units) = (Vec::new(), None);
+        for upload in &mut session.records {
+            let Ok(record) = upload.record(&columns, hold) else {
+                continue;
+            };
+            units.get_or_insert((record.input.unit.clone(), record.output.unit.clone()));
+            shown.push(Shown {
+                name: record.name.clone(),
+                held_out: upload.held_out,
+                time: record.time.clone(),
+                input: record.input.values.clone(),
+                output: record.output.values.clone(),
+            });
+        }
+        let (input, output) = units.unwrap_or_default();
+        // As in the report, those that are fitted come first.
+        shown.sort_by_key(|record| record.held_out);
+        Ok(report::drawing_of_records(&shown, &input, &output))
+    });
+    Ok(as_json(text.await?.into()))
+}
+
+fn as_json(body: Bytes) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], body).into_response()
+}
+
+#[derive(Debug, Deserialize)]
+struct Which {
+    session: String,
+    id: u64,
+}
+
+async fn model(
+    State(app): State<Arc<App>>,
+    Query(which): Query<Which>,
+) -> Result<Response, Refusal> {
+    let session = find(&app, &which.session)?;
+    let session = lock(&session);
+    let fitted = session.models.iter().find(|fitted| fitted.id == which.id);
+    let missing = || {
+        Refusal::new(
+            StatusCode::NOT_FOUND,
+            "this fit is no longer kept; compare again",
+        )
+    };
+    Ok(as_json(fitted.ok_or_else(missing)?.body.clone()))
+}
+
+/// What can be downloaded.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Wanted {
+    Model,
+    Report,
+    Experiment,
+}
+
+#[derive(Debug, Deserialize)]
+struct Download {
+    session: String,
+    of: Wanted,
+}
+
+async fn file(
+    State(app): State<Arc<App>>,
+    Query(download): Query<Download>,
+) -> Result<Response, Refusal> {
+    let session = find(&app, &download.session)?;
+    aside(move || {
+        let session = lock(&session);
+        let missing = |what: &str| Refusal::new(StatusCode::NOT_FOUND, what);
+        let (name, kind, text) = match download.of {
+            Wanted::Model => {
+                let path = session.file.as_deref().unwrap_or(Path::new(UNNAMED));
+                let name = path
+                    .file_name()
+                    .map_or(UNNAMED.into(), |name| name.to_string_lossy());
+                (plain_name(&name), "application/toml", session.text.clone())
+            }
+            Wanted::Report => {
+                // Whatever was computed last.
+                let latest = [&session.fitted, &session.diagnosis].into_iter().flatten();
+                let latest = latest.max_by_key(|found| found.id);
+                let latest =
+                    latest.ok_or_else(|| missing("nothing was computed yet; compare first"))?;
+                (
+                    "report.html".to_string(),
+                    "text/html; charset=utf-8",
+                    report::html(&latest.found),
+                )
+            }
+            Wanted::Experiment => {
+                let found = session.design.as_ref();
+                let found = found.ok_or_else(|| missing("no experiment was designed yet"))?;
+                let (design, columns) = &found.found;
+                let text = Proposal::new(design.clone(), columns).record();
+                ("next.csv".to_string(), "text/csv; charset=utf-8", text)
+            }
+        };
+        let mut headers = HeaderMap::new();
+        headers.insert(header::CONTENT_TYPE, header::HeaderValue::from_static(kind));
+        let safe: String = name
+            .chars()
+            .filter(|c| c.is_ascii_alphanumeric() || "-_.".contains(*c))
+            .collect();
+        if let Ok(value) = format!("attachment; filename=\"{safe}\"").parse() {
+            headers.insert(header::CONTENT_DISPOSITION, value);
+        }
+        Ok((headers, text).into_response())
+    })
+    .await
+}

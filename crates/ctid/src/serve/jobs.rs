@@ -1,0 +1,276 @@
+//! The computations: one for each tab, on a thread of its own. The functions of the commands do the work.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::Instant;
+
+use axum::http::StatusCode;
+use ct_signals::Columns;
+use missing_effect::design::{Design, Limits, design};
+use missing_effect::{Diagnosis, Options, Problem, Progress, Verdict, compare, diagnose};
+
+use super::guard::Refusal;
+use super::session::{Fitted, Found, Job, Session, lock};
+use super::sessions::Shared;
+use super::words;
+use crate::design::candidacy;
+use crate::input::{self, Files};
+use crate::model_file::{self, ModelFile};
+use crate::{Error, edit};
+
+/// What is to be computed.
+#[derive(Debug, Clone)]
+pub(super) enum Task {
+    /// Fits the model.
+    Compare,
+    /// Fits the model with these effects in place of its own; the model stays.
+    Chain(Vec<(String, Option<String>)>),
+    /// Searches what is missing.
+    Diagnose,
+    /// The experiment within these limits that tells apart two effects of a group of the diagnosis.
+    Design {
+        group: usize,
+        between: [String; 2],
+        limits: Limits,
+    },
+}
+
+/// What came out.
+enum Outcome {
+    Fitted(Diagnosis),
+    Diagnosed(Diagnosis),
+    Designed(Box<Design>, Columns),
+}
+
+/// What a computation works on.
+struct Work {
+    text: String,
+    model: ModelFile,
+    files: Files,
+    problem: Problem,
+    data: u64,
+}
+
+impl Work {
+    /// The model of this text with the records of the session.
+    fn new(session: &mut Session, text: String) -> Result<Self, Refusal> {
+        let name = session.model_name();
+        let model = model_file::parse(&name, &text)?;
+        let (mut records, mut test) = (Vec::new(), Vec::new());
+        let mut files = Files {
+            data: Vec::new(),
+            test: Vec::new(),
+            model: PathBuf::from(&name),
+        };
+        for upload in &mut session.records {
+            let record = upload.record(&model.columns, model.hold);
+            let record = record.map_err(Refusal::input)?.as_ref().clone();
+            let (to, names) = match upload.held_out {
+                true => (&mut test, &mut files.test),
+                false => (&mut records, &mut files.data),
+            };
+            to.push(record);
+            names.push(PathBuf::from(&upload.name));
+        }
+        if records.is_empty() {
+            return Err(Refusal::input(
+                "there is no record to fit; drop a CSV file first",
+            ));
+        }
+        let problem = input::problem(&name, model.clone(), records, test)?;
+        Ok(Self {
+            text,
+            model,
+            files,
+            problem,
+            data: session.data,
+        })
+    }
+
+    fn options<'a>(&self, stop: &'a AtomicBool) -> Options<'a> {
+        Options {
+            stop: Some(stop),
+            ..Options::default()
+        }
+    }
+}
+
+/// Begins a computation in place of the one that runs; what it gives is put into the session.
+///
+/// # Errors
+/// Where records and model do not allow it.
+pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
+    let mut session = lock(shared);
+    session.stop();
+    let text = match &task {
+        Task::Compare | Task::Diagnose => session.text.clone(),
+        Task::Chain(effects) => with_effects(&session, effects)?,
+        Task::Design { group, between, .. } => beside(&session, *group, between)?,
+    };
+    let work = Work::new(&mut session, text)?;
+    let number = session.number();
+    let stop = Arc::new(AtomicBool::new(false));
+    let progress = Arc::new(Mutex::new(None));
+    session.job = Some(Job {
+        number,
+        what: match task {
+            Task::Compare | Task::Chain(_) => "compare",
+            Task::Diagnose => "diagnose",
+            Task::Design { .. } => "design",
+        },
+        begun: Instant::now(),
+        stop: stop.clone(),
+        progress: progress.clone(),
+    });
+    session.failure = None;
+    session.version += 1;
+    let place = Arc::downgrade(shared);
+    let run = move || {
+        let show = |now: Progress| {
+            let mut shown = lock(&progress);
+            // The threads report in any order: it never runs back within a phase.
+            let back =
+                shown.is_some_and(|old: Progress| old.phase == now.phase && old.done > now.done);
+            if !back {
+                *shown = Some(now);
+            }
+        };
+        let outcome = catch_unwind(AssertUnwindSafe(|| compute(&work, &task, &stop, &show)));
+        // The tab may be gone, and so is whoever waits.
+        let Some(shared) = place.upgrade() else {
+            return;
+        };
+        let mut session = lock(&shared);
+        let ours = session.job.as_ref().is_some_and(|job| job.number == number);
+        if !ours || stop.load(Ordering::Relaxed) {
+            return;
+        }
+        session.job = None;
+        session.version += 1;
+        match outcome {
+            Ok(Ok(outcome)) => settle(&mut session, work, outcome),
+            Ok(Err(error)) => session.fail(error.to_string()),
+            Err(_) => session.fail("the computation broke off, which is a fault of ctid; what it said is in the terminal".into()),
+        }
+    };
+    if let Err(error) = thread::Builder::new()
+        .name("ctid computes".into())
+        .spawn(run)
+    {
+        session.job = None;
+        let what = format!("no thread can be started: {error}");
+        return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, what));
+    }
+    Ok(())
+}
+
+fn compute(
+    work: &Work,
+    task: &Task,
+    stop: &AtomicBool,
+    show: &(dyn Fn(Progress) + Sync),
+) -> Result<Outcome, Error> {
+    let (problem, options) = (&work.problem, work.options(stop));
+    let outcome = match task {
+        Task::Compare | Task::Chain(_) => compare(problem, &options).map(Outcome::Fitted),
+        Task::Diagnose => diagnose(problem, &options, show).map(Outcome::Diagnosed),
+        Task::Design {
+            between: [a, b],
+            limits,
+            ..
+        } => {
+            let of = |name: &str| candidacy(&work.model, &work.files.model, name);
+            let between = [of(a)?, of(b)?];
+            design(problem, between, limits, &options, show)
+                .map(|design| Outcome::Designed(Box::new(design), work.model.columns.clone()))
+        }
+    };
+    outcome.map_err(|error| work.files.blame(error))
+}
+
+/// Puts what came out where the page finds it.
+fn settle(session: &mut Session, work: Work, outcome: Outcome) {
+    let id = session.number();
+    let Work {
+        model, text, data, ..
+    } = work;
+    match outcome {
+        Outcome::Fitted(found) => {
+            let Some(step) = found.steps.last() else {
+                return;
+            };
+            session.keep(Fitted {
+                id,
+                data,
+                rmse: step.rmse,
+                rmse_test: step.rmse_test,
+                bic: step.bic,
+                adequate: found.verdict == Verdict::Adequate,
+                body: words::fitted(id, &found).into(),
+                model: model.clone(),
+            });
+            session.fitted = Some(Arc::new(Found {
+                id,
+                model,
+                text,
+                data,
+                found,
+            }));
+        }
+        Outcome::Diagnosed(found) => {
+            session.diagnosis = Some(Arc::new(Found {
+                id,
+                model,
+                text,
+                data,
+                found,
+            }));
+        }
+        Outcome::Designed(design, columns) => {
+            let found = (*design, columns);
+            session.design = Some(Arc::new(Found {
+                id,
+                model,
+                text,
+                data,
+                found,
+            }));
+        }
+    }
+}
+
+/// The session's model with other effects.
+fn with_effects(session: &Session, effects: &[(String, Option<String>)]) -> Result<String, Error> {
+    let name = session.model_name();
+    let mut text = session.text.clone();
+    for placed in &session.model()?.effects {
+        text = edit::without_effect(&name, &text, placed.effect.id)?.text;
+    }
+    for (effect, place) in effects {
+        text = edit::with_effect(&name, &text, effect, place.as_deref())?.text;
+    }
+    Ok(text)
+}
+
+/// The model that was diagnosed with what was found beside a group: two of the group are to be told apart there.
+fn beside(session: &Session, group: usize, between: &[String; 2]) -> Result<String, Refusal> {
+    let name = session.model_name();
+    let Some(of) = &session.diagnosis else {
+        return Err(Refusal::input("nothing was diagnosed yet; diagnose first"));
+    };
+    let mut text = of.text.clone();
+    for (k, step) in of.found.steps.iter().skip(1).enumerate() {
+        let Some(effect) = step
+            .added
+            .as_ref()
+            .filter(|effect| k != group && !between.contains(effect))
+        else {
+            continue;
+        };
+        text = edit::with_effect(&name, &text, effect, step.place.as_deref())?.text;
+    }
+    Ok(text)
+}

@@ -1,0 +1,213 @@
+//! `ctid serve`: a page on 127.0.0.1 that does what the commands do, with the mouse.
+//!
+//! # What it is made of
+//! | what | where |
+//! |---|---|
+//! | who may ask | `guard.rs` |
+//! | the page's files | `assets.rs`, `page/` |
+//! | what one tab works on | `session.rs`; all of them: `sessions.rs` |
+//! | the form of the model | `settings.rs` |
+//! | computations | `jobs.rs` |
+//! | what the page is told | `state.rs`, `words.rs` |
+//! | the routes | `api.rs`, `downloads.rs` |
+//!
+//! The state is a model file, that of `--model` or a text that is kept for the tab and can be downloaded. It is changed by the
+//! functions of `ctid add` and `ctid remove`, fitted by those of `ctid compare` and `ctid diagnose`; a file is read again at
+//! every request, so that page and commands can be mixed.
+//!
+//! # The requests
+//! Every tab has a session, named in the query; what is sent is JSON but for a record, what comes back is JSON but for
+//! a download. No parameter ever reaches the file system. A `POST` carries the token that stands in the page. A refusal is
+//! `{"error": "..."}` with a status of 400 or more: one line with the mend, as the commands write it.
+//!
+//! | request | takes | gives |
+//! |---|---|---|
+//! | `POST /api/session` | `{session}`, the one that the tab had, or null | `{session, state, plants}` |
+//! | `GET /api/state?session=&since=` | the version that the page shows | the state, or `{version, job}` where it is the same |
+//! | `POST /api/record?session=&name=&held_out=` | the CSV itself, at most 64 MB | the state |
+//! | `POST /api/forget?session=` | `{name}` of a record | the state |
+//! | `POST /api/settings?session=` | `{plant, hold, columns, known, controller}`, as the model file has them | the state |
+//! | `POST /api/text?session=` | `{text}`, a whole model file | the state |
+//! | `POST /api/effect?session=` | `{do: "add" or "remove", effect, place}` | the state |
+//! | `POST /api/run?session=` | `{what: "compare"}`, `{what: "diagnose"}`, `{what: "chain", effects: [[effect, place], ...]}`, `{what: "design", group, between: [a, b], range: [low, high], slew, duration}`, of which the last three may be missing | the state |
+//! | `POST /api/cancel?session=` | | the state |
+//! | `GET /api/data?session=` | | the records' curves, as the report draws them |
+//! | `GET /api/model?session=&id=` | the number of a fit | its curves, parameters and sentences |
+//! | `GET /api/file?session=&of=` | `model`, `report` or `experiment` | the file |
+//!
+//! The state is `{version, file, text, model_error, settings, effects, records, headings, guessed, current, trail, models,
+//! diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits of its first
+//! effects, `job` `{what, phase, done, total, seconds}` while something is computed.
+//!
+//! # What is bounded
+//! Eight tabs, 256 MB of records over all of them, 64 MB and 20 records in one, 500 columns in a file, twelve fits in a tab, one computation in
+//! a tab; it stops when another begins, when its tab is forgotten, and three minutes after its page has asked last.
+
+mod api;
+mod assets;
+mod downloads;
+mod guard;
+mod jobs;
+mod session;
+mod sessions;
+mod settings;
+mod state;
+mod words;
+
+use std::io::Write;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::{Router, middleware};
+use clap::Args;
+use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
+
+use self::guard::{Guard, LARGEST_BODY};
+use self::session::Upload;
+use self::sessions::Sessions;
+use crate::commands::say;
+use crate::input::Files;
+use crate::{Error, model_file};
+
+/// Where the page is, if nothing else is there.
+const PORT: u16 = 8420;
+/// So many ports from the first on are tried.
+const TRIED: u16 = 20;
+
+/// What may be typed.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Records (CSV) that are there from the start; others can be dropped on the page
+    #[arg(value_name = "DATA.csv")]
+    data: Vec<PathBuf>,
+    /// Model file, which the page edits; without it the page keeps one that can be downloaded
+    #[arg(long, value_name = "M.toml")]
+    model: Option<PathBuf>,
+    /// Held-out record; may be repeated
+    #[arg(long, value_name = "T.csv")]
+    test: Vec<PathBuf>,
+    /// Port on 127.0.0.1; the next that is free where it is taken, 0 for any
+    #[arg(long, value_name = "PORT", default_value_t = PORT)]
+    port: u16,
+}
+
+/// What all requests share.
+#[derive(Debug)]
+struct App {
+    guard: Guard,
+    sessions: Sessions,
+    /// One file is taken at a time.
+    uploading: Semaphore,
+}
+
+impl Arguments {
+    /// Serves the page until the process ends; the address goes to `out` first.
+    pub(crate) fn run(&self, out: &mut dyn Write) -> Result<(), Error> {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()?;
+        let records = self.records()?;
+        let listener = runtime.block_on(listen(self.port))?;
+        let address = listener.local_addr()?;
+        say(
+            out,
+            &format!("The page is at http://{address}/, on this machine alone; Ctrl-C ends it.\n"),
+        )?;
+        let sessions = Sessions::new(self.model.clone(), records);
+        runtime.block_on(serve(listener, address, sessions))
+    }
+
+    /// The records of the command line; what is wrong with them or the model is said before anything is served.
+    fn records(&self) -> Result<Vec<Upload>, Error> {
+        let paths = || {
+            self.data
+                .iter()
+                .map(|path| (path, false))
+                .chain(self.test.iter().map(|path| (path, true)))
+        };
+        if let Some(model) = &self.model {
+            model_file::read(model)?;
+            if !self.data.is_empty() {
+                let files = Files {
+                    data: self.data.clone(),
+                    test: self.test.clone(),
+                    model: model.clone(),
+                };
+                files.read()?;
+            }
+        }
+        paths()
+            .map(|(path, held_out)| read(path, held_out))
+            .collect()
+    }
+}
+
+fn read(path: &Path, held_out: bool) -> Result<Upload, Error> {
+    let unreadable = |error| {
+        Error::file(
+            path,
+            format!("the record cannot be read: {error}; check the path"),
+        )
+    };
+    if std::fs::metadata(path).map_err(unreadable)?.len() > LARGEST_BODY as u64 {
+        let what = format!(
+            "it is larger than {} MB, the most that the page takes; run `ctid diagnose` on it",
+            LARGEST_BODY >> 20
+        );
+        return Err(Error::file(path, what));
+    }
+    let content = std::fs::read(path).map_err(unreadable)?;
+    let name = path.file_name().map(|name| name.to_string_lossy());
+    let name = name.map_or_else(|| path.display().to_string(), |name| name.into_owned());
+    Upload::new(&name, held_out, content.into())
+        .map_err(|refusal| Error::Usage(refusal.to_string()))
+}
+
+/// The port, or the next that is free.
+async fn listen(port: u16) -> Result<TcpListener, Error> {
+    let mut tried = port;
+    loop {
+        match TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, tried))).await {
+            Ok(listener) => return Ok(listener),
+            Err(error) => {
+                let last = tried == u16::MAX || tried - port + 1 >= TRIED;
+                if last || error.kind() != std::io::ErrorKind::AddrInUse {
+                    return Err(Error::Usage(format!(
+                        "port {tried} of 127.0.0.1 cannot be used: {error}; choose another with --port, or 0 for any"
+                    )));
+                }
+                tried += 1;
+            }
+        }
+    }
+}
+
+async fn serve(
+    listener: TcpListener,
+    address: SocketAddr,
+    sessions: Sessions,
+) -> Result<(), Error> {
+    let app = Arc::new(App {
+        guard: Guard::new(address.port()),
+        sessions,
+        uploading: Semaphore::new(1),
+    });
+    let watched = app.clone();
+    tokio::spawn(async move {
+        let mut clock = tokio::time::interval(Duration::from_secs(5));
+        loop {
+            clock.tick().await;
+            watched.sessions.stop_abandoned();
+        }
+    });
+    let router = Router::new()
+        .merge(assets::routes())
+        .merge(api::routes())
+        .layer(middleware::from_fn_with_state(app.clone(), guard::guard))
+        .with_state(app);
+    Ok(axum::serve(listener, router).await?)
+}

@@ -1,0 +1,104 @@
+// The records: dropped, listed, and which of their columns is what.
+import { $, button, fill, make } from "./dom.js";
+import * as server from "./server.js";
+
+const ROLES = [["time", "Time"], ["input", "Command u"], ["output", "Reading y"], ["reference", "Reference r"]];
+
+/** Takes dropped files: a model file is taken for the model, everything else for a record. */
+async function take(files, heldOut, fail) {
+  for (const file of files) {
+    try {
+      if (/\.toml$/i.test(file.name)) await server.send("/api/text", { text: await file.text() });
+      else await server.upload(file, heldOut);
+    } catch (error) {
+      fail(error.message);
+      return;
+    }
+  }
+}
+
+function listen(zone, input, heldOut, fail) {
+  input.addEventListener("change", async () => {
+    await take([...input.files], heldOut, fail);
+    input.value = "";
+  });
+  const over = (on) => (event) => { event.preventDefault(); zone.classList.toggle("over", on); };
+  zone.addEventListener("dragenter", over(true));
+  zone.addEventListener("dragover", over(true));
+  zone.addEventListener("dragleave", over(false));
+  zone.addEventListener("drop", (event) => {
+    over(false)(event);
+    event.stopPropagation();
+    take([...event.dataTransfer.files], heldOut, fail);
+  });
+}
+
+export function start(changed, fail) {
+  listen($("drop-fitted"), $("file-fitted"), false, fail);
+  listen($("drop-test"), $("file-test"), true, fail);
+  // A file that misses its zone is not to take the place of the page.
+  for (const kind of ["dragover", "drop"]) addEventListener(kind, (event) => event.preventDefault());
+  $("hold").addEventListener("change", changed);
+  $("column-fields").addEventListener("change", changed);
+}
+
+function record(one, fail) {
+  const { read } = one;
+  const about = read
+    ? `${read.samples} samples, ${read.length}, every ${read.interval}; ${read.input.name} ${read.input.range}, ${read.output.name} ${read.output.range}`
+    : one.error;
+  return make("li", {},
+    make("div", {}, make("strong", {}, one.name), " ", make("span", { className: "badge" }, one.held_out ? "held out" : "fitted")),
+    make("p", { className: read ? "caption" : "alert" }, about),
+    button("Remove", { className: "quiet", ariaLabel: `Remove ${one.name}` }, () => server.send("/api/forget", { name: one.name }).catch((e) => fail(e.message))));
+}
+
+// `y [cm]` is `y` in `cm`.
+const split = (text) => { const found = /^(.*?)\s*[[(]([^\])]*)[\])]$/.exec(text || ""); return found ? [found[1], found[2]] : [text || "", ""]; };
+
+/** The heading that a name of the model means. */
+function meant(headings, named) {
+  const [name] = split(named);
+  return headings.find((h) => h.header === named) || headings.find((h) => h.name === name || h.header === name);
+}
+
+function field(role, title, headings, named, guess) {
+  const found = named ? meant(headings, named) : headings.find((h) => h.header === guess);
+  const select = make("select", { id: `column-${role}` },
+    make("option", { value: "" }, role === "reference" ? "none" : "choose…"),
+    headings.map((h) => make("option", { value: h.header, selected: found === h }, h.header)));
+  const ours = found && found.unit ? found.unit : split(named)[1];
+  const input = make("input", { id: `unit-${role}`, value: ours, size: 6, disabled: !found || Boolean(found.unit), placeholder: role === "time" ? "s" : "unit", autocomplete: "off" });
+  input.setAttribute("aria-label", `Unit of the ${title.toLowerCase()}`);
+  if (found && found.unit) input.title = "as the header says";
+  return [make("label", { htmlFor: select.id }, title), make("span", { className: "pair" }, select, input)];
+}
+
+/** What the form says of the columns, as the model file has them. */
+export function columns() {
+  const said = {};
+  for (const [role] of ROLES) {
+    const [select, input] = [$(`column-${role}`), $(`unit-${role}`)];
+    if (!select || !select.value) continue;
+    const heading = (server.current().headings || []).find((h) => h.header === select.value);
+    const unit = input.value.trim();
+    said[role] = heading && !heading.unit && unit ? `${heading.name} [${unit}]` : select.value;
+  }
+  return said;
+}
+
+export const hold = () => $("hold").value;
+
+export function show(state, fail) {
+  fill($("records"), state.records.map((one) => record(one, fail)));
+  $("after-record").hidden = !state.records.length;
+  const fitted = state.records.some((one) => !one.held_out);
+  $("drop-fitted").classList.toggle("small", fitted);
+  $("drop-what").textContent = fitted ? "Another record" : "Drop a CSV here";
+  $("drop-how").textContent = fitted ? "fitted together with the first" : "or choose one: time, command and reading, with a header";
+  if (!state.headings || $("columns").contains(document.activeElement)) return;
+  const { columns: named, hold: kind } = state.settings;
+  fill($("column-fields"), ROLES.flatMap(([role, title]) => field(role, title, state.headings, named[role], state.guessed[role])));
+  $("hold").value = kind;
+  if (state.records.some((one) => one.error)) $("columns").open = true;
+}

@@ -1,0 +1,88 @@
+// What a diagnosis found: the effects that are missing, each with what cannot be told from it, and the ranking.
+import { $, button, fill, make, units } from "./dom.js";
+import * as experiment from "./experiment.js";
+import * as server from "./server.js";
+
+const named = (one) => (one.place ? `${one.effect} (${one.place})` : one.effect);
+
+export function start(fail) {
+  $("diagnose").addEventListener("click", () => {
+    asked = true;
+    server.run("diagnose").catch((e) => fail(e.message));
+  });
+}
+
+/** Adds an effect, or takes it out where it is on. */
+function toggle(state, effect, place, fail, id) {
+  const on = state.effects.some((one) => one.effect === effect);
+  const name = named({ effect, place });
+  const press = () => server.send("/api/effect", { do: on ? "remove" : "add", effect, place: on ? null : place }).catch((e) => fail(e.message));
+  return button(on ? "Remove" : "Add", { id, className: on ? "added" : "primary", ariaLabel: `${on ? "Remove" : "Add"} ${name}` }, press);
+}
+
+function group(state, one, k, fail) {
+  const others = one.others.map((other) => {
+    const place = state.diagnosis.ranking.find((score) => score.effect === other)?.place ?? null;
+    return make("li", {}, make("code", {}, other), " ",
+      toggle(state, other, place, fail, `add-other-${k}-${other}`),
+      button("What would tell?", { id: `tell-${k}-${other}`, ariaLabel: `Which experiment tells ${one.effect} from ${other}?` },
+        () => experiment.ask({ group: k, between: [one.effect, other] }, fail)));
+  });
+  return make("li", { className: "found" },
+    make("div", { className: "head" }, make("code", { className: "name" }, named(one)), toggle(state, one.effect, one.place, fail, `add-found-${k}`)),
+    make("p", { className: "figures" }, one.size ? make("span", {}, units(one.size)) : null, one.rmse ? make("span", {}, "error then ", make("b", {}, units(one.rmse))) : null),
+    one.sentence ? make("p", {}, units(one.sentence)) : null,
+    others.length ? [make("p", { className: "caption" }, "These data cannot tell it from:"), make("ul", { className: "others" }, others)] : null);
+}
+
+function row(state, one, k, widest, fail) {
+  if (one.effect === "none") return null;
+  const bar = make("span", { className: one.found ? "bar found" : one.equal ? "bar equal" : "bar" });
+  bar.style.width = `${(100 * Math.max(0, one.gain ?? 0)) / widest}%`;
+  return make("li", {},
+    make("div", { className: "head" },
+      make("details", {}, make("summary", {}, make("code", {}, named(one))),
+        make("p", {}, one.physics), make("p", {}, make("code", {}, one.equation)), make("p", { className: "caption" }, `To confirm it: ${one.confirm}`)),
+      toggle(state, one.effect, one.place, fail, `add-ranked-${k}`)),
+    make("p", { className: "figures" }, make("span", {}, "error then ", make("b", {}, units(one.rmse))), make("span", { title: "fall of the Bayesian information criterion; below 6 is no evidence" }, `evidence ${one.evidence}`),
+      one.size ? make("span", {}, units(one.size)) : null, one.visible ? make("span", {}, "visible from ", units(one.visible)) : null),
+    make("div", { className: "track" }, bar));
+}
+
+let all = false;
+let shown = null;
+// What stands there: what was unfolded stays so while that does.
+let written = "";
+// Somebody waits for what is found.
+let asked = false;
+
+export function show(state, fail) {
+  $("missing").hidden = !state.current && !state.diagnosis;
+  $("diagnose").disabled = Boolean(state.job) && state.job.what === "diagnose";
+  const found = state.diagnosis;
+  $("diagnose").textContent = found ? "Diagnose again" : "Diagnose";
+  $("diagnose").classList.toggle("primary", !found);
+  $("diagnose-hint").hidden = Boolean(found);
+  const wanted = JSON.stringify([found, state.effects, all]);
+  if (wanted === written) return;
+  written = wanted;
+  if (!found) { fill($("findings")); shown = null; return; }
+  const gains = found.ranking.map((one) => one.gain ?? 0);
+  const widest = Math.max(1, ...gains);
+  const most = all ? found.ranking.length : plots.narrow.matches ? 4 : 8;
+  const rest = found.ranking.length - most;
+  fill($("findings"),
+    make("p", { className: `verdict-line ${found.tone}` }, found.headline),
+    make("p", { className: "caption" }, `Diagnosed of ${found.of}: error ${found.before}, noise floor ${found.noise}, ${found.seconds.toFixed(1)} s.`),
+    found.groups.length ? make("ul", { className: "groups" }, found.groups.map((one, k) => group(state, one, k, fail))) : null,
+    found.sentences.map((sentence) => make("p", {}, units(sentence))),
+    make("h3", {}, "One effect at a time, refitted"),
+    make("p", { className: "caption" }, "The larger the evidence (fall of BIC), the better; below 6 is none, and effects within 6 of each other are not told apart."),
+    make("ol", { className: "ranking" }, found.ranking.slice(0, most).map((one, k) => row(state, one, k, widest, fail))),
+    rest > 0 || all ? button(all ? "Show fewer" : `Show ${rest} more`, { id: "more-ranked", className: "quiet" }, () => { all = !all; show(server.current(), fail); }) : null);
+  if (asked && shown !== found.id) {
+    asked = false;
+    $("missing").scrollIntoView({ block: "start", behavior: "smooth" });
+  }
+  shown = found.id;
+}

@@ -1,0 +1,147 @@
+// The models over the measurements: the trail of the falling error, curves, residuals, parameters.
+import { $, fill, figure, make, plot, table, units } from "./dom.js";
+import * as server from "./server.js";
+
+const BINNED = "Above the samples with the mean of each bin, below the root mean square of each bin; hatched bars fail clearly.";
+const FAILS = [
+  ["by-time", "Residual against time", "Measured minus model; shaded where it clearly fails, dashed the noise floor."],
+  ["by-level", "Against the model's output", BINNED],
+  ["by-flow", "Against the input", BINNED],
+  ["by-direction", "By direction of the model's output", "Bars: root mean square; diamonds: mean."],
+  ["by-frequency", "By frequency", "Root mean square of the residual in each octave."],
+];
+
+let drawing = null;
+let view = { chosen: 0, residualRecord: 0, sameAxes: true };
+let fits = [];
+let key = "";
+let state = null;
+
+const label = (trail, k) => {
+  if (k === 0 || trail[k].effects.length - trail[k - 1].effects.length !== 1) return trail[k].name;
+  const [effect, place] = trail[k].effects[trail[k].effects.length - 1];
+  return place ? `+ ${effect} (${place})` : `+ ${effect}`;
+};
+
+/** One report of all models on the trail. */
+function joined(trail, bodies) {
+  const last = bodies[bodies.length - 1].drawing;
+  return { ...last, steps: bodies.map((body, k) => ({ ...body.drawing.steps[body.drawing.steps.length - 1], label: label(trail, k) })) };
+}
+
+export async function show(next) {
+  state = next;
+  $("empty").hidden = state.records.length > 0;
+  const trail = state.trail;
+  const wanted = JSON.stringify([trail.map((one) => one.id), state.records.map((one) => [one.name, one.held_out, one.read]), state.settings.columns]);
+  document.querySelector(".see").classList.toggle("stale", trail.length > 0 && state.current === null);
+  if (wanted === key) return;
+  // While the next model is fitted the last one stays in sight, but not where the records are others.
+  if (!trail.length && fits.length && state.job && sameRecords(wanted)) return;
+  key = wanted;
+  if (!state.records.some((one) => one.read)) { clear(); return; }
+  const bodies = await Promise.all(trail.map((one) => server.fit(one.id)));
+  const report = bodies.length ? joined(trail, bodies) : await server.data();
+  if (key !== wanted) return;
+  fits = bodies;
+  const held = report.records.findIndex((record) => !record.held_out);
+  view = { ...view, chosen: Math.max(0, bodies.length - 1), residualRecord: Math.max(0, held) };
+  drawing = diagnosisFigures(report, view);
+  places(report);
+  words(trail);
+  draw();
+}
+
+const sameRecords = (wanted) => key && JSON.stringify(JSON.parse(key).slice(1)) === JSON.stringify(JSON.parse(wanted).slice(1));
+
+function clear() {
+  fits = [];
+  drawing = null;
+  for (const part of ["trail-part", "fit-part", "fails-part", "parameters-part"]) $(part).hidden = true;
+}
+
+/** Makes the places of the plots, which stay as long as the records do. */
+function places(report) {
+  const wanted = report.records.map((record) => record.name + record.held_out).join("\n");
+  if ($("record-figures").dataset.of !== wanted) {
+    $("record-figures").dataset.of = wanted;
+    $("record-figures").replaceChildren(...report.records.map((record, k) => figure(`record-${k}`, [record.name, " ", make("span", { className: "badge" }, record.held_out ? "held out" : "fitted")])));
+  }
+  if (!$("fail-figures").childElementCount) {
+    const [first, ...rest] = FAILS.map((one) => figure(...one));
+    $("fail-figures").append(first, make("div", { className: "pairs" }, rest));
+  }
+}
+
+function words(trail) {
+  const some = fits.length > 0;
+  $("fit-part").hidden = false;
+  $("h-fit").textContent = some ? "Measured against model" : "The record";
+  $("fit-lead").textContent = some
+    ? "Above the reading and the models, below the input. Shaded: where the chosen model clearly fails. Drag to zoom, double-click to see all again."
+    : "As it was measured. Choose a plant, and the model is drawn over it.";
+  for (const part of ["trail-part", "fails-part", "parameters-part"]) $(part).hidden = !some;
+  if (!some) return;
+  const out = fits[0].drawing.output_unit;
+  const held = trail.some((one) => one.rmse_test !== null);
+  fill($("trail"), trail.map((one, k) => {
+    const text = [make("span", { className: "number" }, one.rmse_text, " ", make("small", {}, units(out))), make("span", { className: "label" }, label(trail, k)),
+      one.rmse_test_text ? make("span", { className: "test" }, `held out ${one.rmse_test_text} `, units(out)) : null];
+    const pick = make("button", { type: "button", id: `step-${k}`, className: "step", ariaPressed: String(k === view.chosen), title: "show this model" }, text);
+    pick.addEventListener("click", () => choose(k));
+    return make("li", {}, pick);
+  }));
+  $("trail-test").textContent = held ? " Below it the same on the held-out record, which took part in no fit and no choice." : "";
+  chosenWords();
+}
+
+function chosenWords() {
+  const fit = fits[view.chosen];
+  const step = fit.drawing.steps[fit.drawing.steps.length - 1];
+  document.querySelectorAll("#trail .step").forEach((one, k) => one.setAttribute("aria-pressed", String(k === view.chosen)));
+  fill($("fails"), step.failures.sentences.map((sentence) => make("li", {}, units(sentence))));
+  fill($("fit-sentences"), fit.sentences.map((sentence) => make("p", {}, units(sentence))));
+  table($("parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
+    fit.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? "–", units(one.unit)]));
+  $("parameters-caption").textContent = `${fit.starts_agree} of ${fit.starts} starts ended in this minimum. –: the data do not determine it, or it sits at a bound.`;
+}
+
+function choose(k) {
+  view.chosen = k;
+  chosenWords();
+  draw();
+}
+
+/** Draws every figure that has a place, again where the scheme or the width has changed. */
+export function draw() {
+  if (!drawing || !window.Plotly) return;
+  for (const [id, figure] of Object.entries(drawing.figures)) {
+    const box = $(`plot-${id}`);
+    if (!box || !id.startsWith("record-") && !fits.length) continue;
+    const made = id === "trail" && fits.length < 2 ? null : figure();
+    if (made && id === "trail") {
+      made.layout.height = 240;
+      made.layout.yaxis.title.text = "error";
+    }
+    box.parentElement.hidden = !made;
+    if (made) plot(box, id, made);
+  }
+  link();
+}
+
+/** The residual shows the stretch of time that the record shows, and the other way round. */
+function link() {
+  const pair = [$(`plot-record-${view.residualRecord}`), $("plot-by-time")];
+  if (!fits.length || pair.some((box) => !box || !box.on || box.dataset.linked)) return;
+  let busy = false;
+  pair.forEach((box, k) => {
+    box.dataset.linked = "yes";
+    box.on("plotly_relayout", (change) => {
+      const all = "xaxis.autorange" in change;
+      if (busy || !all && !("xaxis.range[0]" in change)) return;
+      busy = true;
+      const update = all ? { "xaxis.autorange": true } : { "xaxis.range": [change["xaxis.range[0]"], change["xaxis.range[1]"]] };
+      Plotly.relayout(pair[1 - k], update).finally(() => { busy = false; });
+    });
+  });
+}

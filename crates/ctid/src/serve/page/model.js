@@ -1,0 +1,157 @@
+// The form of the model: the plant, what is known of it, the controller, and the effects that it has.
+import { $, button, fill, make, units } from "./dom.js";
+import * as server from "./server.js";
+import * as data from "./data.js";
+
+let plants = [];
+// What was typed and refused stays until it is mended.
+let draft = false;
+// The list of effects as it stands there.
+let written = "";
+
+const KNOWN = {
+  area: "Area", area_upper: "Area of the upper tank", area_lower: "Area of the lower tank", tank_height: "Height of the tank", input_range: "Full range of the command",
+};
+const LAWS = {
+  PI: [["gain", "Gain"], ["integral_time", "Integral time [s]"]],
+  RS: [["r", "R, powers of the delay"], ["s", "S, powers of the delay"]],
+  RSp: [["r", "R, highest power first"], ["s", "S, highest power first"]],
+};
+const LIMITS = [["u_min", "Smallest command"], ["u_max", "Largest command"]];
+
+const plant = (id) => plants.find((one) => one.id === id);
+
+function input(id, label, value, suffix) {
+  const text = Array.isArray(value) ? value.join(", ") : value ?? "";
+  return [make("label", { htmlFor: id }, label), make("span", { className: "pair" },
+    make("input", { id, value: text, inputMode: "decimal", autocomplete: "off", size: 9 }), make("span", { className: "unit" }, units(suffix)))];
+}
+
+/** A number with a point or a comma; null where there is none, and an error that names the field where it is no number. */
+function number(id, label) {
+  const box = $(id);
+  const text = box ? box.value.trim() : "";
+  if (!text) return null;
+  const value = Number(text.replace(",", "."));
+  box.setAttribute("aria-invalid", String(!Number.isFinite(value)));
+  if (!Number.isFinite(value)) throw new Error(`${label}: "${text}" is not a number; write it with digits and without a unit, such as 154.0`);
+  return value;
+}
+
+function list(id, label) {
+  const text = $(id).value.trim();
+  if (!text) return null;
+  const values = text.split(/[\s,;]+/).filter(Boolean).map(Number);
+  if (!values.every(Number.isFinite)) throw new Error(`${label}: write numbers with commas between them, such as 0.62, -0.60`);
+  return values;
+}
+
+function controller() {
+  const law = $("law").value;
+  if (!law) return null;
+  const said = { type: law === "PI" ? "PI" : "RS" };
+  for (const [key, label] of LAWS[law]) said[key] = law === "PI" ? number(`law-${key}`, label) : list(`law-${key}`, label);
+  if (law === "RSp") said.variable = "p";
+  for (const [key, label] of LIMITS) said[key] = number(`law-${key}`, label);
+  return said;
+}
+
+function settings() {
+  const known = {};
+  for (const [key, label] of Object.entries(KNOWN)) known[key] = number(`known-${key}`, label);
+  return { plant: $("plant").value, hold: data.hold(), columns: data.columns(), known, controller: controller() };
+}
+
+/** Sends the form. Columns are said to the model only where they differ from what is guessed, or stand there already. */
+export async function changed() {
+  if (!$("plant").value) return;
+  try {
+    const said = settings();
+    const { guessed, settings: { columns } } = server.current();
+    for (const role of Object.keys(said.columns)) {
+      if (!columns[role] && said.columns[role] === guessed[role]) delete said.columns[role];
+    }
+    draft = false;
+    await server.send("/api/settings", said);
+    trouble(null);
+  } catch (error) {
+    draft = true;
+    trouble(error.message);
+  }
+}
+
+function trouble(what) {
+  $("model-error").textContent = what || "";
+  $("model-error").hidden = !what;
+}
+
+function laws(settings) {
+  const law = $("law").value;
+  const said = settings.controller || {};
+  fill($("law-fields"), law ? [...LAWS[law], ...LIMITS].flatMap(([key, label]) => input(`law-${key}`, label, said[key], "")) : []);
+}
+
+export function start(known) {
+  plants = known;
+  fill($("plant"), make("option", { value: "" }, "choose a plant…"), plants.map((one) => make("option", { value: one.id }, one.id)));
+  $("plant").addEventListener("change", changed);
+  $("known-fields").addEventListener("change", changed);
+  $("law").addEventListener("change", () => {
+    laws(server.current().settings);
+    // Another law is said once its numbers are.
+    if (!$("law").value || server.current().settings.controller) changed();
+    else $("law-fields").querySelector("input").focus();
+  });
+  $("law-fields").addEventListener("change", () => {
+    const boxes = [...$("law-fields").querySelectorAll("input")].slice(0, 2);
+    if (boxes.every((box) => box.value.trim())) changed();
+  });
+}
+
+function effect(one, fail) {
+  const name = one.place ? `${one.effect} (${one.place})` : one.effect;
+  const remove = () => server.send("/api/effect", { do: "remove", effect: one.effect }).catch((e) => fail(e.message));
+  return make("li", { title: one.physics }, make("code", {}, name), button("Remove", { className: "quiet", ariaLabel: `Remove ${name}` }, remove));
+}
+
+/** Any effect of the catalogue that acts on this plant and is not in it. */
+function more(state, known, fail) {
+  const free = known.effects.filter((one) => !state.effects.some((on) => on.effect === one.effect));
+  const select = make("select", { id: "any-effect" }, make("option", { value: "" }, "any other effect…"),
+    free.map((one) => make("option", { value: JSON.stringify(one) }, one.place ? `${one.effect} (${one.place})` : one.effect)));
+  select.setAttribute("aria-label", "An effect to add");
+  return make("li", { className: "more" }, select, button("Add", { id: "add-any" }, () => {
+    if (!select.value) return;
+    server.send("/api/effect", { do: "add", ...JSON.parse(select.value) }).catch((e) => fail(e.message));
+  }));
+}
+
+export function show(state, fail) {
+  $("model").hidden = !state.records.length && !state.file;
+  const known = plant(state.settings.plant);
+  $("h-effects").hidden = !known;
+  const wanted = JSON.stringify([state.effects, known]);
+  if (known && wanted !== written) {
+    written = wanted;
+    fill($("effects"), state.effects.map((one) => effect(one, fail)), state.effects.length ? null : make("li", { className: "caption" }, "none"), more(state, known, fail));
+  }
+  $("text").textContent = state.text || "(written once a plant is chosen)";
+  if (state.text && state.model_error && !draft) trouble(state.model_error);
+  else if (!draft) trouble(null);
+  if (draft || $("model").contains(document.activeElement) && /^(known|law)-/.test(document.activeElement.id)) return;
+  $("plant").value = state.settings.plant;
+  $("known").hidden = !known;
+  $("controller").hidden = !known;
+  $("equation").textContent = known ? known.model : "";
+  if (!known) return;
+  const level = state.records.find((one) => one.read)?.read.output.unit || "";
+  const command = state.records.find((one) => one.read)?.read.input.unit || "";
+  const areas = !known.has_area ? [] : known.vessels > 1 ? ["area_upper", "area_lower"] : ["area"];
+  const units = { tank_height: level, input_range: command };
+  const square = level ? `${level}^2` : "";
+  fill($("known-fields"), [...areas, "tank_height", "input_range"].flatMap((key) => input(`known-${key}`, KNOWN[key], state.settings.known[key], units[key] ?? square)));
+  const said = state.settings.controller;
+  $("law").value = said ? (said.type === "PI" ? "PI" : said.variable === "p" ? "RSp" : "RS") : "";
+  if (said) $("controller").open = true;
+  laws(state.settings);
+}

@@ -1,0 +1,388 @@
+//! What one tab works on: records, the model, what was fitted and found, and the computation that runs.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use axum::body::Bytes;
+use ct_signals::{Columns, Heading, Hold, Record, csv_header, parse_csv};
+use missing_effect::design::Design;
+use missing_effect::{Diagnosis, Progress};
+
+use super::guard::{LARGEST_BODY, Refusal};
+use crate::edit::{self, Edited};
+use crate::model_file::{self, ModelFile};
+use crate::{Error, atomic};
+
+/// Columns of a file at most: what the page can offer for a choice.
+const MOST_COLUMNS: usize = 500;
+/// Records at most.
+const MOST_RECORDS: usize = 20;
+/// Bytes of a model file at most.
+const LARGEST_MODEL: usize = 1 << 20;
+/// Fitted models that are kept.
+const MOST_MODELS: usize = 12;
+/// How the model is called where it is in no file.
+pub(super) const UNNAMED: &str = "model.toml";
+
+/// A record as it was dropped.
+#[derive(Debug, Clone)]
+pub(super) struct Upload {
+    pub name: String,
+    pub held_out: bool,
+    pub headings: Vec<Heading>,
+    content: Bytes,
+    /// As it was read last, and with which columns.
+    read: Option<(Columns, Hold, Result<Arc<Record>, String>)>,
+}
+
+impl Upload {
+    /// Takes a file; the header alone is looked at.
+    ///
+    /// # Errors
+    /// Where it is no CSV, or has too many columns.
+    pub(super) fn new(name: &str, held_out: bool, content: Bytes) -> Result<Self, Refusal> {
+        let headings = csv_header(name, &content).map_err(Refusal::input)?;
+        if headings.len() > MOST_COLUMNS {
+            return Err(Refusal::input(format!(
+                "{name} has {} columns; the page takes at most {MOST_COLUMNS}: keep those of the time, the input, the output and \
+                 the reference",
+                headings.len()
+            )));
+        }
+        Ok(Self {
+            name: name.to_string(),
+            held_out,
+            headings,
+            content,
+            read: None,
+        })
+    }
+
+    /// The record, read again only where the columns have changed.
+    pub(super) fn record(&mut self, columns: &Columns, hold: Hold) -> Result<Arc<Record>, String> {
+        match &self.read {
+            Some((c, h, record)) if c == columns && *h == hold => record.clone(),
+            _ => {
+                let record = parse_csv(&self.name, &self.content, columns, hold);
+                let record = record.map(Arc::new).map_err(|error| error.to_string());
+                self.read = Some((columns.clone(), hold, record.clone()));
+                record
+            }
+        }
+    }
+}
+
+/// A model that was fitted to the records, ready to be drawn.
+#[derive(Debug)]
+pub(super) struct Fitted {
+    pub id: u64,
+    pub model: ModelFile,
+    /// Which state of the records it was fitted to.
+    pub data: u64,
+    pub rmse: f64,
+    pub rmse_test: Option<f64>,
+    pub bic: f64,
+    /// What is left of the records looks like noise.
+    pub adequate: bool,
+    /// What the page draws and says of it, as JSON.
+    pub body: Bytes,
+}
+
+/// What was found, and of what.
+#[derive(Debug)]
+pub(super) struct Found<T> {
+    pub id: u64,
+    pub model: ModelFile,
+    pub text: String,
+    pub data: u64,
+    pub found: T,
+}
+
+/// A computation that runs.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub number: u64,
+    pub what: &'static str,
+    pub begun: Instant,
+    pub stop: Arc<AtomicBool>,
+    pub progress: Arc<Mutex<Option<Progress>>>,
+}
+
+/// What one tab works on.
+#[derive(Debug)]
+pub(super) struct Session {
+    /// The model file, where there is one; else the text is kept here alone.
+    pub file: Option<PathBuf>,
+    pub text: String,
+    pub records: Vec<Upload>,
+    /// Counts the changes of the records.
+    pub data: u64,
+    /// Counts the changes of everything that the page shows.
+    pub version: u64,
+    pub models: VecDeque<Arc<Fitted>>,
+    /// What was fitted last, for the report.
+    pub fitted: Option<Arc<Found<Diagnosis>>>,
+    pub diagnosis: Option<Arc<Found<Diagnosis>>>,
+    pub design: Option<Arc<Found<(Design, Columns)>>>,
+    pub job: Option<Job>,
+    /// Why the last computation or change came to nothing.
+    pub failure: Option<String>,
+    /// When its page asked last.
+    pub seen: Instant,
+    numbers: u64,
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+impl Session {
+    pub(super) fn new(file: Option<PathBuf>, records: Vec<Upload>) -> Self {
+        let mut session = Self {
+            file,
+            text: String::new(),
+            records,
+            data: 0,
+            version: 1,
+            models: VecDeque::new(),
+            fitted: None,
+            diagnosis: None,
+            design: None,
+            job: None,
+            failure: None,
+            seen: Instant::now(),
+            numbers: 0,
+        };
+        session.refresh();
+        session
+    }
+
+    /// Bytes that the records take.
+    pub(super) fn bytes(&self) -> usize {
+        self.records.iter().map(|record| record.content.len()).sum()
+    }
+
+    /// A number that no other result of this session has.
+    pub(super) fn number(&mut self) -> u64 {
+        self.numbers += 1;
+        self.numbers
+    }
+
+    /// What messages call the model.
+    pub(super) fn model_name(&self) -> String {
+        self.file
+            .as_ref()
+            .map_or(UNNAMED.to_string(), |path| path.display().to_string())
+    }
+
+    /// Reads the model file again: a command may have changed it.
+    pub(super) fn refresh(&mut self) {
+        let Some(path) = &self.file else { return };
+        match model_file::read_text(path) {
+            Ok(text) if text == self.text => {}
+            Ok(text) if text.len() <= LARGEST_MODEL => {
+                self.text = text;
+                self.failure = None;
+                self.version += 1;
+            }
+            Ok(_) => self.fail(format!(
+                "{}: this is no model file: it is larger than 1 MB",
+                path.display()
+            )),
+            Err(error) => self.fail(error.to_string()),
+        }
+    }
+
+    pub(super) fn fail(&mut self, what: String) {
+        let what = crate::one_line(&what);
+        if self.failure.as_ref() != Some(&what) {
+            self.failure = Some(what);
+            self.version += 1;
+        }
+    }
+
+    /// The model as it stands.
+    pub(super) fn model(&self) -> Result<ModelFile, Error> {
+        model_file::parse(&self.model_name(), &self.text)
+    }
+
+    /// Columns and hold as the model names them; what can be guessed where there is no model yet.
+    pub(super) fn layout(&self) -> (Columns, Hold) {
+        match self.model() {
+            Ok(model) => (model.columns, model.hold),
+            Err(_) => (Columns::default(), Hold::Zero),
+        }
+    }
+
+    /// Changes the model: the file where there is one, by the functions of the commands.
+    ///
+    /// # Errors
+    /// Where the change is refused; everything is then as it was.
+    pub(super) fn change(
+        &mut self,
+        edit: impl FnOnce(&str, &str) -> Result<Edited, Error>,
+    ) -> Result<String, Error> {
+        let name = self.model_name();
+        let done = match &self.file {
+            Some(path) => edit::change(path, |text| edit(&name, text))?,
+            None => {
+                let edited = edit(&name, &self.text)?;
+                self.text = edited.text;
+                edited.done
+            }
+        };
+        self.refresh();
+        self.failure = None;
+        self.version += 1;
+        Ok(done)
+    }
+
+    /// Another model in place of this one.
+    ///
+    /// # Errors
+    /// Where it is no model file; everything is then as it was.
+    pub(super) fn replace(&mut self, text: String) -> Result<(), Error> {
+        let name = self.model_name();
+        model_file::parse(&name, &text)?;
+        match &self.file {
+            Some(path) => atomic::write(path, text.as_bytes())?,
+            None => self.text = text,
+        }
+        self.refresh();
+        self.failure = None;
+        self.version += 1;
+        Ok(())
+    }
+
+    /// Takes a record; one of the same name is replaced.
+    ///
+    /// # Errors
+    /// Where there is no room, or it is here under another name.
+    pub(super) fn take(&mut self, upload: Upload) -> Result<(), Refusal> {
+        let others = || {
+            self.records
+                .iter()
+                .filter(|other| other.name != upload.name)
+        };
+        if let Some(same) = others().find(|other| other.content == upload.content) {
+            let what = format!(
+                "{} and {} hold the same; a record that is held out has to be another one than those that are fitted",
+                upload.name, same.name
+            );
+            return Err(Refusal::input(what));
+        }
+        if others().count() >= MOST_RECORDS {
+            return Err(Refusal::input(format!(
+                "there are {MOST_RECORDS} records, which is the most that the page takes; remove one first"
+            )));
+        }
+        let bytes: usize = others().map(|other| other.content.len()).sum();
+        if bytes + upload.content.len() > LARGEST_BODY {
+            return Err(Refusal::too_large());
+        }
+        match self
+            .records
+            .iter_mut()
+            .find(|other| other.name == upload.name)
+        {
+            Some(same) => *same = upload,
+            None => self.records.push(upload),
+        }
+        self.data_changed();
+        Ok(())
+    }
+
+    /// Takes a record away; there may be none of that name.
+    pub(super) fn drop_record(&mut self, name: &str) {
+        self.records.retain(|record| record.name != name);
+        self.data_changed();
+    }
+
+    /// Nothing that was computed is of these records.
+    fn data_changed(&mut self) {
+        self.stop();
+        self.data += 1;
+        self.version += 1;
+        self.models.clear();
+        self.fitted = None;
+        self.diagnosis = None;
+        self.design = None;
+        self.failure = None;
+    }
+
+    /// Keeps a fitted model; the oldest goes where there are many.
+    pub(super) fn keep(&mut self, fitted: Fitted) {
+        self.models.retain(|other| other.model != fitted.model);
+        self.models.push_back(Arc::new(fitted));
+        if self.models.len() > MOST_MODELS {
+            self.models.pop_front();
+        }
+    }
+
+    /// The fit of this model to these records.
+    pub(super) fn fit_of(&self, model: &ModelFile) -> Option<&Arc<Fitted>> {
+        let of = |fitted: &&Arc<Fitted>| fitted.data == self.data && same(&fitted.model, model);
+        self.models.iter().find(of)
+    }
+
+    /// The fits to these records of models that differ from this one in their effects alone.
+    pub(super) fn kin(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
+        let bare = without_effects(model);
+        let kin = |fitted: &&Arc<Fitted>| {
+            fitted.data == self.data && without_effects(&fitted.model) == bare
+        };
+        self.models.iter().filter(kin).collect()
+    }
+
+    /// The fits of the model with its first effects, none of them and then one more each time, as far as they are known.
+    pub(super) fn trail(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
+        let kin = self.kin(model);
+        (0..=model.effects.len())
+            .filter_map(|count| {
+                kin.iter()
+                    .find(|fitted| fitted.model.effects == model.effects[..count])
+                    .copied()
+            })
+            .collect()
+    }
+
+    /// Stops the computation that runs.
+    pub(super) fn stop(&mut self) {
+        if let Some(job) = self.job.take() {
+            job.stop.store(true, Ordering::Relaxed);
+            self.version += 1;
+        }
+    }
+}
+
+/// Whether two files say the same of what is fitted.
+pub(super) fn same(a: &ModelFile, b: &ModelFile) -> bool {
+    let bare = |model: &ModelFile| ModelFile {
+        waiting: Vec::new(),
+        ..model.clone()
+    };
+    bare(a) == bare(b)
+}
+
+/// The model without the effects of the catalogue and what is said of their parameters.
+fn without_effects(model: &ModelFile) -> ModelFile {
+    let mut bare = model.clone();
+    for placed in &model.effects {
+        let own = format!("{}.", placed.effect.id);
+        bare.start.retain(|name, _| !name.starts_with(&own));
+        bare.fixed.retain(|name| !name.starts_with(&own));
+    }
+    bare.effects.clear();
+    bare.waiting.clear();
+    bare
+}
+
+/// The lock of something that no panic leaves half changed.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,238 @@
+//! What the page's form says of the model: read from a model file, and written into it, comments and layout kept.
+
+use ct_signals::{Columns, Hold};
+use serde::{Deserialize, Serialize};
+use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
+
+use crate::edit::{self, Edited};
+use crate::{Error, model_file};
+
+/// The part of a model file that the form shows. Everything may be missing; it is checked as a model file once it is written.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(super) struct Settings {
+    plant: String,
+    hold: Hold,
+    columns: Columns,
+    known: Known,
+    controller: Option<Controller>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+struct Known {
+    area: Option<f64>,
+    area_upper: Option<f64>,
+    area_lower: Option<f64>,
+    tank_height: Option<f64>,
+    input_range: Option<f64>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+struct Controller {
+    #[serde(rename = "type")]
+    kind: String,
+    gain: Option<f64>,
+    integral_time: Option<f64>,
+    variable: Option<String>,
+    r: Option<Vec<f64>>,
+    s: Option<Vec<f64>>,
+    u_min: Option<f64>,
+    u_max: Option<f64>,
+}
+
+impl Settings {
+    /// Those of a text; what cannot be read is empty, and [`model_file::parse`] says why.
+    pub(super) fn of(text: &str) -> Self {
+        toml::from_str(text).unwrap_or_default()
+    }
+
+    /// The text with these settings; whatever they do not speak of stays.
+    ///
+    /// # Errors
+    /// Where the result is no model file.
+    pub(super) fn into_text(self, file: &str, text: &str) -> Result<Edited, Error> {
+        let mut document = edit::document(file, text)?;
+        let root = document.as_table_mut();
+        put(root, "plant", Some(self.plant.as_str().into()));
+        if !root.contains_key("effects") {
+            root.insert("effects", Item::Value(Array::new().into()));
+        }
+        let hold = match self.hold {
+            Hold::Zero => "zero",
+            Hold::First => "first",
+        };
+        if root.contains_key("hold") || self.hold != Hold::Zero {
+            put(root, "hold", Some(hold.into()));
+        }
+        let word = |word: Option<String>| word.filter(|w| !w.trim().is_empty()).map(Value::from);
+        let columns = [
+            ("time", word(self.columns.time)),
+            ("input", word(self.columns.input)),
+            ("output", word(self.columns.output)),
+            ("reference", word(self.columns.reference)),
+        ];
+        section(&mut document, file, "columns", columns)?;
+        let known = [
+            ("area", self.known.area.map(Value::from)),
+            ("area_upper", self.known.area_upper.map(Value::from)),
+            ("area_lower", self.known.area_lower.map(Value::from)),
+            ("tank_height", self.known.tank_height.map(Value::from)),
+            ("input_range", self.known.input_range.map(Value::from)),
+        ];
+        section(&mut document, file, "known", known)?;
+        match self.controller {
+            None => {
+                document.remove("controller");
+            }
+            Some(controller) => {
+                let list =
+                    |list: Option<Vec<f64>>| list.map(|l| Value::Array(l.into_iter().collect()));
+                let entries = [
+                    ("type", word(Some(controller.kind))),
+                    ("gain", controller.gain.map(Value::from)),
+                    ("integral_time", controller.integral_time.map(Value::from)),
+                    ("variable", word(controller.variable)),
+                    ("r", list(controller.r)),
+                    ("s", list(controller.s)),
+                    ("u_min", controller.u_min.map(Value::from)),
+                    ("u_max", controller.u_max.map(Value::from)),
+                ];
+                section(&mut document, file, "controller", entries)?;
+            }
+        }
+        let text = document.to_string();
+        model_file::parse(file, &text)?;
+        Ok(Edited {
+            text,
+            done: format!("{file}: settings written"),
+        })
+    }
+}
+
+/// Writes the entries of a table, made where there is something to write and none is there.
+fn section<const N: usize>(
+    document: &mut DocumentMut,
+    file: &str,
+    name: &str,
+    entries: [(&str, Option<Value>); N],
+) -> Result<(), Error> {
+    if !document.contains_key(name) && entries.iter().all(|(_, value)| value.is_none()) {
+        return Ok(());
+    }
+    let mut new = Table::new();
+    new.decor_mut().set_prefix("\n");
+    let table = document
+        .entry(name)
+        .or_insert(Item::Table(new))
+        .as_table_like_mut()
+        .ok_or_else(|| Error::File {
+            file: file.to_string(),
+            what: format!("[{name}] is not a table; make it one"),
+        })?;
+    for (key, value) in entries {
+        put(table, key, value);
+    }
+    Ok(())
+}
+
+/// A value for a key; one that says the same stays as it is written, and a comment behind it stays in any case.
+fn put(table: &mut dyn TableLike, key: &str, value: Option<Value>) {
+    let Some(mut value) = value else {
+        table.remove(key);
+        return;
+    };
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) if same(old, &value) => {}
+        Some(old) => {
+            *value.decor_mut() = old.decor().clone();
+            *old = value;
+        }
+        None => {
+            table.insert(key, Item::Value(value));
+        }
+    }
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value
+        .as_float()
+        .or_else(|| value.as_integer().map(|integer| integer as f64))
+}
+
+fn same(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::String(a), Value::String(b)) => a.value() == b.value(),
+        (Value::Array(a), Value::Array(b)) => a.iter().map(number).eq(b.iter().map(number)),
+        _ => number(a).is_some() && number(a) == number(b),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COMMENTED: &str = r#"# The tank in hall 3.
+plant = "single-tank"   # as built
+effects = ["overflow"]  # seen in May
+
+[known]  # with a tape
+area = 154   # cm^2
+
+[effect.overflow]
+rim = 20.0
+"#;
+
+    #[test]
+    fn what_is_not_changed_stays_as_it_is_written() {
+        let same = Settings::of(COMMENTED).into_text("m.toml", COMMENTED);
+        assert_eq!(same.unwrap().text, COMMENTED);
+    }
+
+    #[test]
+    fn a_changed_number_keeps_its_comment_and_a_new_table_is_appended() {
+        let mut settings = Settings::of(COMMENTED);
+        settings.known.area = Some(150.5);
+        settings.columns.output = Some("y [cm]".into());
+        let text = settings.into_text("m.toml", COMMENTED).unwrap().text;
+        let expected = COMMENTED.replace("154 ", "150.5 ");
+        assert!(text.contains("[columns]\noutput = \"y [cm]\"\n"), "{text}");
+        let rest: String = text.replace("\n[columns]\noutput = \"y [cm]\"\n", "");
+        assert_eq!(rest, expected);
+    }
+
+    #[test]
+    fn an_empty_text_becomes_a_model_file() {
+        let settings = Settings {
+            plant: "cascaded-tanks".into(),
+            controller: Some(Controller {
+                kind: "PI".into(),
+                gain: Some(0.6),
+                integral_time: Some(90.0),
+                ..Controller::default()
+            }),
+            ..Settings::default()
+        };
+        let text = settings.clone().into_text("m.toml", "").unwrap().text;
+        assert!(
+            text.starts_with("plant = \"cascaded-tanks\"\neffects = []\n"),
+            "{text}"
+        );
+        assert_eq!(Settings::of(&text), settings);
+    }
+
+    #[test]
+    fn what_no_model_file_may_say_is_refused() {
+        let settings = Settings {
+            plant: "cascaded-tanks".into(),
+            known: Known {
+                area: Some(1.0),
+                ..Known::default()
+            },
+            ..Settings::default()
+        };
+        let error = settings.into_text("m.toml", "").err().unwrap().to_string();
+        assert!(error.contains("area_upper"), "{error}");
+    }
+}

@@ -1,0 +1,186 @@
+//! What the page is told of its session, whenever something has changed.
+
+use ct_signals::{Columns, Record};
+use missing_effect::numbers;
+use plants::{CATALOGUE, Outlet, Place, Placed, Plant};
+use serde_json::{Value, json};
+
+use super::session::{Fitted, Found, Session, lock, same};
+use super::settings::Settings;
+use super::words;
+
+/// How far the computation is, if there is one.
+pub(super) fn job(session: &Session) -> Value {
+    let Some(job) = &session.job else {
+        return Value::Null;
+    };
+    let progress = *lock(&job.progress);
+    json!({
+        "what": job.what,
+        "phase": progress.map(|p| p.phase),
+        "done": progress.map(|p| p.done),
+        "total": progress.map(|p| p.total),
+        "seconds": job.begun.elapsed().as_secs_f64(),
+    })
+}
+
+/// Everything but curves.
+pub(super) fn state(session: &mut Session) -> Value {
+    let (columns, hold) = session.layout();
+    let mut uploads = std::mem::take(&mut session.records);
+    let records: Vec<Value> = uploads
+        .iter_mut()
+        .map(|upload| {
+            let read = upload.record(&columns, hold);
+            json!({
+                "name": upload.name,
+                "held_out": upload.held_out,
+                "read": read.as_ref().ok().map(|record| about(record)),
+                "error": read.err(),
+            })
+        })
+        .collect();
+    session.records = uploads;
+    // The form offers the columns of the first file; all have to have the same.
+    let headings = session
+        .records
+        .first()
+        .map(|first| first.headings.as_slice());
+    let guessed = headings.map(Columns::guessed).unwrap_or_default();
+    let model = session.model();
+    let error = model.as_ref().err().map(ToString::to_string);
+    let model = model.ok();
+    let current = model.as_ref().and_then(|model| session.fit_of(model));
+    let trail = model
+        .as_ref()
+        .map_or(Vec::new(), |model| session.trail(model));
+    let kin = model
+        .as_ref()
+        .map_or(Vec::new(), |model| session.kin(model));
+    let diagnosis = session.diagnosis.as_deref().map(|found| {
+        let mut words = words::diagnosis(found);
+        words["of_this_model"] = json!(is_of(found, session));
+        words["of"] = json!(chain_name(&effects_of(&found.model)));
+        words
+    });
+    json!({
+        "version": session.version,
+        "file": session.file.as_ref().map(|path| path.display().to_string()),
+        "text": session.text,
+        "model_error": error,
+        "settings": Settings::of(&session.text),
+        "effects": words::effects(session),
+        "records": records,
+        "headings": headings,
+        "guessed": guessed,
+        "current": current.map(|fitted| fitted.id),
+        "trail": trail.iter().map(|fitted| point(fitted)).collect::<Vec<_>>(),
+        "models": kin.iter().map(|fitted| point(fitted)).collect::<Vec<_>>(),
+        "diagnosis": diagnosis,
+        "design": session.design.as_deref().map(|found| words::design(found.id, &found.found.0)),
+        "job": job(session),
+        "failure": session.failure,
+    })
+}
+
+fn is_of<T>(found: &Found<T>, session: &Session) -> bool {
+    let model = session.model();
+    found.data == session.data && model.is_ok_and(|model| same(&model, &found.model))
+}
+
+/// What a record holds, in words.
+fn about(record: &Record) -> Value {
+    let signal = |signal: &ct_signals::Signal| {
+        let (low, high) = signal.range();
+        let unit = &signal.unit;
+        let range = format!(
+            "{} to {} {unit}",
+            numbers::significant(low, 3),
+            numbers::significant(high, 3)
+        );
+        json!({ "name": signal.name, "unit": unit, "range": range.trim_end() })
+    };
+    json!({
+        "samples": record.len(),
+        "length": numbers::duration(record.duration()),
+        "interval": numbers::duration(record.sample_interval()),
+        "input": signal(&record.input),
+        "output": signal(&record.output),
+        "reference": record.reference.as_ref().map(signal),
+    })
+}
+
+fn effects_of(model: &crate::model_file::ModelFile) -> Vec<(String, Option<&'static str>)> {
+    let placed = model.effects.iter();
+    placed
+        .map(|placed| (placed.effect.id.to_string(), vessel_of(model.plant, placed)))
+        .collect()
+}
+
+fn chain_name(effects: &[(String, Option<&'static str>)]) -> String {
+    if effects.is_empty() {
+        return "base model".to_string();
+    }
+    let named = effects.iter().map(|(effect, place)| match place {
+        Some(place) => format!("{effect} ({place})"),
+        None => effect.clone(),
+    });
+    format!("+ {}", named.collect::<Vec<_>>().join(" + "))
+}
+
+fn point(fitted: &Fitted) -> Value {
+    let effects = effects_of(&fitted.model);
+    json!({
+        "id": fitted.id,
+        "plant": fitted.model.plant.id(),
+        "name": chain_name(&effects),
+        "effects": effects,
+        "rmse": fitted.rmse,
+        "rmse_text": numbers::significant(fitted.rmse, 3),
+        "rmse_test": fitted.rmse_test,
+        "rmse_test_text": fitted.rmse_test.map(|rmse| numbers::significant(rmse, 3)),
+        "bic": numbers::whole(fitted.bic),
+        "adequate": fitted.adequate,
+    })
+}
+
+/// The plants to choose from.
+pub(super) fn plants() -> Value {
+    let plants = Plant::ALL.into_iter().map(|plant| {
+        json!({
+            "id": plant.id(),
+            "vessels": plant.vessels(),
+            "has_area": plant.outlet() == Outlet::Torricelli,
+            "model": equation(plant),
+            "effects": sites(plant),
+        })
+    });
+    plants.collect()
+}
+
+/// Every effect of the catalogue at every place where it can act on a plant.
+fn sites(plant: Plant) -> Vec<Value> {
+    let sites = CATALOGUE.iter().flat_map(|effect| {
+        effect
+            .sites(plant)
+            .map(move |vessel| json!({ "effect": effect.id, "place": vessel_of(plant, &Placed { effect, vessel }) }))
+    });
+    sites.collect()
+}
+
+/// The name of the vessel that an effect acts in, where there are several.
+pub(super) fn vessel_of(plant: Plant, placed: &Placed) -> Option<&'static str> {
+    (placed.effect.place == Place::Vessel)
+        .then(|| plant.vessel_name(placed.vessel))
+        .flatten()
+}
+
+fn equation(plant: Plant) -> &'static str {
+    match plant {
+        Plant::SingleTank => "S dH/dt = pump_gain·u − alpha·√H",
+        Plant::SingleTankLinear => "tau·dy/dt + y = K·u + offset",
+        Plant::CascadedTanks => "two square-root tanks in series; the lower level is measured",
+        Plant::CascadedTanksLinear => "two lags in series",
+        Plant::FirstOrder => "tau·dy/dt + y = K·u",
+    }
+}

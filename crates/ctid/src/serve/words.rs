@@ -1,0 +1,208 @@
+//! Results as the page shows them: what is drawn as the report draws it, numbers as the terminal writes them.
+
+use missing_effect::design::{Candidate, Design, Kind};
+use missing_effect::{Diagnosis, Parameter, Score, Step, Verdict, numbers};
+use plants::EffectInfo;
+use serde_json::{Value, json, value::RawValue};
+
+use super::session::{Found, Session};
+use super::state::vessel_of;
+use crate::findings;
+use crate::report;
+
+/// Experiments of a design that the table shows.
+const EXPERIMENTS: usize = 8;
+
+/// A fitted model: curves, failures, parameters, sentences.
+pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
+    let drawing = RawValue::from_string(report::drawing(diagnosis)).ok();
+    let step = diagnosis.steps.last();
+    #[derive(serde::Serialize)]
+    struct Body<'a> {
+        id: u64,
+        drawing: Option<Box<RawValue>>,
+        parameters: Vec<Value>,
+        starts: usize,
+        starts_agree: usize,
+        sentences: &'a [String],
+        noise: String,
+        seconds: f64,
+    }
+    let body = Body {
+        id,
+        drawing,
+        parameters: step.map_or(Vec::new(), |step| {
+            step.parameters.iter().map(parameter).collect()
+        }),
+        starts: step.map_or(0, |step| step.starts),
+        starts_agree: step.map_or(0, |step| step.starts_agree),
+        sentences: &diagnosis.sentences,
+        noise: with_unit(
+            &numbers::significant(diagnosis.noise_floor, 2),
+            &diagnosis.output_unit,
+        ),
+        seconds: diagnosis.seconds,
+    };
+    // Writing plain structs to memory cannot fail.
+    serde_json::to_string(&body).unwrap_or_else(|_| "{}".to_owned())
+}
+
+fn with_unit(number: &str, unit: &str) -> String {
+    format!("{number} {unit}").trim_end().to_string()
+}
+
+fn parameter(parameter: &Parameter) -> Value {
+    let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
+    json!({ "name": parameter.name, "value": value, "error": error, "unit": parameter.unit })
+}
+
+fn size(parameter: &Parameter) -> String {
+    let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
+    let name = parameter.name.rsplit('.').next().unwrap_or_default();
+    let error = error.map_or(String::new(), |error| format!(" ± {error}"));
+    with_unit(&format!("{name} {value}{error}"), &parameter.unit)
+}
+
+/// What a diagnosis found.
+pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
+    let diagnosis = &found.found;
+    let unit = &diagnosis.output_unit;
+    let ranked = diagnosis
+        .scores
+        .iter()
+        .map(|score| ranked(diagnosis, score));
+    let groups = diagnosis.effects.iter().zip(&diagnosis.groups).enumerate();
+    let groups = groups.map(|(k, (effect, group))| {
+        json!({
+            "effect": effect,
+            "place": findings::tank(diagnosis, k),
+            "size": diagnosis.steps.last().and_then(|step| own_size(step, effect)),
+            "rmse": error_after(diagnosis, k, unit),
+            "sentence": diagnosis.sentences.get(k),
+            "in_doubt": diagnosis.in_doubt.get(k),
+            "others": group.iter().filter(|other| *other != effect).collect::<Vec<_>>(),
+        })
+    });
+    let (headline, tone) = headline(diagnosis);
+    json!({
+        "id": found.id,
+        "headline": headline,
+        "tone": tone,
+        "groups": groups.collect::<Vec<_>>(),
+        // The first sentences are those of the groups.
+        "sentences": diagnosis.sentences.get(diagnosis.groups.len()..).unwrap_or_default(),
+        "before": with_unit(&numbers::significant(diagnosis.steps.first().map_or(f64::NAN, |s| s.rmse), 3), unit),
+        "noise": with_unit(&numbers::significant(diagnosis.noise_floor, 2), unit),
+        "ranking": ranked.collect::<Vec<_>>(),
+        "unknown": diagnosis.unknown.is_some(),
+        "seconds": diagnosis.seconds,
+    })
+}
+
+fn headline(diagnosis: &Diagnosis) -> (String, &'static str) {
+    match diagnosis.verdict {
+        Verdict::Effect => (
+            format!("Missing: {}", diagnosis.effects.join(", ")),
+            "found",
+        ),
+        Verdict::Undecided => (
+            "Something is missing, and more than one effect fits these data".to_owned(),
+            "open",
+        ),
+        Verdict::Unexplained => (
+            "What is left is not noise, and no effect of the catalogue explains it".to_owned(),
+            "open",
+        ),
+        Verdict::Adequate => ("The model is adequate".to_owned(), "good"),
+    }
+}
+
+/// The leading parameter of an effect in a model.
+fn own_size(step: &Step, effect: &str) -> Option<String> {
+    let own = format!("{effect}.");
+    let mut parameters = step.parameters.iter();
+    parameters.find(|p| p.name.starts_with(&own)).map(size)
+}
+
+/// The simulation error once the added effect of this index is on.
+fn error_after(diagnosis: &Diagnosis, index: usize, unit: &str) -> Option<String> {
+    let step = diagnosis.steps.get(index + 1)?;
+    Some(with_unit(&numbers::significant(step.rmse, 3), unit))
+}
+
+fn ranked(diagnosis: &Diagnosis, score: &Score) -> Value {
+    let info = EffectInfo::find(&score.effect);
+    let unit = score.size.as_ref().map_or("", |size| size.unit.as_str());
+    let visible = score.smallest_visible.filter(|size| size.is_finite());
+    json!({
+        "effect": score.effect,
+        "place": score.place,
+        "gain": score.bic_gain.is_finite().then_some(score.bic_gain),
+        "evidence": numbers::whole(score.bic_gain),
+        "rmse": with_unit(&numbers::significant(score.rmse, 3), &diagnosis.output_unit),
+        "size": score.size.as_ref().map(size),
+        "visible": visible.map(|size| with_unit(&numbers::significant(size, 2), unit)),
+        "physics": info.map(|effect| effect.physics),
+        "equation": info.map(|effect| effect.equation),
+        "confirm": info.map(|effect| effect.confirm),
+        "found": findings::is_added(diagnosis, score),
+        "equal": findings::fits_as_well(diagnosis, score),
+    })
+}
+
+/// The experiment that was designed.
+pub(super) fn design(id: u64, design: &Design) -> Value {
+    let unit = &design.experiment.unit;
+    let row = |candidate: &Candidate| {
+        let range = |low: f64, high: f64, unit: &str| {
+            let high = with_unit(&numbers::significant(high, 3), unit);
+            format!("{} to {high}", numbers::significant(low, 3))
+        };
+        json!({
+            "kind": candidate.kind.name(),
+            "range": range(candidate.low, candidate.high, unit),
+            "held": (candidate.kind != Kind::Again).then(|| numbers::duration(candidate.clock)),
+            "level": candidate.reaches.last().map(|reach| range(reach.low, reach.high, &design.output_unit)),
+            "power": numbers::significant(candidate.power.power, 2),
+            "decides": format!("{:.0} %", 100.0 * candidate.power.decides),
+        })
+    };
+    let candidates = design.candidates.iter().take(EXPERIMENTS);
+    let sequence = &design.experiment;
+    json!({
+        "id": id,
+        "between": design.between.each_ref().map(|rival| match &rival.place {
+            Some(place) => format!("{} ({place})", rival.effect),
+            None => rival.effect.clone(),
+        }),
+        "sentences": design.sentences,
+        "rows": candidates.chain(&design.again).map(row).collect::<Vec<_>>(),
+        "twins": design.prospect == missing_effect::design::Prospect::Twins,
+        "limits": format!(
+            "{} to {} ({}), {}",
+            numbers::significant(design.limits.low, 3),
+            with_unit(&numbers::significant(design.limits.high, 3), unit),
+            design.limits.range_from,
+            numbers::duration(design.limits.duration)
+        ),
+        "name": sequence.name,
+        "unit": unit,
+        "time": sequence.time,
+        "values": sequence.values,
+    })
+}
+
+/// The effects and terms of the model as it stands.
+pub(super) fn effects(session: &Session) -> Vec<Value> {
+    let Ok(model) = session.model() else {
+        return Vec::new();
+    };
+    let placed = model.effects.iter().map(|placed| {
+        let vessel = vessel_of(model.plant, placed);
+        json!({ "effect": placed.effect.id, "place": vessel, "physics": placed.effect.physics })
+    });
+    let terms = model.terms.iter().map(
+        |own| json!({ "effect": own.term.name, "place": null, "physics": "a term of your own" }),
+    );
+    placed.chain(terms).collect()
+}

@@ -1,0 +1,84 @@
+//! What nobody waits for any more is not computed any more.
+
+use std::thread::sleep;
+use std::time::Duration;
+
+use ctid_tests::Rig;
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use serde_json::json;
+
+use crate::server::{Tab, alone, csv, serve};
+
+/// Threads that compute in this process, where the system lists them.
+fn computing() -> Option<usize> {
+    let tasks = std::fs::read_dir("/proc/self/task").ok()?.flatten();
+    let names = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("comm")).ok());
+    Some(names.filter(|name| name.trim() == "ctid computes").count())
+}
+
+/// A record whose diagnosis takes far longer than this test.
+fn long_record() -> String {
+    let rig = Rig {
+        samples: 4000,
+        colour: 0.9,
+        hidden: vec![
+            ("pump_deadzone", 0, vec![1.0]),
+            ("sensor_lag", 0, vec![15.0]),
+        ],
+        ..Rig::cascaded_tanks()
+    };
+    csv(&rig.run(&mut ChaCha8Rng::seed_from_u64(1)))
+}
+
+#[test]
+fn what_is_cancelled_stops() {
+    let _alone = alone();
+    let address = serve(&[]);
+    let tab = Tab::open(address);
+    assert_eq!(
+        tab.post("/api/record?name=long.csv", long_record().as_bytes())
+            .status,
+        200
+    );
+    assert_eq!(
+        tab.post("/api/settings", br#"{"plant": "cascaded-tanks"}"#)
+            .status,
+        200
+    );
+    let begin = || {
+        let answer = tab.post("/api/run", br#"{"what": "diagnose"}"#);
+        assert_eq!(answer.status, 200, "{answer:?}");
+        tab.until("searching", |state| {
+            state["job"]["phase"] == "searching sets of effects"
+        });
+    };
+    let gone = |why: &str| {
+        for _ in 0..2400 {
+            match computing() {
+                None => return println!("skipped: this system does not list threads"),
+                Some(0) => return,
+                Some(_) => sleep(Duration::from_millis(50)),
+            }
+        }
+        panic!("it goes on computing after {why}");
+    };
+    begin();
+    assert_eq!(tab.post("/api/cancel", b"{}").json()["job"], json!(null));
+    gone("it was cancelled");
+    let state = tab.state();
+    assert!(
+        state["diagnosis"].is_null() && state["failure"].is_null(),
+        "{state}"
+    );
+    // One computation a tab: the next takes the place of the first.
+    begin();
+    tab.post("/api/run", br#"{"what": "compare"}"#);
+    assert!(computing().is_none_or(|count| count <= 2));
+    tab.post("/api/cancel", b"{}");
+    gone("another took its place");
+    // A tab that is forgotten takes its computation with it.
+    begin();
+    let _others: Vec<Tab> = (0..8).map(|_| Tab::open(address)).collect();
+    assert_eq!(tab.get("/api/state").status, 410);
+    gone("its tab was forgotten");
+}

@@ -1,0 +1,333 @@
+//! What other pages, other programs and unfortunate files send: it is refused, nothing breaks, and nothing grows.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream, UdpSocket};
+
+use serde_json::json;
+
+use crate::browser::Browser;
+use crate::server::{Answer, Tab, alone, bundled, exchange, serve};
+
+fn tour() -> Vec<u8> {
+    std::fs::read(bundled("tour.csv")).unwrap()
+}
+
+#[test]
+fn other_pages_are_refused() {
+    let address = serve(&[]);
+    let tab = Tab::open(address);
+    let port = address.port();
+    let ask = |method: &str, path: &str, headers: &str| {
+        exchange(address, format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n{headers}Content-Length: 0\r\n\r\n").as_bytes())
+    };
+    let host = format!("Host: {address}\r\n");
+    let token = format!("x-ctid-token: {}\r\n", tab.token);
+    let state = format!("/api/state?session={}", tab.session);
+    // As the page itself asks.
+    let own = format!("{host}Origin: http://{address}\r\n");
+    assert_eq!(ask("GET", &state, &own).status, 200);
+    assert_eq!(
+        ask("GET", &state, &format!("Host: localhost:{port}\r\n")).status,
+        200
+    );
+    // A page of another site, of another port, of a file.
+    for origin in [
+        "https://example.org",
+        &format!("http://127.0.0.1:{}", port.wrapping_add(1)),
+        &format!("https://{address}"),
+        "null",
+    ] {
+        for (method, path) in [
+            ("GET", state.as_str()),
+            ("GET", "/"),
+            ("POST", "/api/session"),
+        ] {
+            let answer = ask(method, path, &format!("{host}{token}Origin: {origin}\r\n"));
+            assert_eq!(answer.status, 403, "{origin}: {answer:?}");
+        }
+    }
+    // A name that was pointed at this machine.
+    for name in [
+        format!("example.org:{port}"),
+        "127.0.0.1".to_string(),
+        format!("127.0.0.1.example.org:{port}"),
+        String::new(),
+    ] {
+        let answer = ask("GET", "/", &format!("Host: {name}\r\n"));
+        assert!([400, 403].contains(&answer.status), "{name}: {answer:?}");
+        assert!(!answer.body.contains(&tab.token));
+    }
+    // What changes something needs the token.
+    for wrong in [
+        String::new(),
+        format!("x-ctid-token: {}\r\n", "0".repeat(32)),
+    ] {
+        for path in [
+            "session", "record", "settings", "text", "effect", "run", "cancel", "forget",
+        ] {
+            let path = format!("/api/{path}?session={}&name=a.csv", tab.session);
+            assert_eq!(
+                ask("POST", &path, &format!("{host}{wrong}")).status,
+                403,
+                "{path}"
+            );
+        }
+    }
+    // The browser is told to load nothing from elsewhere, and to give nothing to others.
+    let page = ask("GET", "/", &host);
+    assert!(
+        page.head
+            .contains("content-security-policy: default-src 'self'"),
+        "{}",
+        page.head
+    );
+    assert!(!page.head.contains("access-control-allow"), "{}", page.head);
+}
+
+#[test]
+fn it_listens_on_this_machine_alone() {
+    let address = serve(&[]);
+    assert!(address.ip().is_loopback());
+    // An address of this machine that others see; nothing is sent.
+    let socket = UdpSocket::bind("0.0.0.0:0").unwrap();
+    let outside = socket
+        .connect("192.0.2.1:9")
+        .and_then(|()| socket.local_addr());
+    let Some(ip) = outside
+        .ok()
+        .map(|address| address.ip())
+        .filter(|ip| !ip.is_loopback())
+    else {
+        println!("skipped: this machine has no address that others see");
+        return;
+    };
+    assert!(TcpStream::connect(SocketAddr::new(ip, address.port())).is_err());
+}
+
+/// Memory of this process, which is the server's too \[MB\].
+fn resident() -> Option<usize> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<usize>().ok()? / 1024)
+}
+
+#[test]
+fn a_file_of_200_megabytes_is_refused_early() {
+    let address = serve(&[]);
+    let tab = Tab::open(address);
+    let path = format!("/api/record?session={}&name=large.csv", tab.session);
+    let refused = |answer: &Answer| {
+        assert_eq!(answer.status, 413, "{answer:?}");
+        assert!(
+            answer.error().contains("64 MB") && answer.error().contains("ctid diagnose"),
+            "{answer:?}"
+        );
+    };
+    // Where its length is said, before anything of it is read.
+    let head = tab.head("POST", &path, 200 << 20) + "\r\n";
+    refused(&exchange(address, head.as_bytes()));
+    // Where it is not, once it is too long.
+    let before = resident();
+    let mut stream = TcpStream::connect(address).unwrap();
+    let head = tab
+        .head("POST", &path, 0)
+        .replace("Content-Length: 0", "Transfer-Encoding: chunked");
+    stream.write_all((head + "\r\n").as_bytes()).unwrap();
+    let chunk = [b"100000\r\n".as_slice(), &vec![b'1'; 1 << 20], b"\r\n"].concat();
+    let sent = (0..200)
+        .take_while(|_| stream.write_all(&chunk).is_ok())
+        .count();
+    assert!(sent < 200, "it takes all");
+    let mut answer = String::new();
+    let _ = stream.read_to_string(&mut answer);
+    assert!(
+        answer.is_empty() || answer.starts_with("HTTP/1.1 413"),
+        "{answer}"
+    );
+    if let (Some(before), Some(after)) = (before, resident()) {
+        println!("{before} MB before, {after} MB after");
+        assert!(after < before + 250, "{before} MB before, {after} MB after");
+    }
+    assert_eq!(tab.state()["records"], json!([]));
+}
+
+#[test]
+fn unfortunate_files_are_refused_with_the_mend() {
+    let tab = Tab::open(serve(&[]));
+    let send = |name: &str, bytes: &[u8]| tab.post(&format!("/api/record?name={name}"), bytes);
+    let names: Vec<String> = (0..10_000).map(|k| format!("column {k}")).collect();
+    let row = vec!["1"; 10_000].join(",");
+    let wide = names.join(",") + "\n" + &format!("{row}\n").repeat(20);
+    let answer = send("wide.csv", wide.as_bytes());
+    assert_eq!(answer.status, 422);
+    assert!(
+        answer.error().contains("10000 columns") && answer.error().contains("at most 500"),
+        "{answer:?}"
+    );
+    for (bytes, needle) in [
+        (b"PK\x03\x04 a spreadsheet".as_slice(), "spreadsheet"),
+        (&[0xff, 0xfe, 0, 1], "UTF-16"),
+        (b"", "empty"),
+        (b"1,2,3\n4,5,6\n", "header"),
+    ] {
+        let answer = send("bad.csv", bytes);
+        assert_eq!(answer.status, 422, "{answer:?}");
+        assert!(
+            answer.error().contains(needle) && answer.error().contains("bad.csv"),
+            "{needle}: {answer:?}"
+        );
+    }
+    // What is wrong further down is said of the record, which can be taken away again.
+    let answer = send("rows.csv", b"t,u,y\n0,1,2\n1,2,x\n");
+    assert_eq!(answer.status, 200);
+    assert!(
+        answer.json()["records"][0]["error"]
+            .as_str()
+            .unwrap()
+            .contains("row 3"),
+        "{answer:?}"
+    );
+    assert_eq!(
+        tab.post("/api/forget", br#"{"name": "rows.csv"}"#).json()["records"],
+        json!([])
+    );
+    // A record cannot be held out from itself.
+    assert_eq!(send("one.csv", &tour()).status, 200);
+    let twice = tab.post("/api/record?name=two.csv&held_out=true", &tour());
+    assert!(twice.error().contains("hold the same"), "{twice:?}");
+    // And requests that are none.
+    for (path, body) in [
+        ("/api/settings", "{"),
+        ("/api/settings", r#"{"plant": 7}"#),
+        ("/api/settings", r#"{"plant": "bath-tub"}"#),
+        (
+            "/api/settings",
+            r#"{"plant": "single-tank", "known": {"area": -1}}"#,
+        ),
+        ("/api/text", r#"{"text": "plant = 'nothing'"}"#),
+        ("/api/run", r#"{"what": "everything"}"#),
+        ("/api/run", r#"{"what": "compare"}"#),
+        (
+            "/api/run",
+            r#"{"what": "design", "group": 99, "between": ["a", "b"]}"#,
+        ),
+        ("/api/effect", r#"{"do": "add", "effect": "gravity"}"#),
+        (
+            "/api/effect",
+            r#"{"do": "add", "effect": "overflow", "place": "../.."}"#,
+        ),
+    ] {
+        let answer = tab.post(path, body.as_bytes());
+        assert!(
+            (400..500).contains(&answer.status),
+            "{path} {body}: {answer:?}"
+        );
+    }
+    let large = format!(r#"{{"text": "{}"}}"#, "#".repeat(2 << 20));
+    assert_eq!(tab.post("/api/text", large.as_bytes()).status, 413);
+}
+
+#[test]
+fn no_parameter_reaches_the_file_system() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("secret.txt"), "root:x:0:0").unwrap();
+    let tab = Tab::open(serve(&[]));
+    let secret = folder.path().join("secret.txt").display().to_string();
+    let encoded = |path: &str| path.replace('/', "%2F");
+    for path in [
+        "../../../../../../etc/passwd",
+        "/etc/passwd",
+        "..\\..\\etc\\passwd",
+        "file:///etc/passwd",
+        &secret,
+        "%00",
+        "..%252f..%252fetc%252fpasswd",
+    ] {
+        let encoded = encoded(path);
+        for request in [
+            format!("/{path}"),
+            format!("/{encoded}"),
+            format!("/api/{encoded}"),
+            format!("/api/file?of={encoded}"),
+            format!("/api/file?of=model&name={encoded}&path={encoded}"),
+            format!("/api/model?id={encoded}"),
+            format!("/api/state?since={encoded}"),
+        ] {
+            let answer = tab.get(&request);
+            assert!(!answer.body.contains("root:"), "{request}: {answer:?}");
+        }
+        let other = Tab {
+            session: encoded.clone(),
+            ..tab.clone()
+        };
+        assert!(other.get("/api/state").status >= 400);
+        // As the name of a record it is a name without folders.
+        let answer = tab.post(&format!("/api/record?name={encoded}"), &tour());
+        assert_eq!(answer.status, 200, "{path}: {answer:?}");
+        let name = answer.json()["records"][0]["name"]
+            .as_str()
+            .unwrap()
+            .to_string();
+        assert!(!name.contains(['/', '\\', '\0']), "{name}");
+        let forget = json!({ "name": name }).to_string();
+        assert_eq!(
+            tab.post("/api/forget", forget.as_bytes()).json()["records"],
+            json!([])
+        );
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn two_tabs_do_not_meet_and_the_oldest_of_many_goes() {
+    let address = serve(&[]);
+    let (first, second) = (Tab::open(address), Tab::open(address));
+    assert_ne!(first.session, second.session);
+    assert_eq!(first.post("/api/record?name=tour.csv", &tour()).status, 200);
+    assert_eq!(first.state()["records"].as_array().unwrap().len(), 1);
+    assert_eq!(second.state()["records"], json!([]));
+    // The tab that is loaded again finds its work; one that is not known begins anew.
+    let body = json!({ "session": first.session }).to_string();
+    assert_eq!(
+        first.post("/api/session", body.as_bytes()).json()["session"],
+        json!(first.session)
+    );
+    let tabs: Vec<Tab> = (0..8).map(|_| Tab::open(address)).collect();
+    for gone in [&first, &second] {
+        let answer = gone.get("/api/state");
+        assert_eq!(answer.status, 410, "{answer:?}");
+        assert!(answer.error().contains("load the page again"));
+    }
+    assert_eq!(tabs[7].get("/api/state").status, 200);
+}
+
+/// Names from files are text, whatever they hold.
+#[test]
+fn markup_in_names_is_text() {
+    let address = format!("http://{}/", serve(&[]));
+    let _alone = alone();
+    let Some(mut browser) = Browser::open(&address) else {
+        return;
+    };
+    let markup = "<img src=x onerror=document.title=1>";
+    let text = String::from_utf8(tour()).unwrap();
+    let (_, rows) = text.split_once('\n').unwrap();
+    let file = browser.folder.path().join("<b>bold<b>&amp;.csv");
+    std::fs::write(&file, format!("t <i>x</i> [s],u{markup} [<b>V</b>],\"y <script>document.title=2</script> [cm]\"\n{rows}")).unwrap();
+    browser.drop_files("#drop-fitted", &[&file]);
+    browser.until("document.querySelector('#records li')");
+    assert!(browser.text("#records").contains("<b>bold<b>&amp;.csv"));
+    browser.evaluate("document.querySelector('#columns').open = true");
+    let chosen =
+        browser.evaluate("document.getElementById('column-input').selectedOptions[0].text");
+    assert_eq!(chosen, json!(format!("u{markup} [<b>V</b>]")));
+    browser.choose("plant", "s", "value === 'single-tank'");
+    browser.until("document.querySelectorAll('#trail .step').length === 1 && document.getElementById('plot-record-0')?.data?.length === 3");
+    browser.click("#diagnose");
+    browser.until("document.querySelector('#add-found-0')");
+    browser.picture("markup");
+    let made = "document.querySelectorAll('img, main script, main b b, main i').length + document.querySelectorAll('#records b').length";
+    assert_eq!(browser.evaluate(made), json!(0));
+    assert_eq!(browser.evaluate("document.title"), json!("ctid"));
+    browser.assert_quiet(&address);
+}

@@ -1,0 +1,8 @@
+//! `ctid serve` from outside: its page in a browser, driven by real clicks, and its server against hostile input.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod browser;
+mod cancelled;
+mod click_path;
+mod hostile;
+mod server;

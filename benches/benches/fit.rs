@@ -19,7 +19,7 @@ const TRUTH: [f64; 5] = [10.0, 18.0, 12.5, 7.0, 14.0];
 
 fn known() -> Known {
     Known {
-        area: [Some(154.0); 2],
+        area: [Some(154.0), Some(154.0), None],
         ..Known::default()
     }
 }
@@ -45,6 +45,7 @@ fn record() -> Option<Record> {
         time: (0..SAMPLES).map(|k| k as f64 * H).collect(),
         input: Signal::new("u", "V", u),
         output: Signal::new("y", "cm", y),
+        input_2: None,
         reference: None,
         hold: Hold::Zero,
     })

@@ -24,7 +24,7 @@ fn command(k: usize) -> f64 {
 
 fn structure(plant: Plant, effects: &[&str]) -> Structure {
     let known = Known {
-        area: [Some(AREA[0]), Some(AREA[1])],
+        area: [Some(AREA[0]), Some(AREA[1]), None],
         ..Known::default()
     };
     let scales = Scales::from_ranges((3.5, 6.5), (6.0, 17.0), H, SAMPLES as f64 * H);

@@ -53,7 +53,7 @@ fn record(samples: usize, initial_level: f64, rng: &mut ChaCha8Rng) -> Result<St
     let duration = samples as f64 * INTERVAL;
     let scales = Scales::from_ranges(COMMAND, (0.0, RIM), INTERVAL, duration);
     let known = Known {
-        area: [Some(AREA), None],
+        area: [Some(AREA), None, None],
         ..Known::default()
     };
     let overflow = EffectInfo::find("overflow").ok_or("the catalogue has no overflow")?;

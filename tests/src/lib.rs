@@ -107,14 +107,15 @@ impl Rig {
     #[must_use]
     pub fn known(&self) -> Known {
         let area = match self.plant {
-            Plant::SingleTank => [Some(154.0), None],
-            Plant::CascadedTanks => [Some(154.0), Some(154.0)],
-            _ => [None, None],
+            Plant::SingleTank => [Some(154.0), None, None],
+            Plant::CascadedTanks => [Some(154.0), Some(154.0), None],
+            _ => [None; 3],
         };
         Known {
             area,
             tank_height: Some(60.0),
             input_range: Some(10.0),
+            ..Known::default()
         }
     }
 
@@ -217,7 +218,9 @@ impl Rig {
             self.interval,
             self.interval * self.samples as f64,
         );
-        scales.operating_level = [self.levels[0], *self.levels.last().expect("a vessel")];
+        for (operating, level) in scales.operating_level.iter_mut().zip(&self.levels) {
+            *operating = *level;
+        }
         scales.input_range = 10.0;
         let mut structure = Structure::new(self.plant, self.known(), scales);
         let mut theta = self.theta.clone();
@@ -274,6 +277,7 @@ impl Rig {
                 .collect(),
             input: Signal::new("u", "V", u),
             output: Signal::new("y", "cm", y),
+            input_2: None,
             reference: (self.drive == Drive::Closed).then(|| Signal::new("r", "cm", wanted)),
             hold: Hold::Zero,
         }

@@ -2,7 +2,8 @@
 //!
 //! A column that is named is looked for by its whole header first, then by its name without the
 //! unit. A unit that the file gives must be the one that the model gives, where both do. A column
-//! that is not named is guessed from the letter that control engineers give it: `t`, `u`, `y`, `r`.
+//! that is not named is guessed from the letter that control engineers give it: `t`, `u`, `y`, `r`. The second input is never
+//! guessed: whether there is one is for the model to say.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +21,9 @@ pub struct Columns {
     /// The command to the actuator. Guessed: `u...`, `input`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,
+    /// The command to a second actuator, of a plant that has two; not guessed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input_2: Option<String>,
     /// The sensor's reading. Guessed: `y...`, `output`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub output: Option<String>,
@@ -67,6 +71,7 @@ pub(crate) struct Layout {
     /// Seconds in one unit of the time column.
     pub seconds: f64,
     pub input: Found,
+    pub input_2: Option<Found>,
     pub output: Found,
     pub reference: Option<Found>,
 }
@@ -87,6 +92,11 @@ const INPUT: Role = Role {
     name: "input",
     letter: 'u',
     words: &["u", "input"],
+};
+const INPUT_2: Role = Role {
+    name: "input_2",
+    letter: 'u',
+    words: &[],
 };
 const OUTPUT: Role = Role {
     name: "output",
@@ -164,6 +174,7 @@ impl Columns {
         };
         let time = named(&TIME, &self.time)?;
         let input = named(&INPUT, &self.input)?;
+        let input_2 = named(&INPUT_2, &self.input_2)?;
         let output = named(&OUTPUT, &self.output)?;
         let reference = named(&REFERENCE, &self.reference)?;
 
@@ -171,6 +182,7 @@ impl Columns {
         for (role, column) in [
             (TIME, &time),
             (INPUT, &input),
+            (INPUT_2, &input_2),
             (OUTPUT, &output),
             (REFERENCE, &reference),
         ] {
@@ -206,6 +218,7 @@ impl Columns {
             time,
             seconds,
             input,
+            input_2,
             output,
             reference,
         })

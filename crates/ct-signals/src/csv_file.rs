@@ -81,6 +81,10 @@ pub fn parse_csv(
         time: table.time.iter().map(|t| t * layout.seconds).collect(),
         input: signal(&layout.input, table.input),
         output: signal(&layout.output, table.output),
+        input_2: layout
+            .input_2
+            .as_ref()
+            .map(|found| signal(found, table.input_2)),
         reference: layout
             .reference
             .as_ref()
@@ -114,6 +118,7 @@ struct Table {
     rows: Vec<u64>,
     time: Vec<f64>,
     input: Vec<f64>,
+    input_2: Vec<f64>,
     output: Vec<f64>,
     reference: Vec<f64>,
 }
@@ -174,6 +179,9 @@ fn read_table(file: &str, text: &str, columns: &Columns) -> Result<(Layout, Tabl
         let mut cell = |column: &Found| numbers.parse(row, column, &record[column.index]);
         let time = numbers_time(&mut cell, &layout.time)?;
         table.input.push(cell(&layout.input)?);
+        if let Some(input) = &layout.input_2 {
+            table.input_2.push(cell(input)?);
+        }
         table.output.push(cell(&layout.output)?);
         if let Some(reference) = &layout.reference {
             table.reference.push(cell(reference)?);
@@ -427,7 +435,9 @@ impl Table {
                 high: LARGEST,
             });
         }
-        for (column, values) in [(&layout.input, &self.input), (&layout.output, &self.output)] {
+        let second = layout.input_2.as_ref().map(|found| (found, &self.input_2));
+        let first = [(&layout.input, &self.input), (&layout.output, &self.output)];
+        for (column, values) in first.into_iter().chain(second) {
             if let Some(k) = values.iter().position(|value| value.abs() > LARGEST) {
                 return Err(Error::TooLarge {
                     file: file.into(),

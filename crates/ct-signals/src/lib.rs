@@ -39,6 +39,7 @@
 //!     time: (0..n).map(|k| k as f64).collect(),
 //!     input: Signal::new("u", "V", u.clone()),
 //!     output: Signal::new("y", "cm", y),
+//!     input_2: None,
 //!     reference: None,
 //!     hold: Hold::Zero,
 //! };

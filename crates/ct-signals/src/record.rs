@@ -54,7 +54,7 @@ impl Signal {
     }
 }
 
-/// One experiment: time, input, output and, in a loop, the reference.
+/// One experiment: time, input, output, of a plant with two actuators the second input and, in a loop, the reference.
 ///
 /// `y[k]` is read at `t[k]`, before `u[k]` acts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,6 +65,9 @@ pub struct Record {
     pub time: Vec<f64>,
     /// The command to the actuator.
     pub input: Signal,
+    /// The command to a second actuator, where there is one; it has what the first one has: the same instants, the same hold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input_2: Option<Signal>,
     /// The sensor's reading.
     pub output: Signal,
     /// The set point, where there is a loop.
@@ -116,6 +119,7 @@ impl Record {
     pub fn validate(&self) -> Result<(), Error> {
         let signals = [
             Some(&self.input),
+            self.input_2.as_ref(),
             Some(&self.output),
             self.reference.as_ref(),
         ];

@@ -44,6 +44,7 @@ fn named(time: &str, input: &str, output: &str) -> Columns {
         time: Some(time.into()),
         input: Some(input.into()),
         output: Some(output.into()),
+        input_2: None,
         reference: None,
     }
 }

@@ -206,6 +206,7 @@ fn record() -> Record {
         time: vec![0.0, 1.0, 2.0, 3.5],
         input: Signal::new("u", "V", vec![1.0, 2.0, 0.5, 1.0]),
         output: Signal::new("y", "cm", vec![10.0, 12.0, 9.0, 9.5]),
+        input_2: None,
         reference: None,
         hold: Hold::Zero,
     }

@@ -100,20 +100,26 @@ fn applies_to(effect: &'static EffectInfo) -> impl Iterator<Item = Plant> {
 
 fn place(effect: &'static EffectInfo) -> String {
     match effect.place {
-        Place::Actuator => "at the actuator, between the command and the inflow".to_string(),
+        Place::Actuator => "at the actuator, between the command and the inflow; of two pumps either, `ctid add --where pump_1|pump_2`".to_string(),
         Place::Vessel => {
-            let two = applies_to(effect).find(|plant| plant.vessels() > 1);
-            let names: Vec<&str> = two.map_or(Vec::new(), |plant| {
-                let sites = effect.sites(plant);
-                sites
-                    .filter_map(|vessel| plant.vessel_name(vessel))
-                    .collect()
-            });
-            match names[..] {
+            let names = |vessels: usize| {
+                let several = applies_to(effect).find(|plant| plant.vessels() == vessels);
+                several.map_or(Vec::new(), |plant| {
+                    let sites = effect.sites(plant);
+                    let names = sites.filter_map(|vessel| plant.vessel_name(vessel));
+                    names.collect::<Vec<_>>()
+                })
+            };
+            let of_two = match names(2)[..] {
                 [] => "in the balance of an only vessel".to_string(),
                 [only] => format!("in a vessel's balance; of two vessels the {only} one"),
                 _ => "in a vessel's balance; of two vessels either, `ctid add --where upper|lower`"
                     .to_string(),
+            };
+            match &names(3)[..] {
+                [] => of_two,
+                [only] => format!("{of_two}; of three tanks {only}"),
+                _ => format!("{of_two}; of three tanks any, `T1|T2|T3`"),
             }
         }
         Place::Sensor => "at the sensor, between the level and the reading".to_string(),
@@ -124,7 +130,7 @@ fn place(effect: &'static EffectInfo) -> String {
 fn parameters(effect: &'static EffectInfo, look: Look) -> String {
     let mut all: Vec<ParameterInfo> = Vec::new();
     for plant in applies_to(effect) {
-        let structure = model_file::any_structure(plant);
+        let structure = model_file::any_structure(plant, true);
         for vessel in effect.sites(plant) {
             for info in structure.effect_parameters(Placed { effect, vessel }) {
                 if all.iter().all(|known| known.name != info.name) {

@@ -53,9 +53,9 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
     };
     let initial = [16.0];
     let known = Known {
-        area: [area, None],
-        tank_height: None,
+        area: [area, None, None],
         input_range: Some(10.0),
+        ..Known::default()
     };
     let commands: Vec<f64> = COMMANDS.iter().flat_map(|&u| [u; HELD]).collect();
     let simulate = |structure: &Structure, theta: &[f64]| -> Option<Record> {
@@ -70,6 +70,7 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
             output: Signal::new("y", "cm", readings.collect()),
             time: (0..commands.len()).map(|k| k as f64 * INTERVAL).collect(),
             input: Signal::new("u", "V", commands.clone()),
+            input_2: None,
             reference: None,
             hold: Hold::Zero,
         })

@@ -6,7 +6,7 @@
 //! vessel,level,8.2,-0.3,0.2
 //! vessel,level,11.0,-4.1,0.3
 //! ```
-//! `place` is `actuator`, `sensor`, `vessel`, or of two vessels `upper` or `lower`; `variable` is `level`, `rate` (the
+//! `place` is `actuator` (of two pumps the first), `sensor`, `vessel`, or of several vessels the name of one; `variable` is `level`, `rate` (the
 //! vessel's net inflow), `input` or `time` (since the record began). The standard errors are for the reader alone.
 
 use std::path::Path;
@@ -48,10 +48,12 @@ pub(crate) fn place_of(plant: Plant, word: &str) -> Result<(Place, usize), Strin
         .find(|&vessel| plant.vessel_name(vessel) == Some(word))
         .map(|vessel| (Place::Vessel, vessel))
         .ok_or_else(|| {
-            let vessels = if plant.vessels() == 1 {
-                "vessel"
+            let names = (0..plant.vessels()).filter_map(|vessel| plant.vessel_name(vessel));
+            let names: Vec<&str> = names.collect();
+            let vessels = if names.is_empty() {
+                "vessel".to_string()
             } else {
-                "upper, lower"
+                names.join(", ")
             };
             format!(
                 "\"{word}\" is no place of plant {}; write actuator, {vessels} or sensor",

@@ -163,6 +163,7 @@ fn a_file_becomes_a_record() {
         time,
         input: Signal::new("u", "V", vec![1.0; n]),
         output: Signal::new("y", "cm", vec![2.0; n]),
+        input_2: None,
         reference: Some(Signal::new("r", "cm", vec![3.0; n])),
         hold: ct_signals::Hold::Zero,
     };

@@ -72,6 +72,7 @@ fn in_loop(
         time: (0..SAMPLES).map(|k| k as f64 * INTERVAL).collect(),
         input: Signal::new("u", "V", u),
         output: Signal::new("y", "cm", y),
+        input_2: None,
         reference: Some(Signal::new("r", "cm", r)),
         hold: Hold::Zero,
     })

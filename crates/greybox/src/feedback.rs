@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 use ct_signals::{Hold, Record};
 use plants::controller::{Controller, MAX_CONTROLLER_STATES};
-use plants::{Dual, MAX_VESSELS, Scalar, Simulator, Structure};
+use plants::{Command, Dual, MAX_VESSELS, Scalar, Simulator, Structure};
 
 use crate::{Error, Triangle};
 
@@ -127,7 +127,7 @@ pub(crate) fn step(record: &Record, k: usize) -> f64 {
         .map_or(1.0, |next| next - record.time[k])
 }
 
-/// A plant linearised over one sampling interval: `x+ = A x + b u`, the last level is measured.
+/// A plant linearised over one sampling interval: `x+ = A x + b u`; of two pumps `u` is the command to the first one.
 ///
 /// What an effect adds as memory (dead time, lags) is left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,6 +136,8 @@ pub struct LinearPlant {
     pub a: Vec<Vec<f64>>,
     /// b.
     pub b: Vec<f64>,
+    /// Which level is measured.
+    pub measured: usize,
 }
 
 impl LinearPlant {
@@ -152,12 +154,20 @@ impl LinearPlant {
             .enumerate()
             .map(|(i, value)| Dual::variable(*value, i))
             .collect();
-        let mut simulator = Simulator::new(structure, &theta, &levels, command)?;
-        simulator.advance_held(Dual::variable(command, n), structure.scales.sample_interval);
+        // The second pump at the middle of its range.
+        let second = structure
+            .scales
+            .input_2
+            .map_or(0.0, |(low, high)| 0.5 * (low + high));
+        let mut simulator = Simulator::with_inputs(structure, &theta, &levels, [command, second])?;
+        let interval = structure.scales.sample_interval;
+        let moved = Dual::variable(command, n);
+        simulator.advance_held(moved, Command::held(second), interval);
         let next = simulator.levels();
         Ok(Self {
             a: (0..n).map(|i| next[i].eps[..n].to_vec()).collect(),
             b: (0..n).map(|i| next[i].eps[n]).collect(),
+            measured: structure.scales.measured,
         })
     }
 }
@@ -244,8 +254,8 @@ impl Response {
 
     /// Adds to a row what its commands so far did.
     pub(crate) fn add_to(&self, row: &mut [f64]) {
-        let last = self.levels.len() - row.len();
-        for (value, level) in row.iter_mut().zip(&self.levels[last..]) {
+        let measured = self.plant.measured * row.len();
+        for (value, level) in row.iter_mut().zip(&self.levels[measured..]) {
             *value += level;
         }
     }
@@ -253,7 +263,6 @@ impl Response {
     /// A step under the commands of a row.
     pub(crate) fn advance(&mut self, commands: &[f64]) {
         let (a, b) = (&self.plant.a, &self.plant.b);
-        const { assert!(MAX_VESSELS == 2) };
         // One pass over the columns: a row is short, and every loop over it would cost more than its sums.
         if let [b0, b1] = b[..] {
             let [[a00, a01], [a10, a11]] = [[a[0][0], a[0][1]], [a[1][0], a[1][1]]];
@@ -263,9 +272,21 @@ impl Response {
                 *x0 = a00 * before0 + a01 * before1 + b0 * u;
                 *x1 = a10 * before0 + a11 * before1 + b1 * u;
             }
-        } else {
+        } else if let [b0] = b[..] {
             for (x, u) in self.levels.iter_mut().zip(commands) {
-                *x = a[0][0] * *x + b[0] * u;
+                *x = a[0][0] * *x + b0 * u;
+            }
+        } else {
+            let (n, columns) = (b.len(), commands.len());
+            let mut before = [0.0; MAX_VESSELS];
+            for (column, u) in commands.iter().enumerate() {
+                for (i, level) in before.iter_mut().enumerate().take(n) {
+                    *level = self.levels[i * columns + column];
+                }
+                for i in 0..n {
+                    let moved: f64 = a[i].iter().zip(&before).map(|(a, x)| a * x).sum();
+                    self.levels[i * columns + column] = moved + b[i] * u;
+                }
             }
         }
     }

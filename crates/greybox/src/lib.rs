@@ -20,6 +20,6 @@ pub use fit::{
 };
 pub use levenberg_marquardt::{Stop, Stopping};
 pub use sandwich::{Robust, robust};
-pub use setup::{LoopRun, Rows, Setup, Simulated};
+pub use setup::{LoopRun, Rows, Setup, Simulated, at_rest, commands};
 pub use starts::{random_starts, starts_around};
 pub use triangle::Triangle;

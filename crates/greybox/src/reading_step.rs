@@ -88,6 +88,7 @@ mod tests {
             time: (0..y.len()).map(|k| k as f64).collect(),
             input: Signal::new("u", "V", vec![1.0; y.len()]),
             output: Signal::new("y", "cm", y),
+            input_2: None,
             reference: None,
             hold: Hold::Zero,
         }

@@ -5,10 +5,11 @@
 //! in either order for two tanks (which fit almost as well with their time constants swapped), and the rest of the
 //! parameters follows from the mean of the record.
 
+use ct_signals::{Record, Signal};
 use plants::{Outlet, Plant};
 use rand::RngExt;
 
-use crate::{Setup, levenberg_marquardt::within};
+use crate::{Setup, at_rest, levenberg_marquardt::within};
 
 /// One start for the plant's own parameters and the initial levels; effects start at their first start value.
 #[must_use]
@@ -20,12 +21,20 @@ pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
     (0..n)
         .map(|_| {
             let mut tau = || shortest * (longest / shortest).powf(rng.random::<f64>());
-            start(setup, [tau(), tau()])
+            let tau = [tau(), tau()];
+            // Heads of tanks that are joined, as shares of the measured level: nobody reads them all.
+            let mut head = || 0.05_f64 * 40.0_f64.powf(rng.random::<f64>());
+            let heads = if setup.structure.plant.joined() {
+                [head(), head()]
+            } else {
+                [1.0; 2]
+            };
+            start(setup, tau, heads)
         })
         .collect()
 }
 
-fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
+fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     let structure = &setup.structure;
     let scales = &structure.scales;
     let (mut u, mut y, mut uu, mut uy, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -56,7 +65,7 @@ fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
     // The static gain's sign and rough size, from the correlation of command and level.
     let slope = {
         let (variance, covariance) = (uu / count - u * u, uy / count - u * y);
-        let (low, high) = scales.level[structure.plant.vessels() - 1];
+        let (low, high) = scales.level[scales.measured];
         let span = scales.input.1 - scales.input.0;
         let size = if span > 0.0 { (high - low) / span } else { 0.0 };
         if variance > 0.0 && covariance < 0.0 {
@@ -80,6 +89,7 @@ fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
         Plant::SingleTankLinear => vec![slope, tau[1], y - slope * u],
         Plant::CascadedTanksLinear => vec![slope, tau[0], tau[1], y - slope * u],
         Plant::FirstOrder => vec![if driven { y / u } else { slope }, tau[1]],
+        Plant::ThreeTank => joined_tanks(setup, mean, flow(scales.area[scales.measured]), heads),
     };
     let added = structure.parameters().split_off(x.len());
     x.extend(
@@ -89,6 +99,69 @@ fn start(setup: &Setup, tau: [f64; 2]) -> Vec<f64> {
     );
     extend_levels(setup, &mut x);
     x
+}
+
+/// Pumps, valves and outlet of joined tanks that rest, the measured one at its mean level, with a throughput; `heads`: of the valves,
+/// as shares of that level.
+fn joined_tanks(setup: &Setup, mean: f64, flow: f64, heads: [f64; 2]) -> Vec<f64> {
+    let scales = &setup.structure.scales;
+    let second = scales.input_2.is_some();
+    let middle = |signal: fn(&Record) -> Option<&Signal>| {
+        let values = || {
+            let signals = setup.records.iter().filter_map(signal);
+            signals.flat_map(|signal| &signal.values)
+        };
+        values().map(|u| u.abs()).sum::<f64>() / values().count().max(1) as f64
+    };
+    let u = middle(|record| Some(&record.input));
+    let all = u + middle(|record| record.input_2.as_ref());
+    let gain = if all > 0.0 { flow / all } else { flow };
+    // What goes through the valves comes from the first pump; where that hardly runs, any flow says as much.
+    let through = (gain * u).max(0.1 * flow);
+    let [d13, d32] = heads.map(|share| share * mean);
+    // Levels in the row, T1, T3, T2, from the measured one.
+    let outlet = match scales.measured {
+        0 => mean - d13 - d32,
+        1 => mean - d32,
+        _ => mean,
+    };
+    let outlet = outlet.max(0.05 * mean);
+    let orifice = scales.orifice.unwrap_or(1.0);
+    let valve = |flow: f64, head: f64| flow / (orifice * head.sqrt());
+    let mut x = vec![gain];
+    if second {
+        x.push(gain);
+    }
+    x.extend([
+        valve(through, d13),
+        valve(through, d32),
+        valve(flow, outlet),
+    ]);
+    x
+}
+
+/// The levels at which joined tanks would rest under their first commands, but for the measured one, which is read.
+fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
+    let scales = &setup.structure.scales;
+    let orifice = scales.orifice.unwrap_or(1.0);
+    let [u, u2] = at_rest(record);
+    let pumps = if scales.input_2.is_some() { 2 } else { 1 };
+    let first = x[0] * u;
+    let all = first + if pumps > 1 { x[1] * u2 } else { 0.0 };
+    let head = |flow: f64, az: f64| {
+        let root = flow / (az * orifice);
+        root * root.abs()
+    };
+    let h2 = head(all.max(0.0), x[pumps + 2]);
+    let h3 = h2 + head(first, x[pumps + 1]);
+    let mut levels = [h3 + head(first, x[pumps]), h3, h2];
+    // They stand about the measured one as they would at rest.
+    let shift = record.output.values[0] - levels[scales.measured];
+    for level in &mut levels {
+        *level = (*level + shift).max(0.0);
+    }
+    levels[scales.measured] = record.output.values[0];
+    levels.to_vec()
 }
 
 /// Appends initial states: the measured level from the first reading, the upper one and lags at rest under the first
@@ -101,7 +174,12 @@ pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
             Plant::CascadedTanksLinear => x.push(x[0] * u0),
             _ => {}
         }
-        x.push(y0);
+        if setup.structure.plant.joined() {
+            let levels = joined_levels(setup, x, record);
+            x.extend(levels);
+        } else {
+            x.push(y0);
+        }
         x.extend(setup.structure.lags().iter().map(|_| 0.0));
         x.extend(setup.controller_states(r));
     }

@@ -60,6 +60,7 @@ fn in_loop(rig: &Rig, controller: &Controller, r: &[f64], noise: &[f64]) -> Reco
         time: (0..r.len()).map(|k| k as f64 * rig.interval).collect(),
         input: Signal::new("u", "V", u),
         output: Signal::new("y", "cm", y),
+        input_2: None,
         reference: Some(Signal::new("r", "cm", r.to_vec())),
         hold: ct_signals::Hold::Zero,
     }

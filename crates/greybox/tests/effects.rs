@@ -142,6 +142,7 @@ impl Case {
             time: (0..u.len()).map(|k| k as f64 * INTERVAL).collect(),
             input: Signal::new("u", "V", u.to_vec()),
             output: Signal::new("y", "cm", y),
+            input_2: None,
             reference: None,
             hold: Hold::Zero,
         }

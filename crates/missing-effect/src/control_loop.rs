@@ -18,13 +18,13 @@ pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), E
     let plant = linearised(node)?;
     let own = controller.linear(setup.structure.scales.sample_interval);
     let (n, m) = (plant.b.len(), own.b.len());
-    // Levels x, then the controller's states z: e = -x_last, u = c z + d e.
+    // Levels x, then the controller's states z: e = -x_measured, u = c z + d e.
     let mut a = DMatrix::<f64>::zeros(n + m, n + m);
     for i in 0..n {
         for j in 0..n {
             a[(i, j)] = plant.a[i][j];
         }
-        a[(i, n - 1)] -= plant.b[i] * own.d;
+        a[(i, plant.measured)] -= plant.b[i] * own.d;
         for j in 0..m {
             a[(i, n + j)] = plant.b[i] * own.c[j];
         }
@@ -35,7 +35,7 @@ pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), E
         for j in 0..m {
             a[(n + i, n + j)] = if constant { 0.0 } else { own.a[i][j] };
         }
-        a[(n + i, n - 1)] = -own.b[i];
+        a[(n + i, plant.measured)] = -own.b[i];
     }
     let radius = radius(&a);
     let samples = setup

@@ -132,7 +132,7 @@ pub(crate) fn input_p(node: &Node) -> Result<f64, Error> {
     Ok(least_p(node, |u| vec![u.to_vec()])?.0)
 }
 
-/// The same for all signals that are made of a record's command, and the record that shows it most.
+/// The same for all signals that are made of a record's commands, and the record that shows it most.
 fn least_p(
     node: &Node,
     signals: impl Fn(&[f64]) -> Vec<Vec<f64>>,
@@ -148,7 +148,9 @@ fn least_p(
             .as_ref()
             .filter(|_| in_loop)
             .unwrap_or(&record.input);
-        for signal in signals(&from_outside.values) {
+        let all = [Some(from_outside), record.input_2.as_ref()];
+        let all = all.into_iter().flatten();
+        for signal in all.flat_map(|command| signals(&command.values)) {
             let (_, p) = prewhitened_input_test(&signal, residual, lags)?;
             if p < least {
                 (least, at) = (p, Some(k));
@@ -260,6 +262,7 @@ mod tests {
             time: (0..SAMPLES).map(|k| 2.0 * k as f64).collect(),
             input: Signal::new("u", "V", vec![0.0; SAMPLES]),
             output: Signal::new("y", "cm", vec![0.0; SAMPLES]),
+            input_2: None,
             reference: None,
             hold: Hold::Zero,
         }

@@ -75,6 +75,7 @@ fn through(
         name: "simulated".to_string(),
         time,
         input: Signal::new("u", "V", u),
+        input_2: None,
         output: Signal::new("y", "cm", y),
         reference: None,
         hold: Hold::Zero,

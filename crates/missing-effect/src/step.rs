@@ -33,6 +33,9 @@ fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
             let mut head = record.clone();
             head.time.truncate(HEAD);
             head.input.values.truncate(HEAD);
+            if let Some(second) = &mut head.input_2 {
+                second.values.truncate(HEAD);
+            }
             head.output.values.truncate(HEAD);
             head.reference = None;
             head
@@ -155,10 +158,8 @@ pub(crate) fn report(
     })
 }
 
-/// The vessel's name, where the effect acts in one of several.
+/// The name of its vessel or pump, where the effect acts in one of several.
 pub(crate) fn place_name(node: &Node, placed: plants::Placed) -> Option<String> {
-    (placed.effect.place == plants::Place::Vessel)
-        .then(|| node.setup.structure.plant.vessel_name(placed.vessel))
-        .flatten()
-        .map(str::to_string)
+    let name = placed.place_name(node.setup.structure.plant);
+    name.map(str::to_string)
 }

@@ -6,7 +6,7 @@
 pub enum Error {
     /// No plant of that name.
     #[error(
-        "unknown plant `{name}`: take one of single-tank, single-tank-linear, cascaded-tanks, cascaded-tanks-linear, first-order"
+        "unknown plant `{name}`: take one of single-tank, single-tank-linear, cascaded-tanks, cascaded-tanks-linear, first-order, three-tank"
     )]
     UnknownPlant {
         /// The name that was given.
@@ -28,13 +28,23 @@ pub enum Error {
     },
     /// The effect does not act on this plant.
     #[error(
-        "effect `{effect}` does not act on plant `{plant}`, whose outflow follows another law: `ctid effects {effect}` names the plants it acts on"
+        "effect `{effect}` does not act on plant `{plant}`, {why}: `ctid effects {effect}` names the plants it acts on"
     )]
     EffectDoesNotApply {
         /// The effect.
         effect: &'static str,
         /// The plant.
         plant: &'static str,
+        /// What the plant has instead.
+        why: &'static str,
+    },
+    /// The effect is one of a pump that does not run.
+    #[error(
+        "effect `{effect}` cannot act at pump_2, which is off: name the column of its command as input_2 under [columns]"
+    )]
+    NoSecondPump {
+        /// The effect.
+        effect: &'static str,
     },
     /// The plant has no such vessel, or nothing could be seen of the effect in it.
     #[error(

@@ -1,18 +1,18 @@
 //! Exact propagation of linear vessels under a polynomial inflow, by the matrix exponential.
 
-use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
+use crate::{Scalar, inflow::Inflow, structure::SERIES};
 
 /// Vessels, and the inflow's three coefficients and the constant one beside them.
-const N: usize = MAX_VESSELS + 4;
+const SIZE: usize = SERIES + 4;
 
-type Matrix<T> = [[T; N]; N];
+type Matrix<T> = [[T; SIZE]; SIZE];
 
 /// Propagates `S_i dx_i/dt = q_i - (x_i - offset_i)`, `q_(i+1) = x_i - offset_i`.
 pub(crate) struct Propagators<T> {
     /// Time constant and offset of each vessel.
     vessels: Vec<(T, T)>,
     /// Exponentials made so far, by step length; a delay needs a few, an even sampling one.
-    known: Vec<(T, Vec<[T; N]>)>,
+    known: Vec<(T, Vec<[T; SIZE]>)>,
 }
 
 /// Exponentials that are kept.
@@ -34,12 +34,12 @@ impl<T: Scalar> Propagators<T> {
     }
 
     /// The levels after a step of length `h`.
-    pub(crate) fn advance(
+    pub(crate) fn advance<const N: usize>(
         &mut self,
-        levels: &[T; MAX_VESSELS],
+        levels: &[T; N],
         h: T,
         q: &Inflow<T>,
-    ) -> [T; MAX_VESSELS] {
+    ) -> [T; N] {
         let n = self.vessels.len();
         if h.value() == 0.0 {
             // An empty stretch moves nothing, but its length may have derivatives.
@@ -74,7 +74,7 @@ impl<T: Scalar> Propagators<T> {
     }
 
     /// The exponential's rows for a step of length `h`, which is not zero.
-    fn rows(&mut self, h: T) -> &[[T; N]] {
+    fn rows(&mut self, h: T) -> &[[T; SIZE]] {
         let found = self
             .known
             .iter()
@@ -92,12 +92,12 @@ impl<T: Scalar> Propagators<T> {
 
     /// The first rows of `exp(M)`, where `M` drives the vessels over the unit interval by
     /// `a + b s + c s^2` and by the offsets: the columns after the vessels' belong to `a`, `b`, `c` and one.
-    fn exponential(&self, h: T) -> Vec<[T; N]> {
+    fn exponential(&self, h: T) -> Vec<[T; SIZE]> {
         let zero = T::constant(0.0);
         let n = self.vessels.len();
         // Generator of (levels, p0, p1, p2, 1) with p0 = a + b s + c s^2, p1 = b + 2 c s, p2 = 2 c:
         // p0' = p1, p1' = p2.
-        let mut m: Matrix<T> = [[zero; N]; N];
+        let mut m: Matrix<T> = [[zero; SIZE]; SIZE];
         for (i, &(tau, offset)) in self.vessels.iter().enumerate() {
             let rate = h / tau;
             m[i][i] = -rate;
@@ -155,7 +155,7 @@ impl<T: Scalar> Propagators<T> {
 }
 
 fn identity<T: Scalar>() -> Matrix<T> {
-    let mut unit = [[T::constant(0.0); N]; N];
+    let mut unit = [[T::constant(0.0); SIZE]; SIZE];
     for (i, row) in unit.iter_mut().enumerate() {
         row[i] = T::constant(1.0);
     }
@@ -163,7 +163,7 @@ fn identity<T: Scalar>() -> Matrix<T> {
 }
 
 fn product<T: Scalar>(a: &Matrix<T>, b: &Matrix<T>, size: usize) -> Matrix<T> {
-    let mut c = [[T::constant(0.0); N]; N];
+    let mut c = [[T::constant(0.0); SIZE]; SIZE];
     for i in 0..size {
         for k in 0..size {
             let factor = a[i][k];

@@ -18,6 +18,15 @@ pub enum Plant {
     CascadedTanksLinear,
     /// `tau dy/dt + y = K u`.
     FirstOrder,
+    /// Three tanks in a row, T1, T3, T2, joined by valves, with an outlet at T2 and pumps into T1 and T2 (the DTS200 rig):
+    /// ```text
+    /// S1 dH1/dt = pump_gain_1 u1 - q13,   q13 = az13 s(H1 - H3)
+    /// S3 dH3/dt = q13 - q32,              q32 = az32 s(H3 - H2)
+    /// S2 dH2/dt = pump_gain_2 u2 + q32 - az20 sqrt(H2),   s(d) = sign(d) sqrt(|d|)
+    /// ```
+    /// `az` times `S_n sqrt(2 g)` where that is known ([`crate::Known::orifice`]). The vessels are numbered in the row: 0 is T1, 1 is T3, 2
+    /// is T2. [`crate::Known::measured`] says which level is read.
+    ThreeTank,
 }
 
 /// How a vessel lets its content out.
@@ -67,12 +76,13 @@ const STATIC_GAIN: Unit = Unit {
 
 impl Plant {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::SingleTank,
         Self::SingleTankLinear,
         Self::CascadedTanks,
         Self::CascadedTanksLinear,
         Self::FirstOrder,
+        Self::ThreeTank,
     ];
 
     /// The model file's name.
@@ -84,14 +94,16 @@ impl Plant {
             Self::CascadedTanks => "cascaded-tanks",
             Self::CascadedTanksLinear => "cascaded-tanks-linear",
             Self::FirstOrder => "first-order",
+            Self::ThreeTank => "three-tank",
         }
     }
 
-    /// How many vessels it has; the last one is measured.
+    /// How many vessels it has; the last one is measured, unless [`crate::Known::measured`] says otherwise.
     #[must_use]
     pub fn vessels(self) -> usize {
         match self {
             Self::CascadedTanks | Self::CascadedTanksLinear => 2,
+            Self::ThreeTank => 3,
             _ => 1,
         }
     }
@@ -100,21 +112,48 @@ impl Plant {
     #[must_use]
     pub fn outlet(self) -> Outlet {
         match self {
-            Self::SingleTank | Self::CascadedTanks => Outlet::Torricelli,
+            Self::SingleTank | Self::CascadedTanks | Self::ThreeTank => Outlet::Torricelli,
             _ => Outlet::Linear,
         }
     }
 
-    /// The name of a vessel where there are several: `upper` or `lower`.
+    /// Its vessels stand beside each other, joined by valves through which water flows either way, and not above each other.
+    #[must_use]
+    pub fn joined(self) -> bool {
+        self == Self::ThreeTank
+    }
+
+    /// How many pumps it has; a second one is off where no record says what it was told.
+    #[must_use]
+    pub fn pumps(self) -> usize {
+        1 + usize::from(self.joined())
+    }
+
+    /// The name of a vessel where there are several: `upper` or `lower`; of three, as they stand: `T1`, `T3`, `T2`.
     #[must_use]
     pub fn vessel_name(self, vessel: usize) -> Option<&'static str> {
-        (self.vessels() > 1).then_some(if vessel == 0 { "upper" } else { "lower" })
+        let names: &[&str] = match self.vessels() {
+            3 => &["T1", "T3", "T2"],
+            2 => &["upper", "lower"],
+            _ => &[],
+        };
+        names.get(vessel).copied()
+    }
+
+    /// The name of a pump where there are two: `pump_1` or `pump_2`.
+    #[must_use]
+    pub fn pump_name(self, pump: usize) -> Option<&'static str> {
+        let names = ["pump_1", "pump_2"];
+        names.get(pump).copied().filter(|_| self.pumps() > 1)
     }
 
     /// The name of the level in a vessel.
     #[must_use]
     pub fn level_name(self, vessel: usize) -> &'static str {
         match self.vessel_name(vessel) {
+            Some("T1") => "level_1",
+            Some("T2") => "level_2",
+            Some("T3") => "level_3",
             Some("upper") => "level_upper",
             Some(_) => "level_lower",
             None => "level",
@@ -144,22 +183,24 @@ impl Plant {
         // thirty records; the rest follows from them, generously. No unit is preferred: nothing here has a size.
         let tau = (0.1 * scales.sample_interval, 30.0 * scales.duration);
         let level = positive(scales.largest_level());
-        let input = positive(scales.input.1.abs().max(scales.input.0.abs()));
+        let largest = |(low, high): (f64, f64)| positive(high.abs().max(low.abs()));
+        let input = largest(scales.input);
         let flow = |area: f64| (area * level / tau.1 * 1e-3, area * level / tau.0 * 1e3);
-        let gain = |area: f64| {
+        let pump = |name, area: f64, input: f64| {
             info(
-                "pump_gain",
+                name,
                 GAIN,
                 "inflow for one unit of the command",
                 flow(area).0 / input,
                 flow(area).1 / input,
             )
         };
-        // Torricelli: tau = 2 S sqrt(H)/alpha = 2 S Q/alpha^2. The measured vessel, the last one, is the shortest at its
-        // largest level; that bounds the throughput Q, and Q the upper vessel, whose level is not known.
-        let last = self.vessels() - 1;
-        let (low, high) = scales.level[last];
-        let content = scales.area[last] * positive(low.abs().max(high.abs()));
+        let gain = |area: f64| pump("pump_gain", area, input);
+        // Torricelli: tau = 2 S sqrt(H)/alpha = 2 S Q/alpha^2. The measured vessel, of a series the last one, is the shortest at
+        // its largest level; that bounds the throughput Q, and Q the upper vessel, whose level is not known.
+        let measured = scales.measured;
+        let (low, high) = scales.level[measured];
+        let content = scales.area[measured] * positive(low.abs().max(high.abs()));
         let alpha = |name, meaning, area: f64| {
             info(
                 name,
@@ -168,6 +209,15 @@ impl Plant {
                 flow(area).0 / level.sqrt(),
                 2.0 * (area * content).sqrt() / tau.0,
             )
+        };
+        // The same through a valve, in units of what it lets through where that is known.
+        let valve = |name, meaning, vessel: usize| {
+            let mut valve = alpha(name, meaning, scales.area[vessel]);
+            if let Some(orifice) = scales.orifice {
+                valve.unit = Unit::ONE;
+                (valve.lower, valve.upper) = (valve.lower / orifice, valve.upper / orifice);
+            }
+            valve
         };
         let lag = |name, meaning| info(name, Unit::TIME, meaning, tau.0, tau.1);
         let reach = 1e3 * level;
@@ -215,6 +265,18 @@ impl Plant {
                 offset(),
             ],
             Self::FirstOrder => vec![static_gain(), lag("tau", "time constant")],
+            Self::ThreeTank => {
+                let mut all = vec![pump("pump_gain_1", scales.area[0], input)];
+                if let Some(input) = scales.input_2 {
+                    all.push(pump("pump_gain_2", scales.area[2], largest(input)));
+                }
+                all.extend([
+                    valve("az13", "flow coefficient of the valve between T1 and T3", 0),
+                    valve("az32", "flow coefficient of the valve between T3 and T2", 1),
+                    valve("az20", "flow coefficient of the outlet of T2", 2),
+                ]);
+                all
+            }
         }
     }
 }

@@ -2,12 +2,13 @@
 
 use crate::{
     Error, Outlet, Place, Scalar, Structure,
-    actuator::Actuator,
+    actuator::{Actuator, Signal},
     effects,
+    inflow::Inflow,
     sensor::Sensor,
-    structure::MAX_VESSELS,
+    structure::{MAX_VESSELS, SERIES},
     term,
-    vessels::{Stretch, Vessels},
+    vessels::{Stretch, Valves, Vessels},
 };
 
 /// The command over one sampling interval \[input unit\].
@@ -41,12 +42,34 @@ impl Command {
 /// but for the first step of a new length of a linear plant, and the queue behind a dead time while it fills.
 pub struct Simulator<T: Scalar> {
     actuator: Actuator<T>,
-    vessels: Vessels<T>,
+    layout: Layout<T>,
     sensor: Sensor<T>,
     pump_gain: T,
-    last: usize,
+    measured: usize,
     time: f64,
     substeps: usize,
+}
+
+/// How the vessels stand to each other.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "vessels in series, which most simulations have, stay where the simulator is"
+)]
+enum Layout<T: Scalar> {
+    Series(Vessels<T, SERIES>),
+    Joined(Box<Joined<T>>),
+}
+
+struct Joined<T: Scalar> {
+    vessels: Vessels<T, MAX_VESSELS>,
+    second: Option<SecondPump<T>>,
+}
+
+struct SecondPump<T: Scalar> {
+    actuator: Actuator<T>,
+    gain: T,
+    /// Lengths and commands of its pieces in the present interval: scratch space.
+    pieces: Vec<(T, Signal<T>)>,
 }
 
 impl<T: Scalar> Simulator<T> {
@@ -61,6 +84,19 @@ impl<T: Scalar> Simulator<T> {
         theta: &[T],
         initial: &[T],
         at_rest: f64,
+    ) -> Result<Self, Error> {
+        Self::with_inputs(structure, theta, initial, [at_rest, 0.0])
+    }
+
+    /// The same for a plant with two pumps: what either was told before the record began.
+    ///
+    /// # Errors
+    /// As [`Simulator::new`].
+    pub fn with_inputs(
+        structure: &Structure,
+        theta: &[T],
+        initial: &[T],
+        at_rest: [f64; 2],
     ) -> Result<Self, Error> {
         let plant = structure.plant;
         let n = plant.vessels();
@@ -114,14 +150,22 @@ impl<T: Scalar> Simulator<T> {
                 ],
             ),
             crate::Plant::FirstOrder => (theta[0], vec![(theta[1], Outlet::Linear, zero)]),
+            crate::Plant::ThreeTank => {
+                let valves = &theta[own - n..own];
+                let orifice = structure.scales.orifice.unwrap_or(1.0);
+                let part = |i: usize| (area(i), Outlet::Torricelli, valves[i] * orifice);
+                (theta[0], (0..n).map(part).collect())
+            }
         };
-        let (mut actuator, mut vessels, mut sensor) = (Vec::new(), Vec::new(), Vec::new());
+        let second_gain = structure.scales.input_2.map(|_| theta[1]);
+        let mut actuators = [Vec::new(), Vec::new()];
+        let (mut vessels, mut sensor) = (Vec::new(), Vec::new());
         let mut at = own;
         for (&placed, count) in structure.effects().iter().zip(counts) {
             let site = structure.site(placed);
             if let Some(law) = effects::bind(placed.effect, &site, &theta[at..at + count]) {
                 match placed.effect.place {
-                    Place::Actuator => actuator.push(law),
+                    Place::Actuator => actuators[placed.vessel.min(1)].push(law),
                     Place::Vessel => vessels.push((placed.vessel, law)),
                     Place::Sensor => sensor.push(law),
                 }
@@ -131,27 +175,47 @@ impl<T: Scalar> Simulator<T> {
         for (term, count) in structure.terms().iter().zip(term_counts) {
             let law = term::bind(term, &theta[at..at + count]);
             match term.place {
-                Place::Actuator => actuator.push(law),
+                Place::Actuator => actuators[term.vessel.min(1)].push(law),
                 Place::Vessel => vessels.push((term.vessel, law)),
                 Place::Sensor => sensor.push(law),
             }
             at += count;
         }
-        let mut actuator = Actuator::new(actuator, at_rest, 0.0);
+        let [first, second] = actuators;
+        let mut actuator = Actuator::new(first, at_rest[0], 0.0);
+        let mut second = second_gain.map(|gain| SecondPump {
+            actuator: Actuator::new(second, at_rest[1], 0.0),
+            gain,
+            pieces: Vec::new(),
+        });
         let mut sensor = Sensor::new(sensor);
         let sample = structure.scales.sample_interval;
         for (lag, &before) in lags.iter().zip(before) {
             match lag.effect.place {
-                Place::Actuator => actuator.unsettle(before, sample),
+                Place::Actuator => match &mut second {
+                    Some(second) if lag.vessel > 0 => second.actuator.unsettle(before, sample),
+                    _ => actuator.unsettle(before, sample),
+                },
                 _ => sensor.unsettle(before, sample),
             }
         }
+        let measured = structure.scales.measured.min(n - 1);
+        let layout = if plant.joined() {
+            let (low, high) = structure.scales.level[measured];
+            let valves = Valves::new(low.abs().max(high.abs()));
+            Layout::Joined(Box::new(Joined {
+                vessels: Vessels::new(parts, vessels, levels, (measured, Some(valves))),
+                second,
+            }))
+        } else {
+            Layout::Series(Vessels::new(parts, vessels, levels, (measured, None)))
+        };
         Ok(Self {
             actuator,
-            vessels: Vessels::new(parts, vessels, levels),
+            layout,
             sensor,
             pump_gain,
-            last: n - 1,
+            measured,
             time: 0.0,
             substeps: 1,
         })
@@ -164,12 +228,23 @@ impl<T: Scalar> Simulator<T> {
 
     /// The sensor's reading now. Sensors may have memory, so it is called once for each sample, in order.
     pub fn read(&mut self) -> T {
-        self.sensor.read(self.vessels.levels[self.last], self.time)
+        let level = match &self.layout {
+            Layout::Series(vessels) => vessels.levels[self.measured],
+            Layout::Joined(joined) => joined.vessels.levels[self.measured],
+        };
+        self.sensor.read(level, self.time)
     }
 
     /// The level of each vessel now; only the first [`crate::Plant::vessels`] entries are used.
     pub fn levels(&self) -> [T; MAX_VESSELS] {
-        self.vessels.levels
+        match &self.layout {
+            Layout::Series(vessels) => {
+                let mut levels = [T::constant(0.0); MAX_VESSELS];
+                levels[..SERIES].copy_from_slice(&vessels.levels);
+                levels
+            }
+            Layout::Joined(joined) => joined.vessels.levels,
+        }
     }
 
     /// Time since the record began \[s\].
@@ -177,20 +252,25 @@ impl<T: Scalar> Simulator<T> {
         self.time
     }
 
-    /// Moves on by one sampling interval of length `h` \[s\].
+    /// Moves on by one sampling interval of length `h` \[s\]; a second pump stands at zero.
     pub fn advance(&mut self, command: Command, h: f64) {
-        self.step(T::constant(command.from), command.to, h);
+        self.advance_both([command, Command::held(0.0)], h);
     }
 
-    /// The same under a held command that has derivatives, as a controller gives it.
-    pub fn advance_held(&mut self, command: T, h: f64) {
-        self.step(command, None, h);
+    /// The same under a command to either pump; the second one is not looked at where the plant has no second pump, or that is off.
+    pub fn advance_both(&mut self, [command, second]: [Command; 2], h: f64) {
+        self.step(T::constant(command.from), command.to, second, h);
     }
 
-    fn step(&mut self, from: T, to: Option<f64>, h: f64) {
+    /// The same under a held command to the first pump that has derivatives, as a controller gives it.
+    pub fn advance_held(&mut self, command: T, second: Command, h: f64) {
+        self.step(command, None, second, h);
+    }
+
+    fn step(&mut self, from: T, to: Option<f64>, second: Command, h: f64) {
         let Self {
             actuator,
-            vessels,
+            layout,
             sensor,
             pump_gain,
             time,
@@ -199,27 +279,91 @@ impl<T: Scalar> Simulator<T> {
         } = self;
         let gain = *pump_gain;
         let mut now = T::constant(*time);
-        actuator.pieces(from, to, *time, h, |actuator, length, signal| {
-            // A short piece needs no more parts than its share of the interval.
-            let parts = *substeps as f64 * length.value() / h;
-            let parts = ((parts - 1e-9).ceil() as usize).max(1);
-            let part = if parts == 1 {
-                length
-            } else {
-                length * (1.0 / parts as f64)
-            };
-            for i in 0..parts {
-                let signal = signal.from(part * i as f64);
-                let inflow = actuator.inflow(part, signal, gain, now);
-                if sensor.has_lag() {
-                    let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
-                    vessels.step(part, &inflow, now, &mut Some(&mut follow));
-                } else {
-                    vessels.step(part, &inflow, now, &mut None);
-                }
-                now = now + part;
+        match layout {
+            Layout::Series(vessels) => {
+                actuator.pieces(from, to, *time, h, |actuator, length, signal| {
+                    let (parts, part) = cut(length, h, *substeps);
+                    for i in 0..parts {
+                        let signal = signal.from(part * i as f64);
+                        let inflow = actuator.inflow(part, signal, gain, now);
+                        if sensor.has_lag() {
+                            let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
+                            vessels.step(part, &inflow, now, &mut Some(&mut follow));
+                        } else {
+                            vessels.step(part, &inflow, now, &mut None);
+                        }
+                        now = now + part;
+                    }
+                });
             }
-        });
+            Layout::Joined(joined) => {
+                let Joined {
+                    vessels,
+                    second: pump,
+                } = &mut **joined;
+                if let Some(pump) = pump {
+                    let from = T::constant(second.from);
+                    pump.pieces.clear();
+                    let pieces = &mut pump.pieces;
+                    pump.actuator
+                        .pieces(from, second.to, *time, h, |_, length, signal| {
+                            pieces.push((length, signal));
+                        });
+                }
+                // The pieces of the one are cut where those of the other end.
+                let mut next = 0;
+                let mut passed = T::constant(0.0);
+                actuator.pieces(from, to, *time, h, |actuator, length, signal| {
+                    let mut done = T::constant(0.0);
+                    loop {
+                        let left = length - done;
+                        let other = pump.as_ref().and_then(|pump| pump.pieces.get(next));
+                        let other = other.map(|&(whole, signal)| (whole - passed, signal));
+                        // The last piece of the other ends with the interval, whatever rounding says.
+                        let last = pump.as_ref().is_none_or(|p| next + 1 >= p.pieces.len());
+                        let ends = other.filter(|(rest, _)| !last && rest.value() < left.value());
+                        let stretch = ends.map_or(left, |(rest, _)| rest);
+                        let (parts, part) = cut(stretch, h, *substeps);
+                        for i in 0..parts {
+                            let signal = signal.from(done + part * i as f64);
+                            let inflow = actuator.inflow(part, signal, gain, now);
+                            let inflow_2 = match (&mut *pump, other) {
+                                (Some(pump), Some((_, signal))) => {
+                                    let signal = signal.from(passed + part * i as f64);
+                                    pump.actuator.inflow(part, signal, pump.gain, now)
+                                }
+                                _ => Inflow::held(T::constant(0.0)),
+                            };
+                            let both = [&inflow, &inflow_2];
+                            if sensor.has_lag() {
+                                let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
+                                vessels.step_fed(part, both, now, &mut Some(&mut follow));
+                            } else {
+                                vessels.step_fed(part, both, now, &mut None);
+                            }
+                            now = now + part;
+                        }
+                        if ends.is_none() {
+                            passed = passed + stretch;
+                            return;
+                        }
+                        done = done + stretch;
+                        (next, passed) = (next + 1, T::constant(0.0));
+                    }
+                });
+            }
+        }
         *time += h;
+    }
+}
+
+/// Equal parts of a piece of an interval of length `h`, and the length of each: a short piece needs no more than its share.
+fn cut<T: Scalar>(length: T, h: f64, substeps: usize) -> (usize, T) {
+    let parts = substeps as f64 * length.value() / h;
+    let parts = ((parts - 1e-9).ceil() as usize).max(1);
+    if parts == 1 {
+        (1, length)
+    } else {
+        (parts, length * (1.0 / parts as f64))
     }
 }

@@ -7,7 +7,9 @@ use crate::{
 };
 
 /// The most vessels a plant has.
-pub const MAX_VESSELS: usize = 2;
+pub const MAX_VESSELS: usize = 3;
+/// The most vessels of a plant whose vessels stand in series, each above the next. Three are joined by valves.
+pub(crate) const SERIES: usize = 2;
 
 /// The best of many values that were looked at: a start whose choice a claim has to pay for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,14 +25,22 @@ pub struct Picked {
 pub struct Scales {
     /// Smallest and largest command \[input unit\].
     pub input: (f64, f64),
+    /// Smallest and largest command to the second pump; `None`: no second pump runs \[input unit\].
+    pub input_2: Option<(f64, f64)>,
     /// Range over which the actuator works: the known one, or zero to the largest command \[input unit\].
     pub input_range: f64,
+    /// How many vessels there are, as [`Structure::new`] knows it.
+    pub vessels: usize,
     /// Smallest and largest level that each vessel visits, as far as it is known \[level unit\].
     pub level: [(f64, f64); MAX_VESSELS],
     /// Mean level of each vessel \[level unit\].
     pub operating_level: [f64; MAX_VESSELS],
     /// Area of each vessel, one where it is not known.
     pub area: [f64; MAX_VESSELS],
+    /// The vessel whose level is measured, as [`Structure::new`] knows it.
+    pub measured: usize,
+    /// Flow through a valve of flow coefficient one at one unit of head, where it is known \[level^2.5/s\].
+    pub orifice: Option<f64>,
     /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
     pub reading_step: f64,
     /// Step of a sensor that takes most out of what is not explained so far, where the readings show none; `None` where none is looked for
@@ -50,7 +60,9 @@ impl Scales {
     /// The largest level in any vessel, by magnitude.
     #[must_use]
     pub fn largest_level(&self) -> f64 {
-        self.level.iter().fold(0.0, |most: f64, (low, high)| {
+        // What there is not has the range of the reading.
+        let levels = self.level.iter().take(self.vessels.max(SERIES));
+        levels.fold(0.0, |most: f64, (low, high)| {
             most.max(low.abs()).max(high.abs())
         })
     }
@@ -61,6 +73,11 @@ impl Scales {
 pub struct Known {
     /// Area of each vessel; `None`: one, the level is only known in units of the sensor.
     pub area: [Option<f64>; MAX_VESSELS],
+    /// The vessel whose level is measured; `None`: the last one.
+    pub measured: Option<usize>,
+    /// `S_n sqrt(2 g)` of the pipes that join tanks, `S_n` their cross-section: then flow coefficients are pure numbers
+    /// \[level^2.5/s\].
+    pub orifice: Option<f64>,
     /// Height of the tanks \[level unit\].
     pub tank_height: Option<f64>,
     /// Largest command \[input unit\].
@@ -72,8 +89,20 @@ pub struct Known {
 pub struct Placed {
     /// The effect.
     pub effect: &'static EffectInfo,
-    /// The vessel it acts in; zero for actuator and sensor.
+    /// The vessel it acts in or, at the actuator, the pump; zero for the sensor.
     pub vessel: usize,
+}
+
+impl Placed {
+    /// The name of its place, where the plant has several of the kind: of a vessel or of a pump.
+    #[must_use]
+    pub fn place_name(&self, plant: Plant) -> Option<&'static str> {
+        match self.effect.place {
+            Place::Vessel => plant.vessel_name(self.vessel),
+            Place::Actuator => plant.pump_name(self.vessel),
+            Place::Sensor => None,
+        }
+    }
 }
 
 impl PartialEq for Placed {
@@ -87,17 +116,35 @@ impl PartialEq for Placed {
 pub struct Site<'a> {
     /// The plant.
     pub plant: Plant,
-    /// The vessel it acts in.
+    /// The vessel it acts in or, at the actuator, the pump.
     pub vessel: usize,
     /// What the data visit.
     pub scales: &'a Scales,
 }
 
 impl Site<'_> {
-    /// The measured vessel is the last one.
+    /// The vessel's level is measured.
     #[must_use]
-    pub fn is_last(&self) -> bool {
-        self.vessel + 1 == self.plant.vessels()
+    pub fn is_measured(&self) -> bool {
+        self.vessel == self.scales.measured
+    }
+    /// The vessel stands above another one, into which its outlet leads.
+    #[must_use]
+    pub fn is_above_another(&self) -> bool {
+        !self.plant.joined() && self.vessel + 1 < self.plant.vessels()
+    }
+    /// The vessel's outlet is a valve to a tank beside it.
+    #[must_use]
+    pub fn is_joined_to_next(&self) -> bool {
+        self.plant.joined() && self.vessel + 1 < self.plant.vessels()
+    }
+    /// Smallest and largest command to the pump.
+    #[must_use]
+    pub fn input(&self) -> (f64, f64) {
+        match (self.vessel, self.scales.input_2) {
+            (1, Some(input)) => input,
+            _ => self.scales.input,
+        }
     }
     /// Smallest and largest level of the vessel.
     #[must_use]
@@ -117,7 +164,7 @@ impl Site<'_> {
     /// Smallest and largest level of the measured vessel.
     #[must_use]
     pub fn measured_level(&self) -> (f64, f64) {
-        self.scales.level[self.plant.vessels() - 1]
+        self.scales.level[self.scales.measured]
     }
 }
 
@@ -147,6 +194,13 @@ impl Structure {
             terms: Vec::new(),
             scales,
         };
+        let scales = &mut structure.scales;
+        scales.measured = structure.known.measured.unwrap_or(plant.vessels() - 1);
+        scales.orifice = structure.known.orifice;
+        scales.vessels = plant.vessels();
+        if !plant.joined() {
+            scales.input_2 = None;
+        }
         if plant.outlet() == Outlet::Torricelli {
             for (area, known) in structure.scales.area.iter_mut().zip(structure.known.area) {
                 *area = known.unwrap_or(1.0);
@@ -176,6 +230,11 @@ impl Structure {
             return Err(Error::EffectDoesNotApply {
                 effect: effect.id,
                 plant: self.plant.id(),
+                why: if self.plant.joined() && effect.id == "coupled_tank" {
+                    "whose tanks are joined as they are"
+                } else {
+                    "whose outflow follows another law"
+                },
             });
         }
         if effect.sites(self.plant).all(|site| site != vessel) {
@@ -183,6 +242,9 @@ impl Structure {
                 effect: effect.id,
                 plant: self.plant.id(),
             });
+        }
+        if !self.runs(placed) {
+            return Err(Error::NoSecondPump { effect: effect.id });
         }
         let mut with = self.clone();
         with.effects.push(placed);
@@ -210,7 +272,15 @@ impl Structure {
                     .sites(self.plant)
                     .map(move |vessel| Placed { effect, vessel })
             })
+            .filter(|&placed| self.runs(placed))
             .collect()
+    }
+
+    /// The pump of an effect at the actuator runs.
+    fn runs(&self, placed: Placed) -> bool {
+        placed.effect.place != Place::Actuator
+            || placed.vessel == 0
+            || self.scales.input_2.is_some()
     }
 
     /// Where an effect of this structure finds itself.
@@ -294,7 +364,7 @@ impl Structure {
     #[must_use]
     pub fn lag_before(&self, lag: Placed, at_rest: f64) -> (String, (f64, f64)) {
         let (low, high) = if lag.effect.place == Place::Actuator {
-            let (low, high) = self.scales.input;
+            let (low, high) = self.site(lag).input();
             (low.min(at_rest) - at_rest, high.max(at_rest) - at_rest)
         } else {
             let (low, high) = self.site(lag).measured_level();
@@ -350,10 +420,14 @@ impl Scales {
         let middle = 0.5 * (output.0 + output.1);
         Self {
             input,
+            input_2: None,
             input_range: input.0.abs().max(input.1.abs()),
             level: [output; MAX_VESSELS],
             operating_level: [middle; MAX_VESSELS],
             area: [1.0; MAX_VESSELS],
+            vessels: 1,
+            measured: 0,
+            orifice: None,
             reading_step: 0.0,
             hidden_step: None,
             period: 0.0,

@@ -68,7 +68,7 @@ fn simulated() -> Result<Record, Box<dyn Error>> {
     let inputs: Vec<f64> = inputs.collect();
     let scales = Scales::from_ranges((2.0, 6.0), (4.0, 25.0), interval, samples as f64 * interval);
     let known = Known {
-        area: [Some(AREA), None],
+        area: [Some(AREA), None, None],
         ..Known::default()
     };
     let tank = Structure::new(Plant::SingleTank, known, scales);
@@ -84,6 +84,7 @@ fn simulated() -> Result<Record, Box<dyn Error>> {
         time: (0..samples).map(|k| k as f64 * interval).collect(),
         input: Signal::new("u", "V", inputs),
         output: Signal::new("y", "cm", levels),
+        input_2: None,
         reference: None,
         hold: ct_signals::Hold::Zero,
     };

@@ -69,6 +69,7 @@ fn columns(text: &str) -> Result<Columns, String> {
         time: Some(time.to_owned()),
         input: Some(input.to_owned()),
         output: Some(output.to_owned()),
+        input_2: None,
         reference: None,
     })
 }
@@ -85,7 +86,16 @@ impl Identify {
     /// Which columns, the hold, and the controller with its limits.
     fn layout(&self) -> Result<(Columns, Hold, Option<ControllerSettings>), Error> {
         if let Some(model) = &self.model {
-            let model = model_file::read(model)?;
+            let path = model;
+            let model = model_file::read(path)?;
+            if let Some(second) = &model.columns.input_2 {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "identify fits a linear model of one input, and the model names a second one, \"{second}\": use `ctid compare`, or delete input_2 where that pump stood still"
+                    ),
+                ));
+            }
             return Ok((model.columns, model.hold, model.controller));
         }
         let hold = match self.hold {

@@ -7,7 +7,7 @@ mod tables;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 
 use self::compare::{Compare, Diagnose};
 use self::identify::Identify;
@@ -71,15 +71,9 @@ struct Add {
     /// The shape of a term of your own, as `ctid diagnose --unknown` writes it
     #[arg(long, value_name = "F.csv", conflicts_with = "place")]
     from: Option<PathBuf>,
-    /// The vessel it acts in, where the plant has two
-    #[arg(long = "where", value_enum)]
-    place: Option<Vessel>,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Vessel {
-    Upper,
-    Lower,
+    /// The vessel it acts in, or the pump, where the plant has several
+    #[arg(long = "where", value_parser = ["upper", "lower", "T1", "T2", "T3", "pump_1", "pump_2"])]
+    place: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -117,13 +111,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
             model,
             place,
             from: None,
-        })) => {
-            let place = place.map(|vessel| match vessel {
-                Vessel::Upper => "upper",
-                Vessel::Lower => "lower",
-            });
-            say(out, &(edit::add(&model, &effect, place)? + "\n"))
-        }
+        })) => say(out, &(edit::add(&model, &effect, place.as_deref())? + "\n")),
         Some(Command::Remove(Remove { effect, model })) => {
             say(out, &(edit::remove(&model, &effect)? + "\n"))
         }

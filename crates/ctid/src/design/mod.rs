@@ -8,7 +8,7 @@ use clap::Args;
 use ct_signals::Columns;
 use missing_effect::design::{Candidacy, Design, Limits, Prospect};
 use missing_effect::{Options, Problem};
-use plants::Plant;
+use plants::{EffectInfo, Placed, Plant};
 use serde::Serialize;
 
 use crate::input::Files;
@@ -122,24 +122,39 @@ pub(crate) fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Ca
         ));
     }
     let vessel = place
-        .map(|place| vessel(model.plant, name, place))
+        .map(|place| vessel(model.plant, effect, name, place))
         .transpose()?;
     Ok(Candidacy { effect, vessel })
 }
 
-fn vessel(plant: Plant, name: &str, place: &str) -> Result<usize, Error> {
-    (0..plant.vessels())
-        .find(|&vessel| plant.vessel_name(vessel) == Some(place))
-        .ok_or_else(|| {
-            Error::Usage(if plant.vessels() > 1 {
-                format!("{name}: there is no tank \"{place}\"; write upper or lower")
-            } else {
-                format!(
-                    "{name}: {} has one tank; leave out \":{place}\"",
-                    plant.id()
-                )
-            })
-        })
+fn vessel(
+    plant: Plant,
+    effect: &'static EffectInfo,
+    name: &str,
+    place: &str,
+) -> Result<usize, Error> {
+    let named: Vec<(usize, &str)> = effect
+        .sites(plant)
+        .filter_map(|vessel| Some((vessel, Placed { effect, vessel }.place_name(plant)?)))
+        .collect();
+    if let Some((vessel, _)) = named.iter().find(|(_, known)| *known == place) {
+        return Ok(*vessel);
+    }
+    let names: Vec<&str> = named.iter().map(|(_, known)| *known).collect();
+    Err(Error::Usage(match (&names[..], plant.vessels()) {
+        ([], 1) => format!(
+            "{name}: {} has one tank; leave out \":{place}\"",
+            plant.id()
+        ),
+        ([], _) => format!(
+            "{name}: {} has one place; leave out \":{place}\"",
+            effect.id
+        ),
+        _ => format!(
+            "{name}: there is no tank \"{place}\"; write {}",
+            names.join(" or ")
+        ),
+    }))
 }
 
 impl Arguments {

@@ -15,7 +15,7 @@ use crate::report::rounded;
 use crate::term_file::{self, TermFile};
 use crate::{Error, atomic, names};
 
-/// Adds an effect to a model file; `place` is `upper` or `lower`, where there is a choice. Returns
+/// Adds an effect to a model file; `place` is a vessel or a pump, where there is a choice. Returns
 /// what was done, in one line.
 ///
 /// # Errors
@@ -103,7 +103,7 @@ pub fn with_effect(
         effect,
         vessel: vessel.unwrap_or(effect.usual_site(model.plant)),
     };
-    model_file::any_structure(model.plant)
+    model_file::any_structure(model.plant, model.columns.input_2.is_some())
         .with(placed)
         .map_err(|error| refuse(error.to_string()))?;
 
@@ -285,18 +285,23 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
     Ok(Edited { text, done })
 }
 
-/// ` at the upper tank`, where the plant has two; `assumed` when nobody said which.
+/// ` at the upper vessel`, where the plant has several; `assumed` when nobody said which.
 fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
-    match model.plant.vessel_name(placed.vessel) {
-        Some(name) if placed.effect.place == Place::Vessel => {
+    match placed.place_name(model.plant) {
+        Some(name) => {
+            let kind = match (placed.effect.place, model.plant.joined()) {
+                (Place::Vessel, false) => " vessel",
+                _ => "",
+            };
             let other = if assumed {
                 "; `--where` says another"
             } else {
                 ""
             };
-            format!(" at the {name} vessel{other}")
+            let the = if kind.is_empty() { "" } else { "the " };
+            format!(" at {the}{name}{kind}{other}")
         }
-        _ => String::new(),
+        None => String::new(),
     }
 }
 

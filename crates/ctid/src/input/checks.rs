@@ -65,15 +65,30 @@ pub(super) fn controller(
     })
 }
 
-/// Records that are fitted by one model are in one unit.
+/// Records that are fitted by one model are in one unit, and so are the commands of two pumps.
 pub(super) fn check_units(records: &[Record], test: &[Record]) -> Result<(), Error> {
     let Some((first, others)) = records.split_first() else {
         return Err(Error::Usage(
             "no record is given; name a CSV file".to_string(),
         ));
     };
+    for record in std::iter::once(first).chain(others).chain(test) {
+        if let Some(second) = &record.input_2
+            && second.unit != record.input.unit
+        {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "column \"{}\" is in \"{}\" and column \"{}\" in \"{}\": convert one of the two commands, or correct its header",
+                    record.input.name, record.input.unit, second.name, second.unit
+                ),
+            });
+        }
+    }
     for other in others.iter().chain(test) {
-        for (here, there) in [(&other.input, &first.input), (&other.output, &first.output)] {
+        let mut pairs = vec![(&other.input, &first.input), (&other.output, &first.output)];
+        pairs.extend(other.input_2.as_ref().zip(first.input_2.as_ref()));
+        for (here, there) in pairs {
             if here.unit != there.unit {
                 let named = |unit: &str| match unit {
                     "" => "without a unit".to_string(),
@@ -144,19 +159,21 @@ pub(super) fn check_input<'a>(
         return Ok(());
     };
     for record in records {
-        let (low, high) = record.input_range();
-        let furthest = if -low > high { low } else { high };
-        if furthest.abs() > BEYOND_THE_RANGE * range {
-            return Err(Error::File {
-                file: model_name.to_string(),
-                what: format!(
-                    "input_range = {range}, but column \"{}\" of {} reaches {}{}; give the full range of the command in its unit, or delete the line",
-                    record.input.name,
-                    record.name,
-                    numbers::significant(furthest, 3),
-                    after_space(&record.input.unit)
-                ),
-            });
+        for input in std::iter::once(&record.input).chain(&record.input_2) {
+            let (low, high) = input.range();
+            let furthest = if -low > high { low } else { high };
+            if furthest.abs() > BEYOND_THE_RANGE * range {
+                return Err(Error::File {
+                    file: model_name.to_string(),
+                    what: format!(
+                        "input_range = {range}, but column \"{}\" of {} reaches {}{}; give the full range of the command in its unit, or delete the line",
+                        input.name,
+                        record.name,
+                        numbers::significant(furthest, 3),
+                        after_space(&input.unit)
+                    ),
+                });
+            }
         }
     }
     Ok(())
@@ -237,12 +254,13 @@ pub(super) fn check_rows(model: &ModelFile, records: &[Record]) -> Result<(), Er
     let [first, others @ ..] = records else {
         return Ok(());
     };
-    let scales = Scales::from_ranges(
+    let mut scales = Scales::from_ranges(
         first.input_range(),
         first.output_range(),
         first.sample_interval(),
         first.duration(),
     );
+    scales.input_2 = first.input_2.as_ref().map(|second| second.range());
     let parameters = model.structure(scales)?.parameters().len() - model.fixed.len();
     let needed = parameters + records.len() * Plant::vessels(model.plant);
     if others.is_empty() {

@@ -160,6 +160,7 @@ mod tests {
             time: (0..rows).map(|k| k as f64).collect(),
             input: Signal::new("u", "V", values(1.0)),
             output: Signal::new("y", unit, values(2.0)),
+            input_2: None,
             reference: None,
             hold: Hold::Zero,
         }

@@ -43,7 +43,7 @@ impl Source<'_> {
                             Some(vessel(plant, effect, word).map_err(|what| self.at(at, what))?);
                     }
                     ("where", _) => {
-                        return Err(self.at(at, "where is a word: \"upper\" or \"lower\""));
+                        return Err(self.at(at, "where is a word, such as \"upper\" or \"T1\""));
                     }
                     ("fixed", Entry::Words(words)) => {
                         setting.fixed.clone_from(words);
@@ -115,7 +115,7 @@ impl Source<'_> {
             effect,
             vessel: setting.vessel.unwrap_or(effect.usual_site(plant)),
         };
-        let infos = any_structure(plant).effect_parameters(placed);
+        let infos = any_structure(plant, true).effect_parameters(placed);
         let names: Vec<&str> = infos.iter().map(|info| info.name).collect();
         let unknown = |name: &str| {
             format!(
@@ -155,7 +155,7 @@ impl Source<'_> {
     /// An effect of the list, checked against the plant and the effects before it.
     pub(super) fn placed(
         &self,
-        plant: Plant,
+        (plant, second_pump): (Plant, bool),
         before: &[Placed],
         name: &Spanned<String>,
         settings: &BTreeMap<&'static str, Setting>,
@@ -168,7 +168,9 @@ impl Source<'_> {
         };
         before
             .iter()
-            .try_fold(any_structure(plant), |structure, &on| structure.with(on))
+            .try_fold(any_structure(plant, second_pump), |structure, &on| {
+                structure.with(on)
+            })
             .and_then(|structure| structure.with(placed))
             .map_err(|error| self.at(name.span().start, error.to_string()))?;
         Ok(placed)
@@ -179,7 +181,7 @@ impl Source<'_> {
         model: &mut ModelFile,
         raw: &BTreeMap<Spanned<String>, Spanned<Number>>,
     ) -> Result<(), Error> {
-        let structure = model.structure(any_scales())?;
+        let structure = model.structure(any_scales(model.columns.input_2.is_some()))?;
         let infos = structure.parameters();
         let names = structure.parameter_names();
         for (name, number) in raw {
@@ -208,32 +210,57 @@ impl Source<'_> {
     }
 }
 
-/// The vessel that `where = "..."` names.
-pub(crate) fn vessel(plant: Plant, effect: &EffectInfo, word: &str) -> Result<usize, String> {
-    if effect.place != Place::Vessel {
-        return Err(format!(
-            "{} acts at the {}, so where = \"{word}\" has no meaning; leave it out",
-            effect.id,
-            effect.place.name()
-        ));
+/// The vessel, or the pump, that `where = "..."` names.
+pub(crate) fn vessel(
+    plant: Plant,
+    effect: &'static EffectInfo,
+    word: &str,
+) -> Result<usize, String> {
+    let places = match effect.place {
+        Place::Vessel => plant.vessels(),
+        Place::Actuator => plant.pumps(),
+        Place::Sensor => 1,
+    };
+    let name = |vessel: usize| Placed { effect, vessel }.place_name(plant);
+    if places == 1 {
+        return Err(if effect.place == Place::Vessel {
+            format!(
+                "plant {} has one vessel, so where = \"{word}\" has no meaning; leave it out",
+                plant.id()
+            )
+        } else {
+            format!(
+                "{} acts at the {}, so where = \"{word}\" has no meaning; leave it out",
+                effect.id,
+                effect.place.name()
+            )
+        });
     }
-    if plant.vessels() == 1 {
-        return Err(format!(
-            "plant {} has one vessel, so where = \"{word}\" has no meaning; leave it out",
-            plant.id()
-        ));
-    }
-    (0..plant.vessels())
-        .find(|&vessel| plant.vessel_name(vessel) == Some(word))
-        .ok_or_else(|| format!("where = \"{word}\" is no vessel; write \"upper\" or \"lower\""))
+    (0..places)
+        .find(|&vessel| name(vessel) == Some(word))
+        .ok_or_else(|| {
+            let names = (0..places).filter_map(name);
+            let names: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
+            let kind = if effect.place == Place::Vessel {
+                "vessel"
+            } else {
+                "pump"
+            };
+            format!(
+                "where = \"{word}\" is no {kind}; write {}",
+                names.join(" or ")
+            )
+        })
 }
 
 /// Names and places do not depend on the data: any ranges will do to ask for them.
-fn any_scales() -> Scales {
-    Scales::from_ranges((0.0, 1.0), (0.0, 1.0), 1.0, 100.0)
+fn any_scales(second_pump: bool) -> Scales {
+    let mut scales = Scales::from_ranges((0.0, 1.0), (0.0, 1.0), 1.0, 100.0);
+    scales.input_2 = second_pump.then_some((0.0, 1.0));
+    scales
 }
 
-/// A structure to ask for names and places.
-pub(crate) fn any_structure(plant: Plant) -> Structure {
-    Structure::new(plant, Known::default(), any_scales())
+/// A structure to ask for names and places, a second pump running or not.
+pub(crate) fn any_structure(plant: Plant, second_pump: bool) -> Structure {
+    Structure::new(plant, Known::default(), any_scales(second_pump))
 }

@@ -145,6 +145,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
     let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
     let plant = source.plant(raw.plant.as_ref())?;
     let known = source.known(plant, &raw.known)?;
+    source.check_input_2(plant, &raw.columns)?;
     let controller = raw
         .controller
         .as_ref()
@@ -178,7 +179,8 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
             model.terms.push(term.clone());
             continue;
         }
-        let placed = source.placed(plant, &model.effects, name, &settings)?;
+        let site = (plant, model.columns.input_2.is_some());
+        let placed = source.placed(site, &model.effects, name, &settings)?;
         model.effects.push(placed);
     }
     source.start(&mut model, &raw.start)?;

@@ -49,6 +49,12 @@ pub(super) struct RawKnown {
     pub(super) area: Option<Spanned<Number>>,
     pub(super) area_upper: Option<Spanned<Number>>,
     pub(super) area_lower: Option<Spanned<Number>>,
+    pub(super) area_1: Option<Spanned<Number>>,
+    pub(super) area_2: Option<Spanned<Number>>,
+    pub(super) area_3: Option<Spanned<Number>>,
+    pub(super) pipe_area: Option<Spanned<Number>>,
+    pub(super) gravity: Option<Spanned<Number>>,
+    pub(super) measured: Option<Spanned<String>>,
     pub(super) tank_height: Option<Spanned<Number>>,
     pub(super) input_range: Option<Spanned<Number>>,
 }
@@ -94,7 +100,7 @@ pub(super) type EffectTable = BTreeMap<Spanned<String>, Spanned<Entry>>;
 #[derive(Deserialize)]
 #[serde(
     untagged,
-    expecting = "not understood: a number, where = \"upper\" or \"lower\", or fixed = [\"parameter\"] may stand here"
+    expecting = "not understood: a number, a place such as where = \"upper\" or \"T1\", or fixed = [\"parameter\"] may stand here"
 )]
 pub(super) enum Entry {
     Number(f64),

@@ -1,6 +1,7 @@
 //! The file being read: what is wrong in it is said with its line.
 
-use plants::{Known, Plant};
+use ct_signals::Columns;
+use plants::{Known, MAX_VESSELS, Plant};
 use toml::Spanned;
 
 use super::raw::{Number, RawKnown};
@@ -101,25 +102,56 @@ impl Source<'_> {
         ))
     }
 
+    /// A second input is for a plant with a second pump.
+    pub(super) fn check_input_2(&self, plant: Plant, columns: &Columns) -> Result<(), Error> {
+        if columns.input_2.is_none() || plant.pumps() > 1 {
+            return Ok(());
+        }
+        let at = self.text.find("input_2").unwrap_or(0);
+        Err(self.at(
+            at,
+            format!(
+                "plant {} has one pump; delete input_2, or take plant = \"three-tank\"",
+                plant.id()
+            ),
+        ))
+    }
+
     pub(super) fn known(&self, plant: Plant, raw: &RawKnown) -> Result<Known, Error> {
         let id = plant.id();
-        let two = plant.vessels() > 1;
-        let foreign = if two {
-            vec![("area", &raw.area)]
-        } else {
-            vec![
-                ("area_upper", &raw.area_upper),
-                ("area_lower", &raw.area_lower),
-            ]
+        let of_one = [("area", &raw.area)];
+        let of_two = [
+            ("area_upper", &raw.area_upper),
+            ("area_lower", &raw.area_lower),
+        ];
+        let of_three = [
+            ("area_1", &raw.area_1),
+            ("area_3", &raw.area_3),
+            ("area_2", &raw.area_2),
+            ("pipe_area", &raw.pipe_area),
+            ("gravity", &raw.gravity),
+        ];
+        let (foreign, mend): (Vec<_>, _) = match plant.vessels() {
+            1 => (
+                of_two.iter().chain(&of_three).collect(),
+                "has one vessel; write area",
+            ),
+            2 => (
+                of_one.iter().chain(&of_three).collect(),
+                "has two vessels; write area_upper and area_lower",
+            ),
+            _ => (
+                of_two.iter().collect(),
+                "has three tanks; write area, or area_1, area_2 and area_3,",
+            ),
         };
         for (key, number) in foreign {
             let Some(number) = number else { continue };
-            let mend = if two {
-                "has two vessels; write area_upper and area_lower"
+            let what = if matches!(*key, "pipe_area" | "gravity") {
+                format!("plant {id} has no joined tanks; delete {key}")
             } else {
-                "has one vessel; write area"
+                format!("plant {id} {mend} instead of {key}")
             };
-            let what = format!("plant {id} {mend} instead of {key}");
             return Err(self.at(number.span().start, what));
         }
         let take = |key: &str, number: &Option<Spanned<Number>>| {
@@ -131,18 +163,112 @@ impl Source<'_> {
                 "one area alone does not say how the levels compare; give both area_upper and area_lower, or neither",
             ));
         }
-        let area = if two {
-            [
+        let area = match plant.vessels() {
+            1 => [take("area", &raw.area)?, None, None],
+            2 => [
                 take("area_upper", &raw.area_upper)?,
                 take("area_lower", &raw.area_lower)?,
-            ]
-        } else {
-            [take("area", &raw.area)?, None]
+                None,
+            ],
+            _ => self.areas_of_three(raw)?,
         };
         Ok(Known {
             area,
+            measured: self.measured(plant, raw.measured.as_ref())?,
+            orifice: self.orifice(raw, area[0].is_some())?,
             tank_height: take("tank_height", &raw.tank_height)?,
             input_range: take("input_range", &raw.input_range)?,
         })
+    }
+
+    /// The areas of three tanks, as they stand: one for all, or each its own.
+    fn areas_of_three(&self, raw: &RawKnown) -> Result<[Option<f64>; MAX_VESSELS], Error> {
+        let each = [
+            ("area_1", &raw.area_1),
+            ("area_3", &raw.area_3),
+            ("area_2", &raw.area_2),
+        ];
+        let given = each.iter().find_map(|(_, number)| number.as_ref());
+        if let Some(area) = &raw.area {
+            if let Some(own) = given {
+                return Err(self.at(
+                    own.span().start,
+                    "area is that of all three tanks; give it, or area_1, area_2 and area_3, not both",
+                ));
+            }
+            return Ok([Some(self.positive("area", area)?); MAX_VESSELS]);
+        }
+        let mut areas = [None; MAX_VESSELS];
+        let Some(given) = given else {
+            return Ok(areas);
+        };
+        for (area, (key, number)) in areas.iter_mut().zip(each) {
+            let Some(number) = number else {
+                return Err(self.at(
+                    given.span().start,
+                    format!("{key} is missing; give area_1, area_2 and area_3, or area where all are alike"),
+                ));
+            };
+            *area = Some(self.positive(key, number)?);
+        }
+        Ok(areas)
+    }
+
+    /// The vessel that is measured: of three tanks any may be, so it has to be said.
+    fn measured(
+        &self,
+        plant: Plant,
+        name: Option<&Spanned<String>>,
+    ) -> Result<Option<usize>, Error> {
+        const TANKS: &str = "\"T1\", \"T2\" or \"T3\"";
+        let Some(name) = name else {
+            if plant.joined() {
+                return Err(Error::File {
+                    file: self.file.to_string(),
+                    what: format!(
+                        "nothing says in which tank the level is measured; write measured = {TANKS} under [known]"
+                    ),
+                });
+            }
+            return Ok(None);
+        };
+        let at = name.span().start;
+        if !plant.joined() {
+            let what = format!(
+                "plant {} is measured in its last vessel; delete measured",
+                plant.id()
+            );
+            return Err(self.at(at, what));
+        }
+        let word = name.as_ref();
+        let found = (0..plant.vessels()).find(|&i| plant.vessel_name(i) == Some(word));
+        found.map(Some).ok_or_else(|| {
+            self.at(
+                at,
+                format!("measured = \"{word}\" is no tank; write {TANKS}"),
+            )
+        })
+    }
+
+    /// What a valve lets through at one unit of head and a flow coefficient of one.
+    fn orifice(&self, raw: &RawKnown, area_known: bool) -> Result<Option<f64>, Error> {
+        match (&raw.pipe_area, &raw.gravity) {
+            (None, None) => Ok(None),
+            (Some(pipe), Some(gravity)) => {
+                if !area_known {
+                    return Err(self.at(
+                        pipe.span().start,
+                        "pipe_area says nothing of the levels without the area of the tanks; give area too, in the same unit",
+                    ));
+                }
+                let section = self.positive("pipe_area", pipe)?;
+                let gravity = self.positive("gravity", gravity)?;
+                Ok(Some(section * (2.0 * gravity).sqrt()))
+            }
+            (Some(only), None) | (None, Some(only)) => Err(self.at(
+                only.span().start,
+                "pipe_area and gravity make flow coefficients pure numbers together; give both (gravity = 981 where levels are in cm, 9.81 in m), or neither",
+            )),
+        }
     }
 }

@@ -66,6 +66,7 @@ impl Plant {
                 })
                 .collect(),
             input: Signal::new("u", "V", u.iter().map(|u| u + self.rest.0).collect()),
+            input_2: None,
             reference: None,
             hold: self.hold,
         }
@@ -324,6 +325,7 @@ fn wandering(linear: bool, seed: u64) -> Record {
         time: (0..rows).map(|k| k as f64 * STEP).collect(),
         input: Signal::new("u", "V", input),
         output: Signal::new("y", "cm", output),
+        input_2: None,
         reference: None,
         hold: Hold::Zero,
     }

@@ -56,6 +56,7 @@ fn with_bits(
         time: (0..r.len()).map(|k| k as f64).collect(),
         input: Signal::new("u", "V", raised(u, 4.0)),
         output: Signal::new("y", "cm", raised(y, 20.0)),
+        input_2: None,
         reference: (!open).then(|| Signal::new("r", "cm", raised(r, 20.0))),
         hold: Hold::Zero,
     }
@@ -251,6 +252,7 @@ fn drifting(from: f64, to: f64, rows: usize) -> Record {
         time: (0..rows).map(|k| k as f64).collect(),
         input: Signal::new("u", "V", u),
         output: Signal::new("y", "cm", outputs),
+        input_2: None,
         reference: Some(Signal::new("r", "cm", r.iter().map(|r| 20.0 + r).collect())),
         hold: Hold::Zero,
     }
@@ -486,6 +488,7 @@ fn a_loop_that_is_not_stable_is_refused() {
         time: (0..r.len()).map(|k| k as f64).collect(),
         input: Signal::new("u", "V", data.u),
         output: Signal::new("y", "cm", data.y),
+        input_2: None,
         reference: Some(Signal::new("r", "cm", r)),
         hold: Hold::Zero,
     };

@@ -76,7 +76,7 @@ fixed = ["rim"]
     assert_eq!(effects, [("pump_deadzone", 0), ("overflow", 1)]);
     assert_eq!(model.columns.output.as_deref(), Some("y [cm]"));
     assert_eq!(model.columns.input, None);
-    assert_eq!(model.known.area, [Some(154.0), Some(154.0)]);
+    assert_eq!(model.known.area, [Some(154.0), Some(154.0), None]);
     assert_eq!(model.known.input_range, Some(10.0));
     assert_eq!(model.start["alpha_upper"], 11.0);
     assert_eq!(model.start["overflow.rim"], 50.0);
@@ -107,7 +107,7 @@ fn a_plant_is_enough() {
     let model = parse("plant = \"single-tank\"");
     assert!(model.effects.is_empty() && model.start.is_empty() && model.controller.is_none());
     assert_eq!(model.hold, Hold::Zero);
-    assert_eq!(model.known.area, [None, None]);
+    assert_eq!(model.known.area, [None; 3]);
 }
 
 #[test]
@@ -459,4 +459,119 @@ fn files_that_cannot_be_read() {
 
     std::fs::write(&path, "\u{feff}plant = \"first-order\"\r\n").unwrap();
     assert_eq!(model_file::read(&path).unwrap().plant, Plant::FirstOrder);
+}
+
+const THREE: &str = "plant = \"three-tank\"\n[known]\nmeasured = \"T3\"\n";
+
+#[test]
+fn three_tanks_are_understood() {
+    let text = "plant = \"three-tank\"\neffects = [\"leak_at_height\", \"pump_lag\"]\n\
+                [columns]\ninput_2 = \"u2 [V]\"\n\
+                [known]\nmeasured = \"T2\"\narea = 154.0\npipe_area = 0.5\ngravity = 981\n\
+                [start]\naz13 = 0.5\n\
+                [effect.leak_at_height]\nwhere = \"T1\"\n\
+                [effect.pump_lag]\nwhere = \"pump_2\"\n";
+    let model = parse(text);
+    assert_eq!(model.plant, Plant::ThreeTank);
+    assert_eq!(model.columns.input_2.as_deref(), Some("u2 [V]"));
+    assert_eq!(model.known.measured, Some(2));
+    assert_eq!(model.known.area, [Some(154.0); 3]);
+    let orifice = model.known.orifice.unwrap();
+    assert!((orifice - 0.5 * 1962.0_f64.sqrt()).abs() < 1e-12);
+    let at: Vec<_> = model.effects.iter().map(|on| on.vessel).collect();
+    assert_eq!(at, [0, 1]);
+    let areas = parse(&format!("{THREE}area_1 = 1\narea_2 = 2\narea_3 = 3\n"));
+    assert_eq!(areas.known.area, [Some(1.0), Some(3.0), Some(2.0)]);
+}
+
+#[test]
+fn what_three_tanks_lack_is_said() {
+    let three = |more: &str| format!("{THREE}{more}\n");
+    for (text, start, mend) in [
+        (
+            "plant = \"three-tank\"".to_string(),
+            "tank.toml: nothing says in which tank the level is measured",
+            "measured = \"T1\", \"T2\" or \"T3\"",
+        ),
+        (
+            THREE.replace("T3", "T4"),
+            "tank.toml:3: measured = \"T4\" is no tank",
+            "\"T2\"",
+        ),
+        (
+            three("pipe_area = 0.5\ngravity = 981"),
+            "tank.toml:4: pipe_area says nothing of the levels without the area of the tanks",
+            "give area too",
+        ),
+        (
+            three("area = 154\npipe_area = 0.5"),
+            "tank.toml:5: pipe_area and gravity make flow coefficients pure numbers together",
+            "gravity = 981",
+        ),
+        (
+            three("area_1 = 154\narea_3 = 154"),
+            "tank.toml:4: area_2 is missing",
+            "area where all are alike",
+        ),
+        (
+            three("area_1 = 154\narea = 154"),
+            "tank.toml:4: area is that of all three tanks",
+            "not both",
+        ),
+        (
+            three("area_upper = 154\narea_lower = 154"),
+            "tank.toml:4: plant three-tank has three tanks; write area",
+            "instead of area_upper",
+        ),
+        (
+            three("pipe_aera = 1"),
+            "tank.toml:4: unknown key pipe_aera",
+            "did you mean pipe_area?",
+        ),
+        (
+            three("[start]\naz23 = 1"),
+            "tank.toml:5: [start] has az23, which is not a parameter of this model",
+            "az32",
+        ),
+        (
+            "plant = \"single-tank\"\n[known]\ngravity = 9.81".to_string(),
+            "tank.toml:3: plant single-tank has no joined tanks",
+            "delete gravity",
+        ),
+        (
+            "plant = \"single-tank\"\n[known]\nmeasured = \"T1\"".to_string(),
+            "tank.toml:3: plant single-tank is measured in its last vessel",
+            "delete measured",
+        ),
+        (
+            "plant = \"single-tank\"\n[columns]\ninput_2 = \"u2\"".to_string(),
+            "tank.toml:3: plant single-tank has one pump",
+            "delete input_2",
+        ),
+        (
+            format!("{THREE}[effect.pump_lag]\nwhere = \"pump_3\""),
+            "tank.toml:5: where = \"pump_3\" is no pump",
+            "\"pump_1\" or \"pump_2\"",
+        ),
+        (
+            format!("{THREE}[effect.overflow]\nwhere = \"upper\""),
+            "tank.toml:5: where = \"upper\" is no vessel",
+            "\"T1\" or \"T3\" or \"T2\"",
+        ),
+        (
+            THREE.replace("[known]", "effects = [\"coupled_tank\"]\n[known]"),
+            "tank.toml:2: effect `coupled_tank` does not act on plant `three-tank`",
+            "joined as they are",
+        ),
+        (
+            THREE.replace(
+                "[known]",
+                "effects = [\"pump_lag\"]\n[effect.pump_lag]\nwhere = \"pump_2\"\n[known]",
+            ),
+            "tank.toml:2: effect `pump_lag` cannot act at pump_2, which is off",
+            "input_2 under [columns]",
+        ),
+    ] {
+        refuses(&text, start, mend);
+    }
 }

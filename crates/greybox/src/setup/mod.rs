@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_signals::{Hold, Record};
-use plants::{Command, Scales, Structure, controller::Controller};
+use plants::{Command, Place, Placed, Scales, Structure, controller::Controller};
 
 pub use self::{
     rows::Rows,
@@ -53,6 +53,10 @@ const STATE_PRICE: f64 = 2.0;
 pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<Scales> {
     let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
     let input = records.iter().map(Record::input_range).reduce(wider)?;
+    let input_2 = records
+        .iter()
+        .filter_map(|record| Some(record.input_2.as_ref()?.range()))
+        .reduce(wider);
     let output = records.iter().map(Record::output_range).reduce(wider)?;
     let sample = records
         .iter()
@@ -60,6 +64,10 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
         .fold(f64::INFINITY, f64::min);
     let duration = records.iter().map(Record::duration).fold(0.0, f64::max);
     let mut scales = Scales::from_ranges(input, output, sample, duration);
+    scales.input_2 = input_2;
+    if let Some((low, high)) = input_2 {
+        scales.input_range = scales.input_range.max(low.abs()).max(high.abs());
+    }
     if let Some(range) = input_range {
         scales.input_range = range;
     }
@@ -136,7 +144,7 @@ impl<'a> Setup<'a> {
             }
             // Before the record anything may have happened, and a lag remembers it.
             for &lag in &lags {
-                let (name, range) = structure.lag_before(lag, record.input.values[0]);
+                let (name, range) = structure.lag_before(lag, at_rest(record)[pump_of(lag)]);
                 let name = name + &of;
                 if !fixed.contains_key(&name) {
                     free.push(names.len());
@@ -374,12 +382,41 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// The command from sample `k` to the next one.
-fn command(record: &Record, k: usize) -> Command {
-    let u = &record.input.values;
-    match record.hold {
+/// The commands from sample `k` to the next one, that to a second pump zero where there is none.
+pub fn commands(record: &Record, k: usize) -> [Command; 2] {
+    let held = |u: &[f64]| match record.hold {
         Hold::Zero => Command::held(u[k]),
         Hold::First => Command::ramp(u[k], u[k + 1]),
+    };
+    [held(&record.input.values), second(record, held)]
+}
+
+/// The held command to a second pump at sample `k`; zero where there is none.
+fn second_command(record: &Record, k: usize) -> Command {
+    second(record, |u| Command::held(u[k]))
+}
+
+fn second(record: &Record, command: impl Fn(&[f64]) -> Command) -> Command {
+    let second = record.input_2.as_ref();
+    second.map_or(Command::held(0.0), |signal| command(&signal.values))
+}
+
+/// What the pumps were told before a record began: its first commands.
+#[must_use]
+pub fn at_rest(record: &Record) -> [f64; 2] {
+    let second = record.input_2.as_ref();
+    [
+        record.input.values[0],
+        second.map_or(0.0, |signal| signal.values[0]),
+    ]
+}
+
+/// The pump in front of which something lags, the first one for what is not at a pump.
+fn pump_of(lag: Placed) -> usize {
+    if lag.effect.place == Place::Actuator {
+        lag.vessel.min(1)
+    } else {
+        0
     }
 }
 

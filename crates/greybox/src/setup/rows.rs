@@ -3,7 +3,7 @@
 use ct_signals::{ArModel, Record};
 use plants::{Dual, Simulator};
 
-use super::{Setup, command, reference};
+use super::{Setup, at_rest, commands, reference, second_command};
 use crate::{Triangle, feedback::Response};
 
 /// More than sums of squares over a record differ by where they are taken in another order.
@@ -185,7 +185,7 @@ impl Setup<'_> {
                 let theta: Vec<_> = (0..count).map(dual).collect();
                 let levels: Vec<_> = plant.clone().map(dual).collect();
                 let mut simulator =
-                    Simulator::new(&self.structure, &theta, &levels, record.input.values[0])
+                    Simulator::with_inputs(&self.structure, &theta, &levels, at_rest(record))
                         .ok()?;
                 simulator.set_substeps(self.substeps);
                 let regulator = self.feedback.as_ref().map(|feedback| {
@@ -218,9 +218,9 @@ impl Setup<'_> {
                                 }
                                 commands[columns - 1] = u.re - record.input.values[k];
                             }
-                            simulator.advance_held(u, h);
+                            simulator.advance_held(u, second_command(record, k), h);
                         }
-                        _ => simulator.advance(command(record, k), h),
+                        _ => simulator.advance_both(commands(record, k), h),
                     }
                 }
                 row[columns - 1] = record.output.values[k] - model;
@@ -257,6 +257,7 @@ mod tests {
             time: (0..300).map(|k| 2.0 * k as f64).collect(),
             input: Signal::new("u", "V", (0..300).map(wave).collect()),
             output: Signal::new("y", "cm", (0..300).map(|k| 2.0 * wave(k + 40)).collect()),
+            input_2: None,
             reference: None,
             hold: Hold::Zero,
         };

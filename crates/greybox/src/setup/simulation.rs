@@ -1,9 +1,9 @@
 //! What a setup shows at a vector: simulations on the measured command or in the loop, and what is left of the records.
 
-use ct_signals::Record;
+use ct_signals::{Record, Signal};
 use plants::{MAX_VESSELS, Scalar, Scales, Simulator};
 
-use super::{Setup, command, reference};
+use super::{Setup, at_rest, commands, reference, second_command};
 use crate::{Error, feedback::step};
 
 /// A loop that ran on its reference.
@@ -42,7 +42,7 @@ impl Setup<'_> {
                 return;
             }
             if k + 1 < n {
-                simulator.advance(command(record, k), record.time[k + 1] - record.time[k]);
+                simulator.advance_both(commands(record, k), record.time[k + 1] - record.time[k]);
             }
         }
     }
@@ -61,11 +61,11 @@ impl Setup<'_> {
             mean_level: [0.0; MAX_VESSELS],
         };
         for (r, record) in self.records.iter().enumerate() {
-            let mut simulator = Simulator::new(
+            let mut simulator = Simulator::with_inputs(
                 &self.structure,
                 &x[..self.parameter_count()],
                 &x[self.plant_states_of(r)],
-                record.input.values[0],
+                at_rest(record),
             )?;
             let mut output = Vec::with_capacity(record.len());
             self.run(record, &mut simulator, |_, y, simulator| {
@@ -101,9 +101,8 @@ impl Setup<'_> {
         for (r, record) in self.records.iter().enumerate() {
             let states = self.plant_states_of(r);
             let theta = &x[..self.parameter_count()];
-            let at_rest = record.input.values[0];
-            let mut simulator =
-                Simulator::new(&self.structure, theta, &x[states.clone()], at_rest)?;
+            let (levels, at_rest) = (&x[states.clone()], at_rest(record));
+            let mut simulator = Simulator::with_inputs(&self.structure, theta, levels, at_rest)?;
             simulator.set_substeps(self.substeps);
             let mut regulator = feedback
                 .controller
@@ -114,7 +113,7 @@ impl Setup<'_> {
                 let h = step(record, k);
                 let beside = feedback.replays[r].beside[k];
                 let u = regulator.command_beside(reference(record, k), y, beside, h);
-                simulator.advance_held(u, h);
+                simulator.advance_held(u, second_command(record, k), h);
                 output.push(y);
                 command.push(u);
             }
@@ -233,7 +232,7 @@ impl Setup<'_> {
         for vessel in 0..plant.vessels() {
             let (low, high) = simulated.level[vessel];
             if low.is_finite() && high.is_finite() && high > low {
-                let measured = vessel + 1 == plant.vessels();
+                let measured = vessel == scales.measured;
                 scales.level[vessel] = if measured {
                     (low, high)
                 } else {
@@ -242,12 +241,19 @@ impl Setup<'_> {
                 scales.operating_level[vessel] = simulated.mean_level[vessel];
             }
         }
-        let (sum, n) = self
-            .records
-            .iter()
-            .flat_map(|record| &record.input.values)
-            .fold((0.0, 0usize), |(sum, n), u| (sum + u.abs(), n + 1));
-        scales.flow = (x[0] * sum / n as f64).abs();
+        let mean = |signal: fn(&Record) -> Option<&Signal>| {
+            let (sum, n) = self
+                .records
+                .iter()
+                .filter_map(signal)
+                .flat_map(|signal| &signal.values)
+                .fold((0.0, 0usize), |(sum, n), u| (sum + u.abs(), n + 1));
+            sum / n as f64
+        };
+        scales.flow = (x[0] * mean(|record| Some(&record.input))).abs();
+        if scales.input_2.is_some() {
+            scales.flow += (x[1] * mean(|record| record.input_2.as_ref())).abs();
+        }
         Ok(scales)
     }
 }

@@ -12,14 +12,16 @@ use rand_chacha::ChaCha8Rng;
 /// What is known of a plant: tanks of 154 cm^2, a pump that runs to 10 V.
 pub fn known(plant: Plant) -> Known {
     let area = match plant {
-        Plant::SingleTank => [Some(154.0), None],
-        Plant::CascadedTanks => [Some(154.0), Some(154.0)],
-        _ => [None, None],
+        Plant::SingleTank => [Some(154.0), None, None],
+        Plant::CascadedTanks => [Some(154.0), Some(154.0), None],
+        Plant::ThreeTank => [Some(154.0); 3],
+        _ => [None; 3],
     };
     Known {
         area,
-        tank_height: None,
         input_range: Some(10.0),
+        measured: plant.joined().then_some(1),
+        ..Known::default()
     }
 }
 
@@ -67,6 +69,19 @@ impl Rig {
             levels: vec![7.0, 14.0],
             command: (2.0, 8.0),
             samples: 500,
+            ..Self::single_tank()
+        }
+    }
+
+    /// Three tanks of 154 cm^2 joined by valves, T3 measured, a pump into T1 and one into T2. The commands are so wide that water
+    /// flows either way.
+    pub fn three_tank() -> Self {
+        Self {
+            plant: Plant::ThreeTank,
+            theta: vec![9.0, 8.5, 11.0, 12.0, 16.0],
+            levels: vec![14.0, 12.0, 9.0],
+            command: (0.5, 5.5),
+            samples: 600,
             ..Self::single_tank()
         }
     }
@@ -146,18 +161,28 @@ impl Rig {
 
     /// Runs the rig under a given command and noise.
     pub fn run(&self, u: &[f64], noise: &[f64]) -> Record {
-        let scales = Scales::from_ranges(
+        // What the second pump of joined tanks is told: another course of the same.
+        let second = self.plant.joined().then(|| {
+            let n = u.len();
+            let mirror = |k| self.command.0 + self.command.1 - u[(k + n / 3) % n];
+            (0..n).map(mirror).collect::<Vec<f64>>()
+        });
+        let mut scales = Scales::from_ranges(
             self.command,
             (5.0, 25.0),
             self.interval,
             self.interval * self.samples as f64,
         );
+        scales.input_2 = second.as_ref().map(|_| self.command);
         let mut structure = Structure::new(self.plant, self.known(), scales);
         for placed in self.placed() {
             structure = structure.with(placed).unwrap();
         }
         let theta = &self.truth(0);
-        let mut simulator = Simulator::new(&structure, theta, &self.levels, u[0]).unwrap();
+        let told = |k: usize| second.as_ref().map_or(0.0, |u| u[k]);
+        let at_rest = [u[0], told(0)];
+        let mut simulator =
+            Simulator::with_inputs(&structure, theta, &self.levels, at_rest).unwrap();
         let y = (0..u.len())
             .map(|k| {
                 let reading = simulator.read() + noise[k];
@@ -166,7 +191,11 @@ impl Rig {
                         Hold::Zero => Command::held(u[k]),
                         Hold::First => Command::ramp(u[k], u[k + 1]),
                     };
-                    simulator.advance(command, self.interval);
+                    let second = match self.hold {
+                        Hold::Zero => Command::held(told(k)),
+                        Hold::First => Command::ramp(told(k), told(k + 1)),
+                    };
+                    simulator.advance_both([command, second], self.interval);
                 }
                 reading
             })
@@ -176,6 +205,7 @@ impl Rig {
             time: (0..u.len()).map(|k| k as f64 * self.interval).collect(),
             input: Signal::new("u", "V", u.to_vec()),
             output: Signal::new("y", "cm", y),
+            input_2: second.map(|values| Signal::new("u2", "V", values)),
             reference: None,
             hold: self.hold,
         }

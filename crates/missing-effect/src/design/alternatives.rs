@@ -83,6 +83,7 @@ impl Search<'_, '_> {
         before: &Before,
     ) -> Option<SecondSensor> {
         let plant = self.problem.plant;
+        let measured = self.nodes[0].setup.structure.scales.measured;
         if plant.vessels() < 2 {
             return None;
         }
@@ -101,7 +102,9 @@ impl Search<'_, '_> {
         let fewer = b - a;
         let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };
         Some(SecondSensor {
-            level: plant.level_name(0).to_string(),
+            level: plant
+                .level_name(second_sensor::place(plant, measured))
+                .to_string(),
             existing_without: fresh(before.misfit.map(|misfit| misfit / self.metric.variance)),
             existing_with: fresh([existing(0)?, existing(1)?]),
             best_with: power([experiment(0)?, experiment(1)?], self.ahead_of_each()),

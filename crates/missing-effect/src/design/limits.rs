@@ -43,6 +43,18 @@ pub enum Refused {
         /// The effect.
         effect: String,
     },
+    /// A record with two commands.
+    #[error(
+        "{record} has two commands, {first} and {second}, and an experiment is designed for one: record the second pump off and delete input_2, or play an experiment of your own"
+    )]
+    TwoCommands {
+        /// The record.
+        record: String,
+        /// The first command's column.
+        first: String,
+        /// The second one's.
+        second: String,
+    },
     /// The range's ends are exchanged, equal or no numbers.
     #[error("--range {low} {high}: the smaller value comes first, and they have to differ")]
     Range {

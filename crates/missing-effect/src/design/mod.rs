@@ -80,6 +80,16 @@ pub fn design(
         let effect = between[0].effect.id.to_string();
         return Err(Refused::SameEffect { effect }.into());
     }
+    for record in &problem.records {
+        if let Some(second) = &record.input_2 {
+            return Err(Refused::TwoCommands {
+                record: record.name.clone(),
+                first: record.input.name.clone(),
+                second: second.name.clone(),
+            }
+            .into());
+        }
+    }
     // What is wrong with the limits is said before anything is computed, as far as it can be.
     let looped = problem.controller.is_some() && options.simulate_loop;
     let has_reference = problem.records.iter().all(|r| r.reference.is_some());

@@ -155,6 +155,7 @@ pub(crate) fn play(
             time: (0..values.len()).map(|k| k as f64 * interval).collect(),
             input: signal(&of.input, input),
             output: signal(&of.output, output),
+            input_2: None,
             reference: match (into, &of.reference) {
                 (Loop::Closed(_), Some(reference)) => Some(signal(reference, values.to_vec())),
                 _ => None,

@@ -1,8 +1,8 @@
 //! What a sensor in the other tank would add: its level measured too, with the same noise.
 
-use ct_signals::{Hold, Record};
-use greybox::{Setup, Triangle};
-use plants::{Command, Outlet, Simulator};
+use ct_signals::Record;
+use greybox::{Setup, Triangle, at_rest, commands};
+use plants::{Outlet, Plant, Simulator};
 
 use super::{
     play::Played,
@@ -13,25 +13,32 @@ use crate::node::Node;
 /// Step of a central difference, as a part of the value or of the typical size of its like.
 const STEP: f64 = 1e-5;
 
-/// The level of the first vessel at every sample.
+/// The vessel that it would stand in: the first one, or the last where the first is the measured one.
+pub(crate) fn place(plant: Plant, measured: usize) -> usize {
+    if measured == 0 {
+        plant.vessels() - 1
+    } else {
+        0
+    }
+}
+
+/// The level of that vessel at every sample.
 fn other_level(setup: &Setup, x: &[f64]) -> Option<Vec<Vec<f64>>> {
     let theta = &x[..setup.parameter_count()];
+    let other = place(setup.structure.plant, setup.structure.scales.measured);
     let run = |(r, record): (usize, &Record)| {
-        let u = &record.input.values;
+        let n = record.len();
         let states = &x[setup.plant_states_of(r)];
         let mut simulator =
-            Simulator::<f64>::new(&setup.structure, theta, states, *u.first()?).ok()?;
+            Simulator::<f64>::with_inputs(&setup.structure, theta, states, at_rest(record)).ok()?;
         simulator.set_substeps(setup.substeps);
-        let mut levels = Vec::with_capacity(u.len());
-        for k in 0..u.len() {
-            levels.push(simulator.levels()[0]);
+        let mut levels = Vec::with_capacity(n);
+        for k in 0..n {
+            levels.push(simulator.levels()[other]);
             simulator.read();
-            if k + 1 < u.len() {
-                let command = match record.hold {
-                    Hold::Zero => Command::held(u[k]),
-                    Hold::First => Command::ramp(u[k], u[k + 1]),
-                };
-                simulator.advance(command, record.time[k + 1] - record.time[k]);
+            if k + 1 < n {
+                let h = record.time[k + 1] - record.time[k];
+                simulator.advance_both(commands(record, k), h);
             }
         }
         Some(levels)

@@ -20,9 +20,10 @@ use crate::{
 /// A tank that hides an effect, under a command that hardly moves.
 fn problem(plant: Plant, hidden: (&str, f64), samples: usize) -> Problem {
     let known = Known {
-        area: [(plant == Plant::SingleTank).then_some(154.0), None],
+        area: [(plant == Plant::SingleTank).then_some(154.0), None, None],
         tank_height: Some(60.0),
         input_range: Some(10.0),
+        ..Known::default()
     };
     let command = (4.3, 5.7);
     let mut scales = Scales::from_ranges(command, (10.0, 22.0), INTERVAL, 600.0);

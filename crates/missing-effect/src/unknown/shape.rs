@@ -7,10 +7,10 @@
 
 use std::ops::Range;
 
-use ct_signals::{ArModel, Hold, Record};
-use greybox::Setup;
+use ct_signals::ArModel;
+use greybox::{Setup, at_rest, commands};
 use nalgebra::{DMatrix, DVector};
-use plants::{Command, Fitted, Simulator, Term, Variable};
+use plants::{Fitted, Simulator, Term, Variable};
 
 use super::smooth::{Smoothed, Spot, carrier};
 use crate::{Error, node::Node, noise_floor::slowness};
@@ -62,10 +62,10 @@ fn visited(node: &Node, smoothed: &Smoothed, variable: Variable) -> Result<Vec<f
         let mut theta = node.fit.x[..setup.parameter_count()].to_vec();
         theta.extend(&path.value);
         let mut simulator =
-            Simulator::<f64>::new(&structure, &theta, &path.states, record.input.values[0])?;
+            Simulator::<f64>::with_inputs(&structure, &theta, &path.states, at_rest(record))?;
         simulator.set_substeps(setup.substeps);
         let vessel = match spot.place {
-            plants::Place::Sensor => setup.structure.plant.vessels() - 1,
+            plants::Place::Sensor => setup.structure.scales.measured,
             _ => spot.vessel,
         };
         let area = setup.structure.scales.area[vessel];
@@ -80,20 +80,12 @@ fn visited(node: &Node, smoothed: &Smoothed, variable: Variable) -> Result<Vec<f
             }
             before = Some((t, level));
             if k + 1 < record.len() {
-                simulator.advance(command(record, k), record.time[k + 1] - t);
+                simulator.advance_both(commands(record, k), record.time[k + 1] - t);
             }
         }
     }
     values.sort_unstable_by(f64::total_cmp);
     Ok(values)
-}
-
-fn command(record: &Record, k: usize) -> Command {
-    let u = &record.input.values;
-    match record.hold {
-        Hold::Zero => Command::held(u[k]),
-        Hold::First => Command::ramp(u[k], u[k + 1]),
-    }
 }
 
 /// Knots over the range that is visited: half way between evenly over the range and evenly over the samples.

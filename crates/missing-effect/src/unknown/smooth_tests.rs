@@ -47,6 +47,7 @@ fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
         output: Signal::new("y", "cm", vec![0.0; N]),
         input: Signal::new("u", "V", u.clone()),
         time,
+        input_2: None,
         reference: None,
         hold: Hold::Zero,
     };

@@ -18,9 +18,9 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 };
 
 /// Nothing below the last vessel could push back on it, but beside an only one. Two linear tanks that push on each other are two
-/// linear tanks of other time constants, and no data can show it.
+/// linear tanks of other time constants, and no data can show it. Tanks that are joined by valves push back as they are.
 fn first_vessel(plant: Plant, vessel: usize) -> bool {
-    vessel == 0 && plant != Plant::CascadedTanksLinear
+    vessel == 0 && plant != Plant::CascadedTanksLinear && !plant.joined()
 }
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
@@ -33,7 +33,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         upper,
         starts: vec![start],
     };
-    if !site.is_last() {
+    if site.is_above_another() {
         return vec![coupling("backflow", "share of the lower level that the upper outflow feels", 0.95, 0.05)];
     }
     let (sample, duration) = (site.scales.sample_interval, site.duration());

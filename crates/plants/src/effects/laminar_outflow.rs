@@ -29,10 +29,13 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     }]
 }
 
-struct LaminarOutflow<T>(T);
+struct LaminarOutflow<T> {
+    slope: T,
+    both_ways: bool,
+}
 
-pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
-    LaminarOutflow(parameters[0])
+pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
+    LaminarOutflow { slope: parameters[0], both_ways: site.is_joined_to_next() }
 }
 
 impl<T: Scalar> Law<T> for LaminarOutflow<T> {
@@ -40,7 +43,8 @@ impl<T: Scalar> Law<T> for LaminarOutflow<T> {
         Some(Balance::Outflow)
     }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
-        // A step may look below the bottom, from where nothing flows back.
-        *outflow = *outflow + self.0 * level.max(T::constant(0.0));
+        // A step may look below the bottom, from where nothing flows back; through a valve between two tanks it does.
+        let head = if self.both_ways { *level } else { level.max(T::constant(0.0)) };
+        *outflow = *outflow + self.slope * head;
     }
 }

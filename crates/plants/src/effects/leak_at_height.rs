@@ -23,7 +23,14 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let whole = site.scales.flow.abs() / (0.5 * span).sqrt();
     // A level that is not measured is known from the believed model alone, which has its water leave by another way and may have
     // it far too low.
-    let beyond = if site.is_last() { 0.5 } else { 3.0 } * span;
+    let beyond = if site.is_measured() { 0.5 } else { 3.0 } * span;
+    let mut starts = spread(low, high, 5);
+    let mut lowest = low - 0.5 * span;
+    if site.is_joined_to_next() {
+        // Of joined tanks any may leak at its bottom; that of a tank with an outlet of its own is the outlet's.
+        starts.push(0.0);
+        lowest = lowest.min(0.0);
+    }
     vec![
         ParameterInfo {
             name: "coefficient",
@@ -39,9 +46,9 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             unit: Unit::LEVEL,
             meaning: "level from which on it leaks",
             absent: f64::NAN,
-            lower: low - 0.5 * span,
+            lower: lowest,
             upper: high + beyond,
-            starts: spread(low, high, 5),
+            starts,
         },
     ]
 }

@@ -39,7 +39,7 @@ pub struct EffectInfo {
     pub physics: &'static str,
     /// Its equation.
     pub equation: &'static str,
-    /// The plants, and their vessels, it makes sense in; actuator and sensor ask for vessel zero.
+    /// The plants, and their vessels (or pumps), it makes sense in; the sensor asks for vessel zero.
     pub applies: fn(Plant, usize) -> bool,
     /// Its parameters at a place: the leading one, whose absent value switches the effect off, comes first.
     pub parameters: fn(&Site) -> Vec<ParameterInfo>,
@@ -58,19 +58,18 @@ impl EffectInfo {
         CATALOGUE.iter().copied().find(|effect| effect.id == id)
     }
 
-    /// The vessel that it acts in where nobody says which.
+    /// The vessel that it acts in, or the pump, where nobody says which.
     #[must_use]
     pub fn usual_site(&'static self, plant: Plant) -> usize {
         self.sites(plant).next().unwrap_or(0)
     }
 
-    /// The vessels of a plant that it may act in: zero alone for one at the actuator or the sensor, none where it makes no
-    /// sense.
+    /// The vessels of a plant that it may act in, or its pumps: zero alone for one at the sensor, none where it makes no sense.
     pub fn sites(&'static self, plant: Plant) -> impl Iterator<Item = usize> {
-        let places = if self.place == Place::Vessel {
-            plant.vessels()
-        } else {
-            1
+        let places = match self.place {
+            Place::Vessel => plant.vessels(),
+            Place::Actuator => plant.pumps(),
+            Place::Sensor => 1,
         };
         (0..places).filter(move |&vessel| (self.applies)(plant, vessel))
     }
@@ -152,4 +151,14 @@ fn spread(from: f64, to: f64, n: usize) -> Vec<f64> {
     (0..n)
         .map(|i| from + (to - from) * (i as f64 + 0.5) / n as f64)
         .collect()
+}
+
+/// The smallest relative change of an outflow. A valve between two tanks may be shut altogether, and the level of neither then
+/// runs away: the estimate of a change of -1 scatters about it, so the bound lies a little beyond.
+fn fully_shut(site: &Site, otherwise: f64) -> f64 {
+    if site.is_joined_to_next() {
+        -1.1
+    } else {
+        otherwise
+    }
 }

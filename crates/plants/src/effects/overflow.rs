@@ -28,7 +28,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         upper: high + 0.5 * span,
         starts: spread(low + 0.4 * span, high, 4),
     }];
-    if !site.is_last() {
+    if site.is_above_another() {
         parameters.push(ParameterInfo {
             name: "fraction",
             unit: Unit::ONE,

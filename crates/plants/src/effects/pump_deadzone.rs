@@ -17,7 +17,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 };
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
-    let (low, high) = site.scales.input;
+    let (low, high) = site.input();
     let (low, high) = (low.abs().min(high.abs()), low.abs().max(high.abs()));
     let mut starts = spread(low, low + 0.6 * (high - low), 3);
     starts.insert(0, 0.5 * low);

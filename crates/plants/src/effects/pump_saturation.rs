@@ -17,7 +17,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 };
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
-    let (low, high) = site.scales.input;
+    let (low, high) = site.input();
     vec![ParameterInfo {
         name: "limit",
         unit: Unit::INPUT,

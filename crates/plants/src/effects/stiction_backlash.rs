@@ -21,7 +21,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 const WIDTHS: (f64, i32, f64) = (0.03, 15, 1.2);
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
-    let (low, high) = site.scales.input;
+    let (low, high) = site.input();
     let span = (high - low).max(f64::MIN_POSITIVE);
     vec![
         ParameterInfo {
@@ -79,7 +79,7 @@ struct StictionBacklash<T> {
 
 pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
     let (width, jump) = (parameters[0].value(), parameters[1].value());
-    let (low, high) = site.scales.input;
+    let (low, high) = site.input();
     // At no width at all the chord is short and lies on the one side that there is.
     let reach = (VARIED * width).max(1e-6 * (high - low).abs());
     let at = |width: f64| Element { width: width.max(0.0), jump, position: T::constant(0.0) };

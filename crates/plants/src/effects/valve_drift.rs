@@ -1,6 +1,6 @@
 //! `valve_drift`: the outlet clogs or wears over the record.
 
-use super::{EffectInfo, Place, any_plant};
+use super::{EffectInfo, Place, any_plant, fully_shut};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
@@ -16,13 +16,13 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "R. Isermann, Fault-Diagnosis Systems, 2006: drifting parameters of a process.",
 };
 
-fn parameters(_: &Site) -> Vec<ParameterInfo> {
+fn parameters(site: &Site) -> Vec<ParameterInfo> {
     vec![ParameterInfo {
         name: "change",
         unit: Unit::ONE,
         meaning: "relative change of the outflow over the record",
         absent: 0.0,
-        lower: -0.5,
+        lower: fully_shut(site, -0.5),
         upper: 0.5,
         starts: vec![0.01],
     }]

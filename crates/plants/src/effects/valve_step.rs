@@ -1,6 +1,6 @@
 //! `valve_step`: the outlet changes at one instant.
 
-use super::{EffectInfo, Place, any_plant, spread};
+use super::{EffectInfo, Place, any_plant, fully_shut, spread};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
@@ -24,7 +24,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             unit: Unit::ONE,
             meaning: "relative change of the outflow",
             absent: 0.0,
-            lower: -0.5,
+            lower: fully_shut(site, -0.5),
             upper: 0.5,
             starts: vec![0.01],
         },

@@ -1,6 +1,6 @@
 //! The vessels' balance equations: rates, and how fast each vessel is.
 
-use crate::{Outlet, Scalar, Side, inflow::Inflow, structure::MAX_VESSELS};
+use crate::{Outlet, Scalar, Side, inflow::Inflow};
 
 use super::{
     Levels, VesselLaws, Vessels,
@@ -8,7 +8,7 @@ use super::{
     torricelli::{A_LITTLE, slope_of_root, square_root},
 };
 
-impl<T: Scalar> Vessels<T> {
+impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// A time within the present step, with its derivatives.
     #[inline]
     pub(super) fn time(&self, t: f64) -> T {
@@ -25,20 +25,34 @@ impl<T: Scalar> Vessels<T> {
         moved - moved.value() + t
     }
 
-    /// What vessel `i` alone lets out at a level.
+    /// What vessel `i` alone lets out at a level or, through a valve, at a head.
     #[inline(always)]
-    fn own_outflow(&self, i: usize, level: &T) -> T {
+    pub(super) fn own_outflow(&self, i: usize, level: &T) -> T {
         let vessel = &self.vessels[i];
+        if Self::JOINED && i + 1 < N {
+            return self.through_valve(i, *level);
+        }
         match vessel.outlet {
             Outlet::Torricelli => vessel.coefficient * square_root(*level),
             Outlet::Linear => *level - vessel.coefficient,
         }
     }
 
+    /// The head that drives the outflow of vessel `i` where nothing acts on it: its level or, through a valve, by how much that is
+    /// above the next one.
+    #[inline(always)]
+    pub(super) fn own_head(&self, i: usize, level: &T, levels: &Levels<T, N>) -> T {
+        if Self::JOINED && i + 1 < N {
+            *level - levels[i + 1]
+        } else {
+            *level
+        }
+    }
+
     /// The head that drives the outflow of vessel `i` at a level, the other levels being `levels`.
     #[inline(always)]
-    fn head(&self, i: usize, level: &T, levels: &Levels<T>) -> T {
-        let mut head = *level;
+    fn head(&self, i: usize, level: &T, levels: &Levels<T, N>) -> T {
+        let mut head = self.own_head(i, level, levels);
         if i + 1 < self.vessels.len() {
             for &law in &self.vessels[i].laws.head {
                 self.laws[law].head(&mut head, &levels[i + 1]);
@@ -49,10 +63,10 @@ impl<T: Scalar> Vessels<T> {
 
     /// What flows out of vessel `i` to the next one at a level, the other levels being `levels`.
     #[inline(always)]
-    fn outflow(&self, i: usize, level: &T, levels: &Levels<T>, t: &T) -> T {
+    pub(super) fn outflow(&self, i: usize, level: &T, levels: &Levels<T, N>, t: &T) -> T {
         let vessel = &self.vessels[i];
         if vessel.laws.head.is_empty() && vessel.laws.outflow.is_empty() {
-            return self.own_outflow(i, level);
+            return self.own_outflow(i, &self.own_head(i, level, levels));
         }
         let head = self.head(i, level, levels);
         let mut outflow = self.own_outflow(i, &head);
@@ -64,10 +78,10 @@ impl<T: Scalar> Vessels<T> {
 
     /// What flows out of vessel `i` to the next one, and its net inflow.
     #[inline(always)]
-    pub(super) fn balance(&self, i: usize, inflow: T, levels: &Levels<T>, t: f64) -> (T, T) {
+    pub(super) fn balance(&self, i: usize, inflow: T, levels: &Levels<T, N>, t: f64) -> (T, T) {
         let level = &levels[i];
         if !self.vessels[i].laws.any {
-            let outflow = self.own_outflow(i, level);
+            let outflow = self.own_outflow(i, &self.own_head(i, level, levels));
             return (outflow, inflow - outflow);
         }
         let laws = &self.vessels[i].laws;
@@ -77,7 +91,7 @@ impl<T: Scalar> Vessels<T> {
             && self.side.is_none()
         {
             // Only its surface changes.
-            let outflow = self.own_outflow(i, level);
+            let outflow = self.own_outflow(i, &self.own_head(i, level, levels));
             return (outflow, inflow - outflow);
         }
         let t = self.time(t);
@@ -127,17 +141,20 @@ impl<T: Scalar> Vessels<T> {
 
     /// Rates of all levels \[level unit/s\].
     #[inline]
-    pub(super) fn rates(&self, levels: &Levels<T>, q: T, t: f64) -> Levels<T> {
-        let mut rates = [T::constant(0.0); MAX_VESSELS];
+    pub(super) fn rates(&self, levels: &Levels<T, N>, q: T, t: f64) -> Levels<T, N> {
+        let mut rates = [T::constant(0.0); N];
         self.rates_into(&mut rates, levels, q, t);
         rates
     }
 
     /// The same in place; a rate that is zero for now is written too.
     #[inline(always)]
-    pub(super) fn rates_into(&self, rates: &mut Levels<T>, levels: &Levels<T>, q: T, t: f64) {
+    pub(super) fn rates_into(&self, rates: &mut Levels<T, N>, levels: &Levels<T, N>, q: T, t: f64) {
         let mut inflow = q;
         for (i, vessel) in self.vessels.iter().enumerate() {
+            if Self::JOINED && i + 1 == N {
+                inflow = inflow + self.fed(t);
+            }
             let (outflow, net) = self.balance(i, inflow, levels, t);
             inflow = outflow;
             if vessel.spilling {
@@ -155,8 +172,8 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// Rates of linear vessels without effects, written as in [`Vessels::rates`].
-    pub(super) fn linear_rates(&self, levels: &Levels<T>, q: T) -> Levels<T> {
-        let mut rates = [T::constant(0.0); MAX_VESSELS];
+    pub(super) fn linear_rates(&self, levels: &Levels<T, N>, q: T) -> Levels<T, N> {
+        let mut rates = [T::constant(0.0); N];
         let mut inflow = q;
         for (i, vessel) in self.vessels.iter().enumerate() {
             let outflow = levels[i] - vessel.coefficient;
@@ -168,7 +185,7 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// The net inflow of vessel `i` at levels, in the present modes.
-    pub(super) fn net(&self, i: usize, levels: &Levels<T>, q: T, t: f64) -> T {
+    pub(super) fn net(&self, i: usize, levels: &Levels<T, N>, q: T, t: f64) -> T {
         let mut inflow = q;
         for (k, vessel) in self.vessels.iter().enumerate().take(i) {
             let (outflow, net) = self.balance(k, inflow, levels, t);
@@ -177,6 +194,9 @@ impl<T: Scalar> Vessels<T> {
                 inflow = inflow + net * vessel.rim.fraction;
             }
         }
+        if Self::JOINED && i + 1 == N {
+            inflow = inflow + self.fed(t);
+        }
         self.balance(i, inflow, levels, t).1
     }
 
@@ -184,6 +204,9 @@ impl<T: Scalar> Vessels<T> {
     /// vanishes with them.
     pub(super) fn slope(&self, i: usize, level: T, t: f64) -> T {
         let vessel = &self.vessels[i];
+        if Self::JOINED {
+            return self.joined_slope(i, level, t);
+        }
         let own = match vessel.outlet {
             Outlet::Torricelli => vessel.coefficient * slope_of_root(level),
             Outlet::Linear => T::constant(1.0),
@@ -206,8 +229,8 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// How fast each vessel forgets its level \[1/s\].
-    pub(super) fn forgetting(&self, t: f64) -> [T; MAX_VESSELS] {
-        let mut rates = [T::constant(0.0); MAX_VESSELS];
+    pub(super) fn forgetting(&self, t: f64) -> [T; N] {
+        let mut rates = [T::constant(0.0); N];
         for (i, rate) in rates.iter_mut().enumerate().take(self.vessels.len()) {
             *rate = match self.linear {
                 // Where the vessels' own forgetting is exact it alone is meant.

@@ -4,7 +4,7 @@
 //! vessels' time constants, and by the exponential Runge-Kutta step of [`Damped`] where it is long: the stages of S. M.
 //! Cox and P. C. Matthews (2002), equations (26) to (29), for a chain, in which each vessel also drives the next one.
 
-use crate::{Scalar, damped::Damped, inflow::Inflow, linear::Propagators, structure::MAX_VESSELS};
+use crate::{Scalar, damped::Damped, inflow::Inflow, linear::Propagators};
 
 use super::{Levels, Vessels};
 
@@ -17,9 +17,9 @@ pub(super) struct LinearFlow<T> {
 }
 
 /// The exact flow over one step.
-pub(super) struct Flow<T> {
-    half: Levels<T>,
-    whole: Levels<T>,
+pub(super) struct Flow<T, const N: usize> {
+    half: Levels<T, N>,
+    whole: Levels<T, N>,
     /// Where there are two vessels.
     handed: Option<Handed<T>>,
 }
@@ -35,9 +35,9 @@ struct Handed<T> {
     whole: [T; 3],
 }
 
-impl<T: Scalar> Vessels<T> {
+impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// The levels after a step without events.
-    pub(super) fn flow(&mut self, h: T, q: &Inflow<T>, t: f64) -> Levels<T> {
+    pub(super) fn flow(&mut self, h: T, q: &Inflow<T>, t: f64) -> Levels<T, N> {
         let Some(flow) = &mut self.linear else {
             return self.trial(h, q, t);
         };
@@ -67,13 +67,13 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// One step of linear vessels: their exact flow, and beside it Runge-Kutta on what the effects add.
-    fn linear_trial(&self, flow: &Flow<T>, h: T, q: &Inflow<T>, t: f64) -> Levels<T> {
+    fn linear_trial(&self, flow: &Flow<T, N>, h: T, q: &Inflow<T>, t: f64) -> Levels<T, N> {
         let (whole, half) = (flow.whole, flow.half);
         let dt = h.value();
         if let Some(rates) = self.damping {
             return self.damped_trial(rates, Some(flow), h, q, t);
         }
-        let added = |levels: &Levels<T>, flow: &Levels<T>, q: T, t: f64| {
+        let added = |levels: &Levels<T, N>, flow: &Levels<T, N>, q: T, t: f64| {
             let mut rates = self.rates(levels, q, t);
             let linear = self.linear_rates(flow, q);
             for (rate, linear) in rates.iter_mut().zip(linear) {
@@ -101,21 +101,21 @@ impl<T: Scalar> Vessels<T> {
     /// What is added to a flow, or to standing still, each vessel's own forgetting taken exactly.
     pub(super) fn damped_trial(
         &self,
-        rates: [T; MAX_VESSELS],
-        flow: Option<&Flow<T>>,
+        rates: [T; N],
+        flow: Option<&Flow<T, N>>,
         h: T,
         q: &Inflow<T>,
         t: f64,
-    ) -> Levels<T> {
+    ) -> Levels<T, N> {
         let n = self.states;
-        let zero = [T::constant(0.0); MAX_VESSELS];
-        let damped: [Damped<T>; MAX_VESSELS] = std::array::from_fn(|i| Damped::new(rates[i], h));
+        let zero = [T::constant(0.0); N];
+        let damped: [Damped<T>; N] = std::array::from_fn(|i| Damped::new(rates[i], h));
         let [begin, half, whole] = match flow {
             Some(flow) => [&self.levels, &flow.half, &flow.whole],
             None => [&self.levels; 3],
         };
         // What drives the deviation from the flow, but for its forgetting and what a linear vessel hands on.
-        let driving = |at: &Levels<T>, deviation: &Levels<T>, q: T, t: f64| {
+        let driving = |at: &Levels<T, N>, deviation: &Levels<T, N>, q: T, t: f64| {
             let mut levels = *at;
             for i in 0..n {
                 levels[i] = levels[i] + deviation[i];
@@ -137,7 +137,7 @@ impl<T: Scalar> Vessels<T> {
         // What the first vessel's deviation, and its drive, bring to the second one in half a step and in a whole one.
         let handed = flow.and_then(|flow| flow.handed);
         let middle = t + 0.5 * h.value();
-        let from_zero = |k: &Levels<T>| {
+        let from_zero = |k: &Levels<T, N>| {
             let mut d = zero;
             for i in 0..n {
                 d[i] = damped[i].half(k[i]);

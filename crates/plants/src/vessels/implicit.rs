@@ -4,7 +4,7 @@ use crate::{Outlet, Scalar, inflow::Inflow};
 
 use super::{Stretch, Vessels, Watch, rims::crossing};
 
-impl<T: Scalar> Vessels<T> {
+impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// One step that cannot overshoot, whatever its length: implicit in each vessel's own level, of order one.
     pub(super) fn relax(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let mut next = self.levels;
@@ -41,8 +41,7 @@ impl<T: Scalar> Vessels<T> {
         }
         if let Some(watch) = watch {
             // The transient is over at once; what is left looks straight.
-            let last = self.vessels.len() - 1;
-            let (before, after) = (self.levels[last], next[last]);
+            let (before, after) = (self.levels[self.measured], next[self.measured]);
             let rate = (after - before) / h;
             watch(&Stretch {
                 h,

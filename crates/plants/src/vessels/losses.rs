@@ -9,7 +9,7 @@ use super::Vessels;
 /// it would be cut only here and there along a record, and its output would not be smooth in the parameters.
 const STABLE: f64 = 1.5;
 
-impl<T: Scalar> Vessels<T> {
+impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// By how much more vessel `i` loses where it stands higher \[flow/level unit\].
     pub(super) fn loss_slope(&self, i: usize, level: T, t: &T) -> T {
         let step = 1e-6 * (level.value().abs() + 1e-3);

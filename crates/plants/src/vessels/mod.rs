@@ -1,11 +1,13 @@
-//! The vessels in series: their parts, their laws and their present levels.
+//! The vessels, in series or joined by valves: their parts, their laws and their present levels.
 //!
 //! [`balance`] has the equations, [`losses`] how fast they become by what leaves beside the outlets, [`parts`] cuts a step,
-//! [`rims`] finds what happens in a part, [`runge_kutta`], [`exponential`] and [`implicit`] take it.
+//! [`rims`] finds what happens in a part, [`runge_kutta`], [`exponential`] and [`implicit`] take it. [`joined`] has the valves between
+//! tanks, and how steps are cut and taken there.
 
 mod balance;
 mod exponential;
 mod implicit;
+mod joined;
 mod losses;
 mod parts;
 mod rims;
@@ -13,14 +15,15 @@ mod runge_kutta;
 mod torricelli;
 
 use crate::{
-    Balance, Law, Outlet, Rim, Scalar, Side, inflow::Inflow, linear::Propagators,
-    structure::MAX_VESSELS,
+    Balance, Law, Outlet, Rim, Scalar, Side, inflow::Inflow, linear::Propagators, structure::SERIES,
 };
 
 use exponential::LinearFlow;
+use joined::Feed;
+pub(crate) use joined::Valves;
 pub(crate) use torricelli::square_root;
 
-pub(crate) type Levels<T> = [T; MAX_VESSELS];
+pub(crate) type Levels<T, const N: usize> = [T; N];
 
 /// Who wants to see the smooth stretches of the measured level, if anybody.
 pub(crate) type Watch<'a, T> = Option<&'a mut dyn FnMut(&Stretch<T>)>;
@@ -53,11 +56,12 @@ struct VesselLaws {
     any: bool,
 }
 
-/// The vessels in series.
-pub(crate) struct Vessels<T: Scalar> {
+/// The vessels: at most [`SERIES`] in series, or three joined by valves. `N` is known at compile time, so that neither pays for the
+/// other.
+pub(crate) struct Vessels<T: Scalar, const N: usize> {
     vessels: Vec<Vessel<T>>,
     laws: Vec<Box<dyn Law<T>>>,
-    pub(crate) levels: Levels<T>,
+    pub(crate) levels: Levels<T, N>,
     /// For linear vessels.
     linear: Option<LinearFlow<T>>,
     /// A side tank of an only vessel; its level follows the vessel's in `levels`.
@@ -69,11 +73,16 @@ pub(crate) struct Vessels<T: Scalar> {
     /// Beginning and length of the present step, where they have derivatives.
     clock: Option<(T, T)>,
     /// How fast every vessel forgets, where a part is long against that \[1/s\]: then it is taken exponentially.
-    damping: Option<[T; MAX_VESSELS]>,
+    damping: Option<Levels<T, N>>,
     /// Some vessel has a rim.
     rims: bool,
     /// All are Torricelli's, of areas without derivatives, and nothing acts in them.
     bare: bool,
+    /// Of vessels that are joined: their valves, and what the second pump brings.
+    valves: Option<Valves>,
+    feed: Option<Feed<T>>,
+    /// The vessel whose level is measured.
+    measured: usize,
     /// One over the shortest time constant of linear vessels; zero for others \[1/s\].
     fastest: f64,
 }
@@ -87,12 +96,17 @@ pub(crate) struct Stretch<T> {
     pub rate_after: T,
 }
 
-impl<T: Scalar> Vessels<T> {
-    /// `parts`: area, outlet and its coefficient for each vessel; `laws`: the vessel each acts in, and the law.
+impl<T: Scalar, const N: usize> Vessels<T, N> {
+    /// The vessels are joined by valves.
+    const JOINED: bool = N > SERIES;
+
+    /// `parts`: area, outlet and its coefficient for each vessel; `laws`: the vessel each acts in, and the law; then the vessel that is
+    /// measured, and the valves of vessels that are joined.
     pub(crate) fn new(
         parts: Vec<(T, Outlet, T)>,
         laws: Vec<(usize, Box<dyn Law<T>>)>,
         levels: &[T],
+        (measured, valves): (usize, Option<Valves>),
     ) -> Self {
         let mut vessels: Vec<Vessel<T>> = parts
             .into_iter()
@@ -155,7 +169,7 @@ impl<T: Scalar> Vessels<T> {
             half: propagators(),
             disturbed: vessels.iter().any(|v| v.laws.any),
         });
-        let mut initial = [T::constant(0.0); MAX_VESSELS];
+        let mut initial = [T::constant(0.0); N];
         for (level, given) in initial.iter_mut().zip(levels) {
             *level = *given;
         }
@@ -171,6 +185,9 @@ impl<T: Scalar> Vessels<T> {
             rims,
             bare,
             damping: None,
+            valves,
+            feed: None,
+            measured,
             fastest,
         };
         all.keep_within();
@@ -193,16 +210,16 @@ impl<T: Scalar> Vessels<T> {
         }
     }
 
-    fn accept(&mut self, next: Levels<T>, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    fn accept(&mut self, next: Levels<T, N>, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if let Some(watch) = watch {
-            let last = self.vessels.len() - 1;
+            let measured = self.measured;
             let before = self.levels;
-            let rate_before = self.rates(&before, q.start, t)[last];
-            let rate_after = self.rates(&next, q.end, t + h.value())[last];
+            let rate_before = self.rates(&before, q.start, t)[measured];
+            let rate_after = self.rates(&next, q.end, t + h.value())[measured];
             watch(&Stretch {
                 h,
-                before: before[last],
-                after: next[last],
+                before: before[measured],
+                after: next[measured],
                 rate_before,
                 rate_after,
             });

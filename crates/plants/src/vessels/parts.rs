@@ -4,7 +4,7 @@
 //! sets off is over when they are long, and a vessel that has settled takes the rest in one exponential part. Where a
 //! level moves too far for its forgetting to be one number the parts are short, or at last implicit and of order one.
 
-use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
+use crate::{Scalar, inflow::Inflow};
 
 use super::{Vessels, Watch};
 
@@ -23,7 +23,7 @@ const SETTLING: f64 = 0.2;
 /// reading leaves a trace only in the vessel that it flows into: the last one may move more.
 const SETTLED: [f64; 2] = [1e-4, 1e-2];
 
-impl<T: Scalar> Vessels<T> {
+impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// Moves on by `h` from time `start`; `watch` sees every smooth stretch of the measured level in turn.
     pub(crate) fn step(&mut self, h: T, q: &Inflow<T>, start: T, watch: &mut Watch<T>) {
         if self.switches.is_empty() {
@@ -60,7 +60,8 @@ impl<T: Scalar> Vessels<T> {
     fn stretch(&mut self, h: T, q: &Inflow<T>, start: T, watch: &mut Watch<T>) {
         let zero = T::constant(0.0);
         let plain = h.same_derivatives(zero) && start.same_derivatives(zero);
-        self.clock = (!plain && !self.laws.is_empty()).then_some((start, h));
+        let timed = !self.laws.is_empty() || (Self::JOINED && self.feed.is_some());
+        self.clock = (!plain && timed).then_some((start, h));
         let t = start.value();
         let wanted = self.fastest * h.value();
         if wanted > STEP_LIMIT {
@@ -132,6 +133,10 @@ impl<T: Scalar> Vessels<T> {
     }
 
     fn part(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
+        if Self::JOINED {
+            self.joined_part(h, q, t, watch);
+            return;
+        }
         if self.stiffness(h.value(), q, t) <= STEP_LIMIT {
             self.unit(h, q, t, watch);
             return;
@@ -181,7 +186,7 @@ impl<T: Scalar> Vessels<T> {
 
     /// How many of [`UNITS`] the next part may last although a vessel is faster than that, `done` of them over; zero
     /// where a level moves too far for its forgetting to be one number.
-    fn calm(&self, rates: &[T; MAX_VESSELS], h: f64, q: &Inflow<T>, t: f64, done: usize) -> usize {
+    fn calm(&self, rates: &[T; N], h: f64, q: &Inflow<T>, t: f64, done: usize) -> usize {
         let left = UNITS - done;
         let mut longest = left;
         let mut inflows = [Some(q.start), Some(q.end)];
@@ -215,7 +220,7 @@ impl<T: Scalar> Vessels<T> {
     }
 
     /// A step that is short enough.
-    fn unit(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
+    pub(super) fn unit(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if self.rims {
             self.step_with_rims(h, q, t, watch);
             return;

@@ -1,7 +1,7 @@
 //! Steps of vessels with rims: which of them spill, and the instant at which a level meets its rim or leaves it, located
 //! so that the step keeps its order and its derivatives.
 
-use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
+use crate::{Scalar, inflow::Inflow};
 
 use super::{Levels, Vessel, Vessels, Watch};
 
@@ -16,7 +16,7 @@ pub(super) enum Event<T> {
     Release(usize, T),
 }
 
-impl<T: Scalar> Vessels<T> {
+impl<T: Scalar, const N: usize> Vessels<T, N> {
     pub(super) fn step_with_rims(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let (mut h, mut q, mut t) = (h, *q, t);
         let mut released = None;
@@ -67,6 +67,9 @@ impl<T: Scalar> Vessels<T> {
         }
         let mut inflow = q;
         for i in 0..self.vessels.len() {
+            if Self::JOINED && i + 1 == N {
+                inflow = inflow + self.fed(t);
+            }
             let (outflow, net) = self.balance(i, inflow, &self.levels, t);
             let vessel = &mut self.vessels[i];
             vessel.spilling = self.levels[i].value() >= vessel.rim.level.value()
@@ -83,8 +86,8 @@ impl<T: Scalar> Vessels<T> {
     /// beginning, where they are known.
     pub(super) fn first_event(
         &self,
-        next: &Levels<T>,
-        begin: Option<[f64; MAX_VESSELS]>,
+        next: &Levels<T, N>,
+        begin: Option<[f64; N]>,
         h: T,
         q: &Inflow<T>,
         t: f64,
@@ -105,7 +108,7 @@ impl<T: Scalar> Vessels<T> {
                 continue;
             }
             // Positive once the event has happened.
-            let past = |levels: &Levels<T>, q: T, t: f64| {
+            let past = |levels: &Levels<T, N>, q: T, t: f64| {
                 if vessel.spilling {
                     -self.net(i, levels, q, t).value()
                 } else {
@@ -170,7 +173,7 @@ impl<T: Scalar> Vessels<T> {
     fn top(
         &self,
         i: usize,
-        next: &Levels<T>,
+        next: &Levels<T, N>,
         begin: Option<f64>,
         h: T,
         q: &Inflow<T>,

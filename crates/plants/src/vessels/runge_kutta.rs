@@ -2,14 +2,14 @@
 
 use std::ops::Mul;
 
-use crate::{Scalar, inflow::Inflow, structure::MAX_VESSELS};
+use crate::{Scalar, inflow::Inflow};
 
 use super::{Levels, Vessel, Vessels, torricelli::square_root};
 
-impl<T: Scalar> Vessels<T> {
+impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// One Runge-Kutta step from the present levels, in the present modes.
     #[inline]
-    pub(super) fn trial(&self, h: T, q: &Inflow<T>, t: f64) -> Levels<T> {
+    pub(super) fn trial(&self, h: T, q: &Inflow<T>, t: f64) -> Levels<T, N> {
         self.trial_and_rates(h, q, t).0
     }
 
@@ -20,7 +20,7 @@ impl<T: Scalar> Vessels<T> {
         h: T,
         q: &Inflow<T>,
         t: f64,
-    ) -> (Levels<T>, Option<[f64; MAX_VESSELS]>) {
+    ) -> (Levels<T, N>, Option<[f64; N]>) {
         let dt = h.value();
         if let Some(rates) = self.damping {
             (self.damped_trial(rates, None, h, q, t), None)
@@ -40,12 +40,12 @@ impl<T: Scalar> Vessels<T> {
     /// The same for Torricelli's vessels without effects, in the same order of operations and so with the same bits, for
     /// a fit spends most of its time here.
     #[inline]
-    fn bare_trial<const N: usize>(
+    fn bare_trial<const M: usize>(
         &self,
-        vessels: [&Vessel<T>; N],
+        vessels: [&Vessel<T>; M],
         h: f64,
         q: &Inflow<T>,
-    ) -> Levels<T> {
+    ) -> Levels<T, N> {
         // Loops over places rather than arrays by value, which would be copied about.
         let zero = T::constant(0.0);
         let mut next = self.levels;
@@ -56,16 +56,16 @@ impl<T: Scalar> Vessels<T> {
             (q.middle, 0.5, 2.0),
             (q.end, 1.0, 1.0),
         ];
-        let mut rates = [zero; MAX_VESSELS];
-        let mut sum = [zero; MAX_VESSELS];
+        let mut rates = [zero; N];
+        let mut sum = [zero; N];
         for (stage, (q, ahead, weight)) in stages.into_iter().enumerate() {
             if stage > 0 {
-                for i in 0..N {
+                for i in 0..M {
                     at[i] = self.levels[i] + rates[i] * (h * ahead);
                 }
             }
             let mut inflow = q;
-            for i in 0..N {
+            for i in 0..M {
                 let outflow = vessels[i].coefficient * square_root(at[i]);
                 rates[i] = (inflow - outflow) * vessels[i].plain_inverse.unwrap_or(f64::NAN);
                 inflow = outflow;
@@ -73,7 +73,7 @@ impl<T: Scalar> Vessels<T> {
             }
         }
         let sixth = h * (1.0 / 6.0);
-        for i in 0..N {
+        for i in 0..M {
             next[i] = next[i] + sum[i] * sixth;
         }
         next
@@ -87,7 +87,7 @@ impl<T: Scalar> Vessels<T> {
         dt: f64,
         q: &Inflow<T>,
         t: f64,
-    ) -> (Levels<T>, Option<[f64; MAX_VESSELS]>)
+    ) -> (Levels<T, N>, Option<[f64; N]>)
     where
         T: Mul<H, Output = T>,
     {
@@ -102,9 +102,9 @@ impl<T: Scalar> Vessels<T> {
             (half, q.middle, middle, 2.0),
             (h, q.end, t + dt, 1.0),
         ];
-        let mut rates = [zero; MAX_VESSELS];
-        let mut sum = [zero; MAX_VESSELS];
-        let mut begin = [0.0; MAX_VESSELS];
+        let mut rates = [zero; N];
+        let mut sum = [zero; N];
+        let mut begin = [0.0; N];
         for (stage, (ahead, q, t, weight)) in stages.into_iter().enumerate() {
             if stage > 0 {
                 for i in 0..self.states {
@@ -128,7 +128,12 @@ impl<T: Scalar> Vessels<T> {
 
     /// `from + by h`.
     #[inline(always)]
-    pub(super) fn moved<H: Copy>(&self, from: &Levels<T>, by: &Levels<T>, h: H) -> Levels<T>
+    pub(super) fn moved<H: Copy>(
+        &self,
+        from: &Levels<T, N>,
+        by: &Levels<T, N>,
+        h: H,
+    ) -> Levels<T, N>
     where
         T: Mul<H, Output = T>,
     {
@@ -142,10 +147,10 @@ impl<T: Scalar> Vessels<T> {
     #[inline(always)]
     pub(super) fn weighted<H: Copy + Mul<f64, Output = H>>(
         &self,
-        from: &Levels<T>,
+        from: &Levels<T, N>,
         h: H,
-        [k1, k2, k3, k4]: [&Levels<T>; 4],
-    ) -> Levels<T>
+        [k1, k2, k3, k4]: [&Levels<T, N>; 4],
+    ) -> Levels<T, N>
     where
         T: Mul<H, Output = T>,
     {

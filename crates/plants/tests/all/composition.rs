@@ -129,7 +129,8 @@ fn what_cannot_be_is_refused() {
         tank.with(at("sqrt_outflow", 0)),
         Err(Error::EffectDoesNotApply {
             effect: "sqrt_outflow",
-            plant: "single-tank"
+            plant: "single-tank",
+            why: "whose outflow follows another law",
         })
     );
     assert_eq!(

@@ -49,7 +49,13 @@ fn disagreement(
             let rate = |(a, b): (&f64, &f64)| (a - b) / (2.0 * share * scale);
             up.iter().zip(&down).map(rate).collect::<Vec<f64>>()
         };
-        let mut tried = vec![difference(1e-5), difference(1e-6)];
+        // Where joined tanks cut a step hangs on their heads, and the output moves by some 1e-11 where the cut does.
+        let longer = if case.structure.plant.joined() {
+            10.0
+        } else {
+            1.0
+        };
+        let mut tried = vec![difference(1e-5 * longer), difference(1e-6 * longer)];
         let least = (floor * reading / scale).max(1e-12);
         let largest = exact.iter().fold(least, |m, y| m.max(y.eps[lane].abs()));
         let disagree = |tried: &[Vec<f64>]| {
@@ -64,7 +70,7 @@ fn disagreement(
         };
         let mut error = disagree(&tried);
         if error > 1e-6 {
-            tried.push(difference(3e-6));
+            tried.push(difference(3e-6 * longer));
             error = disagree(&tried);
         }
         if error > worst.0 {
@@ -151,7 +157,8 @@ fn pairs_and_triples_have_the_derivatives_of_their_output() {
 #[test]
 fn vessels_that_are_over_within_a_step_have_the_derivatives_of_their_output() {
     let mut failures = Vec::new();
-    for plant in Plant::ALL {
+    // Of joined tanks joined.rs has the fast ones.
+    for plant in Plant::ALL.into_iter().filter(|plant| !plant.joined()) {
         for vessel in 0..plant.vessels() {
             for ratio in [1.6, 4.5, 11.0, 45.0] {
                 let case = fast(plant, vessel, ratio);

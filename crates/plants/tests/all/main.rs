@@ -6,6 +6,7 @@ mod closed_loop;
 mod composition;
 mod derivatives;
 mod fast_vessels;
+mod joined;
 mod lags;
 mod reference;
 mod robustness;

@@ -218,7 +218,7 @@ proptest! {
         seed in 0..100_000_u64,
         size in 0..6_usize,
         shares in proptest::collection::vec(prop_oneof![1 => Just(0.0), 1 => Just(1.0), 6 => 0.0..1.0_f64], 16),
-        levels in proptest::collection::vec(prop_oneof![Just(0.0), 0.0..40.0_f64], 4),
+        levels in proptest::collection::vec(prop_oneof![Just(0.0), 0.0..40.0_f64], 6),
         input in proptest::collection::vec(command(3.0), 40),
         substeps in 1..4_usize,
     ) {
@@ -333,7 +333,7 @@ fn a_record_around_zero_has_no_operating_level_to_divide_by() {
     ] {
         for id in ["area_varies", "sqrt_outflow"] {
             let mut case = base(plant);
-            case.structure.scales.operating_level = [0.0; 2];
+            case.structure.scales.operating_level = [0.0; 3];
             let placed = plants::Placed {
                 effect: effect(id),
                 vessel: 0,

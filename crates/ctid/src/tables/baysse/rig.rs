@@ -146,7 +146,7 @@ impl Rig {
 
     fn structure(&self) -> Result<Structure, Error> {
         let known = Known {
-            area: [Some(self.area), None],
+            area: [Some(self.area), None, None],
             ..Known::default()
         };
         let scales = Scales::from_ranges(
@@ -197,6 +197,7 @@ impl Rig {
             name: "emulated rig".to_owned(),
             time: (0..r.len()).map(|k| k as f64 * STEP).collect(),
             input: Signal::new("u", "V", u),
+            input_2: None,
             output: Signal::new("y", "cm", y),
             reference: Some(Signal::new("r", "cm", r)),
             hold: Hold::Zero,

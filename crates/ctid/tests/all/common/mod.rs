@@ -290,7 +290,11 @@ impl Tanks {
     /// Commands and readings, one each for every sample.
     pub fn run(&self) -> (Vec<f64>, Vec<f64>) {
         let known = Known {
-            area: [Some(154.0), (self.plant.vessels() > 1).then_some(154.0)],
+            area: [
+                Some(154.0),
+                (self.plant.vessels() > 1).then_some(154.0),
+                None,
+            ],
             ..Known::default()
         };
         let duration = INTERVAL * self.rows as f64;

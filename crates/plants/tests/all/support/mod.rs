@@ -30,31 +30,47 @@ pub fn effect(id: &str) -> &'static plants::EffectInfo {
 /// A plant whose levels stay between about 4 and 20 for commands between 3.5 and 6.5, with `h/tau` near 0.03.
 pub fn base(plant: Plant) -> Case {
     let (theta, levels, area, flow, h): (Vec<f64>, Vec<f64>, _, f64, f64) = match plant {
-        Plant::SingleTank => (vec![9.0, 13.0], vec![11.0], [Some(154.0), None], 45.0, 3.0),
+        Plant::SingleTank => (
+            vec![9.0, 13.0],
+            vec![11.0],
+            [Some(154.0), None, None],
+            45.0,
+            3.0,
+        ),
         Plant::CascadedTanks => (
             vec![3.3, 5.0, 4.6],
             vec![9.5, 12.0],
-            [Some(28.0), Some(32.0)],
+            [Some(28.0), Some(32.0), None],
             16.5,
             1.5,
         ),
-        Plant::SingleTankLinear => (vec![2.0, 80.0, 1.5], vec![11.0], [None; 2], 10.0, 3.0),
+        Plant::SingleTankLinear => (vec![2.0, 80.0, 1.5], vec![11.0], [None; 3], 10.0, 3.0),
         Plant::CascadedTanksLinear => (
             vec![2.0, 60.0, 90.0, 1.5],
             vec![9.5, 12.0],
-            [None; 2],
+            [None; 3],
             10.0,
             3.0,
         ),
-        Plant::FirstOrder => (vec![2.2, 80.0], vec![11.0], [None; 2], 11.0, 3.0),
+        Plant::FirstOrder => (vec![2.2, 80.0], vec![11.0], [None; 3], 11.0, 3.0),
+        // T3 is measured; the heads stay a few centimetres either way.
+        Plant::ThreeTank => (
+            vec![3.4, 3.1, 9.1, 8.7, 12.0],
+            vec![15.0, 11.5, 8.2],
+            [Some(122.0), Some(128.0), Some(120.0)],
+            31.0,
+            1.0,
+        ),
     };
     let known = Known {
         area,
+        measured: plant.joined().then_some(1),
         ..Known::default()
     };
     let mut scales = Scales::from_ranges((3.5, 6.5), (6.0, 17.0), h, 400.0 * h);
     scales.input_range = 10.0;
-    scales.operating_level = [10.0, 11.0];
+    scales.operating_level = [10.0, 11.0, 9.0];
+    scales.input_2 = Some((3.5, 6.5));
     scales.flow = flow;
     Case {
         structure: Structure::new(plant, known, scales),
@@ -236,6 +252,15 @@ impl Case {
     }
 }
 
+/// What a second pump is told while the first one is told this.
+pub fn mirrored(command: Command) -> Command {
+    let mirror = |u: f64| 9.8 - u;
+    Command {
+        from: mirror(command.from),
+        to: command.to.map(mirror),
+    }
+}
+
 /// One reading before each command.
 pub fn simulate<T: Scalar>(
     structure: &Structure,
@@ -245,13 +270,15 @@ pub fn simulate<T: Scalar>(
     input: &[(Command, f64)],
     substeps: usize,
 ) -> Vec<T> {
-    let mut simulator = Simulator::new(structure, theta, levels, at_rest).expect("counts");
+    let second = mirrored(Command::held(at_rest)).from;
+    let at_rest = [at_rest, second];
+    let mut simulator = Simulator::with_inputs(structure, theta, levels, at_rest).expect("counts");
     simulator.set_substeps(substeps);
     input
         .iter()
         .map(|&(command, h)| {
             let y = simulator.read();
-            simulator.advance(command, h);
+            simulator.advance_both([command, mirrored(command)], h);
             y
         })
         .collect()

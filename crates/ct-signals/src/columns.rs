@@ -148,6 +148,8 @@ impl Columns {
         Self {
             time: guess(&TIME),
             input: guess(&INPUT),
+            // A second command is one only where it is named.
+            input_2: None,
             output: guess(&OUTPUT),
             reference: guess(&REFERENCE),
         }

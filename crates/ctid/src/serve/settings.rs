@@ -24,6 +24,12 @@ struct Known {
     area: Option<f64>,
     area_upper: Option<f64>,
     area_lower: Option<f64>,
+    area_1: Option<f64>,
+    area_2: Option<f64>,
+    area_3: Option<f64>,
+    pipe_area: Option<f64>,
+    gravity: Option<f64>,
+    measured: Option<String>,
     tank_height: Option<f64>,
     input_range: Option<f64>,
 }
@@ -70,16 +76,24 @@ impl Settings {
         let columns = [
             ("time", word(self.columns.time)),
             ("input", word(self.columns.input)),
+            ("input_2", word(self.columns.input_2)),
             ("output", word(self.columns.output)),
             ("reference", word(self.columns.reference)),
         ];
         section(&mut document, file, "columns", columns)?;
+        let number = |value: Option<f64>| value.map(Value::from);
         let known = [
-            ("area", self.known.area.map(Value::from)),
-            ("area_upper", self.known.area_upper.map(Value::from)),
-            ("area_lower", self.known.area_lower.map(Value::from)),
-            ("tank_height", self.known.tank_height.map(Value::from)),
-            ("input_range", self.known.input_range.map(Value::from)),
+            ("measured", word(self.known.measured)),
+            ("area", number(self.known.area)),
+            ("area_upper", number(self.known.area_upper)),
+            ("area_lower", number(self.known.area_lower)),
+            ("area_1", number(self.known.area_1)),
+            ("area_2", number(self.known.area_2)),
+            ("area_3", number(self.known.area_3)),
+            ("pipe_area", number(self.known.pipe_area)),
+            ("gravity", number(self.known.gravity)),
+            ("tank_height", number(self.known.tank_height)),
+            ("input_range", number(self.known.input_range)),
         ];
         section(&mut document, file, "known", known)?;
         match self.controller {
@@ -91,13 +105,13 @@ impl Settings {
                     |list: Option<Vec<f64>>| list.map(|l| Value::Array(l.into_iter().collect()));
                 let entries = [
                     ("type", word(Some(controller.kind))),
-                    ("gain", controller.gain.map(Value::from)),
-                    ("integral_time", controller.integral_time.map(Value::from)),
+                    ("gain", number(controller.gain)),
+                    ("integral_time", number(controller.integral_time)),
                     ("variable", word(controller.variable)),
                     ("r", list(controller.r)),
                     ("s", list(controller.s)),
-                    ("u_min", controller.u_min.map(Value::from)),
-                    ("u_max", controller.u_max.map(Value::from)),
+                    ("u_min", number(controller.u_min)),
+                    ("u_max", number(controller.u_max)),
                 ];
                 section(&mut document, file, "controller", entries)?;
             }
@@ -219,6 +233,28 @@ rim = 20.0
             text.starts_with("plant = \"cascaded-tanks\"\neffects = []\n"),
             "{text}"
         );
+        assert_eq!(Settings::of(&text), settings);
+    }
+
+    #[test]
+    fn three_tanks_are_written_as_they_are_read() {
+        let settings = Settings {
+            plant: "three-tank".into(),
+            columns: Columns {
+                input: Some("u1 [V]".into()),
+                input_2: Some("u2 [V]".into()),
+                ..Columns::default()
+            },
+            known: Known {
+                area: Some(154.0),
+                pipe_area: Some(0.5),
+                gravity: Some(981.0),
+                measured: Some("T3".into()),
+                ..Known::default()
+            },
+            ..Settings::default()
+        };
+        let text = settings.clone().into_text("m.toml", "").unwrap().text;
         assert_eq!(Settings::of(&text), settings);
     }
 

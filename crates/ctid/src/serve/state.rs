@@ -2,7 +2,7 @@
 
 use ct_signals::{Columns, Record};
 use missing_effect::numbers;
-use plants::{CATALOGUE, Outlet, Place, Placed, Plant};
+use plants::{CATALOGUE, Outlet, Placed, Plant};
 use serde_json::{Value, json};
 
 use super::session::{Fitted, Found, Session, lock, same};
@@ -68,6 +68,7 @@ pub(super) fn state(session: &mut Session) -> Value {
         "file": session.file.as_ref().map(|path| path.display().to_string()),
         "text": session.text,
         "model_error": error,
+        "pumps": model.as_ref().map_or(1, |model| model.plant.pumps()),
         "settings": Settings::of(&session.text),
         "effects": words::effects(session),
         "records": records,
@@ -113,7 +114,7 @@ fn about(record: &Record) -> Value {
 fn effects_of(model: &crate::model_file::ModelFile) -> Vec<(String, Option<&'static str>)> {
     let placed = model.effects.iter();
     placed
-        .map(|placed| (placed.effect.id.to_string(), vessel_of(model.plant, placed)))
+        .map(|placed| (placed.effect.id.to_string(), placed.place_name(model.plant)))
         .collect()
 }
 
@@ -149,8 +150,9 @@ pub(super) fn plants() -> Value {
     let plants = Plant::ALL.into_iter().map(|plant| {
         json!({
             "id": plant.id(),
-            "vessels": plant.vessels(),
-            "has_area": plant.outlet() == Outlet::Torricelli,
+            "known": known_of(plant),
+            "pumps": plant.pumps(),
+            "measured": if plant.joined() { vessel_names(plant) } else { Vec::new() },
             "model": equation(plant),
             "effects": sites(plant),
         })
@@ -158,21 +160,34 @@ pub(super) fn plants() -> Value {
     plants.collect()
 }
 
+/// What may be known of a plant, by its keys in the model file.
+fn known_of(plant: Plant) -> Vec<&'static str> {
+    let areas: &[&str] = match (plant.outlet(), plant.vessels()) {
+        (Outlet::Torricelli, 1) => &["area"],
+        (Outlet::Torricelli, 2) => &["area_upper", "area_lower"],
+        (Outlet::Torricelli, _) => &["area", "area_1", "area_2", "area_3", "pipe_area", "gravity"],
+        _ => &[],
+    };
+    [areas, &["tank_height", "input_range"]].concat()
+}
+
+/// The vessels of a plant that has several, in the order of their names.
+fn vessel_names(plant: Plant) -> Vec<&'static str> {
+    let mut names: Vec<_> = (0..plant.vessels())
+        .filter_map(|i| plant.vessel_name(i))
+        .collect();
+    names.sort_unstable();
+    names
+}
+
 /// Every effect of the catalogue at every place where it can act on a plant.
 fn sites(plant: Plant) -> Vec<Value> {
     let sites = CATALOGUE.iter().flat_map(|effect| {
         effect
             .sites(plant)
-            .map(move |vessel| json!({ "effect": effect.id, "place": vessel_of(plant, &Placed { effect, vessel }) }))
+            .map(move |vessel| json!({ "effect": effect.id, "place": Placed { effect, vessel }.place_name(plant) }))
     });
     sites.collect()
-}
-
-/// The name of the vessel that an effect acts in, where there are several.
-pub(super) fn vessel_of(plant: Plant, placed: &Placed) -> Option<&'static str> {
-    (placed.effect.place == Place::Vessel)
-        .then(|| plant.vessel_name(placed.vessel))
-        .flatten()
 }
 
 fn equation(plant: Plant) -> &'static str {
@@ -182,5 +197,8 @@ fn equation(plant: Plant) -> &'static str {
         Plant::CascadedTanks => "two square-root tanks in series; the lower level is measured",
         Plant::CascadedTanksLinear => "two lags in series",
         Plant::FirstOrder => "tau·dy/dt + y = K·u",
+        Plant::ThreeTank => {
+            "tanks T1, T3, T2 in a row, joined by valves; an outlet at T2, pumps into T1 and T2"
+        }
     }
 }

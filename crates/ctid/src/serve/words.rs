@@ -6,7 +6,6 @@ use plants::EffectInfo;
 use serde_json::{Value, json, value::RawValue};
 
 use super::session::{Found, Session};
-use super::state::vessel_of;
 use crate::findings;
 use crate::report;
 
@@ -198,7 +197,7 @@ pub(super) fn effects(session: &Session) -> Vec<Value> {
         return Vec::new();
     };
     let placed = model.effects.iter().map(|placed| {
-        let vessel = vessel_of(model.plant, placed);
+        let vessel = placed.place_name(model.plant);
         json!({ "effect": placed.effect.id, "place": vessel, "physics": placed.effect.physics })
     });
     let terms = model.terms.iter().map(

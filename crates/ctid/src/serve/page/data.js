@@ -2,7 +2,9 @@
 import { $, button, fill, make } from "./dom.js";
 import * as server from "./server.js";
 
-const ROLES = [["time", "Time"], ["input", "Command u"], ["output", "Reading y"], ["reference", "Reference r"]];
+const ROLES = [["time", "Time"], ["input", "Command u"], ["input_2", "Command of pump 2"], ["output", "Reading y"], ["reference", "Reference r"]];
+// Without these columns a record is one.
+const OPTIONAL = { reference: "none", input_2: "none: it is off" };
 
 /** Takes dropped files: a model file is taken for the model, everything else for a record. */
 async function take(files, heldOut, fail) {
@@ -65,7 +67,7 @@ function meant(headings, named) {
 function field(role, title, headings, named, guess) {
   const found = named ? meant(headings, named) : headings.find((h) => h.header === guess);
   const select = make("select", { id: `column-${role}` },
-    make("option", { value: "" }, role === "reference" ? "none" : "choose…"),
+    make("option", { value: "" }, OPTIONAL[role] || "choose…"),
     headings.map((h) => make("option", { value: h.header, selected: found === h }, h.header)));
   const ours = found && found.unit ? found.unit : split(named)[1];
   const input = make("input", { id: `unit-${role}`, value: ours, size: 6, disabled: !found || Boolean(found.unit), placeholder: role === "time" ? "s" : "unit", autocomplete: "off" });
@@ -98,7 +100,9 @@ export function show(state, fail) {
   $("drop-how").textContent = fitted ? "fitted together with the first" : "or choose one: time, command and reading, with a header";
   if (!state.headings || $("columns").contains(document.activeElement)) return;
   const { columns: named, hold: kind } = state.settings;
-  fill($("column-fields"), ROLES.flatMap(([role, title]) => field(role, title, state.headings, named[role], state.guessed[role])));
+  // Two pumps have the plants that say so.
+  const roles = ROLES.filter(([role]) => role !== "input_2" || state.pumps > 1);
+  fill($("column-fields"), roles.flatMap(([role, title]) => field(role, title, state.headings, named[role], state.guessed[role])));
   $("hold").value = kind;
   if (state.records.some((one) => one.error)) $("columns").open = true;
 }

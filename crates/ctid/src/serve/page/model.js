@@ -10,8 +10,11 @@ let draft = false;
 let written = "";
 
 const KNOWN = {
-  area: "Area", area_upper: "Area of the upper tank", area_lower: "Area of the lower tank", tank_height: "Height of the tank", input_range: "Full range of the command",
+  area: "Area", area_upper: "Area of the upper tank", area_lower: "Area of the lower tank", area_1: "Area of T1", area_2: "Area of T2", area_3: "Area of T3",
+  pipe_area: "Cross-section of the pipes", gravity: "Gravity", tank_height: "Height of the tank", input_range: "Full range of the command",
 };
+// Of three tanks each has its own area only where they are not alike.
+const ALIKE = "Area of each tank, where alike";
 const LAWS = {
   PI: [["gain", "Gain"], ["integral_time", "Integral time [s]"]],
   RS: [["r", "R, powers of the delay"], ["s", "S, powers of the delay"]],
@@ -57,9 +60,45 @@ function controller() {
 }
 
 function settings() {
+  const chosen = plant($("plant").value);
   const known = {};
-  for (const [key, label] of Object.entries(KNOWN)) known[key] = number(`known-${key}`, label);
-  return { plant: $("plant").value, hold: data.hold(), columns: data.columns(), known, controller: controller() };
+  // What another plant's form said is nothing of this one.
+  for (const key of chosen.known) known[key] = number(`known-${key}`, KNOWN[key]);
+  if (chosen.measured.length && $("known-measured")) known.measured = $("known-measured").value || null;
+  const columns = data.columns();
+  if (chosen.pumps < 2) delete columns.input_2;
+  return { plant: chosen.id, hold: data.hold(), columns, known, controller: controller() };
+}
+
+/** The fields of what may be known of a plant. */
+function knownFields(known, state) {
+  const read = state.records.find((one) => one.read)?.read;
+  const [level, command] = [read?.output.unit || "", read?.input.unit || ""];
+  const units = { tank_height: level, input_range: command, gravity: level ? `${level}/s^2` : "" };
+  const square = level ? `${level}^2` : "";
+  const values = state.settings.known;
+  const label = (key) => (key === "area" && known.measured.length ? ALIKE : KNOWN[key]);
+  const measured = known.measured.length ? [make("label", { htmlFor: "known-measured" }, "The reading is the level of"),
+    make("select", { id: "known-measured" }, make("option", { value: "" }, "choose…"),
+      known.measured.map((name) => make("option", { value: name, selected: values.measured === name }, name)))] : [];
+  fill($("known-fields"), measured, known.known.flatMap((key) => input(`known-${key}`, label(key), values[key], units[key] ?? square)));
+}
+
+/** Another plant: one of which more has to be said waits for that. */
+function chosen() {
+  const known = plant($("plant").value);
+  const state = server.current();
+  if (!known || !known.measured.length || state.settings.known.measured) {
+    changed();
+    return;
+  }
+  draft = true;
+  $("known").hidden = false;
+  $("equation").textContent = known.model;
+  knownFields(known, state);
+  $("known").open = true;
+  $("known-measured").focus();
+  trouble(null);
 }
 
 /** Sends the form. Columns are said to the model only where they differ from what is guessed, or stand there already. */
@@ -94,7 +133,7 @@ function laws(settings) {
 export function start(known) {
   plants = known;
   fill($("plant"), make("option", { value: "" }, "choose a plant…"), plants.map((one) => make("option", { value: one.id }, one.id)));
-  $("plant").addEventListener("change", changed);
+  $("plant").addEventListener("change", chosen);
   $("known-fields").addEventListener("change", changed);
   $("law").addEventListener("change", () => {
     laws(server.current().settings);
@@ -144,12 +183,7 @@ export function show(state, fail) {
   $("controller").hidden = !known;
   $("equation").textContent = known ? known.model : "";
   if (!known) return;
-  const level = state.records.find((one) => one.read)?.read.output.unit || "";
-  const command = state.records.find((one) => one.read)?.read.input.unit || "";
-  const areas = !known.has_area ? [] : known.vessels > 1 ? ["area_upper", "area_lower"] : ["area"];
-  const units = { tank_height: level, input_range: command };
-  const square = level ? `${level}^2` : "";
-  fill($("known-fields"), [...areas, "tank_height", "input_range"].flatMap((key) => input(`known-${key}`, KNOWN[key], state.settings.known[key], units[key] ?? square)));
+  knownFields(known, state);
   const said = state.settings.controller;
   $("law").value = said ? (said.type === "PI" ? "PI" : said.variable === "p" ? "RSp" : "RS") : "";
   if (said) $("controller").open = true;

@@ -61,6 +61,8 @@ impl Write for Pipe {
 
 /// Serves until the test ends.
 pub fn serve(arguments: &[&str]) -> SocketAddr {
+    // A thread is named like the one that begins it: the pool's are not to be named like one that computes.
+    rayon::broadcast(|_| ());
     let words: Vec<String> = ["ctid", "serve", "--port", "0"]
         .iter()
         .chain(arguments)

@@ -49,13 +49,12 @@ fn disagreement(
             let rate = |(a, b): (&f64, &f64)| (a - b) / (2.0 * share * scale);
             up.iter().zip(&down).map(rate).collect::<Vec<f64>>()
         };
-        // Where joined tanks cut a step hangs on their heads, and the output moves by some 1e-11 where the cut does.
-        let longer = if case.structure.plant.joined() {
-            10.0
-        } else {
-            1.0
-        };
-        let mut tried = vec![difference(1e-5 * longer), difference(1e-6 * longer)];
+        let mut tried = vec![difference(1e-5), difference(1e-6)];
+        if case.structure.plant.joined() {
+            // Where a step is cut hangs on the heads, and the output moves by some 1e-11 with the cut: of that a short difference
+            // makes too much, and a long one is better where there is no corner.
+            tried.push(difference(1e-4));
+        }
         let least = (floor * reading / scale).max(1e-12);
         let largest = exact.iter().fold(least, |m, y| m.max(y.eps[lane].abs()));
         let disagree = |tried: &[Vec<f64>]| {
@@ -70,7 +69,7 @@ fn disagreement(
         };
         let mut error = disagree(&tried);
         if error > 1e-6 {
-            tried.push(difference(3e-6 * longer));
+            tried.push(difference(3e-6));
             error = disagree(&tried);
         }
         if error > worst.0 {

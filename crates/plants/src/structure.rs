@@ -1,5 +1,7 @@
 //! A structure: a plant, what is known of it, and the effects that are on, in chain order.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     Error, ParameterInfo, Plant, Term,
     effects::{self, EffectInfo, Place},
@@ -19,7 +21,7 @@ pub struct Picked {
 }
 
 /// What the data visit: it sets the plausible ranges, the starts and the operating levels.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scales {
     /// Smallest and largest command \[input unit\].
     pub input: (f64, f64),

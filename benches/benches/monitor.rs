@@ -70,7 +70,10 @@ fn benchmark(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("monitor");
     group.throughput(Throughput::Elements(ROWS as u64));
     group.bench_function("simulation with 3 derivatives", |bencher| {
-        let theta = [Dual::<3>::variable(THETA[0], 0), Dual::variable(THETA[1], 1)];
+        let theta = [
+            Dual::<3>::variable(THETA[0], 0),
+            Dual::variable(THETA[1], 1),
+        ];
         let structure = structure();
         bencher.iter(|| {
             let level = [Dual::constant(16.0)];

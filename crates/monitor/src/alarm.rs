@@ -151,12 +151,20 @@ pub(crate) fn alarm(
     alarm
 }
 
+/// An instant \[s\] as it is written, to the millisecond.
+#[must_use]
+pub fn instant(time: f64) -> String {
+    // An instant of more than 1e12 s has no milliseconds left.
+    let rounded = (time * 1e3).round() / 1e3;
+    if time.abs() < 1e12 { rounded } else { time }.to_string()
+}
+
 fn sentence(alarm: &Alarm) -> String {
     let (Some(since), Some(evidence), Some(size)) = (alarm.since, alarm.evidence, &alarm.size)
     else {
         return format!(
             "The model does not fit since about t = {} s or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}).",
-            significant(alarm.time, 6),
+            instant(alarm.time),
             alarm.score,
             alarm.threshold
         );
@@ -187,6 +195,6 @@ fn sentence(alarm: &Alarm) -> String {
         alarm.effects.first().map_or("", String::as_str),
         size.name,
         significant(size.value, 3),
-        significant(since, 6),
+        instant(since),
     )
 }

@@ -33,6 +33,9 @@ const RUN_UP: usize = 1024;
 const SETTLING: f64 = 6.0;
 /// After an alarm it is looked again, so many slowest time constants later; the last time for good.
 const LOOKS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 12.0];
+/// At so many of them the tracker is let go again: the derivatives are those of parameters that stay, and while the change works its way
+/// through the plant they mislead it.
+const LET_GO: usize = 3;
 /// And at least so many rows later.
 const FEWEST: usize = 8;
 
@@ -422,6 +425,16 @@ impl Core {
         self.build();
     }
 
+    /// A checkpoint after which the tracker finds the parameters again: they have jumped.
+    fn let_go(&mut self) {
+        self.settle_checkpoint();
+        if let Some(tracker) = &mut self.now.tracker {
+            tracker.open();
+        }
+        self.set_checkpoint();
+        self.build();
+    }
+
     /// Builds what runs from the present numbers and the kept rows.
     fn build(&mut self) -> Option<()> {
         let from = self.now.kept.len().saturating_sub(RUN_UP);
@@ -489,7 +502,7 @@ impl Core {
                     looks: 0,
                 };
                 let alarm = self.look(Stage::Alarm, score, time);
-                self.settle_checkpoint();
+                self.let_go();
                 alarm
             }
             Phase::Alarmed { score, rows, looks } => {
@@ -503,7 +516,11 @@ impl Core {
                 *looks += 1;
                 if at + 1 < LOOKS.len() {
                     let alarm = self.look(Stage::Update, score, time);
-                    self.settle_checkpoint();
+                    if at < LET_GO {
+                        self.let_go();
+                    } else {
+                        self.settle_checkpoint();
+                    }
                     return alarm;
                 }
                 let alarm = self.look(Stage::Final, score, time);

@@ -25,7 +25,7 @@ use crate::{
 };
 
 /// Effects that begin while a plant runs. What is a plant's shape, a wrong law or a lag does not.
-const BEGIN: [&str; 13] = [
+const BEGIN: [&str; 12] = [
     "stiction_backlash",
     "pump_deadzone",
     "pump_saturation",
@@ -34,7 +34,6 @@ const BEGIN: [&str; 13] = [
     "valve_step",
     "const_leak",
     "leak_at_height",
-    "periodic_disturbance",
     "overflow",
     "sensor_offset",
     "sensor_drift",
@@ -45,6 +44,8 @@ const BEGIN: [&str; 13] = [
 const ONSETS: [f64; 13] = [
     0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0,
 ];
+/// At every such onset the catalogue's starts are tried again.
+const AFRESH: usize = 4;
 /// An onset has at least so many rows behind it.
 const FEWEST: usize = 8;
 /// Rounds in which the way to the neighbouring onsets is halved.
@@ -52,8 +53,8 @@ const HALVINGS: usize = 3;
 /// A drift of the pump is even where its settling takes as long as it may.
 const EVEN: (&str, &str) = ("pump_gain_drift", "time_constant");
 const ROUGH: Stopping = Stopping {
-    evaluations: 12,
-    cost: 1e-4,
+    evaluations: 8,
+    cost: 1e-3,
 };
 const FINE: Stopping = Stopping {
     evaluations: 40,
@@ -183,17 +184,21 @@ impl Search<'_> {
             .collect();
         lengths.dedup();
         let mut best: Option<(Suspect, usize, Vec<f64>)> = None;
-        let mut keep = |found: Option<(Suspect, Vec<f64>)>, length: usize| {
-            if let Some((suspect, x)) = found
-                && best
-                    .as_ref()
-                    .is_none_or(|(known, ..)| suspect.evidence > known.evidence)
+        let mut near: Option<Vec<f64>> = None;
+        for (i, &length) in lengths.iter().enumerate() {
+            // From the catalogue's starts now and then, in between from where the last onset ended.
+            let from = near.take().filter(|_| !i.is_multiple_of(AFRESH));
+            let Some((suspect, x)) = self.fitted((placed, held), length, from.as_deref(), ROUGH)
+            else {
+                continue;
+            };
+            near = Some(x.clone());
+            if best
+                .as_ref()
+                .is_none_or(|(known, ..)| suspect.evidence > known.evidence)
             {
                 best = Some((suspect, length, x));
             }
-        };
-        for &length in &lengths {
-            keep(self.fitted((placed, held), length, None, ROUGH), length);
         }
         let (_, at, _) = best.as_ref()?;
         // Half-way to the next onset on either side, again and again.

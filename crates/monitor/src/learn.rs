@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::intake::Sample;
 
+/// A command that moves by less of itself stands still.
+const STILL: f64 = 1e-9;
+
 /// The believed model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
@@ -162,6 +165,12 @@ pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f
     record
         .require_rows(setup.free().len())
         .map_err(|error| said(&error))?;
+    let (low, high) = record.input_range();
+    if high - low <= STILL * high.abs().max(low.abs()) {
+        return Err(format!(
+            "the command has stood still at {low}, which says nothing about the plant: move it"
+        ));
+    }
     let mut starts = random_starts(&setup, options.starts, options.seed);
     if let (false, Some(first)) = (model.start.is_empty(), starts.first()) {
         let mut guessed = first.clone();

@@ -66,7 +66,7 @@ mod threshold;
 mod tracker;
 mod watch;
 
-pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict};
+pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict, instant};
 pub use error::{Error, Refused};
 pub use learn::Model;
 pub use monitor::{Estimate, Innovation, Monitor, Notice, Progress, Row, State, Step};

@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// Forgetting never raises the variances above so many times the learned ones on average.
 const MOST: f64 = 1e4;
+/// After a jump, standard errors are so many times what they were.
+const JUMP: f64 = 30.0;
 
 /// A tracker in its serialisable form: the deviations and their covariance, both in learned standard errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,6 +40,13 @@ impl TrackerState {
             covariance: (0..n * n)
                 .map(|k| covariance[k] / (error(k / n) * error(k % n)))
                 .collect(),
+        }
+    }
+
+    /// The parameters have jumped: what was known of them counts for little from now on.
+    pub(crate) fn open(&mut self) {
+        for entry in &mut self.covariance {
+            *entry *= JUMP * JUMP;
         }
     }
 }
@@ -100,5 +109,83 @@ impl Tracker {
                 covariance[(i, i)].max(0.0).sqrt() * error,
             )
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+
+    /// Rows of unit noise and two directions, of standard errors 1 and 1 in the learned covariance.
+    fn run(
+        truth: impl Fn(usize) -> [f64; 2],
+        rows: usize,
+        jump: Option<usize>,
+    ) -> (Vec<(f64, f64)>, usize) {
+        let rng = &mut ChaCha8Rng::seed_from_u64(5);
+        let noise = ct_signals::noise::white(3 * rows, 1.0, rng);
+        let mut state = TrackerState::learned(&[1.0, 0.5, 0.5, 1.0]);
+        let tracked = [(0, 1.0), (1, 1.0)];
+        let mut tracker = Tracker::new(&state, &tracked, 400.0).unwrap();
+        let mut held = 0;
+        for k in 0..rows {
+            if jump == Some(k) {
+                state = tracker.state();
+                state.open();
+                tracker = Tracker::new(&state, &tracked, 400.0).unwrap();
+            }
+            let [a, b] = truth(k);
+            let s = [noise[3 * k], noise[3 * k + 1]];
+            tracker.update(
+                &[s[0], s[1], 1.0, s[0] * a + s[1] * b + noise[3 * k + 2]],
+                2.0,
+            );
+            let inside = tracker
+                .estimates()
+                .zip([a, b])
+                .filter(|((x, e), t)| (x - t).abs() < 1.96 * e);
+            held += inside.count();
+        }
+        (tracker.estimates().collect(), held)
+    }
+
+    #[test]
+    fn the_band_holds_what_stays() {
+        let (_, held) = run(|_| [0.3, -0.2], 20_000, None);
+        assert!(held > 38_000, "{held} of 40000");
+    }
+
+    #[test]
+    fn what_drifts_slowly_is_followed_and_what_jumps_at_once() {
+        let (now, _) = run(|k| [1e-4 * k as f64, 0.0], 20_000, None);
+        assert!(
+            (now[0].0 - 2.0).abs() < 0.3 && now[1].0.abs() < 0.3,
+            "{now:?}"
+        );
+        let jumped = |k: usize| if k < 5000 { [0.0, 0.0] } else { [3.0, -1.0] };
+        let (now, _) = run(jumped, 5060, Some(5005));
+        assert!(
+            (now[0].0 - 3.0).abs() < 0.6 && (now[1].0 + 1.0).abs() < 0.6,
+            "{now:?}"
+        );
+        // Not told, it takes a memory, 200 rows.
+        let (now, _) = run(jumped, 5060, None);
+        assert!((now[0].0 - 3.0).abs() > 1.5, "{now:?}");
+    }
+
+    #[test]
+    fn a_state_builds_the_same_tracker() {
+        let state = TrackerState::learned(&[4.0, 1.0, 1.0, 9.0]);
+        let tracker = Tracker::new(&state, &[(0, 2.0), (1, 3.0)], 100.0).unwrap();
+        let again = tracker.state();
+        assert!(
+            again
+                .covariance
+                .iter()
+                .zip(&state.covariance)
+                .all(|(a, b)| (a - b).abs() < 1e-12)
+        );
+        assert!(Tracker::new(&state, &[(0, 2.0)], 100.0).is_none());
     }
 }

@@ -55,7 +55,8 @@ impl Tank {
                 for i in 0..parts {
                     let t = time + h * f64::from(i);
                     let rate = |level: f64| {
-                        (10.0 * command[k] - (self.alpha)(t) * level.sqrt() - (self.leak)(t)) / 154.0
+                        (10.0 * command[k] - (self.alpha)(t) * level.sqrt() - (self.leak)(t))
+                            / 154.0
                     };
                     let middle = level + 0.5 * h * rate(level);
                     level += h * rate(middle);
@@ -93,15 +94,23 @@ fn new() -> Monitor {
 }
 
 fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
-    rows.iter().map(|row| monitor.update(row).unwrap()).collect()
+    rows.iter()
+        .map(|row| monitor.update(row).unwrap())
+        .collect()
 }
 
 fn alarms(steps: &[Step]) -> Vec<&Alarm> {
-    steps.iter().filter_map(|step| step.alarm.as_ref()).collect()
+    steps
+        .iter()
+        .filter_map(|step| step.alarm.as_ref())
+        .collect()
 }
 
 fn notices(steps: &[Step]) -> Vec<&Notice> {
-    steps.iter().flat_map(|step| step.notices.iter().flatten()).collect()
+    steps
+        .iter()
+        .flat_map(|step| step.notices.iter().flatten())
+        .collect()
 }
 
 #[test]
@@ -184,14 +193,16 @@ fn the_estimates_follow_and_their_band_holds() {
             if monitor.rows() > 3000 && monitor.rows().is_multiple_of(1500) {
                 for (estimate, truth) in monitor.estimates().iter().zip([10.0, 12.5]) {
                     looked += 1;
-                    held += usize::from(
-                        (estimate.value - truth).abs() < estimate.half_width.unwrap(),
-                    );
+                    held +=
+                        usize::from((estimate.value - truth).abs() < estimate.half_width.unwrap());
                 }
             }
         }
     }
-    assert!(looked >= 24 && 100 * held >= 85 * looked, "{held} of {looked}");
+    assert!(
+        looked >= 24 && 100 * held >= 85 * looked,
+        "{held} of {looked}"
+    );
 
     let tank = Tank {
         alpha: |t| if t < 4000.0 { 12.5 } else { 12.75 },
@@ -200,15 +211,14 @@ fn the_estimates_follow_and_their_band_holds() {
     let mut monitor = new();
     let rows = tank.run();
     let changed = rows.iter().position(|row| row.time >= 4000.0).unwrap();
-    // Before it is learned anew.
-    all(&mut monitor, &rows[..changed + 550]);
+    // Before it is learned anew: the alarm has let the tracker go.
+    all(&mut monitor, &rows[..changed + 500]);
     let estimates = monitor.estimates();
     assert_eq!(estimates[1].name, "alpha");
     assert_eq!(estimates[1].unit, "cm^2.5/s");
     assert!((estimates[1].learned - 12.5).abs() < 0.1, "{estimates:?}");
-    // One ratio of the two is known well.
-    let ratio = estimates[1].value / estimates[0].value;
-    assert!((ratio - 1.275).abs() < 0.008, "{estimates:?}");
+    assert!((estimates[1].value - 12.75).abs() < 0.1, "{estimates:?}");
+    assert!((estimates[0].value - 10.0).abs() < 0.1, "{estimates:?}");
 }
 
 /// Saved and restored in every phase, by way of text, it goes on bit for bit.
@@ -227,7 +237,10 @@ fn a_restored_monitor_goes_on_as_if_nothing_had_happened() {
     let mut straight = new();
     let steps = all(&mut straight, &rows);
     assert!(!alarms(&steps).is_empty());
-    for cuts in [vec![10, 700, 1500, 2601, 3505, 3600], vec![2048, 4400, 4437, 4460, 4700, 5100, 6900]] {
+    for cuts in [
+        vec![10, 700, 1500, 2601, 3505, 3600],
+        vec![2048, 4400, 4437, 4460, 4700, 5100, 6900],
+    ] {
         let mut monitor = new();
         let mut from = 0;
         for cut in cuts.into_iter().chain([rows.len()]) {
@@ -288,20 +301,46 @@ fn bad_rows_change_nothing() {
         if k % 7 == 3 {
             let time = row.time;
             let refusals = [
-                Row { output: f64::NAN, ..*row },
-                Row { input: f64::INFINITY, ..*row },
-                Row { time: f64::NAN, ..*row },
-                Row { output: 1e200, ..*row },
-                Row { time: time - 2.0, ..*row },
-                Row { time: time - 100.0, ..*row },
+                Row {
+                    output: f64::NAN,
+                    ..*row
+                },
+                Row {
+                    input: f64::INFINITY,
+                    ..*row
+                },
+                Row {
+                    time: f64::NAN,
+                    ..*row
+                },
+                Row {
+                    output: 1e200,
+                    ..*row
+                },
+                Row {
+                    time: time - 2.0,
+                    ..*row
+                },
+                Row {
+                    time: time - 100.0,
+                    ..*row
+                },
             ];
             let columns = refusals.map(|row| monitor.update(&row).unwrap_err().column());
-            assert_eq!(columns, ["output", "input", "time", "output", "time", "time"]);
+            assert_eq!(
+                columns,
+                ["output", "input", "time", "output", "time", "time"]
+            );
         }
         assert_eq!(monitor.update(row).unwrap(), steps[k]);
     }
     let repeated = monitor.update(&rows[1499]).unwrap_err();
-    assert_eq!(repeated, Refused::Repeated { time: rows[1499].time });
+    assert_eq!(
+        repeated,
+        Refused::Repeated {
+            time: rows[1499].time
+        }
+    );
     assert_eq!(monitor.state(), clean.state());
 }
 
@@ -323,8 +362,18 @@ fn gaps_are_said_and_bridged_or_waited_out() {
     assert_eq!(
         gaps,
         [
-            &Notice::Gap { from: 5998.0, to: 6006.0, missing: 3, bridged: true },
-            &Notice::Gap { from: 11998.0, to: 12800.0, missing: 400, bridged: false },
+            &Notice::Gap {
+                from: 5998.0,
+                to: 6006.0,
+                missing: 3,
+                bridged: true
+            },
+            &Notice::Gap {
+                from: 11998.0,
+                to: 12800.0,
+                missing: 400,
+                bridged: false
+            },
         ]
     );
     assert!(alarms(&steps).is_empty(), "{:?}", alarms(&steps));
@@ -333,7 +382,11 @@ fn gaps_are_said_and_bridged_or_waited_out() {
 
 #[test]
 fn another_sampling_interval_is_learned_anew() {
-    let rows = Tank { rows: 7000, ..Tank::default() }.run();
+    let rows = Tank {
+        rows: 7000,
+        ..Tank::default()
+    }
+    .run();
     // From row 2000 on every third row only.
     let kept: Vec<Row> = rows
         .iter()
@@ -380,8 +433,12 @@ fn a_plant_that_is_sampled_much_faster_than_it_moves_is_watched_in_blocks() {
 /// Nothing can be learned while the command stands still; it waits, and does not fill the memory.
 #[test]
 fn a_command_that_stands_still_teaches_nothing() {
-    let mut rows = Tank { rows: 9000, ..Tank::default() }.run();
-    let moved = rows.split_off(5000);
+    let mut rows = Tank {
+        rows: 4000,
+        ..Tank::default()
+    }
+    .run();
+    let moved = rows.split_off(2500);
     let mut monitor = new();
     for (k, row) in rows.iter().enumerate() {
         let still = Row {
@@ -391,12 +448,12 @@ fn a_command_that_stands_still_teaches_nothing() {
         };
         monitor.update(&still).unwrap();
         let state = serde_json::to_string(&monitor.state());
-        if k % 1000 == 999 {
+        if k % 500 == 499 {
             assert!(state.unwrap().len() < 2_000_000);
         }
     }
     let steps = all(&mut monitor, &moved);
-    assert!(steps.len() == 4000);
+    assert!(steps.len() == 1500);
 }
 
 #[test]

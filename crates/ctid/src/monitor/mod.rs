@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
-use ::monitor::{Model, Monitor, Notice, Refused, Row, Settings, State, Units};
+use ::monitor::{Model, Monitor, Notice, Refused, Row, Settings, State, Units, instant};
 use clap::Args;
 use ct_signals::{Columns, Line, Rows};
 
@@ -374,7 +374,7 @@ impl<'a> Session<'a> {
                 missing,
                 bridged,
             } => {
-                let (line, from, to) = (self.line, significant(*from, 8), significant(*to, 8));
+                let (line, from, to) = (self.line, instant(*from), instant(*to));
                 let what = if *bridged {
                     "the command is taken to have been held"
                 } else {
@@ -398,7 +398,7 @@ impl<'a> Session<'a> {
                 "the time steps by {} s instead of {} s since about t = {} s: the noise is another then, and is learned anew",
                 significant(*to, 4),
                 significant(*from, 4),
-                significant(*time, 8)
+                instant(*time)
             ),
             Notice::Learned {
                 rows,

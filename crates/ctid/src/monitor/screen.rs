@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use ::monitor::{Alarm, Estimate, Innovation, Monitor, Progress};
+use ::monitor::{Alarm, Estimate, Innovation, Monitor, Progress, instant};
 use console::Term;
 
 use crate::look::Look;
@@ -60,7 +60,7 @@ impl Screen {
     }
 
     pub(super) fn alarm(&mut self, alarm: &Alarm) {
-        let text = format!("t = {} s: {}", significant(alarm.time, 8), alarm.sentence);
+        let text = format!("t = {} s: {}", instant(alarm.time), alarm.sentence);
         let text = self.look.warning(text);
         self.say(&text);
     }
@@ -88,7 +88,7 @@ impl Screen {
         };
         self.say(&format!(
             "t = {} s: {}; the model {state}",
-            significant(time, 8),
+            instant(time),
             parameters.join(", ")
         ));
     }

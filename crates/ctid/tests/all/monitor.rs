@@ -34,9 +34,7 @@ fn rows(count: usize, leak: usize) -> Vec<[f64; 3]> {
 }
 
 fn text(header: &str, rows: &[[f64; 3]]) -> String {
-    let lines = rows
-        .iter()
-        .map(|[t, u, y]| format!("{t},15,{u},{y:.4}\n"));
+    let lines = rows.iter().map(|[t, u, y]| format!("{t},15,{u},{y:.4}\n"));
     header.to_string() + &lines.collect::<String>()
 }
 
@@ -107,7 +105,11 @@ fn an_alarm_is_a_json_line_and_a_sentence() {
     assert!((gain["value"].as_f64().unwrap() - 10.0).abs() < 0.5);
     let first = outcome.err.lines().next().unwrap();
     assert!(first.contains("\"t [s]\" is the time"), "{first}");
-    assert!(outcome.err.contains("learned from 1000 rows"), "{}", outcome.err);
+    assert!(
+        outcome.err.contains("learned from 1000 rows"),
+        "{}",
+        outcome.err
+    );
     // Without a terminal nothing steers one.
     assert!(!outcome.err.contains('\u{1b}'));
 }
@@ -122,10 +124,21 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
     let lines = text("", &rows);
     let semicolons = lines.replace(',', ";").replace('.', ",");
     for (what, other) in [
-        ("CRLF and a byte-order mark", format!("\u{feff}{}", text(HEADER, &rows).replace('\n', "\r\n"))),
+        (
+            "CRLF and a byte-order mark",
+            format!("\u{feff}{}", text(HEADER, &rows).replace('\n', "\r\n")),
+        ),
         ("decimal commas", HEADER.replace(',', ";") + &semicolons),
-        ("tabs, quotes, comments, blank lines", HEADER.replace(',', "\t") + "# rig 3\n\n" + &lines.replace(",15,", "\t\"15\"\t").replace(',', "\t")),
-        ("the header again", text(HEADER, &rows[..700]) + &text(HEADER, &rows[700..])),
+        (
+            "tabs, quotes, comments, blank lines",
+            HEADER.replace(',', "\t")
+                + "# rig 3\n\n"
+                + &lines.replace(",15,", "\t\"15\"\t").replace(',', "\t"),
+        ),
+        (
+            "the header again",
+            text(HEADER, &rows[..700]) + &text(HEADER, &rows[700..]),
+        ),
     ] {
         let outcome = fed(&place, "", other);
         assert_eq!(outcome.code, Some(0), "{what}: {}", outcome.err);
@@ -134,7 +147,13 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
     let lone = fed(&place, "", &lines);
     assert!(lone.err.starts_with("standard input: no header: the columns are taken as time, reference, command, reading (t, r, u, y)"), "{}", lone.err);
     let three = fed(&place, "", lines.replace(",15,", ","));
-    assert!(three.err.starts_with("standard input: no header: the columns are taken as time, command, reading (t, u, y)"), "{}", three.err);
+    assert!(
+        three.err.starts_with(
+            "standard input: no header: the columns are taken as time, command, reading (t, u, y)"
+        ),
+        "{}",
+        three.err
+    );
     assert_eq!(three.out, lone.out);
     assert_eq!(events(&lone.out).len(), events(&plain.out).len());
 }
@@ -171,7 +190,11 @@ fn bad_rows_are_said_skipped_and_not_flooded_with() {
         assert!(outcome.err.contains(said), "{said}: {}", outcome.err);
     }
     assert!(outcome.err.lines().count() < 40, "{}", outcome.err);
-    assert!(outcome.err.contains("104 of them with something wrong"), "{}", outcome.err);
+    assert!(
+        outcome.err.contains("104 of them with something wrong"),
+        "{}",
+        outcome.err
+    );
 }
 
 #[test]
@@ -190,16 +213,29 @@ fn what_is_no_row_at_all_is_refused() {
     let refused = |bytes: &str, says: &str| {
         let outcome = fed(&place, "", bytes);
         assert_eq!(outcome.code, Some(2), "{}", outcome.err);
-        assert!(outcome.err.contains("error: ") && outcome.err.contains(says), "{}", outcome.err);
+        assert!(
+            outcome.err.contains("error: ") && outcome.err.contains(says),
+            "{}",
+            outcome.err
+        );
         assert_eq!(outcome.out, "");
     };
-    refused("", "standard input is empty; rows such as 0,15,4.5,14.8 (t, r, u, y) are needed");
+    refused(
+        "",
+        "standard input is empty; rows such as 0,15,4.5,14.8 (t, r, u, y) are needed",
+    );
     refused("\n# nothing\n\n", "standard input is empty");
     refused("1,2\n", "2 numbers and no header");
-    refused("time,level\n1,2\n", "no column beginning with \"u\" for the input");
+    refused(
+        "time,level\n1,2\n",
+        "no column beginning with \"u\" for the input",
+    );
     place.write("m.toml", MODEL.replace("single-tank", "single-tonk"));
     refused("0,1,2,3\n", "unknown plant");
-    place.write("m.toml", "plant = \"single-tank\"\neffects = [\"sensor_drift\"]\n");
+    place.write(
+        "m.toml",
+        "plant = \"single-tank\"\neffects = [\"sensor_drift\"]\n",
+    );
     refused("0,1,2,3\n", "ctid remove sensor_drift --model m.toml");
 }
 
@@ -214,9 +250,19 @@ fn a_state_goes_on_where_it_was() {
         let again = if from == 1300 { 1290 } else { from };
         let outcome = fed(&place, "--state s.json", text(HEADER, &rows[again..to]));
         assert_eq!(outcome.code, Some(0), "{}", outcome.err);
-        assert_eq!(outcome.err.contains("goes on from"), from > 0, "{}", outcome.err);
+        assert_eq!(
+            outcome.err.contains("goes on from"),
+            from > 0,
+            "{}",
+            outcome.err
+        );
         let before = "10 rows up to here were seen before";
-        assert_eq!(outcome.err.contains(before), from == 1300, "{}", outcome.err);
+        assert_eq!(
+            outcome.err.contains(before),
+            from == 1300,
+            "{}",
+            outcome.err
+        );
         parts += &outcome.out;
     }
     assert!(!whole.out.is_empty());
@@ -229,13 +275,25 @@ fn a_state_goes_on_where_it_was() {
         assert!(outcome.err.contains(says), "{}", outcome.err);
         assert_eq!(place.snapshot(), kept);
     };
-    refused("--state s.json", "t [s],u [mV],y [mm]\n", "the saved state is in command [V], reading [cm]");
+    refused(
+        "--state s.json",
+        "t [s],u [mV],y [mm]\n",
+        "the saved state is in command [V], reading [cm]",
+    );
     refused("--state m.toml", "0,1,2,3\n", "it is the model file");
     place.write("notes.txt", "mine");
-    refused("--state notes.txt", "0,1,2,3\n", "it is no state that `ctid monitor` wrote");
+    refused(
+        "--state notes.txt",
+        "0,1,2,3\n",
+        "it is no state that `ctid monitor` wrote",
+    );
     refused("--state no/s.json", "0,1,2,3\n", "choose another folder");
     place.write("m.toml", MODEL.replace("154", "155"));
-    refused("--state s.json", "0,1,2,3\n", "the state belongs to another model");
+    refused(
+        "--state s.json",
+        "0,1,2,3\n",
+        "the state belongs to another model",
+    );
 }
 
 /// Interrupted or terminated while no row comes, it saves its state and ends well; killed, it leaves the last state whole.
@@ -259,7 +317,12 @@ fn a_signal_ends_it_with_its_state_saved() {
             .unwrap();
         assert!(kill.success());
         let mut err = String::new();
-        child.stderr.take().unwrap().read_to_string(&mut err).unwrap();
+        child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut err)
+            .unwrap();
         assert_eq!(child.wait().unwrap().code(), code, "{signal}: {err}");
         assert_eq!(place.path("s.json").exists(), code.is_some());
         let left: Vec<_> = place.snapshot().into_keys().collect();
@@ -298,7 +361,9 @@ fn a_closed_pipe_ends_it() {
 fn a_line_without_an_end_is_thrown_away() {
     let place = place();
     let (mut child, mut input) = begun(&place, "");
-    input.write_all(text(HEADER, &rows(1200, 9999)).as_bytes()).unwrap();
+    input
+        .write_all(text(HEADER, &rows(1200, 9999)).as_bytes())
+        .unwrap();
     let before = peak(&child);
     let part = vec![b'7'; 1 << 20];
     for _ in 0..200 {
@@ -308,9 +373,17 @@ fn a_line_without_an_end_is_thrown_away() {
     input.write_all(b"\n").unwrap();
     drop(input);
     let mut err = String::new();
-    child.stderr.take().unwrap().read_to_string(&mut err).unwrap();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut err)
+        .unwrap();
     assert!(child.wait().unwrap().success(), "{err}");
-    assert!(err.contains("row 1202: more than 65536 bytes without an end of line"), "{err}");
+    assert!(
+        err.contains("row 1202: more than 65536 bytes without an end of line"),
+        "{err}"
+    );
     assert!(after < before + 20_000, "{before} kB, then {after} kB");
 }
 
@@ -318,6 +391,9 @@ fn a_line_without_an_end_is_thrown_away() {
 #[cfg(target_os = "linux")]
 fn peak(child: &Child) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-    let line = status.lines().find(|line| line.starts_with("VmHWM")).unwrap();
+    let line = status
+        .lines()
+        .find(|line| line.starts_with("VmHWM"))
+        .unwrap();
     line.split_whitespace().nth(1).unwrap().parse().unwrap()
 }

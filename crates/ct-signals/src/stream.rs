@@ -157,6 +157,12 @@ impl Rows {
         Ok((rows, false))
     }
 
+    /// Whether a header has named the columns.
+    #[must_use]
+    pub fn has_header(&self) -> bool {
+        self.header.is_some()
+    }
+
     /// The header of time, input or output.
     #[must_use]
     pub fn name(&self, role: &str) -> &str {

@@ -225,12 +225,13 @@ impl Core {
     }
 
     pub(crate) fn feed(&mut self, sample: Sample) -> Fed {
-        self.since.push(sample);
         match sample.follows {
             Follows::On => {}
             Follows::Interval => self.begin(1),
             Follows::Gap => self.resume(&sample),
         }
+        // Behind a checkpoint that a new beginning has set: the sample belongs to what follows it.
+        self.since.push(sample);
         match self.now.phase {
             Phase::Learning { next } => self.gather(sample, next),
             _ => self.watch(sample),
@@ -274,7 +275,6 @@ impl Core {
                 if !self.now.kept.is_empty() || self.now.learned.is_some() {
                     let every = self.now.every;
                     self.begin(every);
-                    self.since.push(*sample);
                 }
             }
         }

@@ -209,7 +209,7 @@ impl Search<'_> {
         for _ in 0..HALVINGS {
             gap = (gap.0 / 2, gap.1 / 2);
             let (_, at, x) = best.clone()?;
-            for length in [at - gap.0, at + gap.1] {
+            for length in [at.saturating_sub(gap.0), at + gap.1] {
                 if length != at
                     && (FEWEST..=n).contains(&length)
                     && let Some(found) = self.fitted((placed, held), length, Some(&x), ROUGH)

@@ -231,15 +231,17 @@ fn a_restored_monitor_goes_on_as_if_nothing_had_happened() {
         ..Tank::default()
     };
     let mut rows = tank.run();
-    // A short and a long gap.
+    // A short and a long gap, and another interval at the end.
     rows.drain(2600..2602);
     rows.drain(3500..3560);
+    let kept = rows.split_off(6200);
+    rows.extend(kept.into_iter().step_by(2));
     let mut straight = new();
     let steps = all(&mut straight, &rows);
     assert!(!alarms(&steps).is_empty());
     for cuts in [
         vec![10, 700, 1500, 2601, 3505, 3600],
-        vec![2048, 4400, 4437, 4460, 4700, 5100, 6900],
+        vec![2048, 4400, 4437, 4460, 4700, 5100, 6221, 6400],
     ] {
         let mut monitor = new();
         let mut from = 0;

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use ::monitor::{Model, Monitor, Notice, Refused, Row, Settings, State, Units, instant};
 use clap::Args;
-use ct_signals::{Columns, Line, Rows};
+use ct_signals::{BadLine, Columns, Line, Rows};
 
 use crate::look::Look;
 use crate::model_file::{self, ModelFile};
@@ -26,6 +26,8 @@ use trouble::Trouble;
 
 /// What the rows are called in messages.
 const INPUT: &str = "standard input";
+/// So many lines at the beginning may be parts of rows.
+const PARTS: usize = 2;
 /// How often the state is saved.
 const SAVED_EVERY: Duration = Duration::from_secs(60);
 
@@ -120,6 +122,8 @@ struct Session<'a> {
     /// The monitor goes on from a saved state.
     restored: bool,
     rows: Option<Rows>,
+    /// Lines before the first row that were none.
+    parts: usize,
     line: u64,
     trouble: Trouble,
     /// Rows that a restored monitor has seen before, at the beginning.
@@ -170,6 +174,7 @@ impl<'a> Session<'a> {
             monitor,
             restored,
             rows: None,
+            parts: 0,
             line: 0,
             trouble: Trouble::default(),
             seen_before: 0,
@@ -206,6 +211,16 @@ impl<'a> Session<'a> {
                 input,
                 output,
             }),
+            Err(BadLine::Fields { .. })
+                if self.taken <= 1 && !self.restored && !rows.has_header() =>
+            {
+                // Who listens to a running line hears the end of a row first.
+                self.bad(|| "the row before was not whole".to_string());
+                self.rows = None;
+                self.taken = 0;
+                self.line -= 1;
+                self.line(Cut::Line(line))
+            }
             Err(bad) => {
                 self.bad(|| bad.to_string());
                 Ok(())
@@ -216,15 +231,21 @@ impl<'a> Session<'a> {
     /// The first line that says something; whether it is a row.
     fn first(&mut self, line: &[u8]) -> Result<bool, Error> {
         let Ok(text) = std::str::from_utf8(line) else {
-            self.bad(|| ct_signals::BadLine::NotText.to_string());
+            self.bad(|| BadLine::NotText.to_string());
             return Ok(false);
         };
         let said = text.trim_start_matches('\u{feff}').trim();
         if said.is_empty() || said.starts_with('#') {
             return Ok(false);
         }
-        let (rows, is_row) =
-            Rows::begin(INPUT, self.line, text, &self.columns)?;
+        let (rows, is_row) = match Rows::begin(INPUT, self.line, text, &self.columns) {
+            Err(ct_signals::Error::NoOrder { found, .. }) if self.parts < PARTS => {
+                self.parts += 1;
+                self.bad(|| format!("{found} numbers and no header; if this is no part of a row, give t,u,y or t,r,u,y"));
+                return Ok(false);
+            }
+            begun => begun?,
+        };
         self.screen.say(&format!("{INPUT}: {}", rows.order()));
         let [input, output] = rows.units();
         let units = Units {
@@ -446,7 +467,7 @@ impl<'a> Session<'a> {
     }
 
     fn end(&mut self, why: &str) -> Result<(), Error> {
-        if self.rows.is_none() && why != "stopped" {
+        if self.rows.is_none() && self.parts == 0 && why != "stopped" {
             return Err(Error::Usage(format!(
                 "{INPUT} is empty; rows such as 0,15,4.5,14.8 (t, r, u, y) are needed, with a header or without"
             )));

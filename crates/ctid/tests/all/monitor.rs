@@ -197,6 +197,24 @@ fn bad_rows_are_said_skipped_and_not_flooded_with() {
     );
 }
 
+/// Who listens to a running line hears the end of a row first.
+#[test]
+fn a_stream_may_begin_in_the_middle_of_a_row() {
+    let place = place();
+    let lines = text("", &rows(1100, 9999));
+    for part in ["5,4.5,14.8\n", ".5,14.8\n", "8\n"] {
+        let outcome = fed(&place, "", part.to_string() + &lines);
+        assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+        assert!(outcome.err.contains("t, r, u, y"), "{}", outcome.err);
+        assert!(outcome.err.contains("learned from"), "{}", outcome.err);
+        assert!(
+            outcome.err.contains("1 of them with something wrong"),
+            "{}",
+            outcome.err
+        );
+    }
+}
+
 #[test]
 fn a_gap_is_said_with_its_row() {
     let mut rows = rows(1500, 9999);
@@ -225,7 +243,7 @@ fn what_is_no_row_at_all_is_refused() {
         "standard input is empty; rows such as 0,15,4.5,14.8 (t, r, u, y) are needed",
     );
     refused("\n# nothing\n\n", "standard input is empty");
-    refused("1,2\n", "2 numbers and no header");
+    refused("1,2\n1,2\n1,2\n", "2 numbers and no header");
     refused(
         "time,level\n1,2\n",
         "no column beginning with \"u\" for the input",

@@ -41,14 +41,6 @@ pub(crate) struct Bank {
     c: Vec<f64>,
 }
 
-/// A score.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Score {
-    pub value: f64,
-    /// Length of its window \[rows\].
-    pub window: f64,
-}
-
 impl Bank {
     pub(crate) fn new(time_constant: f64, parameters: usize) -> Self {
         let lengths = windows(time_constant).to_vec();
@@ -105,23 +97,17 @@ impl Bank {
         passed
     }
 
-    /// The largest score, by magnitude.
-    pub(crate) fn largest(&self, covariance: &[f64]) -> Score {
-        let (p, q) = (self.parameters, self.directions);
-        let mut largest = Score {
-            value: 0.0,
-            window: 0.0,
-        };
-        for (w, &window) in self.lengths.iter().enumerate() {
-            for cell in w * q..(w + 1) * q {
-                let variance = self.v[cell] + quadratic(&self.c[cell * p..][..p], covariance);
-                let value = self.z[cell] / variance.sqrt();
-                if value.abs() > f64::abs(largest.value) {
-                    largest = Score { value, window };
-                }
-            }
-        }
-        largest
+    /// The largest magnitude of a score.
+    pub(crate) fn largest(&self, covariance: &[f64]) -> f64 {
+        let p = self.parameters;
+        let cells = self.z.iter().zip(&self.v).enumerate();
+        cells
+            .map(|(cell, (z, v))| {
+                let variance = v + quadratic(&self.c[cell * p..][..p], covariance);
+                z.abs() / variance.sqrt()
+            })
+            // Where nothing has been seen yet there is no score.
+            .fold(0.0, f64::max)
     }
 }
 

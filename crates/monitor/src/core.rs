@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     Alarm, Model, Notice, Settings, Stage, Units,
     alarm::alarm,
-    bank::{Bank, Score, windows},
+    bank::{Bank, windows},
     intake::{Follows, Sample},
     isolate::{Kept, isolate},
     learn::{Learned, learn, record},
@@ -219,7 +219,7 @@ impl Core {
     }
 
     /// The largest score and the threshold.
-    pub(crate) fn score(&self) -> Option<(Score, f64)> {
+    pub(crate) fn score(&self) -> Option<(f64, f64)> {
         let (bank, running) = (self.now.bank.as_ref()?, self.running.as_ref()?);
         Some((bank.largest(&running.covariance), running.threshold))
     }
@@ -495,7 +495,7 @@ impl Core {
     fn judge(&mut self, passed: bool, time: f64) -> Option<Alarm> {
         match &mut self.now.phase {
             Phase::Watching if passed => {
-                let score = self.score()?.0.value.abs();
+                let score = self.score()?.0;
                 self.now.phase = Phase::Alarmed {
                     score,
                     rows: 0,

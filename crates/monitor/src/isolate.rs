@@ -48,8 +48,6 @@ const ONSETS: [f64; 13] = [
 const AFRESH: usize = 4;
 /// An onset has at least so many rows behind it.
 const FEWEST: usize = 8;
-/// Rounds in which the way to the neighbouring onsets is halved.
-const HALVINGS: usize = 3;
 /// A drift of the pump is even where its settling takes as long as it may.
 const EVEN: (&str, &str) = ("pump_gain_drift", "time_constant");
 const ROUGH: Stopping = Stopping {
@@ -60,8 +58,10 @@ const FINE: Stopping = Stopping {
     evaluations: 40,
     cost: 1e-8,
 };
-/// What is left is more than noise where its mean square lies so many standard errors above it.
+/// What is left is more than noise where its squares lie so many standard errors above those of the noise ...
 const BEYOND: f64 = 4.0;
+/// ... and are more than this share of what was above the noise before: no learned model is exact, and beside a large effect its errors show.
+const LEFT: f64 = 0.1;
 
 /// A row that is kept, with what the learned model said of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -84,15 +84,18 @@ pub(crate) struct Suspect {
     pub size: (&'static str, f64, Unit),
     /// The size lies inside its plausible range.
     pub plausible: bool,
-    /// Whitened squares that it leaves from its onset on, in the noise's variance, and rows there.
-    left: (f64, usize),
+    /// Whitened squares from its onset on, in the noise's variance: what the learned model leaves, and what is left with it; and rows
+    /// there.
+    squares: (f64, f64),
+    rows: usize,
 }
 
 impl Suspect {
     /// What it leaves is more than noise.
     pub(crate) fn leaves_more_than_noise(&self) -> bool {
-        let (squares, rows) = (self.left.0, self.left.1 as f64);
-        squares > rows + BEYOND * (2.0 * rows).sqrt()
+        let (before, left) = self.squares;
+        let rows = self.rows as f64;
+        left > rows + BEYOND * (2.0 * rows).sqrt() && left - rows > LEFT * (before - rows)
     }
 
     /// Belongs to the group of the best.
@@ -206,7 +209,7 @@ impl Search<'_> {
         let below = position.checked_sub(1).map_or(FEWEST, |i| lengths[i]);
         let above = lengths.get(position + 1).copied().unwrap_or(n);
         let mut gap = (at - below.min(*at), above - at);
-        for _ in 0..HALVINGS {
+        while gap != (0, 0) {
             gap = (gap.0 / 2, gap.1 / 2);
             let (_, at, x) = best.clone()?;
             for length in [at.saturating_sub(gap.0), at + gap.1] {
@@ -295,7 +298,8 @@ impl Search<'_> {
                 since: rows[0].sample.time,
                 size: (leading.name, size, leading.unit),
                 plausible: size > leading.lower + room && size < leading.upper - room,
-                left: (squares, length),
+                squares: (self.squares[length - 1], squares),
+                rows: length,
             },
             values,
         ))

@@ -1,6 +1,5 @@
 //! The monitor: rows in; innovations, estimates, notices and alarms out.
 
-use plants::Plant;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -148,7 +147,6 @@ pub struct Monitor {
     core: Core,
     fingerprint: String,
     units: Units,
-    plant: Plant,
 }
 
 impl Monitor {
@@ -181,7 +179,6 @@ impl Monitor {
         Ok(Self {
             intake: Intake::new(),
             fingerprint: model.fingerprint(),
-            plant: model.plant,
             core: Core::new(model, settings, units.clone()),
             units,
         })
@@ -279,12 +276,7 @@ impl Monitor {
     /// Where it is.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        let (score, threshold) = self
-            .core
-            .score()
-            .map_or((f64::NAN, f64::NAN), |(score, threshold)| {
-                (score.value.abs(), threshold)
-            });
+        let (score, threshold) = self.core.score().unwrap_or((f64::NAN, f64::NAN));
         match self.core.phase() {
             Phase::Learning { .. } => Progress::Learning(self.core.kept()),
             Phase::Watching => Progress::Watching { score, threshold },
@@ -296,11 +288,5 @@ impl Monitor {
     #[must_use]
     pub fn time_constant(&self) -> Option<f64> {
         Some(self.core.learned()?.time_constant)
-    }
-
-    /// The plant.
-    #[must_use]
-    pub fn plant(&self) -> Plant {
-        self.plant
     }
 }

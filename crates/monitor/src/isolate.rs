@@ -215,7 +215,7 @@ impl Search<'_> {
             for length in [at.saturating_sub(gap.0), at + gap.1] {
                 if length != at
                     && (FEWEST..=n).contains(&length)
-                    && let Some(found) = self.fitted((placed, held), length, Some(&x), ROUGH)
+                    && let Some(found) = self.fitted((placed, held), length, Some(&x), FINE)
                     && best
                         .as_ref()
                         .is_none_or(|(known, ..)| found.0.evidence > known.evidence)

@@ -148,22 +148,6 @@ fn a_leak_is_seen_named_and_dated() {
     assert!(learned >= 1);
 }
 
-/// Beside a change a hundred times the noise the learned model's own errors show; the answer stays.
-#[test]
-fn a_large_leak_is_named_at_every_look() {
-    let tank = Tank {
-        leak: |t| if t < 4000.0 { 0.0 } else { 8.0 },
-        ..Tank::default()
-    };
-    let steps = all(&mut new(), &tank.run());
-    let alarms = alarms(&steps);
-    assert!(alarms.len() >= 6);
-    for alarm in &alarms[1..6] {
-        assert!(alarm.effects.iter().any(|e| e == "const_leak"), "{alarm:?}");
-        assert!((alarm.since.unwrap() - 4000.0).abs() < 20.0, "{alarm:?}");
-    }
-}
-
 #[test]
 fn nothing_is_seen_where_nothing_is() {
     for (seed, colour) in [(3, 0.0), (4, 0.7)] {

@@ -118,8 +118,8 @@ fn main() {
             .map_or(of_it.last(), |at| of_it.get(at));
         seen += usize::from(delay.is_some_and(|d| d <= 3.0));
         seen_visible += usize::from(since_visible.is_some_and(|d| d <= 3.0));
-        named += usize::from(last.as_ref().is_some_and(|l| holds(l)));
-        named_at_once += usize::from(of_it.first().as_ref().is_some_and(|l| holds(l)));
+        named += usize::from(last.as_ref().is_some_and(&holds));
+        named_at_once += usize::from(of_it.first().as_ref().is_some_and(&holds));
         println!(
             "{:<16} {:<22} {:>5} {:>8.0} {:>7.2} {:>8.2}  {:<3} {:?}",
             placed.effect.id,
@@ -128,7 +128,7 @@ fn main() {
             tau / onset.rig.interval,
             delay.unwrap_or(f64::NAN),
             since_visible.unwrap_or(f64::NAN),
-            if last.as_ref().is_some_and(|l| holds(l)) {
+            if last.as_ref().is_some_and(&holds) {
                 "yes"
             } else {
                 "no"

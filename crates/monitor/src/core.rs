@@ -12,7 +12,7 @@ use plants::Structure;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Alarm, Model, Notice, Settings, Stage, Units,
+    Alarm, Estimate, Model, Notice, Settings, Stage, Units,
     alarm::alarm,
     bank::{Bank, windows},
     intake::{Follows, Sample},
@@ -36,8 +36,10 @@ const LOOKS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 12.0];
 /// At so many of them the tracker is let go again: the derivatives are those of parameters that stay, and while the change works its way
 /// through the plant they mislead it.
 const LET_GO: usize = 3;
-/// And at least so many rows later.
+/// A look comes at least so many rows after the alarm, and each later one twice as many.
 const FEWEST: usize = 8;
+/// Half the width of the interval that holds a Gaussian value with a probability of 95 %.
+const BAND: f64 = 1.96;
 
 /// Where the watching is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -187,8 +189,8 @@ impl Core {
         self.now.kept.len()
     }
 
-    /// Every parameter: its name and unit, as it was learned and its standard error then, and as it is tracked.
-    pub(crate) fn parameters(&self) -> Vec<(String, String, f64, Option<(f64, f64)>)> {
+    /// Every parameter as it was learned and as it is tracked; none while learning.
+    pub(crate) fn estimates(&self) -> Vec<Estimate> {
         let (Some(learned), Some(running)) = (&self.now.learned, &self.running) else {
             return Vec::new();
         };
@@ -197,23 +199,22 @@ impl Core {
             .tracker
             .as_ref()
             .map_or(Vec::new(), |tracker| tracker.estimates().collect());
-        let infos = running.structure.parameters();
-        running
-            .structure
-            .parameter_names()
-            .into_iter()
-            .zip(&infos)
+        let structure = &running.structure;
+        let named = structure.parameter_names().into_iter();
+        named
+            .zip(&structure.parameters())
+            .zip(&learned.theta)
             .enumerate()
-            .map(|(i, (name, info))| {
-                let unit =
-                    running
-                        .structure
-                        .unit_label(info, &self.units.output, &self.units.input);
+            .map(|(i, ((name, info), &learned))| {
                 let at = lanes.iter().position(|(lane, _)| *lane == i);
-                let tracked = at
-                    .and_then(|at| estimates.get(at))
-                    .map(|(deviation, error)| (learned.theta[i] + deviation, *error));
-                (name, unit, learned.theta[i], tracked)
+                let tracked = at.and_then(|at| estimates.get(at));
+                Estimate {
+                    name,
+                    unit: structure.unit_label(info, &self.units.output, &self.units.input),
+                    learned,
+                    value: tracked.map_or(learned, |(deviation, _)| learned + deviation),
+                    half_width: tracked.map(|(_, error)| BAND * error),
+                }
             })
             .collect()
     }

@@ -10,8 +10,6 @@ use crate::{
 
 /// The version of [`State`].
 const VERSION: u32 = 1;
-/// Half the width of the interval that holds a Gaussian value with a probability of 95 %.
-const BAND: f64 = 1.96;
 
 /// A row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -260,17 +258,7 @@ impl Monitor {
     /// The parameters as they are tracked, with their band; empty while learning. Allocates.
     #[must_use]
     pub fn estimates(&self) -> Vec<Estimate> {
-        self.core
-            .parameters()
-            .into_iter()
-            .map(|(name, unit, learned, tracked)| Estimate {
-                name,
-                unit,
-                learned,
-                value: tracked.map_or(learned, |(value, _)| value),
-                half_width: tracked.map(|(_, error)| BAND * error),
-            })
-            .collect()
+        self.core.estimates()
     }
 
     /// Where it is.

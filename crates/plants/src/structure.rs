@@ -12,7 +12,7 @@ use crate::{
 pub const MAX_VESSELS: usize = 2;
 
 /// The best of many values that were looked at: a start whose choice a claim has to pay for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Picked {
     /// The best.
     pub value: f64,

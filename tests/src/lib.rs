@@ -1,6 +1,7 @@
 //! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
 
 pub mod draw;
+pub mod onset;
 pub mod outside;
 
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};

@@ -264,7 +264,7 @@ fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error
 }
 
 /// The one of comma, semicolon and tab that the first row has most of.
-fn delimiter(text: &str) -> u8 {
+pub(crate) fn delimiter(text: &str) -> u8 {
     let header = text
         .lines()
         .find(|line| !line.trim().is_empty() && !line.starts_with('#'))

@@ -51,6 +51,18 @@ pub enum Error {
         /// The first row.
         first: String,
     },
+    /// Numbers without names, and neither three nor four of them.
+    #[error(
+        "{file}, row {row}: {found} numbers and no header; give t,u,y or t,r,u,y, or put a header such as \"t [s],u [V],y [cm]\" above"
+    )]
+    NoOrder {
+        /// What is read.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// Numbers in the row.
+        found: usize,
+    },
     /// The columns of the file are not those that were named or are needed.
     #[error("{file}, row {row}{}", .fault.in_model())]
     Column {

@@ -3,6 +3,7 @@
 //! | question | answer |
 //! |---|---|
 //! | How do I read my measurements? | [`read_csv`], with [`Columns`] to say which column is what |
+//! | And where they come one by one? | [`Rows`], a line at a time |
 //! | How do I make a record in code? | [`Record`], [`excitation`], [`noise`], then [`Record::validate`] |
 //! | Is anything left in a residual? | [`residual_tests`] |
 //! | The noise is coloured: what now? | [`ArModel`]: fit it, whiten residuals and sensitivities with it |
@@ -67,6 +68,7 @@ pub mod excitation;
 pub mod noise;
 mod record;
 pub mod residual_tests;
+mod stream;
 mod unit;
 
 pub use ar::{ArModel, Whitener};
@@ -75,3 +77,4 @@ pub use columns::{Columns, Heading};
 pub use csv_file::{csv_header, parse_csv, read_csv};
 pub use error::Error;
 pub use record::{Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, Signal};
+pub use stream::{BadLine, Line, Rows};

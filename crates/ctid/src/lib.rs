@@ -8,6 +8,7 @@
 //! | a missing term as a file | [`term_file`] |
 //! | the next experiment | [`mod@design`] |
 //! | the tour | [`tour`] |
+//! | rows watched as they come | [`mod@monitor`] |
 //! | linear models from a record | [`mod@identify`] |
 //! | the page | [`mod@serve`] |
 //! | a paper's tables, computed again | [`tables`] |
@@ -28,6 +29,7 @@ pub mod identify;
 pub mod input;
 pub mod look;
 pub mod model_file;
+pub mod monitor;
 mod names;
 pub mod output;
 mod plot;

@@ -23,12 +23,21 @@ impl Look {
     /// What standard output can show: no colours into a pipe or where `NO_COLOR` is set.
     #[must_use]
     pub fn of_stdout() -> Self {
-        let term = Term::stdout();
+        Self::of(&Term::stdout(), console::colors_enabled())
+    }
+
+    /// What standard error can show.
+    #[must_use]
+    pub fn of_stderr() -> Self {
+        Self::of(&Term::stderr(), console::colors_enabled_stderr())
+    }
+
+    fn of(term: &Term, colours: bool) -> Self {
         let width = term
             .size_checked()
             .map_or(USUAL, |(_, columns)| usize::from(columns));
         Self {
-            colour: term.is_term() && console::colors_enabled(),
+            colour: term.is_term() && colours,
             width: width.clamp(NARROWEST, WIDEST),
         }
     }

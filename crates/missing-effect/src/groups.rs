@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::{Error, exchange::exchanges, node::Node};
 
 /// What stands in for another lies within this of its criterion.
-pub(crate) const GROUP_MARGIN: f64 = 6.0;
+pub const GROUP_MARGIN: f64 = 6.0;
 
 /// For every added effect, itself and all that fit as well in its place.
 pub(crate) fn groups<'a>(

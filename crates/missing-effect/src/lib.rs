@@ -45,5 +45,6 @@ pub use diagnosis::{
     Step, Verdict,
 };
 pub use error::Error;
+pub use groups::GROUP_MARGIN;
 pub use problem::{Options, Problem, Progress};
 pub use unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window};

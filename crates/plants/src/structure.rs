@@ -1,5 +1,7 @@
 //! A structure: a plant, what is known of it, and the effects that are on, in chain order.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     Error, ParameterInfo, Plant, Term,
     effects::{self, EffectInfo, Place},
@@ -12,7 +14,7 @@ pub const MAX_VESSELS: usize = 3;
 pub(crate) const SERIES: usize = 2;
 
 /// The best of many values that were looked at: a start whose choice a claim has to pay for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Picked {
     /// The best.
     pub value: f64,
@@ -21,7 +23,7 @@ pub struct Picked {
 }
 
 /// What the data visit: it sets the plausible ranges, the starts and the operating levels.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scales {
     /// Smallest and largest command \[input unit\].
     pub input: (f64, f64),

@@ -15,7 +15,7 @@ use self::tables::Tables;
 use crate::look::Look;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
-use crate::{Error, catalogue, design, edit, serve, tour};
+use crate::{Error, catalogue, design, edit, monitor, serve, tour};
 
 /// Says which physical effect a model of measured data is missing.
 #[derive(Debug, Parser)]
@@ -42,6 +42,8 @@ enum Command {
     Effects(Effects),
     /// Propose the next experiment, which tells two effects apart
     Design(design::Arguments),
+    /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
+    Monitor(monitor::Arguments),
     /// Identify a linear model in continuous time from a record
     Identify(Identify),
     /// Serve the page: the same with the mouse, on this machine alone
@@ -124,6 +126,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
             let text = design::text::design(&proposal.design, look);
             finish(&proposal, &text, &outputs, out, look)
         }
+        Some(Command::Monitor(arguments)) => arguments.run(out),
         Some(Command::Identify(arguments)) => arguments.run(out, look),
         Some(Command::Serve(arguments)) => arguments.run(out),
         Some(Command::Tables(arguments)) => arguments.run(out, look),

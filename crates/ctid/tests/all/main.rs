@@ -7,6 +7,7 @@ mod design;
 mod identify;
 mod identify_loop;
 mod model_file;
+mod monitor;
 mod mutations;
 mod own_term;
 mod program;

@@ -355,6 +355,12 @@ impl<'a> Setup<'a> {
         lasting as f64 * (self.samples() as f64).ln() + STATE_PRICE * states as f64
     }
 
+    /// Holds the initial states; only parameters stay free. For records that begin where a simulation has led to.
+    pub fn hold_initial_states(&mut self) {
+        let count = self.parameter_count();
+        self.free.retain(|&i| i < count);
+    }
+
     /// Samples in all records.
     #[must_use]
     pub fn samples(&self) -> usize {

@@ -1,0 +1,109 @@
+//! Bytes into lines, of bounded length: what has no end is thrown away up to the next line.
+
+/// The longest line that is read \[bytes\].
+pub(super) const LONGEST: usize = 64 * 1024;
+
+/// A line, or what is left of one that is too long.
+#[derive(Debug, PartialEq)]
+pub(super) enum Cut<'a> {
+    /// Without its end.
+    Line(&'a [u8]),
+    /// Longer than [`LONGEST`]; said once, when its end has come.
+    TooLong,
+}
+
+/// The part of a line that has come so far.
+#[derive(Default)]
+pub(super) struct Lines {
+    part: Vec<u8>,
+    too_long: bool,
+}
+
+impl Lines {
+    /// Cuts bytes into lines; stops at the first error of `each`.
+    pub(super) fn push<E>(
+        &mut self,
+        mut bytes: &[u8],
+        each: &mut impl FnMut(Cut) -> Result<(), E>,
+    ) -> Result<(), E> {
+        while let Some(end) = bytes.iter().position(|byte| *byte == b'\n') {
+            let (line, rest) = (&bytes[..end], &bytes[end + 1..]);
+            bytes = rest;
+            if !self.too_long && self.part.is_empty() && line.len() <= LONGEST {
+                each(Cut::Line(line))?;
+                continue;
+            }
+            self.keep(line);
+            self.end(each)?;
+        }
+        self.keep(bytes);
+        Ok(())
+    }
+
+    /// The last line, which may have no end.
+    pub(super) fn end<E>(&mut self, each: &mut impl FnMut(Cut) -> Result<(), E>) -> Result<(), E> {
+        let too_long = std::mem::take(&mut self.too_long);
+        let result = if too_long {
+            each(Cut::TooLong)
+        } else if self.part.is_empty() {
+            Ok(())
+        } else {
+            each(Cut::Line(&self.part))
+        };
+        self.part.clear();
+        result
+    }
+
+    fn keep(&mut self, bytes: &[u8]) {
+        if self.too_long || self.part.len() + bytes.len() > LONGEST {
+            self.too_long = true;
+            self.part.clear();
+        } else {
+            self.part.extend_from_slice(bytes);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cut(chunks: &[&[u8]]) -> Vec<String> {
+        let mut lines = Lines::default();
+        let mut all = Vec::new();
+        let mut each = |cut: Cut| {
+            all.push(match cut {
+                Cut::Line(line) => String::from_utf8(line.to_vec()).unwrap(),
+                Cut::TooLong => "too long".to_string(),
+            });
+            Ok::<(), ()>(())
+        };
+        for chunk in chunks {
+            lines.push(chunk, &mut each).unwrap();
+        }
+        lines.end(&mut each).unwrap();
+        all
+    }
+
+    #[test]
+    fn lines_may_come_in_pieces() {
+        assert_eq!(cut(&[b"a,b\nc", b",d", b"\ne"]), ["a,b", "c,d", "e"]);
+        assert_eq!(cut(&[b"a\r\n\nb\n"]), ["a\r", "", "b"]);
+        assert!(cut(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_line_without_an_end_is_not_kept() {
+        let part = vec![b'1'; LONGEST / 2 + 1];
+        assert_eq!(
+            cut(&[b"a\n", &part, &part, b"\nb\n"]),
+            ["a", "too long", "b"]
+        );
+        assert_eq!(cut(&[&part, &part, &part]), ["too long"]);
+        let mut lines = Lines::default();
+        for _ in 0..100 {
+            lines.push(&part, &mut |_| Ok::<(), ()>(())).unwrap();
+        }
+        assert!(lines.part.capacity() <= 2 * LONGEST);
+    }
+}

@@ -1,0 +1,95 @@
+//! The saved state: written whole or not at all, and nothing else is overwritten.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use ::monitor::State;
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, atomic, output};
+
+/// A larger file is none of ours \[bytes\].
+const LARGEST: u64 = 64 * 1024 * 1024;
+
+#[derive(Serialize)]
+struct Written<'a> {
+    written_by: &'a str,
+    state: &'a State,
+}
+
+#[derive(Deserialize)]
+struct Read {
+    written_by: String,
+    state: State,
+}
+
+const WRITTEN_BY: &str = "ctid monitor";
+
+/// The state, where there is one; `None` where the file is not there yet. The folder is seen to take a file.
+pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
+    if output::same_file(path, model) {
+        return Err(Error::file(
+            path,
+            "it is the model file; give the state a name of its own",
+        ));
+    }
+    let not_ours = |what: String| {
+        Error::file(
+            path,
+            format!("{what}; give --state another name, or delete the file to begin anew"),
+        )
+    };
+    let metadata = match fs::metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let folder = atomic::folder(path);
+            atomic::beside(path)
+                .and_then(tempfile::NamedTempFile::close)
+                .map_err(|error| {
+                    Error::file(
+                        path,
+                        format!(
+                            "nothing can be written in {}: {error}; choose another folder",
+                            folder.display()
+                        ),
+                    )
+                })?;
+            return Ok(None);
+        }
+        Err(error) => return Err(not_ours(format!("it cannot be read: {error}"))),
+        Ok(metadata) => metadata,
+    };
+    if !metadata.is_file() {
+        return Err(not_ours("it is no file".to_string()));
+    }
+    if metadata.len() > LARGEST {
+        return Err(not_ours(format!(
+            "it has {} bytes, and a state at most {LARGEST}",
+            metadata.len()
+        )));
+    }
+    let text = fs::read_to_string(path)
+        .map_err(|error| not_ours(format!("it cannot be read: {error}")))?;
+    let read: Read = serde_json::from_str(&text).map_err(|error| {
+        not_ours(format!(
+            "it is no state that `ctid monitor` wrote ({error})"
+        ))
+    })?;
+    if read.written_by != WRITTEN_BY {
+        return Err(not_ours(
+            "it is no state that `ctid monitor` wrote".to_string(),
+        ));
+    }
+    Ok(Some(read.state))
+}
+
+/// Saves a state.
+pub(super) fn write(path: &Path, state: &State) -> Result<(), Error> {
+    let written = Written {
+        written_by: WRITTEN_BY,
+        state,
+    };
+    let text = serde_json::to_string(&written)
+        .map_err(|error| Error::file(path, format!("the state cannot be written: {error}")))?;
+    atomic::write(path, text.as_bytes())
+}

@@ -1,0 +1,69 @@
+//! What is wrong with rows, said without flooding: the first ones in full, then now and then with a count.
+
+/// Messages in a row that are printed in full.
+const IN_FULL: u64 = 5;
+/// After so many good rows trouble is new again.
+const FORGOTTEN: u64 = 1000;
+
+/// Counts bad rows.
+#[derive(Default)]
+pub(super) struct Trouble {
+    /// All of them.
+    pub bad: u64,
+    recent: u64,
+    good: u64,
+}
+
+impl Trouble {
+    /// A good row.
+    pub(super) fn good(&mut self) {
+        self.good += 1;
+        if self.good == FORGOTTEN {
+            self.recent = 0;
+        }
+    }
+
+    /// A bad row: the message to print, where one is.
+    pub(super) fn bad(&mut self, message: impl FnOnce() -> String) -> Option<String> {
+        self.good = 0;
+        self.bad += 1;
+        self.recent += 1;
+        let recent = self.recent;
+        // The 10th, 100th, 1000th ... of them says how many there were.
+        let power = recent >= 10 && 10_u64.checked_pow(recent.ilog10()) == Some(recent);
+        if recent <= IN_FULL {
+            let last = if recent == IN_FULL {
+                " (further ones are only counted)"
+            } else {
+                ""
+            };
+            Some(message() + last)
+        } else if power {
+            Some(format!(
+                "{} ({recent} such rows in a row or nearly so)",
+                message()
+            ))
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flood_is_counted() {
+        let mut trouble = Trouble::default();
+        let printed = (0..100_000)
+            .filter_map(|_| trouble.bad(|| "bad".into()))
+            .count();
+        assert_eq!(printed, 5 + 5);
+        assert_eq!(trouble.bad, 100_000);
+        for _ in 0..FORGOTTEN {
+            trouble.good();
+        }
+        assert_eq!(trouble.bad(|| "bad".into()), Some("bad".into()));
+    }
+}

@@ -1,0 +1,413 @@
+//! `ctid monitor` from outside: rows go in through a pipe.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, Stdio};
+use std::thread;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::common::{INTERVAL, Outcome, Place, Random};
+
+const MODEL: &str = "plant = \"single-tank\"\n[known]\narea = 154.0\n";
+
+/// Rows t, u, y of a single tank; from row `leak` on it loses 2 cm^3/s more.
+fn rows(count: usize, leak: usize) -> Vec<[f64; 3]> {
+    let mut random = Random(7);
+    let (mut level, mut u, mut until) = (16.0_f64, 5.0, 30);
+    (0..count)
+        .map(|k| {
+            if k == until {
+                u = ((3.5 + 3.0 * random.uniform()) * 100.0).round() / 100.0;
+                until += 30 + random.below(60);
+            }
+            let row = [k as f64 * INTERVAL, u, level + 0.05 * random.normal()];
+            let lost = if k < leak { 0.0 } else { 2.0 };
+            let rate = |level: f64| (10.0 * u - 12.5 * level.sqrt() - lost) / 154.0;
+            for _ in 0..20 {
+                let h = INTERVAL / 20.0;
+                level += h * rate(level + 0.5 * h * rate(level));
+            }
+            row
+        })
+        .collect()
+}
+
+fn text(header: &str, rows: &[[f64; 3]]) -> String {
+    let lines = rows.iter().map(|[t, u, y]| format!("{t},15,{u},{y:.4}\n"));
+    header.to_string() + &lines.collect::<String>()
+}
+
+const HEADER: &str = "t [s],r [cm],u [V],y [cm]\n";
+
+fn place() -> Place {
+    let place = Place::empty();
+    place.write("m.toml", MODEL);
+    place
+}
+
+/// Begins a monitor.
+fn begun(place: &Place, words: &str) -> (Child, ChildStdin) {
+    let mut child = place
+        .command(&format!("monitor --model m.toml {words}"))
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let input = child.stdin.take().unwrap();
+    (child, input)
+}
+
+/// Runs a monitor on bytes.
+fn fed(place: &Place, words: &str, bytes: impl AsRef<[u8]>) -> Outcome {
+    let (child, mut input) = begun(place, words);
+    let bytes = bytes.as_ref().to_vec();
+    let writer = thread::spawn(move || {
+        // It may stop reading.
+        let _ = input.write_all(&bytes);
+    });
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap();
+    Outcome {
+        code: output.status.code(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+fn events(out: &str) -> Vec<Value> {
+    out.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+#[test]
+fn an_alarm_is_a_json_line_and_a_sentence() {
+    let place = place();
+    let outcome = fed(&place, "--estimates", text(HEADER, &rows(2200, 1600)));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+    let events = events(&outcome.out);
+    let alarm = events.iter().find(|e| e["event"] == "alarm").unwrap();
+    assert_eq!(alarm["schema"], 1);
+    let time = alarm["time"].as_f64().unwrap();
+    assert!((3200.0..3500.0).contains(&time), "{alarm}");
+    for key in ["since", "evidence", "score", "threshold"] {
+        assert!(alarm[key].is_number(), "{alarm}");
+    }
+    for key in ["verdict", "sentence"] {
+        assert!(alarm[key].is_string(), "{alarm}");
+    }
+    assert!(!alarm["effects"].as_array().unwrap().is_empty(), "{alarm}");
+    let sentence = alarm["sentence"].as_str().unwrap();
+    assert!(sentence.starts_with("Consistent with ") && outcome.err.contains(sentence));
+    let estimates = events.iter().find(|e| e["event"] == "estimates").unwrap();
+    let gain = &estimates["parameters"][0];
+    assert_eq!(gain["name"], "pump_gain");
+    assert!((gain["value"].as_f64().unwrap() - 10.0).abs() < 0.5);
+    let first = outcome.err.lines().next().unwrap();
+    assert!(first.contains("\"t [s]\" is the time"), "{first}");
+    assert!(outcome.err.contains("learned from 10"), "{}", outcome.err);
+    // Without a terminal nothing steers one.
+    assert!(!outcome.err.contains('\u{1b}'));
+}
+
+/// However the rows are written, the same comes out.
+#[test]
+fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
+    let rows = rows(1400, 1100);
+    let place = place();
+    let plain = fed(&place, "", text(HEADER, &rows));
+    assert!(!plain.out.is_empty(), "{}", plain.err);
+    let lines = text("", &rows);
+    let semicolons = lines.replace(',', ";").replace('.', ",");
+    for (what, other) in [
+        (
+            "CRLF and a byte-order mark",
+            format!("\u{feff}{}", text(HEADER, &rows).replace('\n', "\r\n")),
+        ),
+        ("decimal commas", HEADER.replace(',', ";") + &semicolons),
+        (
+            "tabs, quotes, comments, blank lines",
+            HEADER.replace(',', "\t")
+                + "# rig 3\n\n"
+                + &lines.replace(",15,", "\t\"15\"\t").replace(',', "\t"),
+        ),
+        (
+            "the header again",
+            text(HEADER, &rows[..700]) + &text(HEADER, &rows[700..]),
+        ),
+    ] {
+        let outcome = fed(&place, "", other);
+        assert_eq!(outcome.code, Some(0), "{what}: {}", outcome.err);
+        assert_eq!(outcome.out, plain.out, "{what}: {}", outcome.err);
+    }
+    let lone = fed(&place, "", &lines);
+    assert!(lone.err.starts_with("standard input: no header: the columns are taken as time, reference, command, reading (t, r, u, y)"), "{}", lone.err);
+    let three = fed(&place, "", lines.replace(",15,", ","));
+    assert!(
+        three.err.starts_with(
+            "standard input: no header: the columns are taken as time, command, reading (t, u, y)"
+        ),
+        "{}",
+        three.err
+    );
+    assert_eq!(three.out, lone.out);
+    assert_eq!(events(&lone.out).len(), events(&plain.out).len());
+}
+
+#[test]
+fn bad_rows_are_said_skipped_and_not_flooded_with() {
+    let rows = rows(1400, 1100);
+    let clean = text(HEADER, &rows);
+    let mut bad = String::new();
+    for (k, line) in clean.lines().enumerate() {
+        bad += line;
+        bad += "\n";
+        match k {
+            100 => bad += "text,15,5,16\n",
+            101 => bad += "203,15,,16\n",
+            102 => bad += "203,15,5,NaN\n",
+            103 => bad += "1,15,5,16\n",
+            1200..1300 => bad += "2403,15\n",
+            _ => {}
+        }
+    }
+    let place = place();
+    let outcome = fed(&place, "", &bad);
+    assert_eq!(outcome.code, Some(0));
+    assert_eq!(outcome.out, fed(&place, "", &clean).out);
+    for said in [
+        "standard input, row 102: column \"t [s]\": \"text\" is not a number",
+        "standard input, row 104: column \"u [V]\": the cell is empty",
+        "standard input, row 106: column \"y [cm]\": NaN is not a finite number",
+        "standard input, row 108: column \"t [s]\": the time goes back from 204 s to 1 s",
+        "2 fields where 4 are read",
+        "; the row is skipped",
+    ] {
+        assert!(outcome.err.contains(said), "{said}: {}", outcome.err);
+    }
+    assert!(outcome.err.lines().count() < 40, "{}", outcome.err);
+    assert!(
+        outcome.err.contains("104 of them with something wrong"),
+        "{}",
+        outcome.err
+    );
+}
+
+/// Who listens to a running line hears the end of a row first.
+#[test]
+fn a_stream_may_begin_in_the_middle_of_a_row() {
+    let place = place();
+    let lines = text("", &rows(1100, 9999));
+    for part in ["5,4.5,14.8\n", ".5,14.8\n", "8\n"] {
+        let outcome = fed(&place, "", part.to_string() + &lines);
+        assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+        assert!(outcome.err.contains("t, r, u, y"), "{}", outcome.err);
+        assert!(outcome.err.contains("learned from"), "{}", outcome.err);
+        assert!(
+            outcome.err.contains("1 of them with something wrong"),
+            "{}",
+            outcome.err
+        );
+    }
+}
+
+#[test]
+fn a_gap_is_said_with_its_row() {
+    let mut rows = rows(1500, 9999);
+    rows.drain(1200..1203);
+    let outcome = fed(&place(), "", text(HEADER, &rows));
+    let said = "standard input, row 1202, column \"t [s]\": 3 rows are missing (the time steps from 2398 to 2406 s)";
+    assert!(outcome.err.contains(said), "{}", outcome.err);
+    assert_eq!(outcome.out, "");
+}
+
+#[test]
+fn what_is_no_row_at_all_is_refused() {
+    let place = place();
+    let refused = |bytes: &str, says: &str| {
+        let outcome = fed(&place, "", bytes);
+        assert_eq!(outcome.code, Some(2), "{}", outcome.err);
+        assert!(
+            outcome.err.contains("error: ") && outcome.err.contains(says),
+            "{}",
+            outcome.err
+        );
+        assert_eq!(outcome.out, "");
+    };
+    refused(
+        "",
+        "standard input is empty; rows such as 0,15,4.5,14.8 (t, r, u, y) are needed",
+    );
+    refused("\n# nothing\n\n", "standard input is empty");
+    refused("1,2\n1,2\n1,2\n", "2 numbers and no header");
+    refused(
+        "time,level\n1,2\n",
+        "no column beginning with \"u\" for the input",
+    );
+    place.write("m.toml", MODEL.replace("single-tank", "single-tonk"));
+    refused("0,1,2,3\n", "unknown plant");
+    place.write(
+        "m.toml",
+        "plant = \"single-tank\"\neffects = [\"sensor_drift\"]\n",
+    );
+    refused("0,1,2,3\n", "ctid remove sensor_drift --model m.toml");
+}
+
+#[test]
+fn a_state_goes_on_where_it_was() {
+    let rows = rows(2200, 1600);
+    let place = place();
+    let whole = fed(&place, "", text(HEADER, &rows));
+    let mut parts = String::new();
+    for (from, to) in [(0, 500), (500, 1300), (1300, 1640), (1640, 2200)] {
+        // The log is given from a little before where it ended: what was seen is skipped.
+        let again = if from == 1300 { 1290 } else { from };
+        let outcome = fed(&place, "--state s.json", text(HEADER, &rows[again..to]));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+        assert_eq!(
+            outcome.err.contains("goes on from"),
+            from > 0,
+            "{}",
+            outcome.err
+        );
+        let before = "10 rows up to here were seen before";
+        assert_eq!(
+            outcome.err.contains(before),
+            from == 1300,
+            "{}",
+            outcome.err
+        );
+        parts += &outcome.out;
+    }
+    assert!(!whole.out.is_empty());
+    assert_eq!(parts, whole.out);
+
+    let refused = |words: &str, bytes: &str, says: &str| {
+        let kept = place.snapshot();
+        let outcome = fed(&place, words, bytes);
+        assert_eq!(outcome.code, Some(2), "{}", outcome.err);
+        assert!(outcome.err.contains(says), "{}", outcome.err);
+        assert_eq!(place.snapshot(), kept);
+    };
+    refused(
+        "--state s.json",
+        "t [s],u [mV],y [mm]\n",
+        "the saved state is in command [V], reading [cm]",
+    );
+    refused("--state m.toml", "0,1,2,3\n", "it is the model file");
+    place.write("notes.txt", "mine");
+    refused(
+        "--state notes.txt",
+        "0,1,2,3\n",
+        "it is no state that `ctid monitor` wrote",
+    );
+    refused("--state no/s.json", "0,1,2,3\n", "choose another folder");
+    place.write("m.toml", MODEL.replace("154", "155"));
+    refused(
+        "--state s.json",
+        "0,1,2,3\n",
+        "the state belongs to another model",
+    );
+}
+
+/// Interrupted or terminated while no row comes, it saves its state and ends well; killed, it leaves the last state whole.
+#[test]
+#[cfg(unix)]
+fn a_signal_ends_it_with_its_state_saved() {
+    let rows = rows(1500, 9999);
+    for (signal, code) in [("INT", Some(0)), ("TERM", Some(0)), ("KILL", None)] {
+        let place = place();
+        let (mut child, mut input) = begun(&place, "--state s.json --estimates");
+        input.write_all(text(HEADER, &rows).as_bytes()).unwrap();
+        input.flush().unwrap();
+        // The first estimates: the rows have come.
+        let mut first = String::new();
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        out.read_line(&mut first).unwrap();
+        thread::sleep(Duration::from_millis(300));
+        let kill = std::process::Command::new("kill")
+            .args([format!("-{signal}"), child.id().to_string()])
+            .status()
+            .unwrap();
+        assert!(kill.success());
+        let mut err = String::new();
+        child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut err)
+            .unwrap();
+        assert_eq!(child.wait().unwrap().code(), code, "{signal}: {err}");
+        assert_eq!(place.path("s.json").exists(), code.is_some());
+        let left: Vec<_> = place.snapshot().into_keys().collect();
+        assert_eq!(left.len(), if code.is_some() { 2 } else { 1 }, "{left:?}");
+        if code.is_some() {
+            assert!(err.contains("stopped after 1501 lines"), "{err}");
+            let more = fed(&place, "--state s.json", text(HEADER, &rows[1490..]));
+            assert_eq!(more.code, Some(0), "{}", more.err);
+        }
+        drop(input);
+    }
+}
+
+/// Whoever reads the alarms has gone: it saves and ends.
+#[test]
+fn a_closed_pipe_ends_it() {
+    let place = place();
+    let (mut child, mut input) = begun(&place, "--state s.json --estimates --interval 2");
+    drop(child.stdout.take());
+    let bytes = text(HEADER, &rows(2000, 9999));
+    let writer = thread::spawn(move || {
+        let _ = input.write_all(bytes.as_bytes());
+        input
+    });
+    let output = child.wait_with_output().unwrap();
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{err}");
+    assert!(err.contains("standard output was closed"), "{err}");
+    assert!(place.path("s.json").exists());
+    drop(writer.join().unwrap());
+}
+
+/// A line without an end is not kept: the memory stays as it is.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_line_without_an_end_is_thrown_away() {
+    let place = place();
+    let (mut child, mut input) = begun(&place, "");
+    input
+        .write_all(text(HEADER, &rows(1200, 9999)).as_bytes())
+        .unwrap();
+    let before = peak(&child);
+    let part = vec![b'7'; 1 << 20];
+    for _ in 0..200 {
+        input.write_all(&part).unwrap();
+    }
+    let after = peak(&child);
+    input.write_all(b"\n").unwrap();
+    drop(input);
+    let mut err = String::new();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut err)
+        .unwrap();
+    assert!(child.wait().unwrap().success(), "{err}");
+    assert!(
+        err.contains("row 1202: more than 65536 bytes without an end of line"),
+        "{err}"
+    );
+    assert!(after < before + 20_000, "{before} kB, then {after} kB");
+}
+
+/// Largest resident size so far \[kB\].
+#[cfg(target_os = "linux")]
+fn peak(child: &Child) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+    let line = status
+        .lines()
+        .find(|line| line.starts_with("VmHWM"))
+        .unwrap();
+    line.split_whitespace().nth(1).unwrap().parse().unwrap()
+}

@@ -1,0 +1,200 @@
+//! An alarm, and its sentence.
+
+use missing_effect::numbers::significant;
+use plants::Structure;
+use serde::{Deserialize, Serialize};
+
+use crate::isolate::Suspect;
+
+/// The number of the schema of [`Alarm`]; it rises when a key changes its meaning.
+pub const SCHEMA: u32 = 1;
+
+/// Whether an alarm is new.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// The model has stopped fitting.
+    Alarm,
+    /// More rows have come since, and it was looked again.
+    Update,
+    /// The last look; from here on the plant is learned anew as it is now.
+    Final,
+}
+
+/// What the rows since the change say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// One effect of the catalogue explains them, and no other does.
+    Effect,
+    /// Several explain them, and cannot be told apart yet.
+    Undecided,
+    /// No effect of the catalogue explains them.
+    Unexplained,
+}
+
+/// The model does not fit any more. Its serialised form is one line of the program's output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Alarm {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// New, or more is known of it.
+    pub event: Stage,
+    /// Time of the row after which it was raised \[s\].
+    pub time: f64,
+    /// When the change began, as the best effect has it \[s\]; `None` where nothing explains it.
+    pub since: Option<f64>,
+    /// What the rows say.
+    pub verdict: Verdict,
+    /// The effects that cannot be told apart, best first; empty where nothing explains the rows.
+    pub effects: Vec<String>,
+    /// By how much the Bayesian information criterion falls with the best of them.
+    pub evidence: Option<f64>,
+    /// The next effect, whether in the group or behind it, and its evidence.
+    pub next: Option<Other>,
+    /// The size of the best effect.
+    pub size: Option<Size>,
+    /// The score that passed the threshold when the alarm was raised, and the threshold.
+    pub score: f64,
+    /// See `score`.
+    pub threshold: f64,
+    /// All of it in words.
+    pub sentence: String,
+}
+
+/// An effect and its evidence.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Other {
+    /// The effect.
+    pub effect: String,
+    /// By how much the criterion falls with it.
+    pub evidence: f64,
+}
+
+/// The size of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Size {
+    /// The parameter's name.
+    pub name: String,
+    /// Its value; of a drift, what has been reached by now.
+    pub value: f64,
+    /// Its unit; empty for a share.
+    pub unit: String,
+    /// The vessel, of two.
+    pub vessel: Option<String>,
+}
+
+/// Units of the signals, for sentences.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Units {
+    /// Of the reading.
+    pub output: String,
+    /// Of the command.
+    pub input: String,
+}
+
+/// What a look at the rows found.
+pub(crate) fn alarm(
+    (event, time): (Stage, f64),
+    (score, threshold): (f64, f64),
+    suspects: &[Suspect],
+    structure: &Structure,
+    units: &Units,
+) -> Alarm {
+    let best = suspects
+        .first()
+        .filter(|best| best.plausible && best.evidence > 0.0 && !best.leaves_more_than_noise());
+    let mut alarm = Alarm {
+        schema: SCHEMA,
+        event,
+        time,
+        since: None,
+        verdict: Verdict::Unexplained,
+        effects: Vec::new(),
+        evidence: None,
+        next: None,
+        size: None,
+        score,
+        threshold,
+        sentence: String::new(),
+    };
+    if let Some(best) = best {
+        let group: Vec<&Suspect> = suspects.iter().filter(|s| s.near(best)).collect();
+        alarm.since = Some(best.since);
+        alarm.verdict = if group.len() == 1 {
+            Verdict::Effect
+        } else {
+            Verdict::Undecided
+        };
+        alarm.effects = group
+            .iter()
+            .map(|s| s.placed.effect.id.to_string())
+            .collect();
+        alarm.evidence = Some(best.evidence);
+        alarm.next = suspects.get(1).map(|next| Other {
+            effect: next.placed.effect.id.to_string(),
+            evidence: next.evidence,
+        });
+        let (name, value, unit) = best.size;
+        let known = structure.known.area[0].is_some();
+        alarm.size = Some(Size {
+            name: name.to_string(),
+            value,
+            unit: unit.label(&units.output, &units.input, known),
+            vessel: (best.placed.effect.place == plants::Place::Vessel)
+                .then(|| structure.plant.vessel_name(best.placed.vessel))
+                .flatten()
+                .map(str::to_string),
+        });
+    }
+    alarm.sentence = sentence(&alarm);
+    alarm
+}
+
+/// An instant \[s\] as it is written, to the millisecond.
+#[must_use]
+pub fn instant(time: f64) -> String {
+    // An instant of more than 1e12 s has no milliseconds left.
+    let rounded = (time * 1e3).round() / 1e3;
+    if time.abs() < 1e12 { rounded } else { time }.to_string()
+}
+
+fn sentence(alarm: &Alarm) -> String {
+    let (Some(since), Some(evidence), Some(size)) = (alarm.since, alarm.evidence, &alarm.size)
+    else {
+        return format!(
+            "The model does not fit since about t = {} s or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}).",
+            instant(alarm.time),
+            alarm.score,
+            alarm.threshold
+        );
+    };
+    let unit = if size.unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {}", size.unit)
+    };
+    let vessel = size
+        .vessel
+        .as_ref()
+        .map_or(String::new(), |vessel| format!(", {vessel} tank"));
+    let against = alarm.next.as_ref().map_or(String::new(), |next| {
+        format!(
+            ", {:.1} against {:.1} for {}",
+            evidence, next.evidence, next.effect
+        )
+    });
+    let group = match &alarm.effects[..] {
+        [_, others @ ..] if !others.is_empty() => {
+            format!("; not to be told yet from {}", others.join(", "))
+        }
+        _ => String::new(),
+    };
+    format!(
+        "Consistent with {} ({} = {}{unit}{vessel}) since t = {} s{against}{group}.",
+        alarm.effects.first().map_or("", String::as_str),
+        size.name,
+        significant(size.value, 3),
+        instant(since),
+    )
+}

@@ -1,0 +1,111 @@
+//! What a monitor refuses.
+
+/// Why there is no monitor.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The plant and its effects do not go together.
+    #[error(transparent)]
+    Structure(#[from] plants::Error),
+    /// An effect that follows the time since a record began.
+    #[error(
+        "{effect} follows the time since a record began, and what is watched has no beginning: remove it, the monitor looks for it by itself"
+    )]
+    ByClock {
+        /// The effect.
+        effect: String,
+    },
+    /// A plant with two pumps.
+    #[error(
+        "plant {plant} has two pumps, and a row carries one command: the monitor watches plants with one"
+    )]
+    TwoPumps {
+        /// The plant.
+        plant: &'static str,
+    },
+    /// A setting is outside its range.
+    #[error("{setting} is {value}, but has to be {range}")]
+    Setting {
+        /// Which setting.
+        setting: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        range: &'static str,
+    },
+    /// A state that another version wrote.
+    #[error(
+        "the state is of version {found}, and this program reads version {known}: begin without it"
+    )]
+    Version {
+        /// The version of the state.
+        found: u32,
+        /// The version that is read.
+        known: u32,
+    },
+    /// A state of another model.
+    #[error(
+        "the state belongs to another model: it was saved for {saved}, and the model now is {now}; name another state file, or delete it to begin anew"
+    )]
+    OtherModel {
+        /// The model of the state.
+        saved: String,
+        /// The model that was given.
+        now: String,
+    },
+    /// A state whose numbers do not go together.
+    #[error("the state is damaged: {what}; delete it to begin anew")]
+    Damaged {
+        /// What does not go together.
+        what: String,
+    },
+}
+
+/// Why a row is not used. It leaves the monitor as it was.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refused {
+    /// A value is not finite.
+    #[error("{value} is not a finite number")]
+    NotFinite {
+        /// `time`, `input` or `output`.
+        column: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// A value whose powers overflow.
+    #[error("{value:e} is too large to compute with: below {limit:e}")]
+    TooLarge {
+        /// `time`, `input` or `output`.
+        column: &'static str,
+        /// The value.
+        value: f64,
+        /// What has to be larger than it.
+        limit: f64,
+    },
+    /// The time of the row before.
+    #[error("the time {time} s is repeated from the row before")]
+    Repeated {
+        /// The time \[s\].
+        time: f64,
+    },
+    /// A time before that of the row before.
+    #[error("the time goes back from {previous} s to {time} s")]
+    Backward {
+        /// The time \[s\].
+        time: f64,
+        /// The time before \[s\].
+        previous: f64,
+    },
+}
+
+impl Refused {
+    /// The column to look at: `time`, `input` or `output`.
+    #[must_use]
+    pub fn column(&self) -> &'static str {
+        match self {
+            Self::NotFinite { column, .. } | Self::TooLarge { column, .. } => column,
+            Self::Repeated { .. } | Self::Backward { .. } => "time",
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! Rows as they come: what is refused, where samples are missing, and the means of blocks of rows.
+//!
+//! The usual step of the time is the median of the first 21. A step of more than one and a half times the longest of them is
+//! a gap: a short one is bridged by the held command, a longer one begins a new stretch. Where 20 steps in a
+//! row are of another length, the sampling interval has changed.
+//!
+//! A process that is sampled much faster than it moves is watched in blocks: time, command and reading are their means over
+//! `every` rows, and the command runs in a straight line from one mean to the next.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Notice, Refused, Row};
+
+/// Steps from which the usual one is taken.
+const STEPS: usize = 21;
+/// A step above this many of the longest usual ones is a gap.
+const GAP: f64 = 1.5;
+/// Steps of another length in a row that make it the usual one.
+const OTHER: usize = 20;
+/// A gap of more than so many usual steps begins a new stretch.
+const BRIDGED: f64 = 5.0;
+/// Values beyond this cannot be raised to the powers that a fit takes.
+const LARGEST: f64 = 1e15;
+
+/// A row, or the mean of a block of rows, as it is watched.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Sample {
+    /// \[s\]
+    pub time: f64,
+    pub input: f64,
+    pub output: f64,
+    /// How it follows the one before.
+    pub follows: Follows,
+}
+
+/// How a sample follows the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Follows {
+    /// After the usual step, or a gap that is bridged.
+    On,
+    /// After a long gap.
+    Gap,
+    /// The first one of another sampling interval.
+    Interval,
+}
+
+/// What became of a row.
+pub(crate) struct Taken {
+    /// What is to be watched, where a block is complete.
+    pub sample: Option<Sample>,
+    pub notice: Option<Notice>,
+}
+
+/// The state between two rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Intake {
+    /// Rows in a block.
+    pub every: usize,
+    /// Rows that were taken.
+    pub rows: u64,
+    last: Option<f64>,
+    /// The latest steps, at most [`STEPS`].
+    steps: Vec<f64>,
+    /// Median and longest of the usual steps.
+    usual: Option<(f64, f64)>,
+    /// Steps of another length in a row.
+    other: usize,
+    /// Sums of the block's times (since its first), commands and readings; rows in it; its first time.
+    sums: [f64; 3],
+    filled: usize,
+    begun: f64,
+    follows: Follows,
+}
+
+impl Intake {
+    pub(crate) fn new() -> Self {
+        Self {
+            every: 1,
+            rows: 0,
+            last: None,
+            steps: Vec::with_capacity(STEPS),
+            usual: None,
+            other: 0,
+            sums: [0.0; 3],
+            filled: 0,
+            begun: 0.0,
+            follows: Follows::Gap,
+        }
+    }
+
+    /// The numbers that a file may have spoilt.
+    pub(crate) fn sound(&self) -> bool {
+        self.every > 0 && self.steps.len() <= STEPS && self.filled < self.every
+    }
+
+    /// Begins a new block, after `every` has changed.
+    pub(crate) fn begin(&mut self) {
+        self.filled = 0;
+        self.sums = [0.0; 3];
+    }
+
+    pub(crate) fn take(&mut self, row: &Row) -> Result<Taken, Refused> {
+        let cells = [
+            ("time", row.time),
+            ("input", row.input),
+            ("output", row.output),
+        ];
+        for (column, value) in cells {
+            if !value.is_finite() {
+                return Err(Refused::NotFinite { column, value });
+            }
+            if value.abs() > LARGEST {
+                return Err(Refused::TooLarge {
+                    column,
+                    value,
+                    limit: LARGEST,
+                });
+            }
+        }
+        let time = row.time;
+        let mut notice = None;
+        if let Some(previous) = self.last {
+            if time == previous {
+                return Err(Refused::Repeated { time });
+            }
+            if time < previous {
+                return Err(Refused::Backward { time, previous });
+            }
+            notice = self.step(previous, time);
+        }
+        self.last = Some(time);
+        self.rows += 1;
+        if self.filled == 0 {
+            self.begun = time;
+        }
+        self.sums[0] += time - self.begun;
+        self.sums[1] += row.input;
+        self.sums[2] += row.output;
+        self.filled += 1;
+        let sample = (self.filled == self.every).then(|| {
+            let mean = |sum: f64| sum / self.every as f64;
+            Sample {
+                time: self.begun + mean(self.sums[0]),
+                input: mean(self.sums[1]),
+                output: mean(self.sums[2]),
+                follows: self.follows,
+            }
+        });
+        if sample.is_some() {
+            self.begin();
+            self.follows = Follows::On;
+        }
+        Ok(Taken { sample, notice })
+    }
+
+    /// Looks at a step of the time.
+    fn step(&mut self, previous: f64, time: f64) -> Option<Notice> {
+        let step = time - previous;
+        if self.steps.len() == STEPS {
+            self.steps.remove(0);
+        }
+        self.steps.push(step);
+        let Some((median, longest)) = self.usual else {
+            if self.steps.len() == STEPS {
+                self.usual = Some(self.median_and_longest());
+            }
+            return None;
+        };
+        if step <= GAP * longest && step * GAP >= median {
+            self.other = 0;
+            return None;
+        }
+        self.other += 1;
+        if self.other == OTHER {
+            self.other = 0;
+            let now = self.median_and_longest();
+            self.usual = Some(now);
+            self.follows = Follows::Interval;
+            self.every = 1;
+            self.begin();
+            return Some(Notice::IntervalChanged {
+                time,
+                from: median,
+                to: now.0,
+            });
+        }
+        if step <= GAP * longest {
+            return None;
+        }
+        let bridged = step <= BRIDGED * longest;
+        if !bridged {
+            if self.follows == Follows::On {
+                self.follows = Follows::Gap;
+            }
+            self.begin();
+        }
+        Some(Notice::Gap {
+            from: previous,
+            to: time,
+            missing: ((step / median).round() as u64).saturating_sub(1),
+            bridged,
+        })
+    }
+
+    /// Of the latest steps; a single long one is no usual one.
+    fn median_and_longest(&self) -> (f64, f64) {
+        let mut sorted = self.steps.clone();
+        sorted.sort_by(f64::total_cmp);
+        (sorted[STEPS / 2], sorted[STEPS - 2])
+    }
+}

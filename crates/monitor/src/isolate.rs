@@ -1,0 +1,325 @@
+//! Isolation: which effect of the catalogue began, and when, explains the latest rows.
+//!
+//! An effect that begins at row `k` is fitted to the rows from `k` on by `greybox`, in the metric of the learned noise: every
+//! parameter of the plant as it was learned, the levels at `k` as the learned model has them, only the effect's own
+//! parameters free. Onsets lie on a grid that is finer towards now, and then between its neighbours. With the innovations
+//! `e` of the learned model,
+//! ```text
+//! evidence = sum_{j >= k} e_j^2 - cost/sigma^2 - (parameters + 1) ln n
+//! ```
+//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept. Effects
+//! within [`GROUP_MARGIN`] of the best cannot be told apart yet.
+
+use std::collections::BTreeMap;
+
+use ct_signals::{ArModel, Hold};
+use greybox::{Setup, Stopping, fit_from};
+use missing_effect::GROUP_MARGIN;
+use plants::{MAX_VESSELS, Placed, Structure, Unit};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    intake::Sample,
+    learn::{Learned, record},
+};
+
+/// Effects that begin while a plant runs. What is a plant's shape, a wrong law or a lag does not.
+const BEGIN: [&str; 12] = [
+    "stiction_backlash",
+    "pump_deadzone",
+    "pump_saturation",
+    "pump_gain_drift",
+    "valve_drift",
+    "valve_step",
+    "const_leak",
+    "leak_at_height",
+    "overflow",
+    "sensor_offset",
+    "sensor_drift",
+    "sensor_saturation",
+];
+
+/// Onsets, in slowest time constants before now.
+const ONSETS: [f64; 13] = [
+    0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0,
+];
+/// At every such onset the catalogue's starts are tried again.
+const AFRESH: usize = 4;
+/// An onset has at least so many rows behind it.
+const FEWEST: usize = 8;
+/// A drift of the pump is even where its settling takes as long as it may.
+const EVEN: (&str, &str) = ("pump_gain_drift", "time_constant");
+const ROUGH: Stopping = Stopping {
+    evaluations: 8,
+    cost: 1e-3,
+};
+const FINE: Stopping = Stopping {
+    evaluations: 40,
+    cost: 1e-8,
+};
+/// What is left is more than noise where its squares lie so many standard errors above those of the noise ...
+const BEYOND: f64 = 4.0;
+/// ... and are more than this share of what was above the noise before: no learned model is exact, and beside a large effect its errors show.
+const LEFT: f64 = 0.1;
+
+/// A row that is kept, with what the learned model said of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Kept {
+    pub sample: Sample,
+    /// Levels of the learned model.
+    pub levels: [f64; MAX_VESSELS],
+    /// Whitened residual in its standard deviations.
+    pub innovation: f64,
+}
+
+/// An effect that explains the latest rows, as well as it can.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Suspect {
+    pub placed: Placed,
+    pub evidence: f64,
+    /// \[s\]
+    pub since: f64,
+    /// Its size: name, value, unit.
+    pub size: (&'static str, f64, Unit),
+    /// The size lies inside its plausible range.
+    pub plausible: bool,
+    /// Whitened squares from its onset on, in the noise's variance: what the learned model leaves, and what is left with it; and rows
+    /// there.
+    squares: (f64, f64),
+    rows: usize,
+}
+
+impl Suspect {
+    /// What it leaves is more than noise.
+    pub(crate) fn leaves_more_than_noise(&self) -> bool {
+        let (before, left) = self.squares;
+        let rows = self.rows as f64;
+        left > rows + BEYOND * (2.0 * rows).sqrt() && left - rows > LEFT * (before - rows)
+    }
+
+    /// Belongs to the group of the best.
+    pub(crate) fn near(&self, best: &Self) -> bool {
+        self.plausible && best.evidence - self.evidence < GROUP_MARGIN
+    }
+}
+
+/// Every effect that may have begun, best first: an implausible size comes after every plausible one.
+pub(crate) fn isolate(
+    structure: &Structure,
+    learned: &Learned,
+    hold: Hold,
+    rows: &[Kept],
+) -> Vec<Suspect> {
+    let Some(noise) = learned.noise() else {
+        return Vec::new();
+    };
+    let search = Search {
+        structure,
+        learned,
+        noise,
+        hold,
+        rows,
+        squares: rows
+            .iter()
+            .rev()
+            .scan(0.0, |sum, row| {
+                *sum += row.innovation * row.innovation;
+                Some(*sum)
+            })
+            .collect(),
+    };
+    let mut suspects: Vec<Suspect> = structure
+        .candidates()
+        .into_par_iter()
+        .filter(|placed| BEGIN.contains(&placed.effect.id))
+        .filter_map(|placed| search.suspect(placed))
+        .collect();
+    suspects.sort_by(|a, b| {
+        (b.plausible, b.evidence)
+            .partial_cmp(&(a.plausible, a.evidence))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    // Of two vessels the one that explains more.
+    let mut best: Vec<Suspect> = Vec::with_capacity(suspects.len());
+    for suspect in suspects {
+        if best
+            .iter()
+            .all(|b| b.placed.effect.id != suspect.placed.effect.id)
+        {
+            best.push(suspect);
+        }
+    }
+    best
+}
+
+struct Search<'a> {
+    structure: &'a Structure,
+    learned: &'a Learned,
+    noise: ArModel,
+    hold: Hold,
+    rows: &'a [Kept],
+    /// Sum of squared innovations over the last 1, 2, ... rows.
+    squares: Vec<f64>,
+}
+
+impl Search<'_> {
+    /// The better of an effect with all its parameters and with one of them held, where that makes a simpler effect of it.
+    fn suspect(&self, placed: Placed) -> Option<Suspect> {
+        let whole = self.suspect_with(placed, None);
+        if placed.effect.id != EVEN.0 {
+            return whole;
+        }
+        let simple = self.suspect_with(placed, Some(EVEN.1));
+        [whole, simple]
+            .into_iter()
+            .flatten()
+            .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+    }
+
+    fn suspect_with(&self, placed: Placed, held: Option<&str>) -> Option<Suspect> {
+        let n = self.rows.len();
+        let unit = self.learned.rows_per_time_constant();
+        let mut lengths: Vec<usize> = ONSETS
+            .iter()
+            .map(|share| ((share * unit).round() as usize).max(FEWEST))
+            .filter(|length| *length <= n)
+            .collect();
+        lengths.dedup();
+        let mut best: Option<(Suspect, usize, Vec<f64>)> = None;
+        let mut near: Option<Vec<f64>> = None;
+        for (i, &length) in lengths.iter().enumerate() {
+            // From the catalogue's starts now and then, in between from where the last onset ended.
+            let from = near.take().filter(|_| !i.is_multiple_of(AFRESH));
+            let Some((suspect, x)) = self.fitted((placed, held), length, from.as_deref(), ROUGH)
+            else {
+                continue;
+            };
+            near = Some(x.clone());
+            if best
+                .as_ref()
+                .is_none_or(|(known, ..)| suspect.evidence > known.evidence)
+            {
+                best = Some((suspect, length, x));
+            }
+        }
+        let (_, at, _) = best.as_ref()?;
+        // Half-way to the next onset on either side, again and again.
+        let position = lengths.iter().position(|length| length == at)?;
+        let below = position.checked_sub(1).map_or(FEWEST, |i| lengths[i]);
+        let above = lengths.get(position + 1).copied().unwrap_or(n);
+        let mut gap = (at - below.min(*at), above - at);
+        while gap != (0, 0) {
+            gap = (gap.0 / 2, gap.1 / 2);
+            let (_, at, x) = best.clone()?;
+            for length in [at.saturating_sub(gap.0), at + gap.1] {
+                if length != at
+                    && (FEWEST..=n).contains(&length)
+                    && let Some(found) = self.fitted((placed, held), length, Some(&x), FINE)
+                    && best
+                        .as_ref()
+                        .is_none_or(|(known, ..)| found.0.evidence > known.evidence)
+                {
+                    best = Some((found.0, length, found.1));
+                }
+            }
+        }
+        let (rough, length, x) = best?;
+        let fine = self.fitted((placed, held), length, Some(&x), FINE);
+        Some(fine.map_or(rough, |(fine, _)| fine))
+    }
+
+    /// The effect as it began `length` rows ago, fitted; its own parameters start at `near` or at the catalogue's starts.
+    fn fitted(
+        &self,
+        (placed, held): (Placed, Option<&str>),
+        length: usize,
+        near: Option<&[f64]>,
+        stopping: Stopping,
+    ) -> Option<(Suspect, Vec<f64>)> {
+        let from = self.rows.len().checked_sub(length)?;
+        let rows = &self.rows[from..];
+        let records = [record(rows.iter().map(|row| &row.sample), self.hold)];
+        let mut structure = self.structure.with(placed).ok()?;
+        structure.scales.duration = records[0].duration();
+        let mut fixed: BTreeMap<String, f64> = self
+            .structure
+            .parameter_names()
+            .into_iter()
+            .zip(self.learned.theta.iter().copied())
+            .collect();
+        let own = structure.effect_parameters(placed);
+        let leading = own.first()?.clone();
+        let name = |parameter: &str| format!("{}.{parameter}", placed.effect.id);
+        // Its onset is that of the record.
+        if placed.effect.id == "valve_step" {
+            fixed.insert(name("time"), 0.0);
+        }
+        if let Some(held) = own.iter().find(|parameter| Some(parameter.name) == held) {
+            fixed.insert(name(held.name), held.upper);
+        }
+        let mut setup = Setup::new(structure, &records, fixed).ok()?;
+        setup.substeps = self.learned.substeps;
+        setup.hold_initial_states();
+        let mut x = vec![0.0; setup.names().len()];
+        for (i, name) in setup.names().iter().enumerate() {
+            if let Some(value) = setup.fixed.get(name) {
+                x[i] = *value;
+            }
+        }
+        let (first, vessels) = (setup.parameter_count(), setup.structure.plant.vessels());
+        x[first..first + vessels].copy_from_slice(&rows[0].levels[..vessels]);
+        let free = setup.free().to_vec();
+        let starts: Vec<Vec<f64>> = match near {
+            Some(values) => vec![values.to_vec()],
+            None => grid(&own, free.len()),
+        };
+        let starts: Vec<Vec<f64>> = starts
+            .into_iter()
+            .map(|values| {
+                let mut start = x.clone();
+                for (i, value) in free.iter().zip(values) {
+                    start[*i] = value;
+                }
+                start
+            })
+            .collect();
+        let fit = fit_from(&setup, &starts, &self.noise, stopping).ok()?;
+        let variance = self.learned.sigma * self.learned.sigma;
+        let squares = fit.cost / variance;
+        let cost = (free.len() + 1) as f64 * (self.rows.len() as f64).ln();
+        let values: Vec<f64> = free.iter().map(|&i| fit.x[i]).collect();
+        let size = *values.first()?;
+        let room = 1e-6 * (leading.upper - leading.lower);
+        Some((
+            Suspect {
+                placed,
+                evidence: self.squares[length - 1] - squares - cost,
+                since: rows[0].sample.time,
+                size: (leading.name, size, leading.unit),
+                plausible: size > leading.lower + room && size < leading.upper - room,
+                squares: (self.squares[length - 1], squares),
+                rows: length,
+            },
+            values,
+        ))
+    }
+}
+
+/// All combinations of the starts of an effect's first parameters.
+fn grid(parameters: &[plants::ParameterInfo], count: usize) -> Vec<Vec<f64>> {
+    parameters
+        .iter()
+        .take(count)
+        .fold(vec![Vec::new()], |grid, parameter| {
+            grid.iter()
+                .flat_map(|values| {
+                    parameter.starts.iter().map(move |start| {
+                        let mut values = values.clone();
+                        values.push(*start);
+                        values
+                    })
+                })
+                .collect()
+        })
+}

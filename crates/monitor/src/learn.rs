@@ -1,0 +1,245 @@
+//! The learning phase: the believed model fitted to the first rows, and the noise that it leaves.
+
+use std::collections::BTreeMap;
+
+use ct_signals::{ArModel, Hold, Record, Signal};
+use greybox::{FitOptions, LinearPlant, Setup, coloured, fit_from, random_starts};
+use plants::{Known, Placed, Plant, Scales, Structure, Term};
+use serde::{Deserialize, Serialize};
+
+use crate::intake::Sample;
+
+/// A command that moves by less of itself stands still.
+const STILL: f64 = 1e-9;
+
+/// The believed model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// The plant.
+    pub plant: Plant,
+    /// What is known of it.
+    pub known: Known,
+    /// The effects that are on.
+    pub effects: Vec<Placed>,
+    /// Terms of the user's own that are on.
+    pub terms: Vec<Term>,
+    /// First guesses by name: `alpha`, `overflow.rim`.
+    pub start: BTreeMap<String, f64>,
+    /// Names in `start` that are not fitted, but watched.
+    pub fixed: Vec<String>,
+    /// What the command does between rows.
+    pub hold: Hold,
+}
+
+impl Model {
+    /// The plant with its effects.
+    pub(crate) fn structure(&self, scales: Scales) -> Result<Structure, plants::Error> {
+        let plant = Structure::new(self.plant, self.known.clone(), scales);
+        let effects = self
+            .effects
+            .iter()
+            .try_fold(plant, |structure, &placed| structure.with(placed))?;
+        self.terms
+            .iter()
+            .try_fold(effects, |structure, term| structure.with_term(term.clone()))
+    }
+
+    fn fixed(&self) -> BTreeMap<String, f64> {
+        let value = |name: &String| Some((name.clone(), *self.start.get(name)?));
+        self.fixed.iter().filter_map(value).collect()
+    }
+
+    /// What a state has to agree with.
+    pub(crate) fn fingerprint(&self) -> String {
+        let effects: Vec<String> = self
+            .effects
+            .iter()
+            .map(|placed| format!("{} ({})", placed.effect.id, placed.vessel))
+            .collect();
+        format!(
+            "{} with effects {effects:?}, terms {:?}, known {:?}, start {:?}, fixed {:?}, hold {:?}",
+            self.plant.id(),
+            self.terms,
+            self.known,
+            self.start,
+            self.fixed,
+            self.hold
+        )
+    }
+}
+
+/// What was learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Learned {
+    /// The parameters, in the structure's order.
+    pub theta: Vec<f64>,
+    /// Their covariance, row by row; zero for what was not fitted, or held at a bound.
+    pub covariance: Vec<f64>,
+    /// Coefficients and innovations' standard deviation of the noise.
+    pub coefficients: Vec<f64>,
+    pub sigma: f64,
+    /// Rows from which it was learned.
+    pub rows: usize,
+    /// The slowest time constant \[s\].
+    pub time_constant: f64,
+    /// The usual step of the time \[s\].
+    pub interval: f64,
+    pub scales: Scales,
+    pub substeps: usize,
+}
+
+impl Learned {
+    pub(crate) fn noise(&self) -> Option<ArModel> {
+        ArModel::from_coefficients(&self.coefficients, self.sigma).ok()
+    }
+
+    /// The slowest time constant in rows.
+    pub(crate) fn rows_per_time_constant(&self) -> f64 {
+        self.time_constant / self.interval
+    }
+
+    /// Positions and standard errors of the parameters that were fitted.
+    pub(crate) fn errors(&self) -> Vec<(usize, f64)> {
+        let n = self.theta.len();
+        (0..n)
+            .map(|i| (i, self.covariance[i * n + i].sqrt()))
+            .filter(|(_, error)| *error > 0.0)
+            .collect()
+    }
+
+    /// The covariance among some of the parameters, row by row.
+    pub(crate) fn covariance_of(&self, positions: &[usize]) -> Vec<f64> {
+        let n = self.theta.len();
+        positions
+            .iter()
+            .flat_map(|i| positions.iter().map(move |j| self.covariance[i * n + j]))
+            .collect()
+    }
+
+    pub(crate) fn sound(&self, parameters: usize) -> bool {
+        let finite = [self.sigma, self.time_constant, self.interval];
+        self.theta.len() == parameters
+            && self.covariance.len() == parameters * parameters
+            && finite.iter().all(|v| v.is_finite() && *v > 0.0)
+            && self.noise().is_some()
+    }
+}
+
+/// Rows as a record; the time counts from the first.
+pub(crate) fn record<'a>(rows: impl Iterator<Item = &'a Sample>, hold: Hold) -> Record {
+    let mut record = Record {
+        name: "the rows".to_string(),
+        time: Vec::new(),
+        input: Signal::default(),
+        input_2: None,
+        output: Signal::default(),
+        reference: None,
+        hold,
+    };
+    let mut first = None;
+    for row in rows {
+        record.time.push(row.time - *first.get_or_insert(row.time));
+        record.input.values.push(row.input);
+        record.output.values.push(row.output);
+    }
+    record
+}
+
+/// The fit, and the levels at the first row; in words why there is none.
+pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f64>), String> {
+    let options = FitOptions::default();
+    let said = |error: &dyn std::fmt::Display| error.to_string();
+    let fixed = model.fixed();
+    let bare = Setup::from_records(
+        model.plant,
+        model.known.clone(),
+        &[],
+        records,
+        BTreeMap::new(),
+    )
+    .map_err(|error| said(&error))?;
+    let structure = model
+        .structure(bare.structure.scales)
+        .map_err(|error| said(&error))?;
+    let mut setup = Setup::new(structure, records, fixed).map_err(|error| said(&error))?;
+    let record = records.first().ok_or("no row")?;
+    record
+        .require_rows(setup.free().len())
+        .map_err(|error| said(&error))?;
+    let (low, high) = record.input_range();
+    if high - low <= STILL * high.abs().max(low.abs()) {
+        return Err(format!(
+            "the command has stood still at {low}, which says nothing about the plant: move it"
+        ));
+    }
+    let mut starts = random_starts(&setup, options.starts, options.seed);
+    if let (false, Some(first)) = (model.start.is_empty(), starts.first()) {
+        let mut guessed = first.clone();
+        for (name, value) in setup.names().iter().zip(&mut guessed) {
+            *value = model.start.get(name).copied().unwrap_or(*value);
+        }
+        starts.push(guessed);
+    }
+    let white = ArModel::white(1.0);
+    let fit = fit_from(&setup, &starts, &white, options.stopping).map_err(|error| said(&error))?;
+    setup
+        .choose_substeps(&fit.x)
+        .map_err(|error| said(&error))?;
+    setup.structure.scales = setup.scales_at(&fit.x).map_err(|error| said(&error))?;
+    let setup = setup
+        .with_structure(setup.structure.clone())
+        .map_err(|error| said(&error))?;
+    let fit = fit_from(&setup, &[fit.x], &white, options.stopping).map_err(|error| said(&error))?;
+    let fit = coloured(&setup, fit, options.noise_order, options.stopping)
+        .map_err(|error| said(&error))?;
+
+    let n = setup.parameter_count();
+    let errors = fit.std_errors();
+    let mut covariance = vec![0.0; n * n];
+    if let Some((positions, correlations)) = fit.correlations() {
+        let named = || positions.iter().enumerate().filter(|(_, i)| **i < n);
+        for (a, &i) in named() {
+            for (b, &j) in named() {
+                let (Some(ei), Some(ej)) = (errors[i], errors[j]) else {
+                    continue;
+                };
+                covariance[i * n + j] = correlations[a][b] * ei * ej;
+            }
+        }
+    } else {
+        return Err(
+            "the rows do not determine the parameters: the command has not moved enough".into(),
+        );
+    }
+    let sigma = fit.noise.sigma();
+    if !(sigma.is_finite() && sigma > 0.0 && covariance.iter().all(|c| c.is_finite())) {
+        return Err("the model leaves no noise to judge by: are the readings measured?".into());
+    }
+    let commands = &record.input.values;
+    let mean = commands.iter().sum::<f64>() / commands.len() as f64;
+    let interval = record.sample_interval();
+    let linear =
+        LinearPlant::at(&setup.structure, &fit.x[..n], mean).map_err(|error| said(&error))?;
+    let slowest = linear
+        .a
+        .iter()
+        .enumerate()
+        .map(|(i, row)| -interval / row[i].ln())
+        .fold(0.0, f64::max);
+    if !(slowest.is_finite() && slowest > 0.0) {
+        return Err("the fitted plant does not settle".into());
+    }
+    let learned = Learned {
+        theta: fit.x[..n].to_vec(),
+        covariance,
+        coefficients: fit.noise.coefficients().to_vec(),
+        sigma,
+        rows: record.len(),
+        time_constant: slowest,
+        interval,
+        scales: setup.structure.scales.clone(),
+        substeps: setup.substeps,
+    };
+    let levels = fit.x[n..].to_vec();
+    Ok((learned, levels))
+}

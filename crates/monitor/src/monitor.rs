@@ -1,0 +1,285 @@
+//! The monitor: rows in; innovations, estimates, notices and alarms out.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Alarm, Error, Model, Refused, Settings, Units,
+    core::{Checkpoint, Core, Phase},
+    intake::{Intake, Sample},
+};
+
+/// The version of [`State`].
+const VERSION: u32 = 1;
+
+/// A row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Time \[s\], above that of the row before.
+    pub time: f64,
+    /// Command \[input unit\].
+    pub input: f64,
+    /// Reading \[output unit\], made before the command acts.
+    pub output: f64,
+}
+
+/// What a row says.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Step {
+    /// The learned model beside the row; `None` while learning, and within a block of rows.
+    pub innovation: Option<Innovation>,
+    /// Something about the rows or the phase, where there is something.
+    pub notices: [Option<Notice>; 2],
+    /// The model does not fit any more, or more is known of that.
+    pub alarm: Option<Alarm>,
+}
+
+/// The learned model beside a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation {
+    /// Measured minus model, which runs on the command alone \[output unit\].
+    pub residual: f64,
+    /// What of it the noise's past does not foretell, in standard deviations.
+    pub standardised: f64,
+}
+
+/// Something that is not an alarm.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Notice {
+    /// Rows are missing.
+    Gap {
+        /// Time of the row before \[s\].
+        from: f64,
+        /// Time of the row behind it \[s\].
+        to: f64,
+        /// How many.
+        missing: u64,
+        /// The command is taken to have been held; else what is not known of the levels is waited for.
+        bridged: bool,
+    },
+    /// The time steps by another interval now: the noise is learned anew.
+    IntervalChanged {
+        /// Since when \[s\].
+        time: f64,
+        /// The usual step before \[s\].
+        from: f64,
+        /// The usual step now \[s\].
+        to: f64,
+    },
+    /// The learning is over.
+    Learned {
+        /// From so many rows.
+        rows: usize,
+        /// The slowest time constant \[s\].
+        time_constant: f64,
+        /// Standard deviation of the noise \[output unit\].
+        noise: f64,
+        /// Rows are watched in blocks of so many.
+        every: usize,
+    },
+    /// The rows so far do not determine the model; it goes on learning.
+    NotLearned {
+        /// Why.
+        why: String,
+    },
+}
+
+/// A parameter as it is tracked.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// As it was learned.
+    pub learned: f64,
+    /// As it is now.
+    pub value: f64,
+    /// Half the width of the 95 % interval; `None` for one that is fixed.
+    pub half_width: Option<f64>,
+}
+
+/// Where the monitor is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Progress {
+    /// It learns, and has so many rows (or blocks of rows).
+    Learning(usize),
+    /// The learned model is watched: the largest score now and the threshold.
+    Watching {
+        /// The largest score, by magnitude.
+        score: f64,
+        /// What it has to pass.
+        threshold: f64,
+    },
+    /// The model does not fit: the same.
+    Alarmed {
+        /// The largest score, by magnitude.
+        score: f64,
+        /// What it had to pass.
+        threshold: f64,
+    },
+}
+
+/// A saved monitor: all of it, for [`Monitor::restore`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    version: u32,
+    model: String,
+    units: Units,
+    intake: Intake,
+    checkpoint: Checkpoint,
+    since: Vec<Sample>,
+}
+
+impl State {
+    /// The units of the signals when it was saved.
+    #[must_use]
+    pub fn units(&self) -> &Units {
+        &self.units
+    }
+}
+
+/// A monitor.
+pub struct Monitor {
+    intake: Intake,
+    core: Core,
+    fingerprint: String,
+    units: Units,
+}
+
+impl Monitor {
+    /// A monitor that has seen nothing yet.
+    ///
+    /// # Errors
+    /// [`Error::Setting`], [`Error::TwoPumps`], [`Error::ByClock`] for an effect in the model that follows the time since a record began, [`Error::Structure`].
+    pub fn new(model: Model, settings: Settings, units: Units) -> Result<Self, Error> {
+        settings.check()?;
+        if model.plant.pumps() > 1 {
+            return Err(Error::TwoPumps {
+                plant: model.plant.id(),
+            });
+        }
+        if let Some(placed) = model.effects.iter().find(|placed| placed.effect.by_clock) {
+            return Err(Error::ByClock {
+                effect: placed.effect.id.to_string(),
+            });
+        }
+        if let Some(term) = model
+            .terms
+            .iter()
+            .find(|term| term.variable == plants::Variable::Time)
+        {
+            return Err(Error::ByClock {
+                effect: term.name.clone(),
+            });
+        }
+        model.structure(plants::Scales::from_ranges(
+            (0.0, 1.0),
+            (0.0, 1.0),
+            1.0,
+            1.0,
+        ))?;
+        Ok(Self {
+            intake: Intake::new(),
+            fingerprint: model.fingerprint(),
+            core: Core::new(model, settings, units.clone()),
+            units,
+        })
+    }
+
+    /// Goes on where a saved monitor was; with the same model and settings what follows is the same, bit for bit.
+    ///
+    /// # Errors
+    /// As [`Monitor::new`], and [`Error::Version`], [`Error::OtherModel`], [`Error::Damaged`].
+    pub fn restore(model: Model, settings: Settings, state: State) -> Result<Self, Error> {
+        let mut monitor = Self::new(model.clone(), settings, state.units.clone())?;
+        if state.version != VERSION {
+            return Err(Error::Version {
+                found: state.version,
+                known: VERSION,
+            });
+        }
+        if state.model != monitor.fingerprint {
+            return Err(Error::OtherModel {
+                saved: state.model,
+                now: monitor.fingerprint,
+            });
+        }
+        if !state.intake.sound() {
+            return Err(Error::Damaged {
+                what: "its counts of rows do not go together".into(),
+            });
+        }
+        monitor.core = Core::restore(model, settings, state.units, state.checkpoint, &state.since)
+            .map_err(|what| Error::Damaged { what })?;
+        monitor.intake = state.intake;
+        Ok(monitor)
+    }
+
+    /// All of it, to be saved.
+    #[must_use]
+    pub fn state(&self) -> State {
+        let (checkpoint, since) = self.core.saved();
+        State {
+            version: VERSION,
+            model: self.fingerprint.clone(),
+            units: self.units.clone(),
+            intake: self.intake.clone(),
+            checkpoint: checkpoint.clone(),
+            since: since.to_vec(),
+        }
+    }
+
+    /// Takes in a row.
+    ///
+    /// # Errors
+    /// [`Refused`]: the row is not used, and the monitor is as it was.
+    pub fn update(&mut self, row: &Row) -> Result<Step, Refused> {
+        let taken = self.intake.take(row)?;
+        let mut step = Step::default();
+        step.notices[0] = taken.notice;
+        if let Some(sample) = taken.sample {
+            let fed = self.core.feed(sample);
+            step.innovation = fed.said.map(|said| Innovation {
+                residual: said.residual,
+                standardised: said.innovation,
+            });
+            step.notices[1] = fed.notice;
+            step.alarm = fed.alarm;
+            if self.core.every() != self.intake.every {
+                self.intake.every = self.core.every();
+                self.intake.begin();
+            }
+        }
+        Ok(step)
+    }
+
+    /// Rows that were taken since the beginning, before a restoration too.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.intake.rows
+    }
+
+    /// The parameters as they are tracked, with their band; empty while learning. Allocates.
+    #[must_use]
+    pub fn estimates(&self) -> Vec<Estimate> {
+        self.core.estimates()
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        let (score, threshold) = self.core.score().unwrap_or((f64::NAN, f64::NAN));
+        match self.core.phase() {
+            Phase::Learning { .. } => Progress::Learning(self.core.kept()),
+            Phase::Watching => Progress::Watching { score, threshold },
+            Phase::Alarmed { .. } => Progress::Alarmed { score, threshold },
+        }
+    }
+
+    /// The slowest time constant that was learned \[s\].
+    #[must_use]
+    pub fn time_constant(&self) -> Option<f64> {
+        Some(self.core.learned()?.time_constant)
+    }
+}

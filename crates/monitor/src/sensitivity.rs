@@ -1,0 +1,84 @@
+//! The learned model on the rows as they come, with exact derivatives of its reading.
+
+use ct_signals::Hold;
+use plants::{Command, Dual, MAX_VESSELS, Scalar, Simulator, Structure};
+
+use crate::intake::Sample;
+
+/// The most parameters by which derivatives are taken; further ones stay as they were learned.
+pub(crate) const MOST_LANES: usize = 16;
+
+/// A simulation with derivatives by the parameters of its structure.
+pub(crate) trait Model: Send {
+    /// The reading now; its derivatives go to `row`, as many as there are lanes.
+    fn read(&mut self, row: &mut [f64]) -> f64;
+    /// Moves on under a command for `h` seconds.
+    fn advance(&mut self, command: Command, h: f64);
+    /// The level of each vessel.
+    fn levels(&self) -> [f64; MAX_VESSELS];
+}
+
+struct Lanes<const N: usize>(Simulator<Dual<N>>);
+
+impl<const N: usize> Model for Lanes<N> {
+    fn read(&mut self, row: &mut [f64]) -> f64 {
+        let y = self.0.read();
+        for (to, derivative) in row.iter_mut().zip(y.eps) {
+            *to = derivative;
+        }
+        y.re
+    }
+    fn advance(&mut self, command: Command, h: f64) {
+        self.0.advance(command, h);
+    }
+    fn levels(&self) -> [f64; MAX_VESSELS] {
+        self.0.levels().map(Scalar::value)
+    }
+}
+
+/// How many parameters have a lane.
+pub(crate) fn lanes(parameters: usize) -> usize {
+    parameters.min(MOST_LANES)
+}
+
+/// A simulation from given levels, which depend on no parameter; `at_rest` is the command before.
+pub(crate) fn model(
+    structure: &Structure,
+    substeps: usize,
+    theta: &[f64],
+    levels: &[f64],
+    at_rest: f64,
+) -> Result<Box<dyn Model>, plants::Error> {
+    match lanes(theta.len()) {
+        0..=3 => in_lanes::<3>(structure, substeps, theta, levels, at_rest),
+        4 => in_lanes::<4>(structure, substeps, theta, levels, at_rest),
+        5..=8 => in_lanes::<8>(structure, substeps, theta, levels, at_rest),
+        _ => in_lanes::<MOST_LANES>(structure, substeps, theta, levels, at_rest),
+    }
+}
+
+fn in_lanes<const N: usize>(
+    structure: &Structure,
+    substeps: usize,
+    theta: &[f64],
+    levels: &[f64],
+    at_rest: f64,
+) -> Result<Box<dyn Model>, plants::Error> {
+    let theta: Vec<Dual<N>> = theta
+        .iter()
+        .enumerate()
+        .map(|(lane, value)| Dual::variable(*value, lane))
+        .collect();
+    let levels: Vec<Dual<N>> = levels.iter().map(|level| Dual::constant(*level)).collect();
+    let mut simulator = Simulator::new(structure, &theta, &levels, at_rest)?;
+    simulator.set_substeps(substeps);
+    Ok(Box::new(Lanes(simulator)))
+}
+
+/// The command from one sample to the next.
+pub(crate) fn command(hold: Hold, from: &Sample, to: &Sample) -> Command {
+    match hold {
+        Hold::Zero => Command::held(from.input),
+        Hold::First => Command::ramp(from.input, to.input),
+    }
+}

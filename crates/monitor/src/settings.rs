@@ -1,0 +1,68 @@
+//! How to watch.
+
+use crate::Error;
+
+/// How to watch. Every field has a usual value: `Settings::default()`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Mean number of (working) rows between false alarms, above 1000; usually 1e6.
+    pub rows_between_false_alarms: f64,
+    /// Fewest rows that are learned from, 100 to 1024; usually 1000.
+    pub learning_rows: usize,
+    /// Fewest slowest time constants that are learned from, 5 to 100; usually 20.
+    pub learning_time_constants: f64,
+    /// Memory of the tracker, in slowest time constants, 1 to 1000; usually 20.
+    pub memory: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rows_between_false_alarms: 1e6,
+            learning_rows: 1000,
+            learning_time_constants: 20.0,
+            memory: 20.0,
+        }
+    }
+}
+
+impl Settings {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let settings = [
+            (
+                "rows between false alarms",
+                self.rows_between_false_alarms,
+                1e3..=1e15,
+                "from 1000 to 1e15",
+            ),
+            (
+                "rows to learn from",
+                self.learning_rows as f64,
+                100.0..=1024.0,
+                "from 100 to 1024",
+            ),
+            (
+                "time constants to learn from",
+                self.learning_time_constants,
+                5.0..=100.0,
+                "from 5 to 100",
+            ),
+            (
+                "memory in time constants",
+                self.memory,
+                1.0..=1e3,
+                "from 1 to 1000",
+            ),
+        ];
+        for (setting, value, range, words) in settings {
+            if !range.contains(&value) {
+                return Err(Error::Setting {
+                    setting,
+                    value,
+                    range: words,
+                });
+            }
+        }
+        Ok(())
+    }
+}

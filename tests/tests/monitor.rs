@@ -1,0 +1,65 @@
+//! The monitor on loops drawn at random: a part of `cargo run --release -p ctid-tests --example monitor_study`.
+#![allow(clippy::unwrap_used)]
+
+use ct_signals::Record;
+use ctid_tests::onset::Onset;
+use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
+use rayon::prelude::*;
+
+fn watched(onset: &Onset, record: &Record) -> Vec<Alarm> {
+    let model = Model {
+        plant: onset.rig.plant,
+        known: onset.rig.known(),
+        effects: Vec::new(),
+        terms: Vec::new(),
+        start: Default::default(),
+        fixed: Vec::new(),
+        hold: record.hold,
+    };
+    let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
+    let rows = record.time.iter().enumerate().map(|(k, time)| Row {
+        time: *time,
+        input: record.input.values[k],
+        output: record.output.values[k],
+    });
+    rows.filter_map(|row| monitor.update(&row).unwrap().alarm)
+        .collect()
+}
+
+/// An effect that begins half-way, of each kind, as large as the noise, in white and coloured noise in turn: seen within
+/// three time constants of when it shows as much as the noise, and in the group that is named.
+#[test]
+fn what_begins_is_seen_and_named() {
+    let found: Vec<(bool, bool)> = (30..35)
+        .into_par_iter()
+        .map(|number| {
+            let colour = if number % 2 == 0 { 0.0 } else { 0.5 };
+            let onset = Onset::drawn(number, 3000, 1.0, colour).unwrap();
+            let alarms = watched(&onset, &onset.run(true, number).unwrap());
+            let at = |row: usize| row as f64 * onset.rig.interval;
+            let visible = at(onset.visible_from().unwrap());
+            let first = alarms.iter().find(|alarm| alarm.time >= at(onset.row));
+            let seen = first.is_some_and(|a| a.time <= visible + 3.0 * onset.time_constant());
+            let (placed, _) = onset.effect.as_ref().unwrap();
+            let last = alarms.iter().rfind(|alarm| alarm.time >= at(onset.row));
+            let named = last.is_some_and(|a| a.effects.iter().any(|e| e == placed.effect.id));
+            (seen, named)
+        })
+        .collect();
+    let count = |of: fn(&(bool, bool)) -> bool| found.iter().filter(|f| of(f)).count();
+    assert!(count(|f| f.0) >= 4, "{found:?}");
+    assert!(count(|f| f.1) >= 4, "{found:?}");
+}
+
+#[test]
+fn nothing_is_seen_where_nothing_begins() {
+    let alarms: Vec<usize> = (40..44)
+        .into_par_iter()
+        .map(|number| {
+            let colour = if number % 2 == 0 { 0.0 } else { 0.5 };
+            let onset = Onset::nothing(8000, colour, number);
+            watched(&onset, &onset.run(true, number).unwrap()).len()
+        })
+        .collect();
+    assert_eq!(alarms, [0; 4]);
+}

@@ -256,18 +256,17 @@ fn two_undecided_effects_show_their_experiment() {
     browser.until("document.querySelector('#findings .groups li')");
     browser.picture("undecided");
     browser.click("[id^=tell-]");
-    browser.until("document.getElementById('plot-experiment')?.data");
+    browser.until("document.querySelector('#experiment .lead')");
     browser.picture("experiment");
     let rows = browser.evaluate("document.querySelectorAll('#experiment tbody tr').length");
     assert!(rows.as_u64().unwrap() > 2, "{rows}");
     browser.click("#limit-low");
-    browser.type_text("3");
+    browser.type_text("1.5");
     browser.click("#limit-high");
-    browser.type_text("7");
+    browser.type_text("8.5");
     browser.click("#design-again");
-    browser.until(
-        "document.querySelector('#experiment .lead').innerText.includes('from 3.00 to 7.00 V')",
-    );
+    browser.until("document.querySelector('#experiment .lead').innerText.includes('from 1.50 to 8.50 V') && document.getElementById('plot-experiment')?.data");
+    browser.picture("experiment-wider");
     let values = browser.evaluate("document.getElementById('plot-experiment').data[0].y");
     let values: Vec<f64> = values
         .as_array()
@@ -275,7 +274,7 @@ fn two_undecided_effects_show_their_experiment() {
         .iter()
         .filter_map(Value::as_f64)
         .collect();
-    assert!(values.len() >= 300 && values.iter().all(|u| (3.0..=7.0).contains(u)));
+    assert!(values.len() >= 300 && values.iter().all(|u| (1.5..=8.5).contains(u)));
     browser.assert_quiet(&address);
 }
 

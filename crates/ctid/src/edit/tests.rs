@@ -34,9 +34,9 @@ fn comments_and_layout_stay() {
 fn a_list_over_several_lines_keeps_its_lines() {
     let text = r#"plant = "single-tank"
 effects = [
-"overflow",   # seen in May
-"pump_lag",   # the new drive
-# perhaps more
+    "overflow",   # seen in May
+    "pump_lag",   # the new drive
+    # perhaps more
 ]
 "#;
     let more = added(text, "sensor_lag");

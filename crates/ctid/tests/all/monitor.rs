@@ -96,7 +96,7 @@ fn an_alarm_is_a_json_line_and_a_sentence() {
     for key in ["verdict", "sentence"] {
         assert!(alarm[key].is_string(), "{alarm}");
     }
-    assert!(alarm["effects"].as_array().unwrap().len() > 0, "{alarm}");
+    assert!(!alarm["effects"].as_array().unwrap().is_empty(), "{alarm}");
     let sentence = alarm["sentence"].as_str().unwrap();
     assert!(sentence.starts_with("Consistent with ") && outcome.err.contains(sentence));
     let estimates = events.iter().find(|e| e["event"] == "estimates").unwrap();

@@ -85,7 +85,9 @@ fn links_lead_to_files() {
         "docs/gallery.md",
         "docs/hidden-dead-zone.md",
         "docs/model-file.md",
+        "docs/monitor.md",
         "docs/page.md",
+        "docs/study.md",
     ] {
         let page = root.join(page);
         let text = std::fs::read_to_string(&page).unwrap();
@@ -97,8 +99,30 @@ fn links_lead_to_files() {
             if link.starts_with("http") || link.starts_with('#') {
                 continue;
             }
-            let there = page.parent().unwrap().join(link);
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let there = page.parent().unwrap().join(file);
             assert!(there.exists(), "{}: no {link}", page.display());
+            if !heading.is_empty() {
+                let text = std::fs::read_to_string(there).unwrap();
+                let found = text
+                    .lines()
+                    .any(|line| anchor(line) == Some(heading.to_string()));
+                assert!(found, "{}: no {link}", page.display());
+            }
         }
     }
+}
+
+/// What a link to a heading ends in.
+fn anchor(line: &str) -> Option<String> {
+    let heading = line.strip_prefix('#')?.trim_start_matches('#').trim();
+    let kept = |c: &char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
+    Some(
+        heading
+            .to_lowercase()
+            .chars()
+            .filter(kept)
+            .collect::<String>()
+            .replace(' ', "-"),
+    )
 }

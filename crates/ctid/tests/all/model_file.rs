@@ -427,7 +427,7 @@ fn tables_of_effects() {
     refuses(
         &two("[effect.overflow]\nrim = [1.0]"),
         "tank.toml:4: not understood",
-        "a number, where =",
+        "a number, a place such as where =",
     );
 }
 

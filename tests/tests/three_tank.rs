@@ -127,6 +127,12 @@ fn a_valve_that_is_blocked_is_found() {
 
 #[test]
 #[ignore = "takes most of a minute of processor time"]
+fn a_valve_that_is_shut_is_found() {
+    found("valve_step", 0, &[-1.0, 1500.0]);
+}
+
+#[test]
+#[ignore = "takes most of a minute of processor time"]
 fn an_adequate_model_is_left_alone() {
     let options = Options {
         max_effects: 1,

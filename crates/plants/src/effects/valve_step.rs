@@ -18,6 +18,11 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let duration = site.duration();
+    let mut changes = vec![0.01];
+    if site.is_joined_to_next() {
+        // A tank behind a shut valve fills and empties alone: no small change leads there.
+        changes.push(-0.9);
+    }
     vec![
         ParameterInfo {
             name: "change",
@@ -26,7 +31,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             absent: 0.0,
             lower: fully_shut(site, -0.5),
             upper: 0.5,
-            starts: vec![0.01],
+            starts: changes,
         },
         ParameterInfo {
             name: "time",

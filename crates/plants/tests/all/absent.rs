@@ -90,8 +90,7 @@ fn the_derivative_at_absent_is_that_of_the_limit() {
                         };
                         worst = worst.max((rise / (2.0 * step) - y.eps[own]).abs() / largest);
                     }
-                    // Where a level comes to rest near a hole the output bends with a root of the leak, and a difference errs by a root of
-                    // its step: as in derivatives.rs.
+                    // A leak that begins between two samples, as in derivatives.rs; of T2 up to 5.5e-6.
                     let most = if plant.joined() && begins_with_a_root(&[placed]) {
                         1e-5
                     } else {

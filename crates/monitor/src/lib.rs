@@ -14,7 +14,7 @@
 //! normal. Memory is constant, and a row allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
 //!
 //! # Example
-//! A tank loses water from the 1500th row on.
+//! A tank loses water from the 3000th row on.
 //! ```
 //! use monitor::{Model, Monitor, Row, Settings, Units, Verdict};
 //! use plants::{Known, Plant};
@@ -33,20 +33,20 @@
 //! let mut monitor = Monitor::new(model, Settings::default(), units)?;
 //!
 //! let mut rng = ChaCha8Rng::seed_from_u64(1);
-//! let noise = ct_signals::noise::white(2000, 0.05, &mut rng);
-//! let command = ct_signals::excitation::steps(2000, 20..=80, 4.0, 6.0, &mut rng)?;
+//! let noise = ct_signals::noise::white(4000, 0.05, &mut rng);
+//! let command = ct_signals::excitation::steps(4000, 20..=80, 4.0, 6.0, &mut rng)?;
 //! let (mut level, mut alarm) = (16.0_f64, None);
-//! for k in 0..2000 {
+//! for k in 0..4000 {
 //!     let row = Row { time: k as f64, input: command[k], output: level + noise[k] };
 //!     alarm = alarm.or(monitor.update(&row)?.alarm);
-//!     let leak = if k < 1500 { 0.0 } else { 3.0 };
+//!     let leak = if k < 3000 { 0.0 } else { 3.0 };
 //!     // S dH/dt = pump_gain u - alpha sqrt(H) - leak, in short steps
 //!     for _ in 0..100 {
 //!         level += 0.01 * (10.0 * command[k] - 12.5 * level.sqrt() - leak) / 154.0;
 //!     }
 //! }
 //! let alarm = alarm.ok_or("no alarm")?;
-//! assert!(alarm.time > 1500.0 && alarm.time < 1600.0);
+//! assert!(alarm.time > 3000.0 && alarm.time < 3100.0);
 //! assert_ne!(alarm.verdict, Verdict::Unexplained);
 //! assert!(alarm.effects.iter().any(|effect| effect == "const_leak"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

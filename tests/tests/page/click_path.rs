@@ -305,6 +305,30 @@ fn page_and_commands_are_mixed() {
     browser.assert_quiet(&address);
 }
 
+/// What a form has no field for yet stays in the file.
+#[test]
+fn the_form_deletes_nothing_that_it_does_not_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("tank.toml");
+    let text = std::fs::read_to_string(bundled("tour.toml")).unwrap();
+    let text = format!("hold = \"first\"\n{text}");
+    std::fs::write(&file, &text).unwrap();
+    let path = file.display().to_string();
+    let address = format!("http://{}/", serve(&["--model", &path]));
+    let _alone = alone();
+    let Some(mut browser) = Browser::open(&address) else {
+        return;
+    };
+    browser.until("document.getElementById('known-area')?.value === '154'");
+    browser.evaluate("const box = document.getElementById('known-area'); box.value = '155'; box.dispatchEvent(new Event('change', { bubbles: true }))");
+    browser.until("document.getElementById('text').textContent.includes('155')");
+    assert_eq!(
+        std::fs::read_to_string(&file).unwrap(),
+        text.replace("154.0 ", "155.0 ")
+    );
+    browser.assert_quiet(&address);
+}
+
 /// The measured benchmark, where it lies beside the checkout: two effects, one after the other.
 #[test]
 fn the_measured_tanks_with_the_mouse() {

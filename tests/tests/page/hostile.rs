@@ -164,6 +164,10 @@ fn unfortunate_files_are_refused_with_the_mend() {
         answer.error().contains("10000 columns") && answer.error().contains("at most 500"),
         "{answer:?}"
     );
+    let line = [b"t".as_slice(), &vec![b','; 2 << 20], b"a\n1\n"].concat();
+    let answer = send("line.csv", &line);
+    assert_eq!(answer.status, 422);
+    assert!(answer.error().contains("one line"), "{answer:?}");
     for (bytes, needle) in [
         (b"PK\x03\x04 a spreadsheet".as_slice(), "spreadsheet"),
         (&[0xff, 0xfe, 0, 1], "UTF-16"),
@@ -299,6 +303,48 @@ fn two_tabs_do_not_meet_and_the_oldest_of_many_goes() {
         assert!(answer.error().contains("load the page again"));
     }
     assert_eq!(tabs[7].get("/api/state").status, 200);
+}
+
+/// What two tabs write into one file at once stands there both.
+#[test]
+fn no_change_of_two_tabs_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("m.toml");
+    std::fs::write(&file, "plant = \"single-tank\"\n").unwrap();
+    let address = serve(&["--model", &file.display().to_string()]);
+    let effects = ["overflow", "pump_deadzone"];
+    let tabs = effects.map(|effect| (effect, Tab::open(address)));
+    for _ in 0..30 {
+        for way in ["add", "remove"] {
+            std::thread::scope(|scope| {
+                for (effect, tab) in &tabs {
+                    let body = json!({ "do": way, "effect": effect }).to_string();
+                    scope.spawn(move || {
+                        assert_eq!(tab.post("/api/effect", body.as_bytes()).status, 200);
+                    });
+                }
+            });
+            let text = std::fs::read_to_string(&file).unwrap();
+            for effect in effects {
+                assert_eq!(text.contains(effect), way == "add", "{effect}: {text}");
+            }
+        }
+    }
+}
+
+/// What the file holds is told again once it is there again, also where it is the same.
+#[test]
+fn a_model_file_that_was_away_is_no_failure_for_ever() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, away) = (folder.path().join("m.toml"), folder.path().join("away"));
+    std::fs::write(&file, "plant = \"single-tank\"\n").unwrap();
+    let tab = Tab::open(serve(&["--model", &file.display().to_string()]));
+    assert!(tab.state()["failure"].is_null());
+    std::fs::rename(&file, &away).unwrap();
+    let failure = tab.state()["failure"].to_string();
+    assert!(failure.contains("cannot be opened"), "{failure}");
+    std::fs::rename(&away, &file).unwrap();
+    assert!(tab.state()["failure"].is_null(), "{}", tab.state());
 }
 
 /// Names from files are text, whatever they hold.

@@ -4,6 +4,7 @@
 mod layout;
 
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use plants::{Fitted, Place, Placed, Term};
 use toml_edit::{Array, DocumentMut, Item, Table, value};
@@ -54,11 +55,15 @@ pub struct Edited {
     pub done: String,
 }
 
+/// One change after the other: of two at once, as from two tabs of `ctid serve`, one would be lost.
+static CHANGING: Mutex<()> = Mutex::new(());
+
 /// Changes a file's text; its kind of line ends stays. Returns what was done, in one line.
 pub(crate) fn change(
     path: &Path,
     edit: impl FnOnce(&str) -> Result<Edited, Error>,
 ) -> Result<String, Error> {
+    let _turn = CHANGING.lock().unwrap_or_else(PoisonError::into_inner);
     let text = model_file::read_text(path)?;
     let edited = edit(&text)?;
     // The editor writes LF; a file from an editor that writes CRLF keeps it.

@@ -45,9 +45,7 @@ impl Files {
                 .iter()
                 .map(|path| {
                     let mut record = read_csv(path, &model.columns, model.hold)?;
-                    if self.shares_its_name(path) {
-                        record.name = path.display().to_string();
-                    }
+                    record.name = self.name_of(path);
                     Ok(record)
                 })
                 .collect()
@@ -81,15 +79,21 @@ impl Files {
         }
     }
 
-    /// Another record has the same file name: only its folder tells it apart.
-    fn shares_its_name(&self, path: &Path) -> bool {
+    /// How a record is called: by its file, or by its path where another has the same file name.
+    pub(crate) fn name_of(&self, path: &Path) -> String {
         let records = self.data.iter().chain(&self.test);
         let same = records.filter(|other| other.file_name() == path.file_name());
-        same.count() > 1
+        match path.file_name() {
+            Some(name) if same.count() <= 1 => name.to_string_lossy().into_owned(),
+            _ => path.display().to_string(),
+        }
     }
 
     /// No record twice: a fitted one cannot be held out, and twice the same is not twice the data.
-    fn check_repetition(&self) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// Where one is.
+    pub(crate) fn check_repetition(&self) -> Result<(), Error> {
         let records: Vec<(&PathBuf, bool)> = self
             .data
             .iter()

@@ -1,8 +1,9 @@
 //! The routes of the page's requests; the head of the module `serve` says what each takes and gives.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use axum::body::{Body, Bytes};
+use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{DefaultBodyLimit, Query, State};
 use axum::http::StatusCode;
 use axum::routing::{get, post};
@@ -11,17 +12,21 @@ use missing_effect::design::Limits;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
+use tokio::time::timeout;
 
 use super::guard::{LARGEST_BODY, Refusal};
 use super::jobs::{self, Task};
-use super::session::{Session, Upload, lock};
+use super::session::{Session, lock};
 use super::sessions::Shared;
 use super::settings::Settings;
+use super::upload::Upload;
 use super::{App, downloads, state};
 use crate::edit;
 
 /// Requests in JSON are no larger \[bytes\].
 const LARGEST_REQUEST: usize = 1 << 20;
+/// A file is here within this time: the next one waits for it.
+const LONGEST_UPLOAD: Duration = Duration::from_secs(60);
 /// Characters of a record's name at most.
 const LONGEST_NAME: usize = 100;
 
@@ -93,11 +98,11 @@ struct Open {
 }
 
 async fn open(State(app): State<Arc<App>>, Json(open): Json<Open>) -> Answer {
-    let known = open
-        .session
-        .and_then(|id| Some((id.clone(), app.sessions.find(&id)?)));
-    let (id, session) = known.unwrap_or_else(|| app.sessions.open());
     aside(move || {
+        let known = open
+            .session
+            .and_then(|id| Some((id.clone(), app.sessions.find(&id)?)));
+        let (id, session) = known.unwrap_or_else(|| app.sessions.open());
         let mut session = lock(&session);
         session.refresh();
         let state = state::state(&mut session);
@@ -153,18 +158,27 @@ async fn record(State(app): State<Arc<App>>, Query(new): Query<NewRecord>, body:
     let closed = |_| Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the server is closing");
     let _turn = app.uploading.acquire().await.map_err(closed)?;
     let session = find(&app, &new.session)?;
-    let content: Bytes = axum::body::to_bytes(body, LARGEST_BODY)
+    let late = |_| {
+        Refusal::input(
+            "the file did not arrive within a minute; copy it to this machine and drop it again",
+        )
+    };
+    let content: Bytes = timeout(LONGEST_UPLOAD, to_bytes(body, LARGEST_BODY))
         .await
+        .map_err(late)?
         .map_err(|_| Refusal::too_large())?;
-    let taken = aside(move || {
+    let all = app.clone();
+    aside(move || {
         let upload = Upload::new(&plain_name(&new.name), new.held_out, content)?;
-        let mut session = lock(&session);
-        session.take(upload)?;
-        Ok((Json(state::state(&mut session)), new.session))
-    });
-    let (answer, id) = taken.await?;
-    app.sessions.make_room(&id);
-    Ok(answer)
+        let answer = {
+            let mut session = lock(&session);
+            session.take(upload)?;
+            Json(state::state(&mut session))
+        };
+        all.sessions.make_room(&new.session);
+        Ok(answer)
+    })
+    .await
 }
 
 #[derive(Debug, Deserialize)]

@@ -70,15 +70,18 @@ async fn model(
     Query(which): Query<Which>,
 ) -> Result<Response, Refusal> {
     let session = find(&app, &which.session)?;
-    let session = lock(&session);
-    let fitted = session.models.iter().find(|fitted| fitted.id == which.id);
-    let missing = || {
-        Refusal::new(
-            StatusCode::NOT_FOUND,
-            "this fit is no longer kept; compare again",
-        )
-    };
-    Ok(as_json(fitted.ok_or_else(missing)?.body.clone()))
+    aside(move || {
+        let session = lock(&session);
+        let fitted = session.models.iter().find(|fitted| fitted.id == which.id);
+        let missing = || {
+            Refusal::new(
+                StatusCode::NOT_FOUND,
+                "this fit is no longer kept; compare again",
+            )
+        };
+        Ok(as_json(fitted.ok_or_else(missing)?.body.clone()))
+    })
+    .await
 }
 
 /// What can be downloaded.

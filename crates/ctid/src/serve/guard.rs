@@ -80,14 +80,20 @@ impl IntoResponse for Refusal {
 /// Who may speak for this server, and the token.
 #[derive(Debug)]
 pub(super) struct Guard {
-    hosts: [String; 2],
+    hosts: Vec<String>,
     token: String,
 }
 
 impl Guard {
     pub(super) fn new(port: u16) -> Self {
+        let names = ["127.0.0.1", "localhost"];
+        let mut hosts = names.map(|host| format!("{host}:{port}")).to_vec();
+        // A browser leaves out the port that it would take anyway.
+        if port == 80 {
+            hosts.extend(names.map(str::to_owned));
+        }
         Self {
-            hosts: ["127.0.0.1", "localhost"].map(|host| format!("{host}:{port}")),
+            hosts,
             token: format!("{:032x}", rand::random::<u128>()),
         }
     }

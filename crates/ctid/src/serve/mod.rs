@@ -5,7 +5,7 @@
 //! |---|---|
 //! | who may ask | `guard.rs` |
 //! | the page's files | `assets.rs`, `page/` |
-//! | what one tab works on | `session.rs`; all of them: `sessions.rs` |
+//! | what one tab works on | `session.rs`, its records `upload.rs`; all of them: `sessions.rs` |
 //! | the form of the model | `settings.rs` |
 //! | computations | `jobs.rs` |
 //! | what the page is told | `state.rs`, `words.rs` |
@@ -18,7 +18,8 @@
 //! # The requests
 //! Every tab has a session, named in the query; what is sent is JSON but for a record, what comes back is JSON but for
 //! a download. No parameter ever reaches the file system. A `POST` carries the token that stands in the page. A refusal is
-//! `{"error": "..."}` with a status of 400 or more: one line with the mend, as the commands write it.
+//! `{"error": "..."}` with a status of 400 or more: one line with the mend, as the commands write it. What the page never sends,
+//! such as broken JSON, is refused in plain text.
 //!
 //! | request | takes | gives |
 //! |---|---|---|
@@ -52,6 +53,7 @@ mod session;
 mod sessions;
 mod settings;
 mod state;
+mod upload;
 mod words;
 
 use std::io::Write;
@@ -66,8 +68,8 @@ use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 
 use self::guard::{Guard, LARGEST_BODY};
-use self::session::Upload;
 use self::sessions::Sessions;
+use self::upload::Upload;
 use crate::commands::say;
 use crate::input::Files;
 use crate::{Error, model_file};
@@ -123,30 +125,28 @@ impl Arguments {
 
     /// The records of the command line; what is wrong with them or the model is said before anything is served.
     fn records(&self) -> Result<Vec<Upload>, Error> {
-        let paths = || {
-            self.data
-                .iter()
-                .map(|path| (path, false))
-                .chain(self.test.iter().map(|path| (path, true)))
+        let files = Files {
+            data: self.data.clone(),
+            test: self.test.clone(),
+            model: self.model.clone().unwrap_or_default(),
         };
+        files.check_repetition()?;
         if let Some(model) = &self.model {
             model_file::read(model)?;
             if !self.data.is_empty() {
-                let files = Files {
-                    data: self.data.clone(),
-                    test: self.test.clone(),
-                    model: model.clone(),
-                };
                 files.read()?;
             }
         }
-        paths()
-            .map(|(path, held_out)| read(path, held_out))
+        let fitted = self.data.iter().map(|path| (path, false));
+        let held_out = self.test.iter().map(|path| (path, true));
+        fitted
+            .chain(held_out)
+            .map(|(path, held_out)| read(path, &files.name_of(path), held_out))
             .collect()
     }
 }
 
-fn read(path: &Path, held_out: bool) -> Result<Upload, Error> {
+fn read(path: &Path, name: &str, held_out: bool) -> Result<Upload, Error> {
     let unreadable = |error| {
         Error::file(
             path,
@@ -161,10 +161,7 @@ fn read(path: &Path, held_out: bool) -> Result<Upload, Error> {
         return Err(Error::file(path, what));
     }
     let content = std::fs::read(path).map_err(unreadable)?;
-    let name = path.file_name().map(|name| name.to_string_lossy());
-    let name = name.map_or_else(|| path.display().to_string(), |name| name.into_owned());
-    Upload::new(&name, held_out, content.into())
-        .map_err(|refusal| Error::Usage(refusal.to_string()))
+    Upload::new(name, held_out, content.into()).map_err(|refusal| Error::Usage(refusal.to_string()))
 }
 
 /// The port, or the next that is free.

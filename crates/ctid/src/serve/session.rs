@@ -7,17 +7,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use axum::body::Bytes;
-use ct_signals::{Columns, Heading, Hold, Record, csv_header, parse_csv};
+use ct_signals::{Columns, Hold};
 use missing_effect::design::Design;
 use missing_effect::{Diagnosis, Progress};
 
 use super::guard::{LARGEST_BODY, Refusal};
+use super::upload::Upload;
 use crate::edit::{self, Edited};
 use crate::model_file::{self, ModelFile};
 use crate::{Error, atomic};
 
-/// Columns of a file at most: what the page can offer for a choice.
-const MOST_COLUMNS: usize = 500;
 /// Records at most.
 const MOST_RECORDS: usize = 20;
 /// Bytes of a model file at most.
@@ -26,54 +25,6 @@ const LARGEST_MODEL: usize = 1 << 20;
 const MOST_MODELS: usize = 12;
 /// How the model is called where it is in no file.
 pub(super) const UNNAMED: &str = "model.toml";
-
-/// A record as it was dropped.
-#[derive(Debug, Clone)]
-pub(super) struct Upload {
-    pub name: String,
-    pub held_out: bool,
-    pub headings: Vec<Heading>,
-    content: Bytes,
-    /// As it was read last, and with which columns.
-    read: Option<(Columns, Hold, Result<Arc<Record>, String>)>,
-}
-
-impl Upload {
-    /// Takes a file; the header alone is looked at.
-    ///
-    /// # Errors
-    /// Where it is no CSV, or has too many columns.
-    pub(super) fn new(name: &str, held_out: bool, content: Bytes) -> Result<Self, Refusal> {
-        let headings = csv_header(name, &content).map_err(Refusal::input)?;
-        if headings.len() > MOST_COLUMNS {
-            return Err(Refusal::input(format!(
-                "{name} has {} columns; the page takes at most {MOST_COLUMNS}: keep those of the time, the input, the output and \
-                 the reference",
-                headings.len()
-            )));
-        }
-        Ok(Self {
-            name: name.to_string(),
-            held_out,
-            headings,
-            content,
-            read: None,
-        })
-    }
-
-    /// The record, read again only where the columns have changed.
-    pub(super) fn record(&mut self, columns: &Columns, hold: Hold) -> Result<Arc<Record>, String> {
-        match &self.read {
-            Some((c, h, record)) if c == columns && *h == hold => record.clone(),
-            _ => {
-                let record = parse_csv(&self.name, &self.content, columns, hold);
-                let record = record.map(Arc::new).map_err(|error| error.to_string());
-                self.read = Some((columns.clone(), hold, record.clone()));
-                record
-            }
-        }
-    }
-}
 
 /// A model that was fitted to the records, ready to be drawn.
 #[derive(Debug)]
@@ -130,8 +81,8 @@ pub(super) struct Session {
     pub job: Option<Job>,
     /// Why the last computation or change came to nothing.
     pub failure: Option<String>,
-    /// When its page asked last.
-    pub seen: Instant,
+    /// The model file could not be read when it was looked at last.
+    lost: bool,
     numbers: u64,
 }
 
@@ -155,7 +106,7 @@ impl Session {
             design: None,
             job: None,
             failure: None,
-            seen: Instant::now(),
+            lost: false,
             numbers: 0,
         };
         session.refresh();
@@ -183,18 +134,22 @@ impl Session {
     /// Reads the model file again: a command may have changed it.
     pub(super) fn refresh(&mut self) {
         let Some(path) = &self.file else { return };
-        match model_file::read_text(path) {
-            Ok(text) if text == self.text => {}
-            Ok(text) if text.len() <= LARGEST_MODEL => {
+        let read = match model_file::read_text(path) {
+            Ok(text) if text.len() > LARGEST_MODEL => Err(format!(
+                "{}: this is no model file: it is larger than 1 MB",
+                path.display()
+            )),
+            read => read.map_err(|error| error.to_string()),
+        };
+        let was_lost = std::mem::replace(&mut self.lost, read.is_err());
+        match read {
+            Ok(text) if text == self.text && !was_lost => {}
+            Ok(text) => {
                 self.text = text;
                 self.failure = None;
                 self.version += 1;
             }
-            Ok(_) => self.fail(format!(
-                "{}: this is no model file: it is larger than 1 MB",
-                path.display()
-            )),
-            Err(error) => self.fail(error.to_string()),
+            Err(what) => self.fail(what),
         }
     }
 

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use super::session::{Session, Upload, lock};
+use super::session::{Session, lock};
+use super::upload::Upload;
 
 /// Tabs at most; the one that was not seen for the longest time goes.
 const MOST: usize = 8;
@@ -16,12 +17,21 @@ const ALONE: Duration = Duration::from_secs(180);
 /// A tab's session.
 pub(super) type Shared = Arc<Mutex<Session>>;
 
+/// A tab. When its page asked last stands beside its session, which may be busy: no tab waits for another's.
+#[derive(Debug)]
+struct Tab {
+    id: String,
+    seen: Instant,
+    session: Shared,
+}
+
 /// All of them, and what a new one begins with.
 #[derive(Debug)]
 pub(super) struct Sessions {
     model: Option<PathBuf>,
     records: Vec<Upload>,
-    all: Mutex<Vec<(String, Shared)>>,
+    /// Never held while a session is locked.
+    all: Mutex<Vec<Tab>>,
 }
 
 impl Sessions {
@@ -35,10 +45,10 @@ impl Sessions {
 
     /// The session of that number.
     pub(super) fn find(&self, id: &str) -> Option<Shared> {
-        let all = lock(&self.all);
-        let (_, session) = all.iter().find(|(known, _)| known == id)?;
-        lock(session).seen = Instant::now();
-        Some(session.clone())
+        let mut all = lock(&self.all);
+        let tab = all.iter_mut().find(|tab| tab.id == id)?;
+        tab.seen = Instant::now();
+        Some(tab.session.clone())
     }
 
     /// A new session and its number.
@@ -47,42 +57,51 @@ impl Sessions {
         let session = Session::new(self.model.clone(), self.records.clone());
         let session = Arc::new(Mutex::new(session));
         let mut all = lock(&self.all);
-        all.push((id.clone(), session.clone()));
-        if all.len() > MOST {
-            forget_oldest(&mut all, &id);
+        all.push(Tab {
+            id: id.clone(),
+            seen: Instant::now(),
+            session: session.clone(),
+        });
+        let many = all.len() > MOST;
+        drop(all);
+        if many {
+            self.forget_oldest(&id);
         }
         (id, session)
     }
 
     /// Makes room after a record was taken by `id`.
     pub(super) fn make_room(&self, id: &str) {
-        let mut all = lock(&self.all);
-        let bytes = |all: &[(String, Shared)]| -> usize {
-            all.iter().map(|(_, session)| lock(session).bytes()).sum()
+        let bytes = || -> usize {
+            let sessions = self.those(|_| true);
+            sessions.iter().map(|session| lock(session).bytes()).sum()
         };
-        while bytes(&all) > BYTES && all.len() > 1 {
-            forget_oldest(&mut all, id);
-        }
+        while bytes() > BYTES && self.forget_oldest(id) {}
     }
 
     /// Stops what nobody waits for.
     pub(super) fn stop_abandoned(&self) {
-        for (_, session) in lock(&self.all).iter() {
-            let mut session = lock(session);
-            if session.seen.elapsed() > ALONE {
-                session.stop();
-            }
+        for session in self.those(|tab| tab.seen.elapsed() > ALONE) {
+            lock(&session).stop();
         }
     }
-}
 
-/// The one that was not seen for the longest time, but `id`; what it computes stops.
-fn forget_oldest(all: &mut Vec<(String, Shared)>, id: &str) {
-    let others = all.iter().enumerate().filter(|(_, (other, _))| other != id);
-    let oldest = others.min_by_key(|(_, (_, session))| lock(session).seen);
-    if let Some(at) = oldest.map(|(at, _)| at) {
-        let (_, session) = all.remove(at);
-        lock(&session).stop();
+    fn those(&self, which: impl Fn(&Tab) -> bool) -> Vec<Shared> {
+        let all = lock(&self.all);
+        let some = all.iter().filter(|tab| which(tab));
+        some.map(|tab| tab.session.clone()).collect()
+    }
+
+    /// The one that was not seen for the longest time, but `id`; what it computes stops. Whether there was one.
+    fn forget_oldest(&self, id: &str) -> bool {
+        let mut all = lock(&self.all);
+        let others = all.iter().enumerate().filter(|(_, tab)| tab.id != id);
+        let oldest = others.min_by_key(|(_, tab)| tab.seen).map(|(at, _)| at);
+        let oldest = oldest.map(|at| all.remove(at));
+        drop(all);
+        let Some(tab) = oldest else { return false };
+        lock(&tab.session).stop();
+        true
     }
 }
 
@@ -102,5 +121,16 @@ mod tests {
         assert!(sessions.find(&second).is_none(), "it was not seen since");
         assert!(sessions.find(&first).is_some());
         assert_eq!(lock(&sessions.all).len(), MOST);
+    }
+
+    #[test]
+    fn a_busy_tab_is_found_and_keeps_no_other_waiting() {
+        let sessions = Sessions::new(None, Vec::new());
+        let (busy, session) = sessions.open();
+        let (other, _) = sessions.open();
+        let work = lock(&session);
+        assert!(sessions.find(&busy).is_some());
+        assert!(sessions.find(&other).is_some());
+        drop(work);
     }
 }

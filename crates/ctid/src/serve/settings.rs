@@ -59,6 +59,10 @@ impl Settings {
     /// # Errors
     /// Where the result is no model file.
     pub(super) fn into_text(self, file: &str, text: &str) -> Result<Edited, Error> {
+        // Where they cannot be read the form is empty, and all that it does not show would be deleted.
+        if toml::from_str::<Self>(text).is_err() {
+            model_file::parse(file, text)?;
+        }
         let mut document = edit::document(file, text)?;
         let root = document.as_table_mut();
         put(root, "plant", Some(self.plant.as_str().into()));
@@ -256,6 +260,19 @@ rim = 20.0
         };
         let text = settings.clone().into_text("m.toml", "").unwrap().text;
         assert_eq!(Settings::of(&text), settings);
+    }
+
+    #[test]
+    fn what_the_form_cannot_show_is_not_deleted() {
+        let settings = Settings {
+            plant: "single-tank".into(),
+            ..Settings::default()
+        };
+        let text =
+            "plant = \"single-tank\"\n[known]\narea = \"154\"\n[controller]\ntype = \"PI\"\n";
+        assert_eq!(Settings::of(text), Settings::default());
+        let error = settings.into_text("m.toml", text).err().unwrap();
+        assert!(error.to_string().starts_with("m.toml:3: not a number"));
     }
 
     #[test]

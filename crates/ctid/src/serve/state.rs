@@ -27,8 +27,8 @@ pub(super) fn job(session: &Session) -> Value {
 /// Everything but curves.
 pub(super) fn state(session: &mut Session) -> Value {
     let (columns, hold) = session.layout();
-    let mut uploads = std::mem::take(&mut session.records);
-    let records: Vec<Value> = uploads
+    let records: Vec<Value> = session
+        .records
         .iter_mut()
         .map(|upload| {
             let read = upload.record(&columns, hold);
@@ -40,7 +40,6 @@ pub(super) fn state(session: &mut Session) -> Value {
             })
         })
         .collect();
-    session.records = uploads;
     // The form offers the columns of the first file; all have to have the same.
     let headings = session
         .records

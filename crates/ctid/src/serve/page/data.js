@@ -6,11 +6,18 @@ const ROLES = [["time", "Time"], ["input", "Command u"], ["input_2", "Command of
 // Without these columns a record is one.
 const OPTIONAL = { reference: "none", input_2: "none: it is off" };
 
+/** Another model in place of this one; what stands in a file of the user's goes, so it is asked first. */
+async function replace(file) {
+  const old = server.current().file;
+  if (old && !confirm(`Overwrite ${old} with ${file.name}? What stands there is not kept.`)) return;
+  await server.send("/api/text", { text: await file.text() });
+}
+
 /** Takes dropped files: a model file is taken for the model, everything else for a record. */
 async function take(files, heldOut, fail) {
   for (const file of files) {
     try {
-      if (/\.toml$/i.test(file.name)) await server.send("/api/text", { text: await file.text() });
+      if (/\.toml$/i.test(file.name)) await replace(file);
       else await server.upload(file, heldOut);
     } catch (error) {
       fail(error.message);
@@ -78,11 +85,14 @@ function field(role, title, headings, named, guess) {
 
 /** What the form says of the columns, as the model file has them. */
 export function columns() {
+  const { headings, settings } = server.current();
+  // Without a record there is nothing to choose from: what the model says stays.
+  if (!headings) return { ...settings.columns };
   const said = {};
   for (const [role] of ROLES) {
     const [select, input] = [$(`column-${role}`), $(`unit-${role}`)];
     if (!select || !select.value) continue;
-    const heading = (server.current().headings || []).find((h) => h.header === select.value);
+    const heading = headings.find((h) => h.header === select.value);
     const unit = input.value.trim();
     said[role] = heading && !heading.unit && unit ? `${heading.name} [${unit}]` : select.value;
   }
@@ -98,11 +108,12 @@ export function show(state, fail) {
   $("drop-fitted").classList.toggle("small", fitted);
   $("drop-what").textContent = fitted ? "Another record" : "Drop a CSV here";
   $("drop-how").textContent = fitted ? "fitted together with the first" : "or choose one: time, command and reading, with a header";
-  if (!state.headings || $("columns").contains(document.activeElement)) return;
+  if ($("columns").contains(document.activeElement)) return;
   const { columns: named, hold: kind } = state.settings;
+  $("hold").value = kind;
+  if (!state.headings) return;
   // Two pumps have the plants that say so.
   const roles = ROLES.filter(([role]) => role !== "input_2" || state.pumps > 1);
   fill($("column-fields"), roles.flatMap(([role, title]) => field(role, title, state.headings, named[role], state.guessed[role])));
-  $("hold").value = kind;
   if (state.records.some((one) => one.error)) $("columns").open = true;
 }

@@ -33,7 +33,7 @@ function input(id, label, value, suffix) {
 /** A number with a point or a comma; null where there is none, and an error that names the field where it is no number. */
 function number(id, label) {
   const box = $(id);
-  const text = box ? box.value.trim() : "";
+  const text = box.value.trim();
   if (!text) return null;
   const value = Number(text.replace(",", "."));
   box.setAttribute("aria-invalid", String(!Number.isFinite(value)));
@@ -62,9 +62,10 @@ function controller() {
 function settings() {
   const chosen = plant($("plant").value);
   const known = {};
-  // What another plant's form said is nothing of this one.
-  for (const key of chosen.known) known[key] = number(`known-${key}`, KNOWN[key]);
-  if (chosen.measured.length && $("known-measured")) known.measured = $("known-measured").value || null;
+  const was = server.current().settings.known;
+  // What another plant's form said is nothing of this one; what has no field yet stays.
+  for (const key of chosen.known) known[key] = $(`known-${key}`) ? number(`known-${key}`, KNOWN[key]) : was[key];
+  if (chosen.measured.length) known.measured = $("known-measured") ? $("known-measured").value || null : was.measured;
   const columns = data.columns();
   if (chosen.pumps < 2) delete columns.input_2;
   return { plant: chosen.id, hold: data.hold(), columns, known, controller: controller() };
@@ -96,7 +97,6 @@ function chosen() {
   $("known").hidden = false;
   $("equation").textContent = known.model;
   knownFields(known, state);
-  $("known").open = true;
   $("known-measured").focus();
   trouble(null);
 }
@@ -182,10 +182,10 @@ export function show(state, fail) {
   $("known").hidden = !known;
   $("controller").hidden = !known;
   $("equation").textContent = known ? known.model : "";
-  if (!known) return;
-  knownFields(known, state);
   const said = state.settings.controller;
   $("law").value = said ? (said.type === "PI" ? "PI" : said.variable === "p" ? "RSp" : "RS") : "";
-  if (said) $("controller").open = true;
   laws(state.settings);
+  if (!known) return;
+  knownFields(known, state);
+  if (said) $("controller").open = true;
 }

@@ -32,6 +32,8 @@ async function post(path, body, more = null) {
 }
 
 function take(next) {
+  // A later one has overtaken it.
+  if (state && next.version < state.version) return;
   if (next.records) {
     state = next;
     told(state);

@@ -1,0 +1,76 @@
+//! A record as the page has sent it, and as it was read last.
+
+use std::sync::Arc;
+
+use axum::body::Bytes;
+use ct_signals::{Columns, Heading, Hold, Record, csv_header, parse_csv};
+
+use super::guard::Refusal;
+
+/// Columns of a file at most: what the page can offer for a choice.
+const MOST_COLUMNS: usize = 500;
+/// Bytes in which the header has to be found.
+const LARGEST_HEAD: usize = 1 << 20;
+
+/// A record as it was dropped.
+#[derive(Debug, Clone)]
+pub(super) struct Upload {
+    pub name: String,
+    pub held_out: bool,
+    pub headings: Vec<Heading>,
+    pub content: Bytes,
+    /// As it was read last, and with which columns.
+    read: Option<(Columns, Hold, Result<Arc<Record>, String>)>,
+}
+
+impl Upload {
+    /// Takes a file; the header alone is looked at.
+    ///
+    /// # Errors
+    /// Where it is no CSV, or has too many columns.
+    pub(super) fn new(name: &str, held_out: bool, content: Bytes) -> Result<Self, Refusal> {
+        let headings = csv_header(name, head(name, &content)?).map_err(Refusal::input)?;
+        if headings.len() > MOST_COLUMNS {
+            return Err(Refusal::input(format!(
+                "{name} has {} columns; the page takes at most {MOST_COLUMNS}: keep those of the time, the input, the output and \
+                 the reference",
+                headings.len()
+            )));
+        }
+        Ok(Self {
+            name: name.to_string(),
+            held_out,
+            headings,
+            content,
+            read: None,
+        })
+    }
+
+    /// The record, read again only where the columns have changed.
+    pub(super) fn record(&mut self, columns: &Columns, hold: Hold) -> Result<Arc<Record>, String> {
+        match &self.read {
+            Some((c, h, record)) if c == columns && *h == hold => record.clone(),
+            _ => {
+                let record = parse_csv(&self.name, &self.content, columns, hold);
+                let record = record.map(Arc::new).map_err(|error| error.to_string());
+                self.read = Some((columns.clone(), hold, record.clone()));
+                record
+            }
+        }
+    }
+}
+
+/// The first lines of a file. One long line may hold as many columns as bytes, each of them far larger in memory.
+fn head<'a>(name: &str, content: &'a [u8]) -> Result<&'a [u8], Refusal> {
+    let Some(first) = content.get(..LARGEST_HEAD) else {
+        return Ok(content);
+    };
+    let end = first.iter().rposition(|byte| b"\r\n".contains(byte));
+    let end = end.ok_or_else(|| {
+        Refusal::input(format!(
+            "{name} is one line for its first {} MB; write one row for each sample, below a header",
+            LARGEST_HEAD >> 20
+        ))
+    })?;
+    Ok(&first[..=end])
+}

@@ -173,6 +173,11 @@ impl Core {
         (&self.checkpoint, &self.since)
     }
 
+    /// The full range of the command, where it is known.
+    pub(crate) fn input_range(&self) -> Option<f64> {
+        self.model.known.input_range
+    }
+
     pub(crate) fn every(&self) -> usize {
         self.now.every
     }
@@ -226,16 +231,21 @@ impl Core {
     }
 
     pub(crate) fn feed(&mut self, sample: Sample) -> Fed {
+        let mut notice = None;
         match sample.follows {
             Follows::On => {}
             Follows::Interval => self.begin(1),
-            Follows::Gap => self.resume(&sample),
+            Follows::Gap => notice = self.resume(&sample),
         }
         // Behind a checkpoint that a new beginning has set: the sample belongs to what follows it.
         self.since.push(sample);
-        match self.now.phase {
+        let fed = match self.now.phase {
             Phase::Learning { next } => self.gather(sample, next),
             _ => self.watch(sample),
+        };
+        Fed {
+            notice: fed.notice.or(notice),
+            ..fed
         }
     }
 
@@ -256,7 +266,7 @@ impl Core {
     }
 
     /// After a long gap: what was gathered is no record, and levels are not known.
-    fn resume(&mut self, sample: &Sample) {
+    fn resume(&mut self, sample: &Sample) -> Option<Notice> {
         match (self.now.phase, &self.now.learned) {
             (Phase::Watching, Some(learned)) => {
                 self.now.settling = (SETTLING * learned.rows_per_time_constant()).ceil() as usize;
@@ -271,12 +281,15 @@ impl Core {
                 self.now.kept.clear();
                 self.now.judged = 0;
                 self.start(&levels, sample.input);
+                None
             }
+            _ if self.now.kept.is_empty() => None,
             _ => {
-                if !self.now.kept.is_empty() || self.now.learned.is_some() {
-                    let every = self.now.every;
-                    self.begin(every);
-                }
+                let every = self.now.every;
+                self.begin(every);
+                Some(Notice::LearnsAnew {
+                    why: "what was gathered before the long gap is no record with what follows",
+                })
             }
         }
     }
@@ -299,6 +312,7 @@ impl Core {
         self.now.kept.push_back(Kept {
             sample,
             levels: [0.0; plants::MAX_VESSELS],
+            stands: sample.input,
             innovation: 0.0,
         });
         if self.now.kept.len() < next.min(KEPT) {
@@ -356,12 +370,8 @@ impl Core {
 
     /// The learned model is run over the rows that it was learned from, and watched from now on.
     fn take_over(&mut self, learned: Learned, levels: &[f64]) -> Option<Notice> {
-        let notice = Notice::Learned {
-            rows: learned.rows * self.now.every,
-            time_constant: learned.time_constant,
-            noise: learned.noise()?.stationary_std(),
-            every: self.now.every,
-        };
+        let (rows, time_constant) = (learned.rows * self.now.every, learned.time_constant);
+        let noise = learned.noise()?.stationary_std();
         let unit = learned.rows_per_time_constant();
         let lanes = crate::sensitivity::lanes(learned.theta.len());
         self.now.bank = Some(Bank::new(unit, lanes));
@@ -376,13 +386,20 @@ impl Core {
             for kept in &mut kept {
                 let said = running.watch.follow(&kept.sample);
                 kept.levels = said.levels;
+                kept.stands = said.stands;
                 kept.innovation = said.innovation;
             }
         }
         self.now.judged = kept.len();
         self.now.kept = kept;
         self.settle_checkpoint();
-        Some(notice)
+        Some(Notice::Learned {
+            rows,
+            time_constant,
+            noise,
+            every: self.now.every,
+            threshold: self.running.as_ref()?.threshold,
+        })
     }
 
     /// Builds what runs, from given levels on.
@@ -440,9 +457,7 @@ impl Core {
     fn build(&mut self) -> Option<()> {
         let from = self.now.kept.len().saturating_sub(RUN_UP);
         let first = self.now.kept.get(from)?;
-        let before = from.checked_sub(1).and_then(|i| self.now.kept.get(i));
-        let at_rest = before.unwrap_or(first).sample.input;
-        let mut running = self.running_from(&first.levels, at_rest)?;
+        let mut running = self.running_from(&first.levels, first.stands)?;
         for kept in self.now.kept.range(from..) {
             running.watch.follow(&kept.sample);
         }
@@ -461,6 +476,7 @@ impl Core {
         self.now.kept.push_back(Kept {
             sample,
             levels: said.levels,
+            stands: said.stands,
             innovation: said.innovation,
         });
         let mut fed = Fed {
@@ -471,6 +487,9 @@ impl Core {
             // A level that left all bounds: what was learned is of no use any more.
             let every = self.now.every;
             self.begin(every);
+            fed.notice = Some(Notice::LearnsAnew {
+                why: "under these commands the learned model leaves all bounds",
+            });
             return fed;
         }
         if self.now.settling > 0 {

@@ -61,7 +61,7 @@ pub enum Error {
     },
 }
 
-/// Why a row is not used. It leaves the monitor as it was.
+/// Why a row is not used. It leaves the monitor as it was, but for the count of times that go back.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {
@@ -82,6 +82,14 @@ pub enum Refused {
         value: f64,
         /// What has to be larger than it.
         limit: f64,
+    },
+    /// A command that no pump of this range gets: simulated, it would bury the model for hours.
+    #[error("{value} is beyond the command's full range, input_range = {range}")]
+    BeyondRange {
+        /// The value.
+        value: f64,
+        /// The full range.
+        range: f64,
     },
     /// The time of the row before.
     #[error("the time {time} s is repeated from the row before")]
@@ -105,6 +113,7 @@ impl Refused {
     pub fn column(&self) -> &'static str {
         match self {
             Self::NotFinite { column, .. } | Self::TooLarge { column, .. } => column,
+            Self::BeyondRange { .. } => "input",
             Self::Repeated { .. } | Self::Backward { .. } => "time",
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! The usual step of the time is the median of the first 21. A step of more than one and a half times the longest of them is
 //! a gap: a short one is bridged by the held command, a longer one begins a new stretch. Where 20 steps in a
-//! row are of another length, the sampling interval has changed.
+//! row are of another length, the sampling interval has changed. A time that goes back is refused; where 100 rows in a row do, in order
+//! among themselves, the clock was set back, or ran ahead for a row, and a new stretch begins.
 //!
 //! A process that is sampled much faster than it moves is watched in blocks: time, command and reading are their means over
 //! `every` rows, and the command runs in a straight line from one mean to the next.
@@ -17,6 +18,8 @@ const STEPS: usize = 21;
 const GAP: f64 = 1.5;
 /// Steps of another length in a row that make it the usual one.
 const OTHER: usize = 20;
+/// Rows in a row whose time goes back, after which it is the clock that did: more than a logger sends again when its line was down.
+const BACK: usize = 100;
 /// A gap of more than so many usual steps begins a new stretch.
 const BRIDGED: f64 = 5.0;
 /// Values beyond this cannot be raised to the powers that a fit takes.
@@ -58,7 +61,9 @@ pub(crate) struct Intake {
     pub every: usize,
     /// Rows that were taken.
     pub rows: u64,
-    last: Option<f64>,
+    pub last: Option<f64>,
+    /// Of the latest rows that lie before that, in order among themselves: the last one's time, and how many.
+    back: Option<(f64, usize)>,
     /// The latest steps, at most [`STEPS`].
     steps: Vec<f64>,
     /// Median and longest of the usual steps.
@@ -78,6 +83,7 @@ impl Intake {
             every: 1,
             rows: 0,
             last: None,
+            back: None,
             steps: Vec::with_capacity(STEPS),
             usual: None,
             other: 0,
@@ -123,12 +129,14 @@ impl Intake {
             if time == previous {
                 return Err(Refused::Repeated { time });
             }
-            if time < previous {
-                return Err(Refused::Backward { time, previous });
-            }
-            notice = self.step(previous, time);
+            notice = if time < previous {
+                Some(self.set_back(previous, time)?)
+            } else {
+                self.step(previous, time)
+            };
         }
         self.last = Some(time);
+        self.back = None;
         self.rows += 1;
         if self.filled == 0 {
             self.begun = time;
@@ -151,6 +159,26 @@ impl Intake {
             self.follows = Follows::On;
         }
         Ok(Taken { sample, notice })
+    }
+
+    /// A row that goes back is refused, but not for ever: one wrong time that lies ahead would make the monitor deaf.
+    fn set_back(&mut self, previous: f64, time: f64) -> Result<Notice, Refused> {
+        let count = match self.back {
+            Some((last, count)) if time >= last => count + usize::from(time > last),
+            _ => 1,
+        };
+        self.back = Some((time, count));
+        if count < BACK {
+            return Err(Refused::Backward { time, previous });
+        }
+        if self.follows == Follows::On {
+            self.follows = Follows::Gap;
+        }
+        self.begin();
+        Ok(Notice::ClockSetBack {
+            from: previous,
+            to: time,
+        })
     }
 
     /// Looks at a step of the time.

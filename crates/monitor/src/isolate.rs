@@ -69,6 +69,8 @@ pub(crate) struct Kept {
     pub sample: Sample,
     /// Levels of the learned model.
     pub levels: [f64; MAX_VESSELS],
+    /// Where in it stood what the command moves: play has a memory without an end, and no run-up finds it.
+    pub stands: f64,
     /// Whitened residual in its standard deviations.
     pub innovation: f64,
 }

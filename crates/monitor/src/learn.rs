@@ -12,6 +12,10 @@ use crate::intake::Sample;
 /// A command that moves by less of itself stands still.
 const STILL: f64 = 1e-9;
 
+/// More of either was never learned: a state that says so would be computed for ever.
+const MOST_SUBSTEPS: usize = 1024;
+const MOST_COEFFICIENTS: usize = 64;
+
 /// The believed model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
@@ -121,6 +125,8 @@ impl Learned {
         self.theta.len() == parameters
             && self.covariance.len() == parameters * parameters
             && finite.iter().all(|v| v.is_finite() && *v > 0.0)
+            && self.substeps <= MOST_SUBSTEPS
+            && self.coefficients.len() <= MOST_COEFFICIENTS
             && self.noise().is_some()
     }
 }

@@ -10,6 +10,8 @@ use crate::{
 
 /// The version of [`State`].
 const VERSION: u32 = 1;
+/// A command above so many times its full range is in another unit, or none, as in a record.
+const BEYOND: f64 = 1.01;
 
 /// A row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +59,13 @@ pub enum Notice {
         /// The command is taken to have been held; else what is not known of the levels is waited for.
         bridged: bool,
     },
+    /// The clock was set back, as 100 rows in a row say: they are followed from here on, as behind a long gap.
+    ClockSetBack {
+        /// The latest time before \[s\].
+        from: f64,
+        /// The time now \[s\].
+        to: f64,
+    },
     /// The time steps by another interval now: the noise is learned anew.
     IntervalChanged {
         /// Since when \[s\].
@@ -76,6 +85,13 @@ pub enum Notice {
         noise: f64,
         /// Rows are watched in blocks of so many.
         every: usize,
+        /// What a score has to pass; far above 6 where the noise is so slow that these rows hardly say how large it is.
+        threshold: f64,
+    },
+    /// What was gathered is given up, and an alarm that was being followed ends without its last look.
+    LearnsAnew {
+        /// Why.
+        why: &'static str,
     },
     /// The rows so far do not determine the model; it goes on learning.
     NotLearned {
@@ -233,8 +249,16 @@ impl Monitor {
     /// Takes in a row.
     ///
     /// # Errors
-    /// [`Refused`]: the row is not used, and the monitor is as it was.
+    /// [`Refused`]: the row is not used.
     pub fn update(&mut self, row: &Row) -> Result<Step, Refused> {
+        if let Some(range) = self.core.input_range()
+            && row.input.abs() > BEYOND * range
+        {
+            return Err(Refused::BeyondRange {
+                value: row.input,
+                range,
+            });
+        }
         let taken = self.intake.take(row)?;
         let mut step = Step::default();
         step.notices[0] = taken.notice;
@@ -258,6 +282,12 @@ impl Monitor {
     #[must_use]
     pub fn rows(&self) -> u64 {
         self.intake.rows
+    }
+
+    /// Time of the latest row that was taken \[s\], before a restoration too.
+    #[must_use]
+    pub fn last_time(&self) -> Option<f64> {
+        self.intake.last
     }
 
     /// The parameters as they are tracked, with their band; empty while learning. Allocates.

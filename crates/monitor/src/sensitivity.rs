@@ -16,6 +16,8 @@ pub(crate) trait Model: Send {
     fn advance(&mut self, command: Command, h: f64);
     /// The level of each vessel.
     fn levels(&self) -> [f64; MAX_VESSELS];
+    /// Where what the command moves stands.
+    fn stands(&self) -> f64;
 }
 
 struct Lanes<const N: usize>(Simulator<Dual<N>>);
@@ -33,6 +35,9 @@ impl<const N: usize> Model for Lanes<N> {
     }
     fn levels(&self) -> [f64; MAX_VESSELS] {
         self.0.levels().map(Scalar::value)
+    }
+    fn stands(&self) -> f64 {
+        self.0.stands()
     }
 }
 

@@ -27,6 +27,8 @@ pub(crate) struct Watch {
 pub(crate) struct Said {
     /// Its levels.
     pub levels: [f64; MAX_VESSELS],
+    /// Where what the command moves stands \[input unit\].
+    pub stands: f64,
     /// Measured minus model \[output unit\].
     pub residual: f64,
     /// Whitened, in standard deviations of the noise's innovations.
@@ -73,7 +75,7 @@ impl Watch {
         }
         self.last = Some(*sample);
         let lanes = self.row.len() - 2;
-        let levels = self.model.levels();
+        let (levels, stands) = (self.model.levels(), self.model.stands());
         let modelled = self.model.read(&mut self.row[..lanes]);
         let residual = sample.output - modelled;
         self.row[lanes] = 1.0;
@@ -84,6 +86,7 @@ impl Watch {
         }
         Said {
             levels,
+            stands,
             residual,
             innovation: self.row[lanes + 1],
             step,

@@ -383,6 +383,57 @@ fn gaps_are_said_and_bridged_or_waited_out() {
 }
 
 #[test]
+fn a_command_that_no_pump_gets_is_refused() {
+    let mut model = model();
+    model.known.input_range = Some(10.0);
+    let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
+    let row = |input| Row {
+        time: 0.0,
+        input,
+        output: 16.0,
+    };
+    let refused = monitor.update(&row(65535.0)).unwrap_err();
+    assert!(matches!(refused, Refused::BeyondRange { .. }));
+    assert_eq!(refused.column(), "input");
+    assert_eq!(monitor.rows(), 0);
+    monitor.update(&row(10.0)).unwrap();
+}
+
+/// A row whose time lies far ahead, or a clock that begins anew, makes the monitor deaf for a hundred rows and no longer.
+#[test]
+fn a_clock_that_goes_back_is_followed() {
+    let rows = Tank {
+        leak: |t| if t < 5200.0 { 0.0 } else { 3.0 },
+        ..Tank::default()
+    }
+    .run();
+    let mut ahead = rows.clone();
+    ahead[2000].time *= 10.0;
+    let mut anew = rows.clone();
+    for row in &mut anew[2001..] {
+        row.time -= 4002.0;
+    }
+    for rows in [ahead, anew] {
+        let mut monitor = new();
+        all(&mut monitor, &rows[..2001]);
+        for row in &rows[2001..2100] {
+            let refused = monitor.update(row).unwrap_err();
+            assert!(matches!(refused, Refused::Backward { .. }), "{refused}");
+        }
+        let mut monitor = Monitor::restore(model(), Settings::default(), monitor.state()).unwrap();
+        let steps = all(&mut monitor, &rows[2100..]);
+        let back = Notice::ClockSetBack {
+            from: rows[2000].time,
+            to: rows[2100].time,
+        };
+        assert_eq!(steps[0].notices[0], Some(back));
+        let alarm = alarms(&steps)[0];
+        let late = alarm.time - rows[2600].time;
+        assert!((0.0..200.0).contains(&late), "{alarm:?}");
+    }
+}
+
+#[test]
 fn another_sampling_interval_is_learned_anew() {
     let rows = Tank {
         rows: 7000,

@@ -84,6 +84,8 @@ pub(crate) struct Actuator<T: Scalar> {
     corners: Vec<T>,
     /// Where the last step ended: the command after delay, for the lag's jump.
     last: T,
+    /// Where what the command moves stands.
+    stands: f64,
     /// The pump's gain changes with time.
     drifts: bool,
 }
@@ -104,6 +106,7 @@ impl<T: Scalar> Actuator<T> {
             past: VecDeque::new(),
             corners: Vec::new(),
             last: zero,
+            stands: at_rest,
             drifts,
         };
         let at_rest = actuator.position(T::constant(at_rest));
@@ -128,7 +131,13 @@ impl<T: Scalar> Actuator<T> {
     /// Where the actuator stands at a recorded command.
     fn position(&mut self, u: T) -> T {
         let moved = self.laws.iter_mut().find_map(|law| law.position(u));
-        moved.unwrap_or(u)
+        let position = moved.unwrap_or(u);
+        self.stands = position.value();
+        position
+    }
+
+    pub(crate) fn stands(&self) -> f64 {
+        self.stands
     }
 
     fn effective(&mut self, u: T, t: f64) -> T {

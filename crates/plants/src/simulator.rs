@@ -247,6 +247,12 @@ impl<T: Scalar> Simulator<T> {
         }
     }
 
+    /// Where what the command to the first pump moves stands now: at the latest command, but for play and stiction. A simulation that has it
+    /// for `at_rest` goes on from there.
+    pub fn stands(&self) -> f64 {
+        self.actuator.stands()
+    }
+
     /// Time since the record began \[s\].
     pub fn time(&self) -> f64 {
         self.time

@@ -28,6 +28,8 @@ use trouble::Trouble;
 const INPUT: &str = "standard input";
 /// So many lines at the beginning may be parts of rows.
 const PARTS: usize = 2;
+/// A threshold above this is not that of the false alarms alone: 8.6 where they come every 1e15 rows.
+const DEAF: f64 = 10.0;
 /// How often the state is saved.
 const SAVED_EVERY: Duration = Duration::from_secs(60);
 
@@ -165,6 +167,7 @@ impl<'a> Session<'a> {
         }
         .map_err(blame)?;
         let saved_rows = monitor.rows();
+        let last_time = monitor.last_time().unwrap_or(f64::NAN);
         Ok(Self {
             arguments,
             out,
@@ -181,7 +184,7 @@ impl<'a> Session<'a> {
             taken: 0,
             screen: Screen::new(Look::of_stderr()),
             next_estimate: f64::NEG_INFINITY,
-            last_time: f64::NAN,
+            last_time,
             saved: Instant::now(),
             saved_rows,
         })
@@ -289,14 +292,22 @@ impl<'a> Session<'a> {
     }
 
     fn row(&mut self, row: &Row) -> Result<(), Halt> {
+        if self.restored
+            && self.taken == 0
+            && let Some(last) = self.monitor.last_time()
+            && row.time <= last
+        {
+            if self.seen_before == 0 {
+                self.screen.say(&format!(
+                    "rows up to t = {} s were seen before the state was saved, and are skipped; if the clock began anew since, name another --state",
+                    instant(last)
+                ));
+            }
+            self.seen_before += 1;
+            return Ok(());
+        }
         let step = match self.monitor.update(row) {
             Ok(step) => step,
-            Err(Refused::Repeated { .. } | Refused::Backward { .. })
-                if self.restored && self.taken == 0 =>
-            {
-                self.seen_before += 1;
-                return Ok(());
-            }
             Err(refused) => {
                 self.refused(&refused);
                 return Ok(());
@@ -381,6 +392,9 @@ impl<'a> Session<'a> {
         });
         let mend = match refused {
             Refused::NotFinite { .. } => "check the sensor, or leave the row out",
+            Refused::BeyondRange { .. } => {
+                "check what writes it, or correct the range in the model file"
+            }
             Refused::TooLarge { .. } => "correct it, or give the column in a larger unit",
             _ => "rows have to come in the order of time: check the clock",
         };
@@ -415,6 +429,15 @@ impl<'a> Session<'a> {
                     None => return,
                 }
             }
+            Notice::ClockSetBack { from, to } => {
+                self.next_estimate = *to;
+                format!(
+                    "the time goes back from {} to {} s and stays there: the rows are followed from here on; what the levels are is waited for",
+                    instant(*from),
+                    instant(*to)
+                )
+            }
+            Notice::LearnsAnew { why } => format!("learns anew: {why}"),
             Notice::IntervalChanged { time, from, to } => format!(
                 "the time steps by {} s instead of {} s since about t = {} s: the noise is another then, and is learned anew",
                 significant(*to, 4),
@@ -426,14 +449,22 @@ impl<'a> Session<'a> {
                 time_constant,
                 noise,
                 every,
+                threshold,
             } => {
+                let deaf = if *threshold > DEAF {
+                    format!(
+                        "; what the model leaves is so slow that only a large change will be seen (threshold {threshold:.1}): it may lack an effect"
+                    )
+                } else {
+                    String::new()
+                };
                 let blocks = if *every > 1 {
                     format!(", watched in means of {every} rows")
                 } else {
                     String::new()
                 };
                 format!(
-                    "learned from {rows} rows: slowest time constant {} s, noise {} rms{blocks}; watching from here on",
+                    "learned from {rows} rows: slowest time constant {} s, noise {} rms{blocks}; watching from here on{deaf}",
                     significant(*time_constant, 4),
                     significant(*noise, 3)
                 )

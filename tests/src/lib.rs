@@ -3,6 +3,7 @@
 pub mod draw;
 pub mod onset;
 pub mod outside;
+pub mod three_tanks;
 
 use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
 use missing_effect::Problem;

@@ -167,6 +167,7 @@ pub(crate) fn assemble(
             held_out,
             time: record.time.clone(),
             input: record.input.values.clone(),
+            input_2: record.input_2.as_ref().map(|second| second.values.clone()),
             output: record.output.values.clone(),
         }
     };

@@ -211,6 +211,9 @@ pub struct Shown {
     pub time: Vec<f64>,
     /// Command.
     pub input: Vec<f64>,
+    /// Command of the second pump, in the unit of the first, where the model runs on it too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input_2: Option<Vec<f64>>,
     /// Reading.
     pub output: Vec<f64>,
 }

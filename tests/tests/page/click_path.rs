@@ -13,7 +13,7 @@ use crate::browser::Browser;
 use crate::server::{alone, bundled, command, csv, serve};
 
 /// The falling error as the page writes it.
-fn trail(browser: &mut Browser) -> Vec<f64> {
+pub fn trail(browser: &mut Browser) -> Vec<f64> {
     let numbers = browser
         .evaluate("[...document.querySelectorAll('#trail .number')].map((one) => one.innerText)");
     let numbers: Vec<f64> = numbers
@@ -51,7 +51,7 @@ fn wait_for_models(browser: &mut Browser, count: usize) {
     ));
 }
 
-fn choose_plant(browser: &mut Browser, plant: &str) {
+pub fn choose_plant(browser: &mut Browser, plant: &str) {
     browser.choose("plant", &plant[..1], &format!("value === '{plant}'"));
 }
 

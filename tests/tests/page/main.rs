@@ -6,3 +6,4 @@ mod cancelled;
 mod click_path;
 mod hostile;
 mod server;
+mod three_tanks;

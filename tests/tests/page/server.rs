@@ -8,7 +8,7 @@ use std::thread;
 use std::time::Duration;
 
 use clap::Parser;
-use ct_signals::Record;
+use ct_signals::{Record, Signal};
 use ctid::look::Look;
 use ctid::{Cli, run};
 use serde_json::Value;
@@ -32,10 +32,21 @@ pub fn bundled(name: &str) -> PathBuf {
 
 /// A record as a file.
 pub fn csv(record: &Record) -> String {
-    let (u, y) = (&record.input.values, &record.output.values);
-    let rows = record.time.iter().zip(u).zip(y);
-    let rows = rows.map(|((t, u), y)| format!("{t},{u},{y}\n"));
-    "t [s],u [V],y [cm]\n".to_string() + &rows.collect::<String>()
+    let signals: Vec<&Signal> = [&record.input]
+        .into_iter()
+        .chain(&record.input_2)
+        .chain([&record.output])
+        .collect();
+    let header = signals.iter().map(|s| format!(",{} [{}]", s.name, s.unit));
+    let rows = record.time.iter().enumerate().map(|(k, t)| {
+        let values = signals.iter().map(|s| format!(",{}", s.values[k]));
+        format!("{t}{}\n", values.collect::<String>())
+    });
+    format!(
+        "t [s]{}\n{}",
+        header.collect::<String>(),
+        rows.collect::<String>()
+    )
 }
 
 /// What a command prints.

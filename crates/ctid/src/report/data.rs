@@ -32,6 +32,7 @@ struct Record<'a> {
     held_out: bool,
     output: Curve,
     input: Curve,
+    input_2: Option<Curve>,
 }
 
 #[derive(Serialize)]
@@ -132,6 +133,10 @@ fn record(shown: &Shown) -> Record<'_> {
         held_out: shown.held_out,
         output: curve(&shown.time, &shown.output),
         input: curve(&shown.time, &shown.input),
+        input_2: shown
+            .input_2
+            .as_ref()
+            .map(|second| curve(&shown.time, second)),
     }
 }
 
@@ -292,6 +297,7 @@ mod tests {
             held_out: false,
             time: (0..n).map(|k| k as f64 * 0.1).collect(),
             input: vec![0.0; n],
+            input_2: None,
             output,
         };
         let curve = record(&shown).output;
@@ -308,6 +314,7 @@ mod tests {
             held_out: false,
             time: vec![0.0, 1.0],
             input: vec![],
+            input_2: None,
             output: vec![1.0, 2.0, 3.0],
         };
         let run = run(&shown, &[1.0]);

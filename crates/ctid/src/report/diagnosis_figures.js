@@ -77,10 +77,13 @@ const diagnosisFigures = (report, view) => {
         hovertemplate: `%{y:.4~g} ${OUT}`,
       });
     });
-    data.push({
-      name: "input", x: record.input.t, y: record.input.y, yaxis: "y2", mode: "lines", showlegend: false,
-      line: { color: c.faint, width: 1.2, shape: "hv" }, hovertemplate: `%{y:.4~g} ${IN}`,
-    });
+    const inputs = record.input_2 ? [["input 1", record.input, c.faint, "solid"], ["input 2", record.input_2, c.text, "dot"]] : [["input", record.input, c.faint, "solid"]];
+    for (const [name, input, color, dash] of inputs) {
+      data.push({
+        name, x: input.t, y: input.y, yaxis: "y2", mode: "lines", showlegend: inputs.length > 1, legendrank: 2000,
+        line: { color, width: 1.2, dash, shape: "hv" }, hovertemplate: `%{y:.4~g} ${IN}`,
+      });
+    }
     return { data, layout: layout(narrow.matches ? 400 : 460, {
       showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: failingWindows(r),
       xaxis: axis("time [s]", { anchor: "y2", exponentformat: "none", hoverformat: ".6~g", showspikes: false }),

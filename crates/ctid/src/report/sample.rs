@@ -238,6 +238,7 @@ pub(crate) fn two_tanks() -> Diagnosis {
                 .map(|(y, e)| y + e)
                 .collect(),
             input,
+            input_2: None,
         }
     })
     .collect();

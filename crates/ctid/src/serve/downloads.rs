@@ -44,6 +44,7 @@ async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Res
                 held_out: upload.held_out,
                 time: record.time.clone(),
                 input: record.input.values.clone(),
+                input_2: record.input_2.as_ref().map(|second| second.values.clone()),
                 output: record.output.values.clone(),
             });
         }

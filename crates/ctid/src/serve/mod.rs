@@ -36,7 +36,7 @@
 //! | `GET /api/model?session=&id=` | the number of a fit | its curves, parameters and sentences |
 //! | `GET /api/file?session=&of=` | `model`, `report` or `experiment` | the file |
 //!
-//! The state is `{version, file, text, model_error, pumps, settings, effects, records, headings, guessed, current, trail, models,
+//! The state is `{version, file, text, model_error, settings, effects, records, headings, guessed, current, trail, models,
 //! diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits of its first
 //! effects, `job` `{what, phase, done, total, seconds}` while something is computed.
 //!

@@ -67,7 +67,6 @@ pub(super) fn state(session: &mut Session) -> Value {
         "file": session.file.as_ref().map(|path| path.display().to_string()),
         "text": session.text,
         "model_error": error,
-        "pumps": model.as_ref().map_or(1, |model| model.plant.pumps()),
         "settings": Settings::of(&session.text),
         "effects": words::effects(session),
         "records": records,
@@ -105,6 +104,7 @@ fn about(record: &Record) -> Value {
         "length": numbers::duration(record.duration()),
         "interval": numbers::duration(record.sample_interval()),
         "input": signal(&record.input),
+        "input_2": record.input_2.as_ref().map(signal),
         "output": signal(&record.output),
         "reference": record.reference.as_ref().map(signal),
     })

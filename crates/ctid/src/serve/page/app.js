@@ -102,8 +102,8 @@ function show(state, trouble) {
     $(`download-${id}`).hidden = !there;
     $(`download-${id}`).href = server.link(id);
   }
-  data.show(state, fail);
   model.show(state, fail);
+  data.show(state, fail, model.pumps(), model.drafting());
   findings.show(state, fail);
   experiment.show(state);
   fall(state);

@@ -4,7 +4,7 @@ import * as server from "./server.js";
 
 const ROLES = [["time", "Time"], ["input", "Command u"], ["input_2", "Command of pump 2"], ["output", "Reading y"], ["reference", "Reference r"]];
 // Without these columns a record is one.
-const OPTIONAL = { reference: "none", input_2: "none: it is off" };
+const OPTIONAL = { reference: "none", input_2: "none (off)" };
 
 /** Another model in place of this one; what stands in a file of the user's goes, so it is asked first. */
 async function replace(file) {
@@ -51,10 +51,12 @@ export function start(changed, fail) {
   $("column-fields").addEventListener("change", changed);
 }
 
+const signals = (read) => [read.input, read.input_2, read.output].filter(Boolean).map((one) => `${one.name} ${one.range}`).join(", ");
+
 function record(one, fail) {
   const { read } = one;
   const about = read
-    ? `${read.samples} samples, ${read.length}, every ${read.interval}; ${read.input.name} ${read.input.range}, ${read.output.name} ${read.output.range}`
+    ? `${read.samples} samples, ${read.length}, every ${read.interval}; ${signals(read)}`
     : one.error;
   return make("li", {},
     make("div", {}, make("strong", {}, one.name), " ", make("span", { className: "badge" }, one.held_out ? "held out" : "fitted")),
@@ -101,7 +103,17 @@ export function columns() {
 
 export const hold = () => $("hold").value;
 
-export function show(state, fail) {
+/** The columns as the model names them; before there is one, as they were chosen. */
+export function columnFields(state, pumps) {
+  const { columns: named, plant } = state.settings;
+  const kept = plant ? named : Object.fromEntries(Object.entries(columns()).filter(([, said]) => meant(state.headings || [], said)));
+  const roles = ROLES.filter(([role]) => role !== "input_2" || pumps > 1);
+  const title = (role, alone) => (role === "input" && pumps > 1 ? "Command of pump 1" : alone);
+  fill($("column-fields"), roles.flatMap(([role, alone]) => field(role, title(role, alone), state.headings || [], kept[role], state.guessed[role])));
+}
+
+/** `pumps` are those of the plant in the form; a draft keeps what was chosen. */
+export function show(state, fail, pumps, draft) {
   fill($("records"), state.records.map((one) => record(one, fail)));
   $("after-record").hidden = !state.records.length;
   const fitted = state.records.some((one) => !one.held_out);
@@ -109,11 +121,9 @@ export function show(state, fail) {
   $("drop-what").textContent = fitted ? "Another record" : "Drop a CSV here";
   $("drop-how").textContent = fitted ? "fitted together with the first" : "or choose one: time, command and reading, with a header";
   if ($("columns").contains(document.activeElement)) return;
-  const { columns: named, hold: kind } = state.settings;
-  $("hold").value = kind;
+  // What the file says shows without a record too.
+  if (state.settings.plant) $("hold").value = state.settings.hold;
   if (!state.headings) return;
-  // Two pumps have the plants that say so.
-  const roles = ROLES.filter(([role]) => role !== "input_2" || state.pumps > 1);
-  fill($("column-fields"), roles.flatMap(([role, title]) => field(role, title, state.headings, named[role], state.guessed[role])));
+  if (!draft || !$("column-fields").childElementCount) columnFields(state, pumps);
   if (state.records.some((one) => one.error)) $("columns").open = true;
 }

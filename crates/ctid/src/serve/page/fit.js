@@ -31,7 +31,7 @@ function joined(trail, bodies) {
 
 export async function show(next) {
   state = next;
-  $("empty").hidden = state.records.length > 0;
+  $("empty").hidden = state.records.some((one) => one.read);
   const trail = state.trail;
   const wanted = JSON.stringify([trail.map((one) => one.id), state.records.map((one) => [one.name, one.held_out, one.read]), state.settings.columns]);
   document.querySelector(".see").classList.toggle("stale", trail.length > 0 && state.current === null);

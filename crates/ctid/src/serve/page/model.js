@@ -4,8 +4,8 @@ import * as server from "./server.js";
 import * as data from "./data.js";
 
 let plants = [];
-// What was typed and refused stays until it is mended.
-let draft = false;
+// What was typed and refused, or waits for more, stays until it is mended or the settings are others: those that it was typed over.
+let draft = null;
 // The list of effects as it stands there.
 let written = "";
 
@@ -23,6 +23,14 @@ const LAWS = {
 const LIMITS = [["u_min", "Smallest command"], ["u_max", "Largest command"]];
 
 const plant = (id) => plants.find((one) => one.id === id);
+const label = (key, of) => (key === "area" && of.measured.length ? ALIKE : KNOWN[key]);
+
+/** What the form says is not the model's yet. */
+export const drafting = () => draft !== null && draft === JSON.stringify(server.current().settings);
+/** Pumps of the plant that the form says. */
+export const pumps = () => plant($("plant").value)?.pumps ?? 1;
+
+const keep = () => { draft = JSON.stringify(server.current().settings); };
 
 function input(id, label, value, suffix) {
   const text = Array.isArray(value) ? value.join(", ") : value ?? "";
@@ -64,8 +72,14 @@ function settings() {
   const known = {};
   const was = server.current().settings.known;
   // What another plant's form said is nothing of this one; what has no field yet stays.
-  for (const key of chosen.known) known[key] = $(`known-${key}`) ? number(`known-${key}`, KNOWN[key]) : was[key];
-  if (chosen.measured.length) known.measured = $("known-measured") ? $("known-measured").value || null : was.measured;
+  for (const key of chosen.known) known[key] = $(`known-${key}`) ? number(`known-${key}`, label(key, chosen)) : was[key] ?? null;
+  if (chosen.measured.length) {
+    known.measured = $("known-measured") ? $("known-measured").value || null : was.measured;
+    if (!known.measured) throw new Error("Say first of which tank the reading is the level.");
+  }
+  if (chosen.known.includes("gravity") && (known.pipe_area === null) !== (known.gravity === null)) {
+    throw new Error("The cross-section of the pipes and gravity make the flow coefficients pure numbers together: give both, or neither.");
+  }
   const columns = data.columns();
   if (chosen.pumps < 2) delete columns.input_2;
   return { plant: chosen.id, hold: data.hold(), columns, known, controller: controller() };
@@ -78,27 +92,45 @@ function knownFields(known, state) {
   const units = { tank_height: level, input_range: command, gravity: level ? `${level}/s^2` : "" };
   const square = level ? `${level}^2` : "";
   const values = state.settings.known;
-  const label = (key) => (key === "area" && known.measured.length ? ALIKE : KNOWN[key]);
+  const form = JSON.stringify([known.id, level, command]);
+  const at = document.activeElement;
+  if ($("known-fields").contains(at) && $("known-fields").dataset.of === form) {
+    // The field in which somebody is stays as it is.
+    for (const key of [...known.known, ...(known.measured.length ? ["measured"] : [])]) {
+      const box = $(`known-${key}`);
+      if (box !== at) box.value = values[key] ?? "";
+    }
+    return;
+  }
+  $("known-fields").dataset.of = form;
   const measured = known.measured.length ? [make("label", { htmlFor: "known-measured" }, "The reading is the level of"),
     make("select", { id: "known-measured" }, make("option", { value: "" }, "choose…"),
       known.measured.map((name) => make("option", { value: name, selected: values.measured === name }, name)))] : [];
-  fill($("known-fields"), measured, known.known.flatMap((key) => input(`known-${key}`, label(key), values[key], units[key] ?? square)));
+  fill($("known-fields"), measured, known.known.flatMap((key) => input(`known-${key}`, label(key, known), values[key], units[key] ?? square)));
 }
 
 /** Another plant: one of which more has to be said waits for that. */
 function chosen() {
   const known = plant($("plant").value);
   const state = server.current();
-  if (!known || !known.measured.length || state.settings.known.measured) {
+  trouble(null);
+  if (!known) {
+    draft = null;
+    form(state);
+    data.columnFields(state, pumps());
+    return;
+  }
+  if (known.measured.length) knownFields(known, state);
+  if (!known.measured.length || state.settings.known.measured) {
     changed();
     return;
   }
-  draft = true;
+  keep();
   $("known").hidden = false;
-  $("equation").textContent = known.model;
-  knownFields(known, state);
+  $("equation").textContent = `${known.model}. Say of which tank the reading is the level, and which column is the command of pump 2.`;
+  data.columnFields(state, known.pumps);
+  $("columns").open = true;
   $("known-measured").focus();
-  trouble(null);
 }
 
 /** Sends the form. Columns are said to the model only where they differ from what is guessed, or stand there already. */
@@ -110,12 +142,13 @@ export async function changed() {
     for (const role of Object.keys(said.columns)) {
       if (!columns[role] && said.columns[role] === guessed[role]) delete said.columns[role];
     }
-    draft = false;
+    draft = null;
     await server.send("/api/settings", said);
     trouble(null);
   } catch (error) {
-    draft = true;
+    keep();
     trouble(error.message);
+    $("model-error").scrollIntoView({ block: "nearest" });
   }
 }
 
@@ -175,17 +208,22 @@ export function show(state, fail) {
     fill($("effects"), state.effects.map((one) => effect(one, fail)), state.effects.length ? null : make("li", { className: "caption" }, "none"), more(state, known, fail));
   }
   $("text").textContent = state.text || "(written once a plant is chosen)";
-  if (state.text && state.model_error && !draft) trouble(state.model_error);
-  else if (!draft) trouble(null);
-  if (draft || $("model").contains(document.activeElement) && /^(known|law)-/.test(document.activeElement.id)) return;
+  if (drafting()) return;
+  trouble(state.text && state.model_error ? state.model_error : null);
+  form(state);
+}
+
+/** The form as the model has it. */
+function form(state) {
+  const known = plant(state.settings.plant);
   $("plant").value = state.settings.plant;
   $("known").hidden = !known;
   $("controller").hidden = !known;
   $("equation").textContent = known ? known.model : "";
+  if (known) knownFields(known, state);
+  if ($("law-fields").contains(document.activeElement)) return;
   const said = state.settings.controller;
   $("law").value = said ? (said.type === "PI" ? "PI" : said.variable === "p" ? "RSp" : "RS") : "";
   laws(state.settings);
-  if (!known) return;
-  knownFields(known, state);
-  if (said) $("controller").open = true;
+  if (known && said) $("controller").open = true;
 }

@@ -1,0 +1,92 @@
+//! Three tanks and two pumps with the mouse: what has to be said of them, and what another plant leaves of it.
+
+use ctid_tests::three_tanks::record;
+use serde_json::json;
+
+use crate::browser::Browser;
+use crate::click_path::{choose_plant, trail};
+use crate::server::{alone, csv, serve};
+
+/// Fitted models in the trail, drawn over the reading and both commands.
+fn wait_for_models(browser: &mut Browser, count: usize) {
+    browser.until(&format!(
+        "document.querySelectorAll('#trail .step').length === {count} && document.getElementById('plot-record-0')?.data?.length === {count} + 3 \
+         && document.getElementById('working').hidden"
+    ));
+}
+
+fn written(browser: &mut Browser, id: &str, text: &str) {
+    browser.click(&format!("#{id}"));
+    browser.type_text(text);
+    browser.press("Enter", 13, "\r");
+}
+
+#[test]
+fn a_leak_of_three_tanks_is_found_and_added() {
+    let address = format!("http://{}/", serve(&[]));
+    let _alone = alone();
+    let Some(mut browser) = Browser::open(&address) else {
+        return;
+    };
+    let file = browser.folder.path().join("tanks.csv");
+    let leak = record(Some(("leak_at_height", 0, &[3.0, 0.0])), 400, 11);
+    std::fs::write(&file, csv(&leak)).unwrap();
+    browser.drop_files("#drop-fitted", &[&file]);
+    browser.until("document.querySelector('#records .alert')");
+    assert!(browser.text("#empty").starts_with("Five steps"));
+
+    // Nothing is fitted before it is said which tank was measured, and what was chosen until then stays.
+    choose_plant(&mut browser, "three-tank");
+    browser.until("document.activeElement.id === 'known-measured'");
+    for (role, letters, header) in [
+        ("input", "u1", "u1 [V]"),
+        ("input_2", "u2", "u2 [V]"),
+        ("output", "h3", "h3 [cm]"),
+    ] {
+        browser.choose(
+            &format!("column-{role}"),
+            letters,
+            &format!("value === '{header}'"),
+        );
+    }
+    browser.press("Tab", 9, "");
+    browser.until("document.getElementById('model-error').innerText.includes('which tank')");
+    assert!(!browser.text("#text").contains("three-tank"));
+    browser.choose("known-measured", "T3", "value === 'T3'");
+    wait_for_models(&mut browser, 1);
+    assert_eq!(browser.text("#model-error"), "");
+    let about = browser.text("#records");
+    assert!(about.contains("u1 ") && about.contains("u2 "), "{about}");
+
+    written(&mut browser, "known-area", "154");
+    written(&mut browser, "known-pipe_area", "0.5");
+    browser.until("document.getElementById('model-error').innerText.includes('give both')");
+    written(&mut browser, "known-gravity", "981");
+    browser.until("document.getElementById('text').textContent.includes('gravity = 981')");
+    wait_for_models(&mut browser, 1);
+
+    browser.click("#diagnose");
+    browser.until("document.querySelector('#add-found-0')");
+    assert_eq!(browser.text("#findings .name"), "leak_at_height (T1)");
+    browser.click("#add-found-0");
+    wait_for_models(&mut browser, 2);
+    let fell = trail(&mut browser);
+    assert!(fell[1] < 0.056 && fell[1] < 0.9 * fell[0], "{fell:?}");
+    let drawn = browser
+        .evaluate("document.getElementById('plot-record-0').data.slice(-2).map((one) => one.name)");
+    assert_eq!(drawn, json!(["input 1", "input 2"]));
+
+    // One pump has no second command, and whoever chooses no plant has the one that the model has.
+    choose_plant(&mut browser, "single-tank");
+    browser.until("document.getElementById('text').textContent.includes('single-tank') && !document.getElementById('column-input_2')");
+    let text = browser.text("#text");
+    assert!(
+        !text.contains("input_2") && !text.contains("measured"),
+        "{text}"
+    );
+    choose_plant(&mut browser, "three-tank");
+    browser.until("document.getElementById('known-measured')?.value === ''");
+    browser.choose("plant", "c", "value === ''");
+    browser.until("document.getElementById('plant').value === 'single-tank' && !document.getElementById('known-measured')");
+    browser.assert_quiet(&address);
+}

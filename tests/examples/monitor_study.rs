@@ -8,7 +8,7 @@
 
 use clap::Parser;
 use ctid_tests::onset::Onset;
-use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
+use monitor::{Alarm, Settings};
 use rayon::prelude::*;
 
 #[derive(Parser)]
@@ -36,35 +36,6 @@ struct Arguments {
     first: u64,
 }
 
-/// All alarms of a loop.
-fn watched(onset: &Onset, settings: Settings, seed: u64) -> Option<Vec<Alarm>> {
-    let record = onset.run(true, seed)?;
-    let model = Model {
-        plant: onset.rig.plant,
-        known: onset.rig.known(),
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        hold: record.hold,
-    };
-    let units = Units {
-        output: "cm".into(),
-        input: "V".into(),
-    };
-    let mut monitor = Monitor::new(model, settings, units).ok()?;
-    let mut alarms = Vec::new();
-    for k in 0..record.len() {
-        let row = Row {
-            time: record.time[k],
-            input: record.input.values[k],
-            output: record.output.values[k],
-        };
-        alarms.extend(monitor.update(&row).ok()?.alarm);
-    }
-    Some(alarms)
-}
-
 fn main() {
     let arguments = Arguments::parse();
     let settings = Settings {
@@ -85,7 +56,7 @@ fn main() {
         .into_par_iter()
         .map(|number| {
             let onset = Onset::drawn(number, arguments.rows, arguments.ratio, colour(number))?;
-            let alarms = watched(&onset, settings, 500 + number)?;
+            let alarms = onset.watched(settings, 500 + number)?;
             Some((onset, alarms))
         })
         .collect();
@@ -143,7 +114,7 @@ fn main() {
         .into_par_iter()
         .map(|number| {
             let onset = Onset::nothing(arguments.quiet_rows, colour(number), number);
-            let alarms = watched(&onset, settings, 900 + number);
+            let alarms = onset.watched(settings, 900 + number);
             (onset, alarms)
         })
         .collect();

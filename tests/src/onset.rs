@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
 use greybox::{Setup, Stopping, fit_from};
+use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
 use plants::{Command, EffectInfo, Placed, Plant, Scales, Simulator, Structure};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -192,6 +193,36 @@ impl Onset {
             reference: Some(Signal::new("r", "cm", wanted)),
             hold: Hold::Zero,
         })
+    }
+
+    /// All alarms that a monitor raises on this loop with its noise, which it takes for the plant without the effect.
+    #[must_use]
+    pub fn watched(&self, settings: Settings, seed: u64) -> Option<Vec<Alarm>> {
+        let record = self.run(true, seed)?;
+        let model = Model {
+            plant: self.rig.plant,
+            known: self.rig.known(),
+            effects: Vec::new(),
+            terms: Vec::new(),
+            start: BTreeMap::new(),
+            fixed: Vec::new(),
+            hold: record.hold,
+        };
+        let units = Units {
+            output: record.output.unit.clone(),
+            input: record.input.unit.clone(),
+        };
+        let mut monitor = Monitor::new(model, settings, units).ok()?;
+        let mut alarms = Vec::new();
+        for k in 0..record.len() {
+            let row = Row {
+                time: record.time[k],
+                input: record.input.values[k],
+                output: record.output.values[k],
+            };
+            alarms.extend(monitor.update(&row).ok()?.alarm);
+        }
+        Some(alarms)
     }
 
     /// The first row at which what began shows in the reading by as much as the noise: without noise, the reading beside that of the plant

@@ -1,30 +1,9 @@
 //! The monitor on loops drawn at random: a part of `cargo run --release -p ctid-tests --example monitor_study`.
 #![allow(clippy::unwrap_used)]
 
-use ct_signals::Record;
 use ctid_tests::onset::Onset;
-use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
+use monitor::Settings;
 use rayon::prelude::*;
-
-fn watched(onset: &Onset, record: &Record) -> Vec<Alarm> {
-    let model = Model {
-        plant: onset.rig.plant,
-        known: onset.rig.known(),
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        hold: record.hold,
-    };
-    let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
-    let rows = record.time.iter().enumerate().map(|(k, time)| Row {
-        time: *time,
-        input: record.input.values[k],
-        output: record.output.values[k],
-    });
-    rows.filter_map(|row| monitor.update(&row).unwrap().alarm)
-        .collect()
-}
 
 /// An effect that begins half-way, of each kind, as large as the noise, in white and coloured noise in turn: seen within
 /// three time constants of when it shows as much as the noise, and in the group that is named.
@@ -35,7 +14,7 @@ fn what_begins_is_seen_and_named() {
         .map(|number| {
             let colour = if number % 2 == 0 { 0.0 } else { 0.5 };
             let onset = Onset::drawn(number, 3000, 1.0, colour).unwrap();
-            let alarms = watched(&onset, &onset.run(true, number).unwrap());
+            let alarms = onset.watched(Settings::default(), number).unwrap();
             let at = |row: usize| row as f64 * onset.rig.interval;
             let visible = at(onset.visible_from().unwrap());
             let first = alarms.iter().find(|alarm| alarm.time >= at(onset.row));
@@ -58,7 +37,8 @@ fn nothing_is_seen_where_nothing_begins() {
         .map(|number| {
             let colour = if number % 2 == 0 { 0.0 } else { 0.5 };
             let onset = Onset::nothing(8000, colour, number);
-            watched(&onset, &onset.run(true, number).unwrap()).len()
+            let alarms = onset.watched(Settings::default(), number).unwrap();
+            alarms.len()
         })
         .collect();
     assert_eq!(alarms, [0; 4]);

@@ -45,8 +45,7 @@ impl Node<'_> {
     pub fn size_of(&self, placed: Placed) -> Option<(ParameterInfo, usize)> {
         let parameters = self.setup.structure.effect_parameters(placed);
         let leading = parameters.into_iter().next()?;
-        let name = format!("{}.{}", placed.effect.id, leading.name);
-        let at = self.setup.names().iter().position(|known| *known == name)?;
+        let at = position_of(&self.setup, placed, leading.name)?;
         Some((leading, at))
     }
 
@@ -59,6 +58,12 @@ impl Node<'_> {
         let size = self.fit.x[at];
         size <= leading.lower + room || size >= leading.upper - room
     }
+}
+
+/// Where a parameter of an effect stands in the vector.
+pub(crate) fn position_of(setup: &Setup, placed: Placed, parameter: &str) -> Option<usize> {
+    let name = format!("{}.{parameter}", placed.effect.id);
+    setup.names().iter().position(|known| *known == name)
 }
 
 /// The parent's vector in the child's order; what the parent does not have is zero.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::{
     hidden_step::{self, hidden_step},
-    node::{Node, ROUGH, best_first, transfer},
+    node::{Node, ROUGH, best_first, position_of, transfer},
     spectral_line::strongest_line,
 };
 
@@ -69,8 +69,7 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
         .flat_map(|values| begun.iter().map(move |x| (x.clone(), values.clone())))
         .map(|(mut x, values)| {
             for (parameter, value) in parameters.iter().zip(values) {
-                let name = format!("{}.{}", placed.effect.id, parameter.name);
-                if let Some(at) = child.names().iter().position(|known| *known == name) {
+                if let Some(at) = position_of(child, placed, parameter.name) {
                     x[at] = value;
                 }
             }
@@ -220,8 +219,7 @@ fn keep_shown_periods(setup: &Setup, placed: Placed, starts: &mut Vec<Vec<f64>>,
         return;
     }
     for parameter in setup.structure.effect_parameters(placed) {
-        let name = format!("{}.{}", placed.effect.id, parameter.name);
-        let own = setup.names().iter().position(|known| *known == name);
+        let own = position_of(setup, placed, parameter.name);
         if let Some(own) = own.filter(|_| parameter.absent.is_finite()) {
             without[own] = parameter.absent;
         }

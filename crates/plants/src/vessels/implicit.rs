@@ -42,14 +42,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         if let Some(watch) = watch {
             // The transient is over at once; what is left looks straight.
             let (before, after) = (self.levels[self.measured], next[self.measured]);
-            let rate = (after - before) / h;
-            watch(&Stretch {
-                h,
-                before,
-                after,
-                rate_before: rate,
-                rate_after: rate,
-            });
+            watch(&Stretch::straight(h, before, after));
         }
         self.levels = next;
     }

@@ -278,14 +278,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         let next = self.newton(&there, h, q.end, end);
         if let Some(watch) = watch {
             let (before, after) = (self.levels[self.measured], next[self.measured]);
-            let rate = (after - before) / h;
-            watch(&Stretch {
-                h,
-                before,
-                after,
-                rate_before: rate,
-                rate_after: rate,
-            });
+            watch(&Stretch::straight(h, before, after));
         }
         self.levels = next;
         self.keep_within();

@@ -96,6 +96,20 @@ pub(crate) struct Stretch<T> {
     pub rate_after: T,
 }
 
+impl<T: Scalar> Stretch<T> {
+    /// From a level to another in a straight line, as after an implicit step, of which only the end is known.
+    fn straight(h: T, before: T, after: T) -> Self {
+        let rate = (after - before) / h;
+        Self {
+            h,
+            before,
+            after,
+            rate_before: rate,
+            rate_after: rate,
+        }
+    }
+}
+
 impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// The vessels are joined by valves.
     const JOINED: bool = N > SERIES;

@@ -16,8 +16,8 @@ pub struct Rim<T> {
 pub struct Side<T> {
     /// Its surface, as a share of the vessel's.
     pub share: T,
-    /// Time constant with which its level follows the vessel's \[s\].
-    pub time_constant: T,
+    /// How fast its level follows the vessel's, one over the time constant \[1/s\].
+    pub rate: T,
 }
 
 /// What a law changes in the balance of its vessel.

@@ -58,7 +58,10 @@ enum CoupledTank<T> {
 
 pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
     match *parameters {
-        [share, time_constant, ..] => CoupledTank::Side(Side { share, time_constant }),
+        [share, time_constant, ..] => CoupledTank::Side(Side {
+            share,
+            rate: T::constant(1.0) / time_constant,
+        }),
         _ => CoupledTank::Backflow(parameters[0]),
     }
 }

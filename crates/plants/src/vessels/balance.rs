@@ -8,21 +8,29 @@ use super::{
     torricelli::{A_LITTLE, slope_of_root, square_root},
 };
 
+/// A time within a step that begins and lasts with derivatives.
+// Inlined, its division is taken out of the loop over the vessels, and done where there is no clock too, on whatever stands there.
+#[cold]
+#[inline(never)]
+fn time_by<T: Scalar>(&(start, length): &(T, T), t: f64) -> T {
+    let share = if length.value() == 0.0 {
+        0.0
+    } else {
+        (t - start.value()) / length.value()
+    };
+    // The value is `t` to the last bit, as it is where there are no derivatives.
+    let moved = start + length * share;
+    moved - moved.value() + t
+}
+
 impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// A time within the present step, with its derivatives.
     #[inline]
     pub(super) fn time(&self, t: f64) -> T {
-        let Some((start, length)) = self.clock else {
-            return T::constant(t);
-        };
-        let share = if length.value() == 0.0 {
-            0.0
-        } else {
-            (t - start.value()) / length.value()
-        };
-        // The value is `t` to the last bit, as it is where there are no derivatives.
-        let moved = start + length * share;
-        moved - moved.value() + t
+        match &self.clock {
+            None => T::constant(t),
+            Some(clock) => time_by(clock, t),
+        }
     }
 
     /// What vessel `i` alone lets out at a level or, through a valve, at a head.
@@ -109,7 +117,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// What flows to a side tank for each unit of level that it stands below its vessel.
     #[inline]
     fn exchange(&self, side: &Side<T>) -> T {
-        self.vessels[0].area * side.share / side.time_constant
+        self.vessels[0].area * side.share * side.rate
     }
 
     /// Surface of vessel `i` at a level.
@@ -167,7 +175,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
         if let Some(side) = &self.side {
             let last = self.states - 1;
-            rates[last] = (levels[last - 1] - levels[last]) / side.time_constant;
+            rates[last] = (levels[last - 1] - levels[last]) * side.rate;
         }
     }
 
@@ -239,7 +247,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             };
         }
         if let Some(side) = &self.side {
-            rates[self.states - 1] = T::constant(1.0) / side.time_constant;
+            rates[self.states - 1] = side.rate;
         }
         rates
     }
@@ -294,7 +302,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             }
         }
         if let Some(side) = &self.side {
-            most = most.max(h * (1.0 + side.share.value()) / side.time_constant.value());
+            most = most.max(h * (1.0 + side.share.value()) * side.rate.value());
         }
         most.max(self.stiffness_of_losses(h, q, t))
     }

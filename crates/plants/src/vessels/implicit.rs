@@ -36,7 +36,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
         if let Some(side) = &self.side {
             let last = self.states - 1;
-            let drawn = h / side.time_constant;
+            let drawn = h * side.rate;
             next[last] = (next[last] + drawn * next[last - 1]) / (drawn + 1.0);
         }
         if let Some(watch) = watch {

@@ -77,10 +77,12 @@ pub(crate) fn minimise(
         };
     };
     // What an undamped step promises says whether it is a minimum; small steps alone may be the damping's doing.
-    let end = |at: &Triangle, free: &[usize]| {
+    let promised = |at: &Triangle, free: &[usize]| {
         let step = at.solve(free, &vec![1.0; p], 0.0);
-        let promised = at.cost() - at.predicted(&step);
-        if promised <= 1e3 * stopping.cost * at.cost() {
+        (at.cost() - at.predicted(&step)) / at.cost()
+    };
+    let end = |at: &Triangle, free: &[usize]| {
+        if promised(at, free) <= 1e3 * stopping.cost {
             Stop::Converged
         } else {
             Stop::Stuck
@@ -94,7 +96,7 @@ pub(crate) fn minimise(
         let free: Vec<usize> = (0..p)
             .filter(|&j| !held(x[j], bounds[j], at.descent(j)))
             .collect();
-        if free.is_empty() || cost == 0.0 {
+        if free.is_empty() || cost == 0.0 || promised(&at, &free) <= stopping.cost {
             return Minimum {
                 x,
                 triangle: at,

@@ -12,7 +12,8 @@ use crate::Triangle;
 pub struct Stopping {
     /// Most evaluations.
     pub evaluations: usize,
-    /// Relative fall of the cost below which a step counts as the last one.
+    /// Relative fall of the cost that is not worth a step: a fit ends where an undamped step promises no more, or two in a row
+    /// brought no more.
     pub cost: f64,
 }
 

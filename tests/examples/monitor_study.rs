@@ -31,6 +31,9 @@ struct Arguments {
     /// The noise's correlation from row to row in the odd loops; it is white in the even ones
     #[arg(long, default_value_t = 0.5)]
     colour: f64,
+    /// Degrees of freedom of the noise, above two: its tails are heavy; without it the noise is Gaussian
+    #[arg(long)]
+    tails: Option<f64>,
     /// Number of the first loop: another thirty
     #[arg(long, default_value_t = 0)]
     first: u64,
@@ -55,7 +58,9 @@ fn main() {
         .clone()
         .into_par_iter()
         .map(|number| {
-            let onset = Onset::drawn(number, arguments.rows, arguments.ratio, colour(number))?;
+            let mut onset =
+                Onset::drawn(number, arguments.rows, arguments.ratio, colour(number))?;
+            onset.tails = arguments.tails;
             let alarms = onset.watched(settings, 500 + number)?;
             Some((onset, alarms))
         })
@@ -113,7 +118,8 @@ fn main() {
     let quiet: Vec<_> = numbers
         .into_par_iter()
         .map(|number| {
-            let onset = Onset::nothing(arguments.quiet_rows, colour(number), number);
+            let mut onset = Onset::nothing(arguments.quiet_rows, colour(number), number);
+            onset.tails = arguments.tails;
             let alarms = onset.watched(settings, 900 + number);
             (onset, alarms)
         })

@@ -8,6 +8,7 @@ use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
 use plants::{Command, EffectInfo, Placed, Plant, Scales, Simulator, Structure};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StudentT;
 
 use crate::{Drive, Rig, draw};
 
@@ -31,6 +32,8 @@ pub struct Onset {
     pub effect: Option<(Placed, Vec<f64>)>,
     /// The row at which it begins.
     pub row: usize,
+    /// Degrees of freedom of the noise, above two; `None`: it is Gaussian.
+    pub tails: Option<f64>,
 }
 
 impl Onset {
@@ -43,6 +46,7 @@ impl Onset {
             rig: draw::rig(plant, Drive::Closed, colour, samples, rng),
             effect: None,
             row: samples,
+            tails: None,
         }
     }
 
@@ -73,6 +77,7 @@ impl Onset {
             effect: Some((placed, values(&rig, placed, sign * size, share))),
             rig: rig.clone(),
             row,
+            tails: None,
         };
         let reached = |size: f64| Some(at(size).misfit()? / rig.noise);
         let (mut low, mut high) = (1e-6_f64, 1e-4_f64);
@@ -157,10 +162,13 @@ impl Onset {
             rng,
         )
         .ok()?;
-        let e = match (noisy, rig.colour > 0.0) {
+        let e = match (noisy, self.tails) {
             (false, _) => vec![0.0; rig.samples],
-            (true, true) => noise::ar1(rig.samples, rig.noise, rig.colour, rng),
-            (true, false) => noise::white(rig.samples, rig.noise, rng),
+            (true, Some(degrees)) => heavy(rig, degrees, rng)?,
+            (true, None) if rig.colour > 0.0 => {
+                noise::ar1(rig.samples, rig.noise, rig.colour, rng)
+            }
+            (true, None) => noise::white(rig.samples, rig.noise, rng),
         };
         let mut controller = rig.controller().start(&[middle]);
         let structure = self.structure();
@@ -250,6 +258,19 @@ impl Onset {
         scales.input_range = 10.0;
         Structure::new(rig.plant, rig.known(), scales)
     }
+}
+
+/// Noise of the rig's size and colour whose innovations have Student's distribution.
+fn heavy(rig: &Rig, degrees: f64, rng: &mut ChaCha8Rng) -> Option<Vec<f64>> {
+    let student = StudentT::new(degrees).ok()?;
+    let unit = ((degrees - 2.0) / degrees).sqrt();
+    let sigma = rig.noise * unit * (1.0 - rig.colour * rig.colour).sqrt();
+    let mut v = 0.0;
+    let follow = |_| {
+        v = rig.colour * v + sigma * rng.sample(student);
+        v
+    };
+    Some((0..rig.samples).map(follow).collect())
 }
 
 /// The parameters of an effect whose size is a share of what the plant has.

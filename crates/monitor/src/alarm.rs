@@ -17,7 +17,7 @@ pub enum Stage {
     Alarm,
     /// More rows have come since, and it was looked again.
     Update,
-    /// The last look; from here on the plant is learned anew as it is now.
+    /// The last look; the model stays as it was learned.
     Final,
 }
 

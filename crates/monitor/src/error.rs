@@ -91,6 +91,14 @@ pub enum Refused {
         /// The full range.
         range: f64,
     },
+    /// A reading that no sensor of this tank gives, however wrong it is.
+    #[error("{value} is far above the tank, tank_height = {height}")]
+    AboveTank {
+        /// The value.
+        value: f64,
+        /// The height.
+        height: f64,
+    },
     /// The time of the row before.
     #[error("the time {time} s is repeated from the row before")]
     Repeated {
@@ -114,6 +122,7 @@ impl Refused {
         match self {
             Self::NotFinite { column, .. } | Self::TooLarge { column, .. } => column,
             Self::BeyondRange { .. } => "input",
+            Self::AboveTank { .. } => "output",
             Self::Repeated { .. } | Self::Backward { .. } => "time",
         }
     }

@@ -161,6 +161,14 @@ impl Intake {
         Ok(Taken { sample, notice })
     }
 
+    /// Begins a new stretch.
+    fn part(&mut self) {
+        if self.follows == Follows::On {
+            self.follows = Follows::Gap;
+        }
+        self.begin();
+    }
+
     /// A row that goes back is refused, but not for ever: one wrong time that lies ahead would make the monitor deaf.
     fn set_back(&mut self, previous: f64, time: f64) -> Result<Notice, Refused> {
         let count = match self.back {
@@ -171,10 +179,7 @@ impl Intake {
         if count < BACK {
             return Err(Refused::Backward { time, previous });
         }
-        if self.follows == Follows::On {
-            self.follows = Follows::Gap;
-        }
-        self.begin();
+        self.part();
         Ok(Notice::ClockSetBack {
             from: previous,
             to: time,
@@ -217,10 +222,7 @@ impl Intake {
         }
         let bridged = step <= BRIDGED * longest;
         if !bridged {
-            if self.follows == Follows::On {
-                self.follows = Follows::Gap;
-            }
-            self.begin();
+            self.part();
         }
         Some(Notice::Gap {
             from: previous,

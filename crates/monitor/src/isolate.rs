@@ -12,16 +12,17 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Hold};
+use ct_signals::{ArModel, Hold, Record};
 use greybox::{Setup, Stopping, fit_from};
 use missing_effect::GROUP_MARGIN;
-use plants::{MAX_VESSELS, Placed, Structure, Unit};
+use plants::{MAX_VESSELS, Placed, Simulator, Structure, Unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     intake::Sample,
     learn::{Learned, record},
+    sensitivity::command,
 };
 
 /// Effects that begin while a plant runs. What is a plant's shape, a wrong law or a lag does not.
@@ -71,6 +72,8 @@ pub(crate) struct Kept {
     pub levels: [f64; MAX_VESSELS],
     /// Where in it stood what the command moves: play has a memory without an end, and no run-up finds it.
     pub stands: f64,
+    /// Measured minus the learned model.
+    pub residual: f64,
     /// Whitened residual in its standard deviations.
     pub innovation: f64,
 }
@@ -106,12 +109,14 @@ impl Suspect {
     }
 }
 
-/// Every effect that may have begun, best first: an implausible size comes after every plausible one.
+/// Every effect that may have begun, best first: an implausible size comes after every plausible one. The noise is `growth` times as large as
+/// it was learned.
 pub(crate) fn isolate(
     structure: &Structure,
     learned: &Learned,
     hold: Hold,
     rows: &[Kept],
+    growth: f64,
 ) -> Vec<Suspect> {
     let Some(noise) = learned.noise() else {
         return Vec::new();
@@ -122,11 +127,12 @@ pub(crate) fn isolate(
         noise,
         hold,
         rows,
+        variance: (growth * learned.sigma).powi(2),
         squares: rows
             .iter()
             .rev()
             .scan(0.0, |sum, row| {
-                *sum += row.innovation * row.innovation;
+                *sum += (row.innovation / growth).powi(2);
                 Some(*sum)
             })
             .collect(),
@@ -161,6 +167,8 @@ struct Search<'a> {
     noise: ArModel,
     hold: Hold,
     rows: &'a [Kept],
+    /// Of the noise's innovations.
+    variance: f64,
     /// Sum of squared innovations over the last 1, 2, ... rows.
     squares: Vec<f64>,
 }
@@ -231,6 +239,34 @@ impl Search<'_> {
         Some(fine.map_or(rough, |(fine, _)| fine))
     }
 
+    /// A fit begins with play, lags and dead time at rest at its first command. What the learned model, begun in the same way, misses of the
+    /// one that ran on is taken from the readings.
+    fn put_right(&self, record: &mut Record, rows: &[Kept]) -> Option<()> {
+        if self.structure.effects().is_empty() && self.structure.terms().is_empty() {
+            return Some(());
+        }
+        let vessels = self.structure.plant.vessels();
+        let first = rows.first()?;
+        let mut begun = Simulator::<f64>::new(
+            self.structure,
+            &self.learned.theta,
+            &first.levels[..vessels],
+            first.sample.input,
+        )
+        .ok()?;
+        begun.set_substeps(self.learned.substeps);
+        let mut before: Option<&Kept> = None;
+        for (row, reading) in rows.iter().zip(&mut record.output.values) {
+            if let Some(before) = before {
+                let step = row.sample.time - before.sample.time;
+                begun.advance(command(self.hold, &before.sample, &row.sample), step);
+            }
+            before = Some(row);
+            *reading = begun.read() + row.residual;
+        }
+        Some(())
+    }
+
     /// The effect as it began `length` rows ago, fitted; its own parameters start at `near` or at the catalogue's starts.
     fn fitted(
         &self,
@@ -241,7 +277,8 @@ impl Search<'_> {
     ) -> Option<(Suspect, Vec<f64>)> {
         let from = self.rows.len().checked_sub(length)?;
         let rows = &self.rows[from..];
-        let records = [record(rows.iter().map(|row| &row.sample), self.hold)];
+        let mut records = [record(rows.iter().map(|row| &row.sample), self.hold)];
+        self.put_right(&mut records[0], rows)?;
         let mut structure = self.structure.with(placed).ok()?;
         structure.scales.duration = records[0].duration();
         let mut fixed: BTreeMap<String, f64> = self
@@ -287,8 +324,7 @@ impl Search<'_> {
             })
             .collect();
         let fit = fit_from(&setup, &starts, &self.noise, stopping).ok()?;
-        let variance = self.learned.sigma * self.learned.sigma;
-        let squares = fit.cost / variance;
+        let squares = fit.cost / self.variance;
         let cost = (free.len() + 1) as f64 * (self.rows.len() as f64).ln();
         let values: Vec<f64> = free.iter().map(|&i| fit.x[i]).collect();
         let size = *values.first()?;

@@ -7,7 +7,7 @@ use greybox::{FitOptions, LinearPlant, Setup, coloured, fit_from, random_starts}
 use plants::{Known, Placed, Plant, Scales, Structure, Term};
 use serde::{Deserialize, Serialize};
 
-use crate::intake::Sample;
+use crate::{intake::Sample, scatter::Limit};
 
 /// A command that moves by less of itself stands still.
 const STILL: f64 = 1e-9;
@@ -90,6 +90,8 @@ pub(crate) struct Learned {
     pub interval: f64,
     pub scales: Scales,
     pub substeps: usize,
+    /// How far neighbouring innovations lie apart.
+    pub scatter: Limit,
 }
 
 impl Learned {
@@ -128,6 +130,7 @@ impl Learned {
             && self.substeps <= MOST_SUBSTEPS
             && self.coefficients.len() <= MOST_COEFFICIENTS
             && self.noise().is_some()
+            && self.scatter.sound()
     }
 }
 
@@ -221,6 +224,14 @@ pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f
     if !(sigma.is_finite() && sigma > 0.0 && covariance.iter().all(|c| c.is_finite())) {
         return Err("the model leaves no noise to judge by: are the readings measured?".into());
     }
+    let residuals = setup.residuals(&fit.x).map_err(|error| said(&error))?;
+    let innovations: Vec<f64> = residuals
+        .iter()
+        .flat_map(|residual| fit.noise.whiten(residual))
+        .map(|e| e / sigma)
+        .collect();
+    let scatter = Limit::learned(&innovations, setup.free().len())
+        .ok_or("the model leaves no noise to judge by: do the readings move?")?;
     let commands = &record.input.values;
     let mean = commands.iter().sum::<f64>() / commands.len() as f64;
     let interval = record.sample_interval();
@@ -245,6 +256,7 @@ pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f
         interval,
         scales: setup.structure.scales.clone(),
         substeps: setup.substeps,
+        scatter,
     };
     let levels = fit.x[n..].to_vec();
     Ok((learned, levels))

@@ -4,14 +4,14 @@
 //! | question | answer |
 //! |---|---|
 //! | Where do I start? | [`Monitor::new`] with the believed [`Model`], then [`Monitor::update`] once a row |
-//! | What does a row say? | [`Step`]: the innovation, and now and then an [`Alarm`] or a [`Notice`] |
+//! | What does a row say? | [`Step`]: the innovation, and now and then an [`Alarm`], a [`ScatterAlarm`] or a [`Notice`] |
 //! | What are the parameters now? | [`Monitor::estimates`] |
 //! | What if it is stopped? | [`Monitor::state`] is saved, [`Monitor::restore`] goes on as if nothing had happened |
 //!
 //! It learns first: the believed model is fitted to the first rows (a thousand and twenty time constants at least), with the
 //! colour of its noise. From then on the learned model runs beside the plant on the measured command, and never
 //! learns: so a feedback that hides a change in the reading shows it in the command, and a slow change does not pass for
-//! normal. Memory is constant, and a row allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
+//! normal. After an alarm it stays the learned one, until it fits again. Memory is constant, and a row allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
 //!
 //! # Example
 //! A tank loses water from the 3000th row on.
@@ -60,6 +60,7 @@ mod intake;
 mod isolate;
 mod learn;
 mod monitor;
+mod scatter;
 mod sensitivity;
 mod settings;
 mod threshold;
@@ -70,4 +71,5 @@ pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict, instant};
 pub use error::{Error, Refused};
 pub use learn::Model;
 pub use monitor::{Estimate, Innovation, Monitor, Notice, Progress, Row, State, Step};
+pub use scatter::{ScatterAlarm, ScatterEvent};
 pub use settings::Settings;

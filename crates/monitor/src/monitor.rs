@@ -3,15 +3,17 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Alarm, Error, Model, Refused, Settings, Units,
+    Alarm, Error, Model, Refused, ScatterAlarm, Settings, Units,
     core::{Checkpoint, Core, Phase},
     intake::{Intake, Sample},
 };
 
 /// The version of [`State`].
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// A command above so many times its full range is in another unit, or none, as in a record.
 const BEYOND: f64 = 1.01;
+/// A reading above so many times the tank's height is in another unit, or none; below it a sensor may be off, which is to be seen.
+const ABOVE: f64 = 1.5;
 
 /// A row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,6 +35,8 @@ pub struct Step {
     pub notices: [Option<Notice>; 2],
     /// The model does not fit any more, or more is known of that.
     pub alarm: Option<Alarm>,
+    /// The noise has grown, or is back where it was.
+    pub scatter: Option<ScatterAlarm>,
 }
 
 /// The learned model beside a row.
@@ -88,7 +92,14 @@ pub enum Notice {
         /// What a score has to pass; far above 6 where the noise is so slow that these rows hardly say how large it is.
         threshold: f64,
     },
-    /// What was gathered is given up, and an alarm that was being followed ends without its last look.
+    /// After an alarm the learned model fits again.
+    FitsAgain {
+        /// Now \[s\].
+        time: f64,
+        /// When the alarm was raised \[s\].
+        since: f64,
+    },
+    /// What was gathered or learned is given up, and an alarm that was being followed ends.
     LearnsAnew {
         /// Why.
         why: &'static str,
@@ -251,7 +262,16 @@ impl Monitor {
     /// # Errors
     /// [`Refused`]: the row is not used.
     pub fn update(&mut self, row: &Row) -> Result<Step, Refused> {
-        if let Some(range) = self.core.input_range()
+        let known = self.core.known();
+        if let Some(height) = known.tank_height
+            && row.output > ABOVE * height
+        {
+            return Err(Refused::AboveTank {
+                value: row.output,
+                height,
+            });
+        }
+        if let Some(range) = known.input_range
             && row.input.abs() > BEYOND * range
         {
             return Err(Refused::BeyondRange {
@@ -270,6 +290,7 @@ impl Monitor {
             });
             step.notices[1] = fed.notice;
             step.alarm = fed.alarm;
+            step.scatter = fed.scatter;
             if self.core.every() != self.intake.every {
                 self.intake.every = self.core.every();
                 self.intake.begin();
@@ -303,7 +324,7 @@ impl Monitor {
         match self.core.phase() {
             Phase::Learning { .. } => Progress::Learning(self.core.kept()),
             Phase::Watching => Progress::Watching { score, threshold },
-            Phase::Alarmed { .. } => Progress::Alarmed { score, threshold },
+            Phase::Alarmed(_) => Progress::Alarmed { score, threshold },
         }
     }
 

@@ -5,7 +5,8 @@ use crate::Error;
 /// How to watch. Every field has a usual value: `Settings::default()`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Mean number of (working) rows between false alarms, above 1000; usually 1e6.
+    /// Mean number of rows between false alarms of all kinds, from 1000 on; usually 1e6. Rows count as they come, also where they are
+    /// watched in blocks.
     pub rows_between_false_alarms: f64,
     /// Fewest rows that are learned from, 100 to 1024; usually 1000.
     pub learning_rows: usize,

@@ -6,6 +6,7 @@ use plants::{MAX_VESSELS, Structure};
 use crate::{
     bank::Bank,
     intake::Sample,
+    isolate::Kept,
     learn::Learned,
     sensitivity::{Model, command, lanes, model},
     tracker::{Tracker, TrackerState},
@@ -35,6 +36,19 @@ pub(crate) struct Said {
     pub innovation: f64,
     /// Seconds since the row before; zero for the first.
     pub step: f64,
+}
+
+impl Said {
+    /// With its row, to be kept.
+    pub(crate) fn of(&self, sample: Sample) -> Kept {
+        Kept {
+            sample,
+            levels: self.levels,
+            stands: self.stands,
+            residual: self.residual,
+            innovation: self.innovation,
+        }
+    }
 }
 
 impl Watch {
@@ -93,17 +107,22 @@ impl Watch {
         }
     }
 
-    /// Lets the scores and the tracker see the row that was followed last.
+    /// Lets the scores and the tracker see the row that was followed last, `growth` times as noisy as was learned.
     pub(crate) fn judge(
-        &self,
+        &mut self,
         bank: &mut Bank,
         tracker: Option<&mut Tracker>,
         covariance: &[f64],
         threshold: f64,
-        step: f64,
+        (step, growth): (f64, f64),
     ) -> bool {
         if !self.row.iter().all(|value| value.is_finite()) {
             return false;
+        }
+        if growth > 1.0 {
+            for value in &mut self.row {
+                *value /= growth;
+            }
         }
         if let Some(tracker) = tracker
             && step > 0.0

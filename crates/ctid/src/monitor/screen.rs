@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use ::monitor::{Alarm, Estimate, Innovation, Monitor, Progress, instant};
+use ::monitor::{Estimate, Innovation, Monitor, Progress, instant};
 use console::Term;
 
 use crate::look::Look;
@@ -59,8 +59,9 @@ impl Screen {
         let _ = writeln!(io::stderr(), "{text}");
     }
 
-    pub(super) fn alarm(&mut self, alarm: &Alarm) {
-        let text = format!("t = {} s: {}", instant(alarm.time), alarm.sentence);
+    /// The sentence of an alarm.
+    pub(super) fn warn(&mut self, time: f64, sentence: &str) {
+        let text = format!("t = {} s: {sentence}", instant(time));
         let text = self.look.warning(text);
         self.say(&text);
     }

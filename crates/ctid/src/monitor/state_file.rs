@@ -24,6 +24,12 @@ struct Read {
     state: State,
 }
 
+/// What a state of every version has.
+#[derive(Deserialize)]
+struct Head {
+    written_by: String,
+}
+
 const WRITTEN_BY: &str = "ctid monitor";
 
 /// The state, where there is one; `None` where the file is not there yet. The folder is seen to take a file.
@@ -71,9 +77,12 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
     let text = fs::read_to_string(path)
         .map_err(|error| not_ours(format!("it cannot be read: {error}")))?;
     let read: Read = serde_json::from_str(&text).map_err(|error| {
-        not_ours(format!(
-            "it is no state that `ctid monitor` wrote ({error})"
-        ))
+        let head = serde_json::from_str::<Head>(&text);
+        not_ours(if head.is_ok_and(|head| head.written_by == WRITTEN_BY) {
+            format!("another version of `ctid monitor` wrote it, or it is damaged ({error})")
+        } else {
+            format!("it is no state that `ctid monitor` wrote ({error})")
+        })
     })?;
     if read.written_by != WRITTEN_BY {
         return Err(not_ours(

@@ -74,6 +74,12 @@ fn fed(place: &Place, words: &str, bytes: impl AsRef<[u8]>) -> Outcome {
     }
 }
 
+/// What it says on standard error.
+#[track_caller]
+fn assert_says(outcome: &Outcome, said: &str) {
+    assert!(outcome.err.contains(said), "{said}: {}", outcome.err);
+}
+
 fn events(out: &str) -> Vec<Value> {
     out.lines()
         .map(|line| serde_json::from_str(line).unwrap())
@@ -105,7 +111,7 @@ fn an_alarm_is_a_json_line_and_a_sentence() {
     assert!((gain["value"].as_f64().unwrap() - 10.0).abs() < 0.5);
     let first = outcome.err.lines().next().unwrap();
     assert!(first.contains("\"t [s]\" is the time"), "{first}");
-    assert!(outcome.err.contains("learned from 10"), "{}", outcome.err);
+    assert_says(&outcome, "learned from 10");
     // Without a terminal nothing steers one.
     assert!(!outcome.err.contains('\u{1b}'));
 }
@@ -154,6 +160,74 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
     assert_eq!(events(&lone.out).len(), events(&plain.out).len());
 }
 
+/// A logger that begins anew with its columns in another order swaps nothing.
+#[test]
+fn a_header_that_comes_again_in_another_order_is_followed() {
+    let rows = rows(1400, 1100);
+    let place = place();
+    let plain = fed(&place, "", text(HEADER, &rows));
+    let mut swapped = text(HEADER, &rows[..700]) + "y [cm];note;u;t [s]\n";
+    for [t, u, y] in &rows[700..] {
+        swapped += &format!("{y:.4};-;{u};{t}\n");
+    }
+    let outcome = fed(&place, "", &swapped);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+    assert_eq!(outcome.out, plain.out, "{}", outcome.err);
+    let said = "row 702: the header comes again in another form, and the rows behind it are read as it says: a header: \"t [s]\" is the time, \"u\" the command, \"y [cm]\" the reading";
+    assert_says(&outcome, said);
+
+    let other_unit =
+        text(HEADER, &rows[..700]) + &text("t [s],r [mm],u [V],y [mm]\n", &rows[700..]);
+    let outcome = fed(&place, "", other_unit);
+    assert_eq!(outcome.code, Some(2), "{}", outcome.err);
+    let said = "row 702: the header comes again with [mm] where it was [cm]";
+    assert_says(&outcome, said);
+}
+
+/// A cable comes loose, and is mended.
+#[test]
+fn a_scatter_that_grows_is_a_json_line_of_its_own() {
+    let mut rows = rows(2600, 9999);
+    let mut random = Random(8);
+    for row in &mut rows[1200..1500] {
+        row[2] += 0.2 * random.normal();
+    }
+    let place = place();
+    let outcome = fed(&place, "", text(HEADER, &rows));
+    let events = events(&outcome.out);
+    let names: Vec<&str> = events
+        .iter()
+        .map(|e| e["event"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["scatter_grown", "scatter_back"], "{}", outcome.err);
+    for event in &events {
+        assert_eq!(event["schema"], 1);
+        assert!(outcome.err.contains(event["sentence"].as_str().unwrap()));
+    }
+    let time = events[0]["time"].as_f64().unwrap();
+    assert!((2400.0..2700.0).contains(&time), "{}", events[0]);
+    let [learned, now] = ["learned", "now"].map(|key| events[0][key].as_f64().unwrap());
+    assert!(
+        (learned - 0.05).abs() < 0.01 && now > 3.0 * learned,
+        "{}",
+        events[0]
+    );
+    assert_eq!(events[0]["unit"], "cm");
+}
+
+#[test]
+fn a_reading_far_above_the_tank_is_refused() {
+    let place = place();
+    place.write("m.toml", MODEL.to_string() + "tank_height = 60.0\n");
+    let clean = text(HEADER, &rows(1100, 9999));
+    let bad = clean.replacen("\n2,", "\n1,15,5,160\n2,", 1);
+    assert_ne!(clean, bad);
+    let outcome = fed(&place, "", bad);
+    let said =
+        "row 3: column \"y [cm]\": 160 is far above the tank, tank_height = 60; check the sensor";
+    assert_says(&outcome, said);
+}
+
 #[test]
 fn bad_rows_are_said_skipped_and_not_flooded_with() {
     let rows = rows(1400, 1100);
@@ -183,14 +257,10 @@ fn bad_rows_are_said_skipped_and_not_flooded_with() {
         "2 fields where 4 are read",
         "; the row is skipped",
     ] {
-        assert!(outcome.err.contains(said), "{said}: {}", outcome.err);
+        assert_says(&outcome, said);
     }
     assert!(outcome.err.lines().count() < 40, "{}", outcome.err);
-    assert!(
-        outcome.err.contains("104 of them with something wrong"),
-        "{}",
-        outcome.err
-    );
+    assert_says(&outcome, "104 of them with something wrong");
 }
 
 /// Who listens to a running line hears the end of a row first.
@@ -201,13 +271,9 @@ fn a_stream_may_begin_in_the_middle_of_a_row() {
     for part in ["5,4.5,14.8\n", ".5,14.8\n", "8\n"] {
         let outcome = fed(&place, "", part.to_string() + &lines);
         assert_eq!(outcome.code, Some(0), "{}", outcome.err);
-        assert!(outcome.err.contains("t, r, u, y"), "{}", outcome.err);
-        assert!(outcome.err.contains("learned from"), "{}", outcome.err);
-        assert!(
-            outcome.err.contains("1 of them with something wrong"),
-            "{}",
-            outcome.err
-        );
+        assert_says(&outcome, "t, r, u, y");
+        assert_says(&outcome, "learned from");
+        assert_says(&outcome, "1 of them with something wrong");
     }
 }
 
@@ -217,7 +283,7 @@ fn a_gap_is_said_with_its_row() {
     rows.drain(1200..1203);
     let outcome = fed(&place(), "", text(HEADER, &rows));
     let said = "standard input, row 1202, column \"t [s]\": 3 rows are missing (the time steps from 2398 to 2406 s)";
-    assert!(outcome.err.contains(said), "{}", outcome.err);
+    assert_says(&outcome, said);
     assert_eq!(outcome.out, "");
 }
 

@@ -1,0 +1,233 @@
+//! Lines of the input: the header, rows, and what is wrong with them.
+
+use std::path::Path;
+
+use ::monitor::{Monitor, Refused, Row, Units, instant};
+use ct_signals::{BadLine, Line, Rows};
+
+use super::{
+    Halt, INPUT, Session, blame,
+    lines::{Cut, LONGEST},
+};
+use crate::{Error, one_line};
+
+/// So many lines at the beginning may be parts of rows.
+const PARTS: usize = 2;
+
+impl Session<'_> {
+    pub(super) fn line(&mut self, cut: Cut) -> Result<(), Halt> {
+        self.line += 1;
+        let line = match cut {
+            Cut::Line(line) => line,
+            Cut::TooLong => {
+                self.bad(|| {
+                    format!("more than {LONGEST} bytes without an end of line; end every row with a line feed")
+                });
+                return Ok(());
+            }
+        };
+        if self.rows.is_none() && !self.first(line)? {
+            return Ok(());
+        }
+        let Some(rows) = &mut self.rows else {
+            return Ok(());
+        };
+        match rows.read(line) {
+            Ok(Line::Nothing) => Ok(()),
+            Ok(Line::Row([time, input, output])) => self.row(&Row {
+                time,
+                input,
+                output,
+            }),
+            Err(BadLine::Fields { .. })
+                if self.taken <= 1 && !self.restored && !rows.has_header() =>
+            {
+                // Who listens to a running line hears the end of a row first.
+                self.bad(|| "the row before was not whole".to_string());
+                self.rows = None;
+                self.taken = 0;
+                self.line -= 1;
+                self.line(Cut::Line(line))
+            }
+            Err(bad @ (BadLine::Text { .. } | BadLine::Fields { .. })) => {
+                if !self.header_again(line)? {
+                    self.bad(|| bad.to_string());
+                }
+                Ok(())
+            }
+            Err(bad) => {
+                self.bad(|| bad.to_string());
+                Ok(())
+            }
+        }
+    }
+
+    /// Whether a line that is no row is a header of another form: what follows is read in its order.
+    fn header_again(&mut self, line: &[u8]) -> Result<bool, Error> {
+        let (Some(known), Ok(text)) = (&self.rows, std::str::from_utf8(line)) else {
+            return Ok(false);
+        };
+        let Ok((rows, false)) = Rows::begin(INPUT, self.line, text, &self.columns) else {
+            return Ok(false);
+        };
+        // Who does not say a unit does not change it.
+        let pairs = known.units().into_iter().zip(rows.units());
+        for (before, now) in pairs {
+            if !now.is_empty() && !before.is_empty() && now != before {
+                return Err(Error::Usage(format!(
+                    "{INPUT}, row {}: the header comes again with [{now}] where it was [{before}], and the model was learned in that; convert the rows, or begin anew",
+                    self.line
+                )));
+            }
+        }
+        let text = format!(
+            "{INPUT}, row {}: the header comes again in another form, and the rows behind it are read as it says: {}",
+            self.line,
+            rows.order()
+        );
+        if let Some(text) = self.trouble.bad(|| text) {
+            self.screen.say(&one_line(&text));
+        }
+        self.rows = Some(rows);
+        Ok(true)
+    }
+
+    /// The first line that says something; whether it is a row.
+    fn first(&mut self, line: &[u8]) -> Result<bool, Error> {
+        let Ok(text) = std::str::from_utf8(line) else {
+            self.bad(|| BadLine::NotText.to_string());
+            return Ok(false);
+        };
+        let said = text.trim_start_matches('\u{feff}').trim();
+        if said.is_empty() || said.starts_with('#') {
+            return Ok(false);
+        }
+        let (rows, is_row) = match Rows::begin(INPUT, self.line, text, &self.columns) {
+            Err(ct_signals::Error::NoOrder { found, .. }) if self.parts < PARTS => {
+                self.parts += 1;
+                self.bad(|| format!("{found} numbers and no header; if this is no part of a row, give t,u,y or t,r,u,y"));
+                return Ok(false);
+            }
+            begun => begun?,
+        };
+        self.screen.say(&format!("{INPUT}: {}", rows.order()));
+        let [input, output] = rows.units();
+        let units = Units {
+            output: output.to_string(),
+            input: input.to_string(),
+        };
+        if self.restored {
+            self.resumed(&units)?;
+        } else {
+            self.monitor = Monitor::new(self.model.clone(), self.settings, units)
+                .map_err(|error| blame(error, self.arguments))?;
+        }
+        self.screen.units(rows.units()[1]);
+        self.rows = Some(rows);
+        Ok(is_row)
+    }
+
+    /// The saved state and the rows have to be in the same units.
+    fn resumed(&mut self, units: &Units) -> Result<(), Error> {
+        let state = self.monitor.state();
+        let saved = state.units();
+        if saved != units {
+            let named =
+                |units: &Units| format!("command [{}], reading [{}]", units.input, units.output);
+            return Err(Error::Usage(format!(
+                "the saved state is in {}, but the rows are in {}; convert the rows, or name another --state",
+                named(saved),
+                named(units)
+            )));
+        }
+        self.screen.say(&format!(
+            "goes on from {} rows in {}",
+            self.monitor.rows(),
+            self.arguments
+                .state
+                .as_deref()
+                .unwrap_or(Path::new(""))
+                .display()
+        ));
+        Ok(())
+    }
+
+    fn row(&mut self, row: &Row) -> Result<(), Halt> {
+        if self.restored
+            && self.taken == 0
+            && let Some(last) = self.monitor.last_time()
+            && row.time <= last
+        {
+            if self.seen_before == 0 {
+                self.screen.say(&format!(
+                    "rows up to t = {} s were seen before the state was saved, and are skipped; if the clock began anew since, name another --state",
+                    instant(last)
+                ));
+            }
+            self.seen_before += 1;
+            return Ok(());
+        }
+        let step = match self.monitor.update(row) {
+            Ok(step) => step,
+            Err(refused) => {
+                self.refused(&refused);
+                return Ok(());
+            }
+        };
+        if self.taken == 0 && self.seen_before > 0 {
+            self.screen.say(&format!(
+                "{} rows up to here were seen before the state was saved, and are skipped",
+                self.seen_before
+            ));
+        }
+        self.taken += 1;
+        self.trouble.good();
+        self.last_time = row.time;
+        for notice in step.notices.iter().flatten() {
+            self.notice(notice)?;
+        }
+        if let Some(innovation) = step.innovation {
+            self.screen.innovation(row.time, innovation);
+        }
+        if let Some(scatter) = &step.scatter {
+            self.screen.warn(scatter.time, &scatter.sentence);
+            self.print(scatter)?;
+        }
+        if let Some(alarm) = &step.alarm {
+            self.screen.warn(alarm.time, &alarm.sentence);
+            self.print(alarm)?;
+        }
+        if row.time >= self.next_estimate {
+            self.estimate(row.time)?;
+        }
+        Ok(())
+    }
+
+    fn bad(&mut self, what: impl FnOnce() -> String) {
+        let line = self.line;
+        let message = self
+            .trouble
+            .bad(|| format!("{INPUT}, row {line}: {}; the row is skipped", what()));
+        if let Some(message) = message {
+            self.screen.say(&one_line(&message));
+        }
+    }
+
+    fn refused(&mut self, refused: &Refused) {
+        let column = self.rows.as_ref().map_or(String::new(), |rows| {
+            rows.name(refused.column()).to_string()
+        });
+        let mend = match refused {
+            Refused::NotFinite { .. } => "check the sensor, or leave the row out",
+            Refused::BeyondRange { .. } => {
+                "check what writes it, or correct the range in the model file"
+            }
+            Refused::AboveTank { .. } => {
+                "check the sensor, or give the height in the reading's unit in the model file"
+            }
+            Refused::TooLarge { .. } => "correct it, or give the column in a larger unit",
+            _ => "rows have to come in the order of time: check the clock",
+        };
+        self.bad(|| format!("column \"{column}\": {refused}; {mend}"));
+    }
+}

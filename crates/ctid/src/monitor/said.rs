@@ -1,0 +1,147 @@
+//! What is said between the alarms: notices in words, estimates, and JSON lines.
+
+use std::io;
+
+use ::monitor::{Notice, instant};
+
+use super::{Halt, INPUT, Session};
+use crate::numbers::significant;
+use crate::{Error, one_line};
+
+/// A threshold above this is not that of the false alarms alone: 8.6 where they come every 1e15 rows.
+const DEAF: f64 = 10.0;
+
+impl Session<'_> {
+    pub(super) fn notice(&mut self, notice: &Notice) -> Result<(), Halt> {
+        let text = match notice {
+            Notice::Gap {
+                from,
+                to,
+                missing,
+                bridged,
+            } => {
+                let (line, from, to) = (self.line, instant(*from), instant(*to));
+                let what = if *bridged {
+                    "the command is taken to have been held"
+                } else {
+                    "what the levels are is waited for"
+                };
+                let name = self
+                    .rows
+                    .as_ref()
+                    .map_or("", |rows| rows.name("time"))
+                    .to_string();
+                match self.trouble.bad(|| {
+                    format!(
+                        "{INPUT}, row {line}, column \"{name}\": {missing} rows are missing (the time steps from {from} to {to} s); {what}"
+                    )
+                }) {
+                    Some(text) => text,
+                    None => return Ok(()),
+                }
+            }
+            Notice::ClockSetBack { from, to } => {
+                self.next_estimate = *to;
+                format!(
+                    "the time goes back from {} to {} s and stays there: the rows are followed from here on; what the levels are is waited for",
+                    instant(*from),
+                    instant(*to)
+                )
+            }
+            Notice::FitsAgain { time, since } => {
+                #[derive(serde::Serialize)]
+                struct FitsAgain {
+                    schema: u32,
+                    event: &'static str,
+                    time: f64,
+                    since: f64,
+                }
+                self.print(&FitsAgain {
+                    schema: ::monitor::SCHEMA,
+                    event: "fits_again",
+                    time: *time,
+                    since: *since,
+                })?;
+                format!(
+                    "t = {} s: the model fits again, after the alarm of t = {} s",
+                    instant(*time),
+                    instant(*since)
+                )
+            }
+            Notice::LearnsAnew { why } => format!("learns anew: {why}"),
+            Notice::IntervalChanged { time, from, to } => format!(
+                "the time steps by {} s instead of {} s since about t = {} s: the noise is another then, and is learned anew",
+                significant(*to, 4),
+                significant(*from, 4),
+                instant(*time)
+            ),
+            Notice::Learned {
+                rows,
+                time_constant,
+                noise,
+                every,
+                threshold,
+            } => {
+                let deaf = if *threshold > DEAF {
+                    format!(
+                        "; what the model leaves is so slow that only a large change will be seen (threshold {threshold:.1}): it may lack an effect"
+                    )
+                } else {
+                    String::new()
+                };
+                let blocks = if *every > 1 {
+                    format!(", watched in means of {every} rows")
+                } else {
+                    String::new()
+                };
+                format!(
+                    "learned from {rows} rows: slowest time constant {} s, noise {} rms{blocks}; watching from here on{deaf}",
+                    significant(*time_constant, 4),
+                    significant(*noise, 3)
+                )
+            }
+            Notice::NotLearned { why } => format!("goes on learning: {why}"),
+            _ => return Ok(()),
+        };
+        self.screen.say(&one_line(&text));
+        Ok(())
+    }
+
+    /// Says where the parameters are, when it is time.
+    pub(super) fn estimate(&mut self, time: f64) -> Result<(), Halt> {
+        let Some(time_constant) = self.monitor.time_constant() else {
+            return Ok(());
+        };
+        self.next_estimate = time + self.arguments.interval.unwrap_or(10.0 * time_constant);
+        let estimates = self.monitor.estimates();
+        self.screen
+            .estimates(time, &estimates, self.monitor.progress());
+        if self.arguments.estimates {
+            #[derive(serde::Serialize)]
+            struct Estimates<'a> {
+                schema: u32,
+                event: &'a str,
+                time: f64,
+                parameters: &'a [::monitor::Estimate],
+            }
+            self.print(&Estimates {
+                schema: ::monitor::SCHEMA,
+                event: "estimates",
+                time,
+                parameters: &estimates,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// A JSON line.
+    pub(super) fn print(&mut self, value: &impl serde::Serialize) -> Result<(), Halt> {
+        let line =
+            serde_json::to_string(value).map_err(|error| Error::Output(io::Error::other(error)))?;
+        match writeln!(self.out, "{line}").and_then(|()| self.out.flush()) {
+            Ok(()) => Ok(()),
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Err(Halt::Closed),
+            Err(error) => Err(Halt::Error(error.into())),
+        }
+    }
+}

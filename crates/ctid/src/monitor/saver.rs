@@ -1,0 +1,118 @@
+//! Saves the state now and then; what cannot be written is said once, and tried again.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use ::monitor::Monitor;
+
+use super::state_file;
+use crate::{Error, one_line};
+
+/// How often the state is saved.
+const SAVED_EVERY: Duration = Duration::from_secs(60);
+
+pub(super) struct Saver {
+    /// None where no state is kept.
+    path: Option<PathBuf>,
+    tried: Instant,
+    /// Rows of the state that is in the file.
+    rows: u64,
+    failed: bool,
+}
+
+impl Saver {
+    pub(super) fn new(path: Option<PathBuf>, rows: u64) -> Self {
+        Self {
+            path,
+            tried: Instant::now(),
+            rows,
+            failed: false,
+        }
+    }
+
+    pub(super) fn is_due(&self) -> bool {
+        self.tried.elapsed() >= SAVED_EVERY
+    }
+
+    /// Saves it; in words where that begins to fail, or to succeed again.
+    pub(super) fn save(&mut self, monitor: &Monitor) -> Option<String> {
+        let failed = std::mem::replace(&mut self.failed, false);
+        match self.finish(monitor) {
+            Ok(()) if failed => Some("the state is saved again".to_string()),
+            Ok(()) => None,
+            Err(error) => {
+                self.failed = true;
+                (!failed).then(|| {
+                    one_line(&format!(
+                        "{error}; it goes on watching, and tries again every {} s",
+                        SAVED_EVERY.as_secs()
+                    ))
+                })
+            }
+        }
+    }
+
+    /// The last time: a failure is an error.
+    pub(super) fn finish(&mut self, monitor: &Monitor) -> Result<(), Error> {
+        self.tried = Instant::now();
+        let Some(path) = &self.path else {
+            return Ok(());
+        };
+        if monitor.rows() != self.rows {
+            state_file::write(path, &monitor.state())?;
+            self.rows = monitor.rows();
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::monitor::{Model, Row, Settings, Units};
+    use ct_signals::Hold;
+    use plants::{Known, Plant};
+
+    #[test]
+    fn a_folder_that_goes_and_comes_back_is_said_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let model = Model {
+            plant: Plant::SingleTank,
+            known: Known::default(),
+            effects: Vec::new(),
+            terms: Vec::new(),
+            start: Default::default(),
+            fixed: Vec::new(),
+            hold: Hold::Zero,
+        };
+        let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
+        let inside = folder.path().join("rig");
+        let path = inside.join("s.json");
+        let mut saver = Saver::new(Some(path.clone()), 0);
+        let mut time = 0.0;
+        let mut next = |saver: &mut Saver| {
+            time += 1.0;
+            let row = Row {
+                time,
+                input: 5.0,
+                output: 16.0,
+            };
+            monitor.update(&row).unwrap();
+            saver.save(&monitor)
+        };
+        let first = next(&mut saver).unwrap();
+        assert!(first.contains("cannot be written") && first.contains("goes on watching"));
+        assert_eq!(next(&mut saver), None);
+        std::fs::create_dir(&inside).unwrap();
+        assert_eq!(next(&mut saver).unwrap(), "the state is saved again");
+        assert!(path.exists());
+        assert_eq!(next(&mut saver), None);
+        std::fs::remove_dir_all(&inside).unwrap();
+        assert!(next(&mut saver).unwrap().contains("cannot be written"));
+        // No row has come since it failed: it is owed all the same.
+        assert!(saver.finish(&monitor).is_err());
+        std::fs::create_dir(&inside).unwrap();
+        saver.finish(&monitor).unwrap();
+        assert!(path.exists());
+    }
+}

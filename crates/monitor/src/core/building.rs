@@ -1,0 +1,96 @@
+//! What runs is built from plain numbers and the rows that are kept.
+
+use ct_signals::Hold;
+
+use super::{Core, Running};
+use crate::{
+    bank::windows,
+    scatter::{Most, SHARE},
+    threshold::{relative_error, threshold},
+    tracker::Tracker,
+    watch::{Watch, tracked},
+};
+
+/// Rows on which the simulation settles when it is built again.
+const RUN_UP: usize = 1024;
+
+impl Core {
+    pub(super) fn set_checkpoint(&mut self) {
+        self.since.clear();
+        self.checkpoint.clone_from(&self.now);
+    }
+
+    /// A checkpoint, and everything built again from it.
+    pub(super) fn settle_checkpoint(&mut self) {
+        if let Some(tracker) = self.running.as_ref().and_then(|r| r.tracker.as_ref()) {
+            self.now.tracker = Some(tracker.state());
+        }
+        self.set_checkpoint();
+        self.build();
+    }
+
+    /// A checkpoint after which the tracker finds the parameters again: they have jumped.
+    pub(super) fn let_go(&mut self) {
+        self.settle_checkpoint();
+        if let Some(tracker) = &mut self.now.tracker {
+            tracker.open();
+        }
+        self.set_checkpoint();
+        self.build();
+    }
+
+    pub(super) fn hold(&self) -> Hold {
+        if self.now.every > 1 {
+            Hold::First
+        } else {
+            self.model.hold
+        }
+    }
+
+    /// Builds what runs, from given levels on.
+    pub(super) fn start(&mut self, levels: &[f64], at_rest: f64) {
+        self.running = self.running_from(levels, at_rest);
+    }
+
+    pub(super) fn running_from(&self, levels: &[f64], at_rest: f64) -> Option<Running> {
+        let learned = self.now.learned.as_ref()?;
+        let bank = self.now.bank.as_ref()?;
+        let structure = self.model.structure(learned.scales.clone()).ok()?;
+        let watch = Watch::new(&structure, learned, self.hold(), levels, at_rest)?;
+        let memory = self.settings.memory * learned.time_constant;
+        let tracker = self
+            .now
+            .tracker
+            .as_ref()
+            .and_then(|state| Tracker::new(state, &tracked(learned), memory));
+        let lanes: Vec<usize> = (0..bank.directions() - 1).collect();
+        // The promise is in rows; scores and blocks count means of so many.
+        let samples = self.settings.rows_between_false_alarms / self.now.every as f64;
+        let threshold = threshold(
+            &windows(learned.rows_per_time_constant()),
+            bank.directions(),
+            samples / (1.0 - SHARE),
+            relative_error(&learned.noise()?, learned.rows),
+        );
+        Some(Running {
+            structure,
+            watch,
+            tracker,
+            covariance: learned.covariance_of(&lanes),
+            threshold,
+            most: Most::new(&learned.scatter, samples),
+        })
+    }
+
+    /// Builds what runs from the present numbers and the kept rows.
+    pub(super) fn build(&mut self) -> Option<()> {
+        let from = self.now.kept.len().saturating_sub(RUN_UP);
+        let first = self.now.kept.get(from)?;
+        let mut running = self.running_from(&first.levels, first.stands)?;
+        for kept in self.now.kept.range(from..) {
+            running.watch.follow(&kept.sample);
+        }
+        self.running = Some(running);
+        Some(())
+    }
+}

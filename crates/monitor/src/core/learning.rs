@@ -1,0 +1,142 @@
+//! Gathering rows to learn from, and taking over what was learned.
+
+use std::collections::VecDeque;
+
+use super::{Core, Fed, KEPT, Phase};
+use crate::{
+    Notice,
+    bank::Bank,
+    intake::Sample,
+    isolate::Kept,
+    learn::{Learned, learn, record},
+    scatter::Scatter,
+    watch::as_learned,
+};
+
+impl Core {
+    /// Begins to learn anew.
+    pub(super) fn begin(&mut self, every: usize) {
+        self.now.phase = Phase::Learning {
+            next: self.settings.learning_rows,
+        };
+        self.now.every = every;
+        self.now.kept.clear();
+        self.now.judged = 0;
+        self.now.settling = 0;
+        self.now.learned = None;
+        self.now.bank = None;
+        self.now.scatter = Scatter::default();
+        self.now.tracker = None;
+        self.running = None;
+        self.set_checkpoint();
+    }
+
+    /// Gathers a row to learn from; a fit is tried at `next` rows.
+    pub(super) fn gather(&mut self, sample: Sample, next: usize) -> Fed {
+        self.now.kept.push_back(Kept {
+            sample,
+            levels: [0.0; plants::MAX_VESSELS],
+            stands: sample.input,
+            residual: 0.0,
+            innovation: 0.0,
+        });
+        if self.now.kept.len() < next.min(KEPT) {
+            return Fed::default();
+        }
+        let records = [record(
+            self.now.kept.iter().map(|kept| &kept.sample),
+            self.hold(),
+        )];
+        let notice = match learn(&self.model, &records) {
+            Err(why) => {
+                // The older half goes: what comes next may say more.
+                self.later(2 * next, |kept| {
+                    kept.drain(..KEPT / 2);
+                });
+                Some(Notice::NotLearned { why })
+            }
+            Ok((learned, levels)) => {
+                let span = records[0].duration();
+                let needed = self.settings.learning_time_constants * learned.time_constant;
+                if span < needed {
+                    let full = self.now.kept.len() == KEPT;
+                    let rows = self.now.kept.len() as f64 * needed / span;
+                    // A little more, for the estimate of the time constant moves.
+                    self.later((1.02 * rows).ceil() as usize, halve);
+                    if full {
+                        self.now.every *= 2;
+                        self.set_checkpoint();
+                    }
+                    None
+                } else {
+                    self.take_over(learned, &levels)
+                }
+            }
+        };
+        Fed {
+            notice,
+            ..Fed::default()
+        }
+    }
+
+    /// Puts the next try off to so many rows; where no more fit in, room is made.
+    fn later(&mut self, next: usize, room: impl FnOnce(&mut VecDeque<Kept>)) {
+        let next = if self.now.kept.len() < KEPT {
+            next.min(KEPT)
+        } else {
+            room(&mut self.now.kept);
+            KEPT
+        };
+        self.now.phase = Phase::Learning { next };
+        if self.now.kept.len() < KEPT && self.since.len() >= KEPT {
+            self.set_checkpoint();
+        }
+    }
+
+    /// The learned model is run over the rows that it was learned from, and watched from now on.
+    fn take_over(&mut self, learned: Learned, levels: &[f64]) -> Option<Notice> {
+        let (rows, time_constant) = (learned.rows * self.now.every, learned.time_constant);
+        let noise = learned.noise()?.stationary_std();
+        let unit = learned.rows_per_time_constant();
+        let lanes = crate::sensitivity::lanes(learned.theta.len());
+        self.now.bank = Some(Bank::new(unit, lanes));
+        self.now.tracker = Some(as_learned(&learned));
+        self.now.learned = Some(learned);
+        self.now.phase = Phase::Watching;
+        self.now.settling = 0;
+        let at_rest = self.now.kept.front()?.sample.input;
+        self.start(levels, at_rest);
+        let mut kept = std::mem::take(&mut self.now.kept);
+        if let Some(running) = &mut self.running {
+            for kept in &mut kept {
+                let said = running.watch.follow(&kept.sample);
+                *kept = said.of(kept.sample);
+            }
+        }
+        self.now.judged = kept.len();
+        self.now.kept = kept;
+        self.settle_checkpoint();
+        Some(Notice::Learned {
+            rows,
+            time_constant,
+            noise,
+            every: self.now.every,
+            threshold: self.running.as_ref()?.threshold,
+        })
+    }
+}
+
+/// Means of pairs of rows.
+fn halve(kept: &mut VecDeque<Kept>) {
+    let pairs = kept.len() / 2;
+    for i in 0..pairs {
+        let (a, b) = (kept[2 * i].sample, kept[2 * i + 1].sample);
+        kept[i].sample = Sample {
+            time: 0.5 * (a.time + b.time),
+            input: 0.5 * (a.input + b.input),
+            output: 0.5 * (a.output + b.output),
+            follows: a.follows,
+        };
+    }
+    kept.truncate(pairs);
+}

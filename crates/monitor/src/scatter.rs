@@ -1,0 +1,350 @@
+//! The size of the innovations: has their scatter grown, whatever their structure?
+//!
+//! The scores ask whether the residual has a structure, so innovations that only grow, as those of a loose cable do, fit. Here the rows
+//! are taken in pairs: `d = |e_2j - e_2j-1|` is the scatter from a row to the next, which a residual that moves slowly leaves as it is, so
+//! that a change of the plant is left to the scores. The limit is the `k`-th largest `d` of the `n` pairs that were learned
+//! from. Where nothing has changed, the number of pairs beyond it in a block of `B` is beta-binomial,
+//! ```text
+//! P(c) = C(B, c) B(k + c, n - k + 1 + B - c)/B(k, n - k + 1)
+//! ```
+//! whatever the noise's distribution is (W. J. Conover, Practical Nonparametric Statistics, 1999, sec. 3.3: tolerance limits), heavy tails
+//! too. A block that has more of them than it has with a probability of its share is an alarm. What was fitted lies a little closer to the
+//! model than what comes later: the limit is wider by `sqrt((N + p)/(N - p))`, Akaike's final prediction error.
+
+use serde::{Deserialize, Serialize};
+use statrs::function::{beta::ln_beta, factorial::ln_binomial};
+
+use crate::Units;
+
+/// The share of the false alarms that is promised for the scatter; the scores have the rest.
+pub(crate) const SHARE: f64 = 0.1;
+/// Pairs in a block: the short ones see a large growth soon, the long ones a small one at all.
+const BLOCKS: [usize; 3] = [16, 64, 256];
+/// The limit is passed by one learned pair in so many.
+const BEYOND: usize = 10;
+/// While it has grown, its size is taken from blocks of this length ...
+const SIZED: usize = 1;
+/// ... and whether it has come back from these.
+const BACK: usize = 2;
+/// Of the latest eight pairs so many beyond the limit are suspicious: usually there is one.
+const SUSPICIOUS: u32 = 3;
+
+/// The limit that was learned.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Limit {
+    /// Of the difference of two neighbours, in standard deviations of the innovations.
+    difference: f64,
+    /// Learned pairs, and how many of them lie at it or beyond.
+    pairs: usize,
+    beyond: usize,
+    /// Root mean square of the learned innovations.
+    rms: f64,
+}
+
+impl Limit {
+    /// From the learned innovations; `parameters` were fitted to them.
+    pub(crate) fn learned(innovations: &[f64], parameters: usize) -> Option<Self> {
+        let pairs = innovations.chunks_exact(2);
+        let mut apart: Vec<f64> = pairs.map(|pair| (pair[0] - pair[1]).abs()).collect();
+        let beyond = apart.len() / BEYOND;
+        apart.sort_by(|a, b| b.total_cmp(a));
+        let n = innovations.len() as f64;
+        let p = (parameters as f64).min(0.5 * n);
+        let squares: f64 = innovations.iter().map(|e| e * e).sum();
+        let limit = Self {
+            difference: apart.get(beyond.checked_sub(1)?)? * ((n + p) / (n - p)).sqrt(),
+            pairs: apart.len(),
+            beyond,
+            rms: (squares / n).sqrt(),
+        };
+        limit.sound().then_some(limit)
+    }
+
+    pub(crate) fn sound(&self) -> bool {
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        positive(self.difference)
+            && positive(self.rms)
+            && (1..=self.pairs).contains(&self.beyond)
+            && self.pairs < 1 << 20
+    }
+
+    /// The fewest pairs beyond the limit that a block of `length` has with a probability below `probability`.
+    fn most(&self, length: usize, probability: f64) -> usize {
+        let (k, rest) = (self.beyond as f64, (self.pairs - self.beyond + 1) as f64);
+        let whole = ln_beta(k, rest);
+        let mut tail = 0.0;
+        for count in (0..=length).rev() {
+            let (c, other) = (count as f64, (length - count) as f64);
+            tail += (ln_binomial(length as u64, count as u64) + ln_beta(k + c, rest + other)
+                - whole)
+                .exp();
+            if tail > probability {
+                return count + 1;
+            }
+        }
+        0
+    }
+
+    /// The mean of that number and a standard deviation more: what a block has as a rule.
+    fn usual(&self, length: usize) -> f64 {
+        let (k, rest, b) = (
+            self.beyond as f64,
+            (self.pairs - self.beyond + 1) as f64,
+            length as f64,
+        );
+        let share = k / (k + rest);
+        let variance = b * share * (1.0 - share) * (k + rest + b) / (k + rest + 1.0);
+        b * share + variance.sqrt()
+    }
+}
+
+/// What a block has had so far.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Block {
+    pairs: usize,
+    beyond: usize,
+    sum: f64,
+    squares: f64,
+}
+
+impl Block {
+    /// Standard deviation of its innovations.
+    fn deviation(&self) -> f64 {
+        let n = 2.0 * self.pairs as f64;
+        let mean = self.sum / n;
+        (self.squares / n - mean * mean).max(0.0).sqrt()
+    }
+}
+
+/// The scatter's state between two rows.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Scatter {
+    first: Option<f64>,
+    blocks: [Block; BLOCKS.len()],
+    /// Whether the latest pairs were beyond the limit, a bit each.
+    latest: u8,
+    /// How many times as large as learned it is.
+    grown: Option<f64>,
+}
+
+/// What has become of the scatter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Moved {
+    /// It is so many times as large as it was learned.
+    Grown(f64),
+    Back,
+}
+
+/// How many pairs beyond the limit an alarm takes, for each length of a block.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Most([usize; BLOCKS.len()]);
+
+impl Most {
+    /// `samples` is the mean number between false alarms of all kinds.
+    pub(crate) fn new(limit: &Limit, samples: f64) -> Self {
+        Self(BLOCKS.map(|length| {
+            let rows = 2.0 * length as f64;
+            limit.most(length, SHARE * rows / (samples * BLOCKS.len() as f64))
+        }))
+    }
+}
+
+impl Scatter {
+    pub(crate) fn sound(&self) -> bool {
+        let grown = self.grown.unwrap_or(1.0);
+        let blocks = self.blocks.iter().zip(BLOCKS);
+        grown.is_finite() && grown >= 1.0 && blocks.into_iter().all(|(b, n)| b.pairs < n)
+    }
+
+    /// How many times as large as learned it is; one where it has not grown.
+    pub(crate) fn growth(&self) -> f64 {
+        self.grown.unwrap_or(1.0)
+    }
+
+    /// It may be about to be found grown: a score that passes now may be of that.
+    pub(crate) fn is_suspicious(&self) -> bool {
+        self.grown.is_none() && self.latest.count_ones() >= SUSPICIOUS
+    }
+
+    /// What was begun is given up: rows are missing, or say nothing of it.
+    pub(crate) fn begin(&mut self) {
+        *self = Self {
+            grown: self.grown,
+            ..Self::default()
+        };
+    }
+
+    /// Takes in an innovation \[standard deviations\].
+    pub(crate) fn update(&mut self, e: f64, limit: &Limit, most: &Most) -> Option<Moved> {
+        let Some(first) = self.first.take() else {
+            self.first = Some(e);
+            return None;
+        };
+        let beyond = (e - first).abs() > limit.difference;
+        self.latest = self.latest << 1 | u8::from(beyond);
+        let mut moved = None;
+        for (i, block) in self.blocks.iter_mut().enumerate() {
+            block.pairs += 1;
+            block.beyond += usize::from(beyond);
+            block.sum += first + e;
+            block.squares += first * first + e * e;
+            if block.pairs < BLOCKS[i] {
+                continue;
+            }
+            let ratio = (block.deviation() / limit.rms).max(1.0);
+            match &mut self.grown {
+                None if block.beyond >= most.0[i] => {
+                    self.grown = Some(ratio);
+                    moved = Some(Moved::Grown(ratio));
+                }
+                Some(_) if i == BACK && (block.beyond as f64) <= limit.usual(BLOCKS[i]) => {
+                    self.grown = None;
+                    moved = Some(Moved::Back);
+                }
+                Some(grown) if i == SIZED => *grown = ratio,
+                _ => {}
+            }
+            *block = Block::default();
+        }
+        if moved.is_some() {
+            self.begin();
+        }
+        moved
+    }
+}
+
+/// The scatter of the readings about the learned model has grown, or has come back. Its serialised form is one line of the program's output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScatterAlarm {
+    /// [`SCHEMA`](crate::SCHEMA).
+    pub schema: u32,
+    /// Which of them.
+    pub event: ScatterEvent,
+    /// Time of the row after which it was raised \[s\].
+    pub time: f64,
+    /// Standard deviation of the noise as it was learned \[output unit\].
+    pub learned: f64,
+    /// Standard deviation of the noise now \[output unit\].
+    pub now: f64,
+    /// The output unit.
+    pub unit: String,
+    /// All of it in words.
+    pub sentence: String,
+}
+
+/// What the scatter did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScatterEvent {
+    /// It has grown.
+    ScatterGrown,
+    /// It is back where it was learned.
+    ScatterBack,
+}
+
+impl ScatterAlarm {
+    pub(crate) fn new(moved: Moved, time: f64, noise: f64, units: &Units) -> Self {
+        let unit = &units.output;
+        let written = |value: f64| {
+            let number = missing_effect::numbers::significant(value, 3);
+            format!("{number} {unit}").trim_end().to_string()
+        };
+        let (event, now, sentence) = match moved {
+            Moved::Grown(ratio) => {
+                let now = ratio * noise;
+                let sentence = format!(
+                    "The scatter of the readings has grown from {} to {}, without a structure that an effect of the plant has: look at the sensor and its cable.",
+                    written(noise),
+                    written(now)
+                );
+                (ScatterEvent::ScatterGrown, now, sentence)
+            }
+            Moved::Back => (
+                ScatterEvent::ScatterBack,
+                noise,
+                format!("The scatter of the readings is back at {}.", written(noise)),
+            ),
+        };
+        Self {
+            schema: crate::SCHEMA,
+            event,
+            time,
+            learned: noise,
+            now,
+            unit: unit.clone(),
+            sentence,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::RngExt;
+    use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+    use rand_distr::StudentT;
+
+    fn student(n: usize, degrees: f64, seed: u64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let student = StudentT::new(degrees).unwrap();
+        (0..n).map(|_| rng.sample(student)).collect()
+    }
+
+    /// How often, over many learned limits and the rows behind each, the scatter grows where it does not.
+    fn false_alarms(degrees: f64, samples: f64) -> usize {
+        let (learned, rows) = (1000, 10_000);
+        let run = |seed| {
+            let e = student(learned + rows, degrees, seed);
+            let limit = Limit::learned(&e[..learned], 2).unwrap();
+            let most = Most::new(&limit, samples);
+            let mut scatter = Scatter::default();
+            let moved = e[learned..]
+                .iter()
+                .filter_map(|e| scatter.update(*e, &limit, &most));
+            moved.filter(|m| matches!(m, Moved::Grown(_))).count()
+        };
+        (0..200).map(run).sum()
+    }
+
+    #[test]
+    fn it_is_found_grown_as_seldom_as_promised_whatever_the_tails() {
+        // Two million rows: a hundred were allowed.
+        for degrees in [1e6, 5.0, 3.0] {
+            let alarms = false_alarms(degrees, SHARE * 20_000.0);
+            assert!((20..=110).contains(&alarms), "{alarms} at {degrees}");
+        }
+    }
+
+    #[test]
+    fn what_alternates_and_what_grows_is_seen_and_comes_back() {
+        let e = student(1000, 1e6, 1);
+        let limit = Limit::learned(&e, 2).unwrap();
+        let most = Most::new(&limit, 1e6);
+        let seen = |values: &[f64]| {
+            let mut scatter = Scatter::default();
+            let (mut at, mut back) = (None, None);
+            for (k, e) in values.iter().chain(&student(3000, 1e6, 2)).enumerate() {
+                match scatter.update(*e, &limit, &most) {
+                    Some(Moved::Grown(ratio)) => at = at.or(Some((k, ratio))),
+                    Some(Moved::Back) => back = Some(k),
+                    None => {}
+                }
+            }
+            assert!(scatter.sound() && scatter.growth() == 1.0);
+            (at, back.is_some_and(|k| k > values.len()))
+        };
+        let alternating: Vec<f64> = (0..640).map(|k| [5.0, -5.0][k % 2]).collect();
+        let (at, back) = seen(&alternating);
+        assert!(back && at.is_some_and(|(k, ratio)| k < 32 && (ratio - 5.0).abs() < 0.3));
+        let grown: Vec<f64> = student(3000, 1e6, 3).iter().map(|e| 1.4 * e).collect();
+        let (at, back) = seen(&grown);
+        assert!(back && at.is_some_and(|(k, ratio)| k < 2048 && (1.2..1.8).contains(&ratio)));
+        // A slow residual is none of its business.
+        let slow: Vec<f64> = student(3000, 1e6, 4)
+            .iter()
+            .enumerate()
+            .map(|(k, e)| e + 4.0 * (0.02 * k as f64).sin())
+            .collect();
+        assert_eq!(seen(&slow).0, None);
+    }
+}

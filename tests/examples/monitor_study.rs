@@ -58,8 +58,7 @@ fn main() {
         .clone()
         .into_par_iter()
         .map(|number| {
-            let mut onset =
-                Onset::drawn(number, arguments.rows, arguments.ratio, colour(number))?;
+            let mut onset = Onset::drawn(number, arguments.rows, arguments.ratio, colour(number))?;
             onset.tails = arguments.tails;
             let alarms = onset.watched(settings, 500 + number)?;
             Some((onset, alarms))

@@ -165,9 +165,7 @@ impl Onset {
         let e = match (noisy, self.tails) {
             (false, _) => vec![0.0; rig.samples],
             (true, Some(degrees)) => heavy(rig, degrees, rng)?,
-            (true, None) if rig.colour > 0.0 => {
-                noise::ar1(rig.samples, rig.noise, rig.colour, rng)
-            }
+            (true, None) if rig.colour > 0.0 => noise::ar1(rig.samples, rig.noise, rig.colour, rng),
             (true, None) => noise::white(rig.samples, rig.noise, rng),
         };
         let mut controller = rig.controller().start(&[middle]);

@@ -97,6 +97,8 @@ impl Core {
                 (said.step, self.now.scatter.growth()),
             );
             fed.scatter = self.scatter(&said, sample.time);
+            // A score of the smaller noise says nothing of the larger.
+            let passed = passed && fed.scatter.is_none();
             (fed.alarm, fed.notice) = self.judge(passed, sample.time);
         }
         if self.since.len() >= STRETCH {

@@ -22,7 +22,7 @@ fn a_leak_behind_a_dead_time_is_named_and_measured() {
         vessel: 0,
     };
     let rng = &mut ChaCha8Rng::seed_from_u64(9);
-    let (count, onset, leak) = (1900, 1500, 1.5);
+    let (count, onset, leak) = (1900, 1500, 0.5);
     let mut command = excitation::steps(count, 15..=60, 3.5, 6.5, rng).unwrap();
     for (k, u) in command[onset - 400..].iter_mut().enumerate() {
         *u = if (k / 20).is_multiple_of(2) { 3.5 } else { 6.5 };
@@ -56,11 +56,11 @@ fn a_leak_behind_a_dead_time_is_named_and_measured() {
             level += 0.1 * rate(level + 0.05 * rate(level));
         }
     }
-    println!("{alarms:#?}");
     let first = alarms.first().unwrap();
     assert!((3000.0..3200.0).contains(&first.time), "{first:?}");
-    for alarm in &alarms {
-        assert!(alarm.effects.iter().any(|e| e == "const_leak"), "{alarm:?}");
-        assert!((alarm.since.unwrap() - 3000.0).abs() < 60.0, "{alarm:?}");
-    }
+    // With the first rows its onset is uncertain; with more it is not.
+    let last = alarms.last().unwrap();
+    assert!(alarms.len() > 3);
+    assert!(last.effects.iter().any(|e| e == "const_leak"), "{last:?}");
+    assert!((last.since.unwrap() - 3000.0).abs() < 60.0, "{last:?}");
 }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use ::monitor::{Estimate, Innovation, Monitor, Progress, instant};
-use console::Term;
+use console::{Term, truncate_str};
 
 use crate::look::Look;
 use crate::numbers::{significant, value_and_error};
@@ -142,14 +142,40 @@ impl Screen {
                     colour: RESIDUAL,
                 };
                 let plot = plot(&[curve], times, (-most, most), ROWS, self.look);
-                format!(
-                    "innovations [standard deviations], measured minus model now {} {}, score {score:.1} of {threshold:.1}\n{plot}",
-                    significant(self.residual, 3),
-                    self.unit
-                )
+                let width = self.term.as_ref().map_or(0, |term| term.size().1);
+                let heading = heading(self.residual, &self.unit, (score, threshold), width);
+                format!("{heading}\n{plot}")
             }
         };
         self.drawn = text.lines().count();
         let _ = io::stderr().write_all(text.as_bytes());
+    }
+}
+
+/// The line above the plot. A terminal would break a longer one in two, and one of them would stay when the plot is taken away.
+fn heading(residual: f64, unit: &str, (score, threshold): (f64, f64), width: u16) -> String {
+    let whole = format!(
+        "innovations [standard deviations], residual now {} {unit}, score {score:.1} of {threshold:.1}",
+        significant(residual, 3),
+    );
+    truncate_str(&whole, usize::from(width), "").into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_above_the_plot_is_one_line() {
+        let wide = heading(-0.0122, "cm", (2.7, 5.4), 100);
+        assert!(wide.ends_with("now -0.0122 cm, score 2.7 of 5.4"), "{wide}");
+        for width in [80, 40] {
+            let line = heading(-1.23456e-7, "litres", (123.4, 105.4), width);
+            assert_eq!(
+                console::measure_text_width(&line),
+                usize::from(width),
+                "{line}"
+            );
+        }
     }
 }

@@ -148,9 +148,13 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
     (step.starts_agree < 2).then(|| {
         format!(
-            "Of {} starts {} ended in the minimum that is shown: there may be a better one, and other values of the parameters.",
+            "Of {} starts {} the minimum that is shown: there may be a better one, and other values of the parameters.",
             step.starts,
-            if step.starts_agree == 0 { "none" } else { "one alone" }
+            if step.starts_agree == 0 {
+                "around it none came as low as"
+            } else {
+                "one alone ended in"
+            }
         )
     })
 }
@@ -331,7 +335,9 @@ fn next_experiment(group: &[String], added: usize) -> String {
     } else {
         ""
     };
-    format!(" `ctid design ... --between {a} {b}`{others} proposes the experiment that would.")
+    format!(
+        " `ctid design ... --between {a} {b}`{others} says whether an experiment would, and which."
+    )
 }
 
 /// Where what is missing acts, on what it depends, and what it looks like.

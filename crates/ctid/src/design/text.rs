@@ -29,11 +29,11 @@ pub fn design(design: &Design, look: Look) -> String {
 fn rivals(design: &Design, look: Look) -> String {
     let [a, b] = &design.between;
     let title = format!(
-        "{} or {}, on the records that there are",
+        "{} or {}, on the records that there are, in the metric of their noise",
         named(a),
         named(b)
     );
-    let heading = ["effect", "BIC falls", "error after", "size found"];
+    let heading = ["effect", "BIC falls", "size found"];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
     for rival in [a, b] {
         let size = rival.size.as_ref().map_or(String::new(), |size| {
@@ -42,14 +42,9 @@ fn rivals(design: &Design, look: Look) -> String {
             let error = error.map_or(String::new(), |error| format!(" ± {error}"));
             with_unit(&format!("{name} {value}{error}"), &size.unit)
         });
-        rows.push(vec![
-            named(rival),
-            numbers::whole(rival.bic_gain),
-            with_unit(&numbers::significant(rival.rmse, 3), &design.output_unit),
-            size,
-        ]);
+        rows.push(vec![named(rival), numbers::whole(rival.bic_gain), size]);
     }
-    let sides = [Side::Left, Side::Right, Side::Right, Side::Left];
+    let sides = [Side::Left, Side::Right, Side::Left];
     lines(&look.heading(&title), &sides, &rows)
 }
 

@@ -291,10 +291,10 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
     if step.starts > 1 {
         text += &format!(
             "  {}\n",
-            look.faint(format!(
-                "{} of {} starts ended in this minimum",
-                step.starts_agree, step.starts
-            ))
+            look.faint(match step.starts_agree {
+                0 => format!("none of {} starts around it came as low", step.starts),
+                agree => format!("{agree} of {} starts ended in this minimum", step.starts),
+            })
         );
     }
     text.push('\n');

@@ -25,6 +25,8 @@ const PLENTY: f64 = 200.0;
 const SLOWER: [f64; 2] = [1.0, 4.0];
 /// Excursions that differ by less than this are one.
 const SAME_EXCURSION: f64 = 0.1;
+/// A level below this share of the highest one is none.
+const DRAINED: f64 = 1e-6;
 
 /// What the search needs to know.
 pub(crate) struct Search<'s, 'a> {
@@ -128,10 +130,16 @@ impl Search<'_, '_> {
         let reaches: Vec<Reach> = (0..plant.vessels())
             .map(|vessel| {
                 let either = played.each_ref().map(|played| played.levels[vessel]);
+                let (low, high) = (either[0].0.min(either[1].0), either[0].1.max(either[1].1));
                 Reach {
                     level: plant.level_name(vessel).to_string(),
-                    low: either[0].0.min(either[1].0),
-                    high: either[0].1.max(either[1].1),
+                    // A tank that drains for long keeps a level that nobody would read.
+                    low: if low.abs() < DRAINED * high.abs() {
+                        0.0
+                    } else {
+                        low
+                    },
+                    high,
                 }
             })
             .collect();

@@ -177,6 +177,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             of_probability(best.power.decides),
             significant(best.power.power, 2),
             match design.prospect {
+                _ if design.bic_ahead.abs() > GROUP_MARGIN => "it is not needed to tell them apart",
                 Prospect::Decides => "play it",
                 Prospect::May => "it is worth playing, and may leave the question open",
                 _ => "it will hardly do",

@@ -1,16 +1,31 @@
 //! Writes a file whole or not at all: beside it under another name first, then renamed.
 
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
 use crate::Error;
 
+/// A lock is held for some milliseconds: so often and after such a pause it is asked for again.
+const TRIES: u32 = 100;
+const PAUSE: Duration = Duration::from_millis(10);
+
 /// Puts `content` where `path` says; an existing file keeps its permissions, a link stays a link.
 pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
-    replace(path, content).map_err(|error| {
+    write_if(path, content, || true).map(|_| ())
+}
+
+/// The same, but only where `still` holds at the last moment before; whether it did.
+pub(crate) fn write_if(
+    path: &Path,
+    content: &[u8],
+    still: impl FnOnce() -> bool,
+) -> Result<bool, Error> {
+    replace(path, content, still).map_err(|error| {
         Error::file(
             path,
             format!(
@@ -20,7 +35,22 @@ pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
     })
 }
 
-fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
+/// Keeps other `ctid` programs from changing files of the folder in which `path` lies, until it is dropped. Where the system
+/// cannot lock a folder, or somebody holds the lock for long, there is none.
+pub(crate) fn lock_beside(path: &Path) -> Option<File> {
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let folder = File::open(folder(&target)).ok()?;
+    for _ in 0..TRIES {
+        match folder.try_lock() {
+            Ok(()) => return Some(folder),
+            Err(TryLockError::WouldBlock) => sleep(PAUSE),
+            Err(TryLockError::Error(_)) => return None,
+        }
+    }
+    None
+}
+
+fn replace(path: &Path, content: &[u8], still: impl FnOnce() -> bool) -> io::Result<bool> {
     // A file that is not there yet has no canonical name, and no link to keep.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let mut file = beside(&target)?;
@@ -35,8 +65,11 @@ fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
         fs::set_permissions(file.path(), metadata.permissions())?;
     }
     file.as_file().sync_all()?;
+    if !still() {
+        return Ok(false);
+    }
     file.persist(&target)?;
-    Ok(())
+    Ok(true)
 }
 
 /// A file in the same folder that vanishes unless it is renamed.

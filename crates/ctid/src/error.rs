@@ -24,6 +24,14 @@ pub enum Error {
         /// What is wrong and the mend.
         what: String,
     },
+    /// A file that was changed by somebody else between reading and writing.
+    #[error("{file}: {what}")]
+    Changed {
+        /// The path as it was given.
+        file: String,
+        /// What has changed and the mend.
+        what: String,
+    },
     /// No effect of that name.
     #[error("{0}")]
     UnknownEffect(String),

@@ -36,6 +36,19 @@ pub struct TermFile {
     pub unit: String,
 }
 
+impl From<&Unknown> for TermFile {
+    fn from(unknown: &Unknown) -> Self {
+        Self {
+            place: unknown.place.clone(),
+            variable: unknown.variable.to_string(),
+            at: unknown.knots.clone(),
+            value: unknown.ordinates.clone(),
+            at_unit: unknown.variable_unit.clone(),
+            unit: unknown.unit.clone(),
+        }
+    }
+}
+
 /// The place and the vessel of a name.
 pub(crate) fn place_of(plant: Plant, word: &str) -> Result<(Place, usize), String> {
     match word {

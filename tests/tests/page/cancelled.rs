@@ -16,6 +16,18 @@ fn computing() -> Option<usize> {
     Some(names.filter(|name| name.trim() == "ctid computes").count())
 }
 
+/// Waits until nothing is computed.
+fn gone(why: &str) {
+    for _ in 0..2400 {
+        match computing() {
+            None => return println!("skipped: this system does not list threads"),
+            Some(0) => return,
+            Some(_) => sleep(Duration::from_millis(50)),
+        }
+    }
+    panic!("it goes on computing after {why}");
+}
+
 /// A record whose diagnosis takes far longer than this test.
 fn long_record() -> String {
     let rig = Rig {
@@ -52,16 +64,6 @@ fn what_is_cancelled_stops() {
             state["job"]["phase"] == "searching sets of effects"
         });
     };
-    let gone = |why: &str| {
-        for _ in 0..2400 {
-            match computing() {
-                None => return println!("skipped: this system does not list threads"),
-                Some(0) => return,
-                Some(_) => sleep(Duration::from_millis(50)),
-            }
-        }
-        panic!("it goes on computing after {why}");
-    };
     begin();
     assert_eq!(tab.post("/api/cancel", b"{}").json()["job"], json!(null));
     gone("it was cancelled");
@@ -81,4 +83,49 @@ fn what_is_cancelled_stops() {
     let _others: Vec<Tab> = (0..8).map(|_| Tab::open(address)).collect();
     assert_eq!(tab.get("/api/state").status, 410);
     gone("its tab was forgotten");
+}
+
+/// A fit of a model that has become another one is of no use: it ends at once, and one of the same model goes on.
+#[test]
+fn a_fit_of_an_older_model_stops() {
+    let _alone = alone();
+    let tab = Tab::open(serve(&[]));
+    let record = long_record();
+    assert_eq!(
+        tab.post("/api/record?name=long.csv", record.as_bytes())
+            .status,
+        200
+    );
+    let text = "plant = 'cascaded-tanks'\n";
+    let written = |from: &str, text: &str| {
+        let body = json!({ "text": text, "from": from }).to_string();
+        let answer = tab.post("/api/text", body.as_bytes());
+        assert_eq!(answer.status, 200, "{answer:?}");
+        answer.json()
+    };
+    let begin = |body: &str| {
+        let answer = tab.post("/api/run", body.as_bytes());
+        assert_eq!(answer.json()["job"]["what"], "compare", "{answer:?}");
+    };
+    written("", text);
+    begin(r#"{"what": "compare"}"#);
+    let commented = format!("# ours\n{text}");
+    assert_eq!(written(text, &commented)["job"]["what"], "compare");
+    let answer = tab
+        .post("/api/effect", br#"{"do": "add", "effect": "overflow"}"#)
+        .json();
+    assert!(
+        answer["job"].is_null() && answer["failure"].is_null(),
+        "{answer}"
+    );
+    gone("its model became another");
+    // Other effects beside the model are fitted whatever effects it has, but not to another plant.
+    begin(r#"{"what": "chain", "effects": [["sensor_lag", null]]}"#);
+    let answer = tab
+        .post("/api/effect", br#"{"do": "remove", "effect": "overflow"}"#)
+        .json();
+    assert_eq!(answer["job"]["what"], "compare");
+    let now = answer["text"].as_str().unwrap().to_string();
+    assert!(written(&now, "plant = 'first-order'\n")["job"].is_null());
+    gone("its plant became another");
 }

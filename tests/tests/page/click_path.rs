@@ -44,7 +44,7 @@ pub fn trail(browser: &mut Browser) -> Vec<f64> {
 }
 
 /// Fitted models in the trail, and the last one of them drawn.
-fn wait_for_models(browser: &mut Browser, count: usize) {
+pub fn wait_for_models(browser: &mut Browser, count: usize) {
     browser.until(&format!(
         "document.querySelectorAll('#trail .step').length === {count} && document.getElementById('plot-record-0')?.data?.length === {count} + 2 \
          && document.getElementById('working').hidden"

@@ -3,7 +3,9 @@
 
 mod browser;
 mod cancelled;
+mod choices;
 mod click_path;
 mod hostile;
+mod overtaken;
 mod server;
 mod three_tanks;

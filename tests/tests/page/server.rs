@@ -36,6 +36,7 @@ pub fn csv(record: &Record) -> String {
         .into_iter()
         .chain(&record.input_2)
         .chain([&record.output])
+        .chain(&record.reference)
         .collect();
     let header = signals.iter().map(|s| format!(",{} [{}]", s.name, s.unit));
     let rows = record.time.iter().enumerate().map(|(k, t)| {

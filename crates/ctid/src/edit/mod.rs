@@ -58,22 +58,66 @@ pub struct Edited {
 /// One change after the other: of two at once, as from two tabs of `ctid serve`, one would be lost.
 static CHANGING: Mutex<()> = Mutex::new(());
 
-/// Changes a file's text; its kind of line ends stays. Returns what was done, in one line.
+/// Whoever writes into the file meanwhile, such as an editor, is read so often again.
+const READINGS: usize = 5;
+
+/// Changes a file's text; its kind of line ends stays. What others have written there meanwhile is kept: the change is then made to
+/// that. Returns what was done, in one line.
+///
+/// # Errors
+/// Those of `edit`, those of the file, and [`Error::Changed`] where the file is another at every reading.
 pub(crate) fn change(
     path: &Path,
-    edit: impl FnOnce(&str) -> Result<Edited, Error>,
+    edit: impl Fn(&str) -> Result<Edited, Error>,
 ) -> Result<String, Error> {
     let _turn = CHANGING.lock().unwrap_or_else(PoisonError::into_inner);
-    let text = model_file::read_text(path)?;
-    let edited = edit(&text)?;
-    // The editor writes LF; a file from an editor that writes CRLF keeps it.
-    let written = if text.contains("\r\n") {
-        edited.text.replace("\r\n", "\n").replace('\n', "\r\n")
-    } else {
-        edited.text
-    };
-    atomic::write(path, written.as_bytes())?;
-    Ok(edited.done)
+    let _lock = atomic::lock_beside(path);
+    for _ in 0..READINGS {
+        let text = model_file::read_text(path)?;
+        let edited = edit(&text)?;
+        // The editor writes LF; a file from an editor that writes CRLF keeps it.
+        let written = if text.contains("\r\n") {
+            edited.text.replace("\r\n", "\n").replace('\n', "\r\n")
+        } else {
+            edited.text
+        };
+        if atomic::write_if(path, written.as_bytes(), || still(path, &text))? {
+            return Ok(edited.done);
+        }
+    }
+    Err(changed(
+        &path.display().to_string(),
+        "something else writes into it all the time",
+    ))
+}
+
+/// Puts a whole text in the place of `from`, or where no file is.
+///
+/// # Errors
+/// [`Error::Changed`] where another text stands there.
+pub(crate) fn replace(path: &Path, from: &str, text: &str) -> Result<(), Error> {
+    let _turn = CHANGING.lock().unwrap_or_else(PoisonError::into_inner);
+    let _lock = atomic::lock_beside(path);
+    let as_it_was = || !path.exists() || still(path, from);
+    if atomic::write_if(path, text.as_bytes(), as_it_was)? {
+        return Ok(());
+    }
+    Err(changed(
+        &path.display().to_string(),
+        "it has been changed since it was shown",
+    ))
+}
+
+fn still(path: &Path, text: &str) -> bool {
+    model_file::read_text(path).is_ok_and(|now| now == text)
+}
+
+/// A change that would have been made to something else than was seen.
+pub(crate) fn changed(file: &str, what: &str) -> Error {
+    Error::Changed {
+        file: file.to_string(),
+        what: format!("{what}; nothing was written; look at what stands there now and try again"),
+    }
 }
 
 /// The text of a model file with one more effect; `file` names it in messages.

@@ -130,3 +130,60 @@ fn a_refused_change_leaves_the_file_as_it_was() {
     // Nothing is left beside it.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
+
+/// A folder with a model file in it.
+fn in_a_file(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tank.toml");
+    std::fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+const BARE: &str = "plant = \"single-tank\"\neffects = []\n";
+
+/// An editor that writes between reading and writing loses nothing, and neither does who adds the effect.
+#[test]
+fn what_is_written_meanwhile_is_kept() {
+    let (_folder, path) = in_a_file(BARE);
+    let readings = std::cell::Cell::new(0);
+    let done = change(&path, |text| {
+        readings.set(readings.get() + 1);
+        if readings.get() == 1 {
+            std::fs::write(&path, format!("# measured in May\n{text}")).unwrap();
+        }
+        with_effect("tank.toml", text, "overflow", None)
+    });
+    assert!(done.unwrap().contains("added overflow"));
+    assert_eq!(readings.get(), 2);
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(
+        text,
+        "# measured in May\nplant = \"single-tank\"\neffects = [\"overflow\"]\n"
+    );
+}
+
+#[test]
+fn a_file_that_never_rests_is_not_written() {
+    let (_folder, path) = in_a_file(BARE);
+    let last = std::cell::RefCell::new(String::new());
+    let error = change(&path, |text| {
+        last.replace(format!("# again\n{text}"));
+        std::fs::write(&path, last.borrow().as_str()).unwrap();
+        with_effect("tank.toml", text, "overflow", None)
+    });
+    assert!(matches!(error, Err(Error::Changed { .. })), "{error:?}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), last.into_inner());
+}
+
+#[test]
+fn a_text_takes_the_place_of_the_one_that_was_seen_alone() {
+    let (_folder, path) = in_a_file(BARE);
+    let error = replace(&path, "plant = \"first-order\"\n", "# new\n");
+    assert!(matches!(error, Err(Error::Changed { .. })), "{error:?}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), BARE);
+    replace(&path, BARE, "# new\n").unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "# new\n");
+    std::fs::remove_file(&path).unwrap();
+    replace(&path, BARE, "# anew\n").unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "# anew\n");
+}

@@ -1,5 +1,6 @@
 //! The routes of the page's requests; the head of the module `serve` says what each takes and gives.
 
+use std::num::NonZeroU8;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -18,10 +19,11 @@ use super::guard::{LARGEST_BODY, Refusal};
 use super::jobs::{self, Task};
 use super::session::{Session, lock};
 use super::sessions::Shared;
-use super::settings::Settings;
+use super::settings::Form;
 use super::upload::Upload;
 use super::{App, downloads, state};
 use crate::edit;
+use crate::term_file::TermFile;
 
 /// Requests in JSON are no larger \[bytes\].
 const LARGEST_REQUEST: usize = 1 << 20;
@@ -39,6 +41,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/api/settings", post(settings))
         .route("/api/text", post(text))
         .route("/api/effect", post(effect))
+        .route("/api/loop", post(treat_loop))
         .route("/api/run", post(run))
         .route("/api/cancel", post(cancel))
         .route("/api/forget", post(forget))
@@ -175,7 +178,7 @@ async fn record(State(app): State<Arc<App>>, Query(new): Query<NewRecord>, body:
             session.take(upload)?;
             Json(state::state(&mut session))
         };
-        all.sessions.make_room(&new.session);
+        all.sessions.make_room();
         Ok(answer)
     })
     .await
@@ -201,10 +204,10 @@ async fn forget(
 async fn settings(
     State(app): State<Arc<App>>,
     Query(tab): Query<Tab>,
-    Json(settings): Json<Settings>,
+    Json(form): Json<Form>,
 ) -> Answer {
     with(&app, &tab.session, move |session| {
-        session.change(|file, text| settings.into_text(file, text))?;
+        session.change(|file, text| form.written_into(file, text))?;
         Ok(())
     })
     .await
@@ -213,6 +216,9 @@ async fn settings(
 #[derive(Debug, Deserialize)]
 struct Text {
     text: String,
+    /// The one that was shown.
+    #[serde(default)]
+    from: String,
 }
 
 async fn text(
@@ -221,16 +227,18 @@ async fn text(
     Json(text): Json<Text>,
 ) -> Answer {
     with(&app, &tab.session, move |session| {
-        Ok(session.replace(text.text)?)
+        Ok(session.replace(&text.from, text.text)?)
     })
     .await
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Way {
     Add,
     Remove,
+    /// Adds what the diagnosis left unexplained, as a term of this name.
+    Keep,
 }
 
 #[derive(Debug, Deserialize)]
@@ -247,10 +255,39 @@ async fn effect(
     Json(Effect { way, effect, place }): Json<Effect>,
 ) -> Answer {
     with(&app, &tab.session, move |session| {
-        session.change(|file, text| match way {
-            Way::Add => edit::with_effect(file, text, &effect, place.as_deref()),
-            Way::Remove => edit::without_effect(file, text, &effect),
+        let diagnosis = session.diagnosis.clone();
+        let unknown = diagnosis.as_ref().and_then(|of| of.found.unknown.as_ref());
+        let shape = match (way, unknown) {
+            (Way::Keep, None) => {
+                return Err(Refusal::input(
+                    "nothing is unexplained that has a shape; diagnose first",
+                ));
+            }
+            (Way::Keep, Some(unknown)) => Some(TermFile::from(unknown)),
+            _ => None,
+        };
+        session.change(|file, text| match (way, &shape) {
+            (Way::Keep, Some(shape)) => edit::with_term(file, text, &effect, "the shape", shape),
+            (Way::Remove, _) => edit::without_effect(file, text, &effect),
+            _ => edit::with_effect(file, text, &effect, place.as_deref()),
         })?;
+        Ok(())
+    })
+    .await
+}
+
+#[derive(Debug, Deserialize)]
+struct Treated {
+    measured: bool,
+}
+
+async fn treat_loop(
+    State(app): State<Arc<App>>,
+    Query(tab): Query<Tab>,
+    Json(treated): Json<Treated>,
+) -> Answer {
+    with(&app, &tab.session, move |session| {
+        session.treat_loop(treated.measured);
         Ok(())
     })
     .await
@@ -263,7 +300,9 @@ enum Run {
     Chain {
         effects: Vec<(String, Option<String>)>,
     },
-    Diagnose,
+    Diagnose {
+        max_effects: Option<NonZeroU8>,
+    },
     Design {
         group: usize,
         between: [String; 2],
@@ -278,7 +317,7 @@ async fn run(State(app): State<Arc<App>>, Query(tab): Query<Tab>, Json(run): Jso
     let task = match run {
         Run::Compare => Task::Compare,
         Run::Chain { effects } => Task::Chain(effects),
-        Run::Diagnose => Task::Diagnose,
+        Run::Diagnose { max_effects } => Task::Diagnose { max_effects },
         Run::Design {
             group,
             between,

@@ -20,7 +20,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Path, kind and content of what does not change.
-const FILES: [(&str, &str, &str); 13] = [
+const FILES: [(&str, &str, &str); 14] = [
     ("/report.css", STYLE, report::STYLE),
     ("/page.css", STYLE, include_str!("page/page.css")),
     ("/plots.js", SCRIPT, report::PLOTS),
@@ -33,6 +33,7 @@ const FILES: [(&str, &str, &str); 13] = [
     ("/fit.js", SCRIPT, include_str!("page/fit.js")),
     ("/chains.js", SCRIPT, include_str!("page/chains.js")),
     ("/findings.js", SCRIPT, include_str!("page/findings.js")),
+    ("/unknown.js", SCRIPT, include_str!("page/unknown.js")),
     ("/experiment.js", SCRIPT, include_str!("page/experiment.js")),
 ];
 

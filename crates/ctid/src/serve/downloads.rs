@@ -16,6 +16,7 @@ use super::App;
 use super::api::{Tab, aside, find, plain_name};
 use super::guard::Refusal;
 use super::session::{UNNAMED, lock};
+use super::words;
 use crate::design::Proposal;
 use crate::output::Found as _;
 use crate::report;
@@ -73,6 +74,9 @@ async fn model(
     let session = find(&app, &which.session)?;
     aside(move || {
         let session = lock(&session);
+        if let Some(of) = session.diagnosis.as_ref().filter(|of| of.id == which.id) {
+            return Ok(as_json(words::fitted(of.id, &of.found).into()));
+        }
         let fitted = session.models.iter().find(|fitted| fitted.id == which.id);
         let missing = || {
             Refusal::new(

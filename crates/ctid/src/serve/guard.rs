@@ -67,7 +67,10 @@ impl std::fmt::Display for Refusal {
 
 impl From<crate::Error> for Refusal {
     fn from(error: crate::Error) -> Self {
-        Self::input(error)
+        match error {
+            crate::Error::Changed { .. } => Self::new(StatusCode::CONFLICT, error.to_string()),
+            _ => Self::input(error),
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The computations: one for each tab, on a thread of its own. The functions of the commands do the work.
 
+use std::num::NonZeroU8;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,7 +14,7 @@ use missing_effect::design::{Design, Limits, design};
 use missing_effect::{Diagnosis, Options, Problem, Progress, Verdict, compare, diagnose};
 
 use super::guard::Refusal;
-use super::session::{Fitted, Found, Job, Session, lock};
+use super::session::{Fitted, Found, Job, Kind, Session, lock};
 use super::sessions::Shared;
 use super::words;
 use crate::design::candidacy;
@@ -28,8 +29,8 @@ pub(super) enum Task {
     Compare,
     /// Fits the model with these effects in place of its own; the model stays.
     Chain(Vec<(String, Option<String>)>),
-    /// Searches what is missing.
-    Diagnose,
+    /// Searches what is missing; at most so many effects, where that is said.
+    Diagnose { max_effects: Option<NonZeroU8> },
     /// The experiment within these limits that tells apart two effects of a group of the diagnosis.
     Design {
         group: usize,
@@ -52,6 +53,7 @@ struct Work {
     files: Files,
     problem: Problem,
     data: u64,
+    measured: bool,
 }
 
 impl Work {
@@ -87,11 +89,13 @@ impl Work {
             files,
             problem,
             data: session.data,
+            measured: session.measured,
         })
     }
 
     fn options<'a>(&self, stop: &'a AtomicBool) -> Options<'a> {
         Options {
+            simulate_loop: !self.measured,
             stop: Some(stop),
             ..Options::default()
         }
@@ -106,7 +110,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     let mut session = lock(shared);
     session.stop();
     let text = match &task {
-        Task::Compare | Task::Diagnose => session.text.clone(),
+        Task::Compare | Task::Diagnose { .. } => session.text.clone(),
         Task::Chain(effects) => with_effects(&session, effects)?,
         Task::Design { group, between, .. } => beside(&session, *group, between)?,
     };
@@ -116,11 +120,13 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     let progress = Arc::new(Mutex::new(None));
     session.job = Some(Job {
         number,
-        what: match task {
-            Task::Compare | Task::Chain(_) => "compare",
-            Task::Diagnose => "diagnose",
-            Task::Design { .. } => "design",
+        kind: match task {
+            Task::Compare => Kind::Compare,
+            Task::Chain(_) => Kind::Chain,
+            Task::Diagnose { .. } => Kind::Diagnose,
+            Task::Design { .. } => Kind::Design,
         },
+        model: work.model.clone(),
         begun: Instant::now(),
         stop: stop.clone(),
         progress: progress.clone(),
@@ -173,10 +179,15 @@ fn compute(
     stop: &AtomicBool,
     show: &(dyn Fn(Progress) + Sync),
 ) -> Result<Outcome, Error> {
-    let (problem, options) = (&work.problem, work.options(stop));
+    let (problem, mut options) = (&work.problem, work.options(stop));
     let outcome = match task {
         Task::Compare | Task::Chain(_) => compare(problem, &options).map(Outcome::Fitted),
-        Task::Diagnose => diagnose(problem, &options, show).map(Outcome::Diagnosed),
+        Task::Diagnose { max_effects } => {
+            if let Some(most) = max_effects {
+                options.max_effects = usize::from(most.get());
+            }
+            diagnose(problem, &options, show).map(Outcome::Diagnosed)
+        }
         Task::Design {
             between: [a, b],
             limits,
@@ -195,7 +206,11 @@ fn compute(
 fn settle(session: &mut Session, work: Work, outcome: Outcome) {
     let id = session.number();
     let Work {
-        model, text, data, ..
+        model,
+        text,
+        data,
+        measured,
+        ..
     } = work;
     match outcome {
         Outcome::Fitted(found) => {
@@ -205,6 +220,7 @@ fn settle(session: &mut Session, work: Work, outcome: Outcome) {
             session.keep(Fitted {
                 id,
                 data,
+                measured,
                 rmse: step.rmse,
                 rmse_test: step.rmse_test,
                 bic: step.bic,
@@ -217,6 +233,7 @@ fn settle(session: &mut Session, work: Work, outcome: Outcome) {
                 model,
                 text,
                 data,
+                measured,
                 found,
             }));
         }
@@ -226,6 +243,7 @@ fn settle(session: &mut Session, work: Work, outcome: Outcome) {
                 model,
                 text,
                 data,
+                measured,
                 found,
             }));
         }
@@ -236,6 +254,7 @@ fn settle(session: &mut Session, work: Work, outcome: Outcome) {
                 model,
                 text,
                 data,
+                measured,
                 found,
             }));
         }
@@ -246,8 +265,10 @@ fn settle(session: &mut Session, work: Work, outcome: Outcome) {
 fn with_effects(session: &Session, effects: &[(String, Option<String>)]) -> Result<String, Error> {
     let name = session.model_name();
     let mut text = session.text.clone();
-    for placed in &session.model()?.effects {
-        text = edit::without_effect(&name, &text, placed.effect.id)?.text;
+    let model = session.model()?;
+    let on = model.effects.iter().map(|placed| placed.effect.id);
+    for on in on.chain(model.terms.iter().map(|own| own.term.name.as_str())) {
+        text = edit::without_effect(&name, &text, on)?.text;
     }
     for (effect, place) in effects {
         text = edit::with_effect(&name, &text, effect, place.as_deref())?.text;

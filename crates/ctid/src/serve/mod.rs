@@ -3,9 +3,9 @@
 //! # What it is made of
 //! | what | where |
 //! |---|---|
-//! | who may ask | `guard.rs` |
+//! | who may ask | `guard.rs`; how many at once: `connections.rs` |
 //! | the page's files | `assets.rs`, `page/` |
-//! | what one tab works on | `session.rs`, its records `upload.rs`; all of them: `sessions.rs` |
+//! | what one tab works on | `session.rs`, its records `upload.rs`; all of them: `sessions.rs`; what they hold: `held.rs` |
 //! | the form of the model | `settings.rs` |
 //! | computations | `jobs.rs` |
 //! | what the page is told | `state.rs`, `words.rs` |
@@ -27,27 +27,31 @@
 //! | `GET /api/state?session=&since=` | the version that the page shows | the state, or `{version, job}` where it is the same |
 //! | `POST /api/record?session=&name=&held_out=` | the CSV itself, at most 64 MB | the state |
 //! | `POST /api/forget?session=` | `{name}` of a record | the state |
-//! | `POST /api/settings?session=` | `{plant, hold, columns, known, controller}`, as the model file has them | the state |
-//! | `POST /api/text?session=` | `{text}`, a whole model file | the state |
-//! | `POST /api/effect?session=` | `{do: "add" or "remove", effect, place}` | the state |
-//! | `POST /api/run?session=` | `{what: "compare"}`, `{what: "diagnose"}`, `{what: "chain", effects: [[effect, place], ...]}`, `{what: "design", group, between: [a, b], range: [low, high], slew, duration}`, of which the last three may be missing | the state |
+//! | `POST /api/settings?session=` | `{plant, hold, columns, known, controller}`, as the model file has them, and `from`: the same as the form was filled from | the state; 409 where the model says something else than `from` |
+//! | `POST /api/text?session=` | `{text}`, a whole model file, and `from`: the text that it replaces | the state; 409 where another stands there |
+//! | `POST /api/effect?session=` | `{do: "add" or "remove", effect, place}`; `{do: "keep", effect}` adds what the diagnosis left unexplained under that name | the state |
+//! | `POST /api/loop?session=` | `{measured}`: whether models run on the measured command where the loop could be simulated | the state |
+//! | `POST /api/run?session=` | `{what: "compare"}`, `{what: "diagnose", max_effects}`, `{what: "chain", effects: [[effect, place], ...]}`, `{what: "design", group, between: [a, b], range: [low, high], slew, duration}`, of which the last three may be missing | the state |
 //! | `POST /api/cancel?session=` | | the state |
 //! | `GET /api/data?session=` | | the records' curves, as the report draws them |
-//! | `GET /api/model?session=&id=` | the number of a fit | its curves, parameters and sentences |
+//! | `GET /api/model?session=&id=` | the number of a fit or of the diagnosis | its curves, parameters and sentences |
 //! | `GET /api/file?session=&of=` | `model`, `report` or `experiment` | the file |
 //!
-//! The state is `{version, file, text, model_error, settings, effects, records, headings, guessed, current, trail, models,
-//! diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits of its first
-//! effects, `job` `{what, phase, done, total, seconds}` while something is computed.
+//! The state is `{version, file, text, model_error, settings, effects, waiting, records, headings, guessed, current, trail, models,
+//! chains, loop, diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits of its first
+//! effects, `job` `{what, phase, done, total, seconds}` while something is computed. A fit stops where the model becomes another.
 //!
 //! # What is bounded
-//! Eight tabs, 256 MB of records over all of them, 64 MB and 20 records in one, 500 columns in a file, twelve fits in a tab, one computation in
-//! a tab; it stops when another begins, when its tab is forgotten, and three minutes after its page has asked last.
+//! Eight tabs, and 64 connections whose requests begin within ten seconds. 64 MB of files and 20 records in a tab, 500 columns in a file,
+//! twelve fits in a tab. Over all tabs 512 MB of files, of what is read from them (at most four times as much) and of what was computed; the
+//! tab that was seen last may hold more, and is then alone. One computation in a tab, which takes a copy of what was read; it stops when another begins, when its tab is forgotten, and three minutes after its page has asked last.
 
 mod api;
 mod assets;
+mod connections;
 mod downloads;
 mod guard;
+mod held;
 mod jobs;
 mod session;
 mod sessions;
@@ -67,6 +71,7 @@ use clap::Args;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 
+use self::connections::Bounds;
 use self::guard::{Guard, LARGEST_BODY};
 use self::sessions::Sessions;
 use self::upload::Upload;
@@ -198,7 +203,13 @@ async fn serve(
         let mut clock = tokio::time::interval(Duration::from_secs(5));
         loop {
             clock.tick().await;
-            watched.sessions.stop_abandoned();
+            let watched = watched.clone();
+            // A tab that is busy is waited for.
+            let _ = tokio::task::spawn_blocking(move || {
+                watched.sessions.stop_abandoned();
+                watched.sessions.make_room();
+            })
+            .await;
         }
     });
     let router = Router::new()
@@ -206,5 +217,6 @@ async fn serve(
         .merge(api::routes())
         .layer(middleware::from_fn_with_state(app.clone(), guard::guard))
         .with_state(app);
-    Ok(axum::serve(listener, router).await?)
+    connections::serve(listener, router, Bounds::default()).await;
+    Ok(())
 }

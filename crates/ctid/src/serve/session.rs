@@ -12,10 +12,11 @@ use missing_effect::design::Design;
 use missing_effect::{Diagnosis, Progress};
 
 use super::guard::{LARGEST_BODY, Refusal};
+use super::held::of_diagnosis;
 use super::upload::Upload;
+use crate::Error;
 use crate::edit::{self, Edited};
 use crate::model_file::{self, ModelFile};
-use crate::{Error, atomic};
 
 /// Records at most.
 const MOST_RECORDS: usize = 20;
@@ -33,6 +34,8 @@ pub(super) struct Fitted {
     pub model: ModelFile,
     /// Which state of the records it was fitted to.
     pub data: u64,
+    /// It ran on the measured command, also where the loop could be simulated.
+    pub measured: bool,
     pub rmse: f64,
     pub rmse_test: Option<f64>,
     pub bic: f64,
@@ -49,14 +52,28 @@ pub(super) struct Found<T> {
     pub model: ModelFile,
     pub text: String,
     pub data: u64,
+    pub measured: bool,
     pub found: T,
+}
+
+/// Kinds of computations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The fit of the model as it stands.
+    Compare,
+    /// The fit of the model with other effects.
+    Chain,
+    Diagnose,
+    Design,
 }
 
 /// A computation that runs.
 #[derive(Debug)]
 pub(super) struct Job {
     pub number: u64,
-    pub what: &'static str,
+    pub kind: Kind,
+    /// What it computes with.
+    pub model: ModelFile,
     pub begun: Instant,
     pub stop: Arc<AtomicBool>,
     pub progress: Arc<Mutex<Option<Progress>>>,
@@ -81,6 +98,8 @@ pub(super) struct Session {
     pub job: Option<Job>,
     /// Why the last computation or change came to nothing.
     pub failure: Option<String>,
+    /// The models run on the measured command, also where the loop could be simulated.
+    pub measured: bool,
     /// The model file could not be read when it was looked at last.
     lost: bool,
     numbers: u64,
@@ -106,6 +125,7 @@ impl Session {
             design: None,
             job: None,
             failure: None,
+            measured: false,
             lost: false,
             numbers: 0,
         };
@@ -113,9 +133,13 @@ impl Session {
         session
     }
 
-    /// Bytes that the records take.
-    pub(super) fn bytes(&self) -> usize {
-        self.records.iter().map(|record| record.content.len()).sum()
+    /// Bytes that it holds: records as they were sent and as they were read, and what was computed.
+    pub(super) fn held(&self) -> usize {
+        let records: usize = self.records.iter().map(Upload::held).sum();
+        let fits: usize = self.models.iter().map(|fitted| fitted.body.len()).sum();
+        let found = [&self.fitted, &self.diagnosis].into_iter().flatten();
+        let found: usize = found.map(|found| of_diagnosis(&found.found)).sum();
+        records + fits + found
     }
 
     /// A number that no other result of this session has.
@@ -146,8 +170,7 @@ impl Session {
             Ok(text) if text == self.text && !was_lost => {}
             Ok(text) => {
                 self.text = text;
-                self.failure = None;
-                self.version += 1;
+                self.text_changed();
             }
             Err(what) => self.fail(what),
         }
@@ -158,6 +181,40 @@ impl Session {
         if self.failure.as_ref() != Some(&what) {
             self.failure = Some(what);
             self.version += 1;
+        }
+    }
+
+    /// Tells the page of another text, and stops a fit that is of no use for it.
+    fn text_changed(&mut self) {
+        self.failure = None;
+        self.version += 1;
+        let Some(job) = &self.job else { return };
+        let of_use = match (job.kind, self.model()) {
+            (Kind::Compare, Ok(model)) => same(&job.model, &model),
+            (Kind::Chain, Ok(model)) => without_effects(&job.model) == without_effects(&model),
+            (Kind::Compare | Kind::Chain, Err(_)) => false,
+            // What it finds is said to be of the model that it was asked for.
+            (Kind::Diagnose | Kind::Design, _) => true,
+        };
+        if !of_use {
+            self.stop();
+        }
+    }
+
+    /// Which way a loop is treated; what was fitted the other way is kept for the way back.
+    pub(super) fn treat_loop(&mut self, measured: bool) {
+        if self.measured == measured {
+            return;
+        }
+        self.measured = measured;
+        self.failure = None;
+        self.version += 1;
+        if self
+            .job
+            .as_ref()
+            .is_some_and(|job| matches!(job.kind, Kind::Compare | Kind::Chain))
+        {
+            self.stop();
         }
     }
 
@@ -180,7 +237,7 @@ impl Session {
     /// Where the change is refused; everything is then as it was.
     pub(super) fn change(
         &mut self,
-        edit: impl FnOnce(&str, &str) -> Result<Edited, Error>,
+        edit: impl Fn(&str, &str) -> Result<Edited, Error>,
     ) -> Result<String, Error> {
         let name = self.model_name();
         let done = match &self.file {
@@ -192,25 +249,29 @@ impl Session {
             }
         };
         self.refresh();
-        self.failure = None;
-        self.version += 1;
+        self.text_changed();
         Ok(done)
     }
 
-    /// Another model in place of this one.
+    /// Another model in place of the text that was shown.
     ///
     /// # Errors
-    /// Where it is no model file; everything is then as it was.
-    pub(super) fn replace(&mut self, text: String) -> Result<(), Error> {
+    /// Where it is no model file, or another text stands there meanwhile; everything is then as it was.
+    pub(super) fn replace(&mut self, from: &str, text: String) -> Result<(), Error> {
         let name = self.model_name();
         model_file::parse(&name, &text)?;
         match &self.file {
-            Some(path) => atomic::write(path, text.as_bytes())?,
-            None => self.text = text,
+            Some(path) => edit::replace(path, from, &text)?,
+            None if self.text == from => self.text = text,
+            None => {
+                return Err(edit::changed(
+                    &name,
+                    "it has been changed since it was shown",
+                ));
+            }
         }
         self.refresh();
-        self.failure = None;
-        self.version += 1;
+        self.text_changed();
         Ok(())
     }
 
@@ -272,7 +333,9 @@ impl Session {
 
     /// Keeps a fitted model; the oldest goes where there are many.
     pub(super) fn keep(&mut self, fitted: Fitted) {
-        self.models.retain(|other| other.model != fitted.model);
+        let again =
+            |other: &Fitted| other.model == fitted.model && other.measured == fitted.measured;
+        self.models.retain(|other| !again(other));
         self.models.push_back(Arc::new(fitted));
         if self.models.len() > MOST_MODELS {
             self.models.pop_front();
@@ -281,29 +344,55 @@ impl Session {
 
     /// The fit of this model to these records.
     pub(super) fn fit_of(&self, model: &ModelFile) -> Option<&Arc<Fitted>> {
-        let of = |fitted: &&Arc<Fitted>| fitted.data == self.data && same(&fitted.model, model);
+        let of = |fitted: &&Arc<Fitted>| self.is_comparable(fitted) && same(&fitted.model, model);
         self.models.iter().find(of)
     }
 
-    /// The fits to these records of models that differ from this one in their effects alone.
+    fn is_comparable(&self, fitted: &Fitted) -> bool {
+        fitted.data == self.data && fitted.measured == self.measured
+    }
+
+    /// The fits to these records of models that differ from this one in their effects and terms alone.
     pub(super) fn kin(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
         let bare = without_effects(model);
         let kin = |fitted: &&Arc<Fitted>| {
-            fitted.data == self.data && without_effects(&fitted.model) == bare
+            self.is_comparable(fitted) && without_effects(&fitted.model) == bare
         };
         self.models.iter().filter(kin).collect()
     }
 
-    /// The fits of the model with its first effects, none of them and then one more each time, as far as they are known.
+    /// The fits of the model with its first effects, none of them and then one more each time, and then with its first terms, as
+    /// far as they are known.
     pub(super) fn trail(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
         let kin = self.kin(model);
-        (0..=model.effects.len())
-            .filter_map(|count| {
-                kin.iter()
-                    .find(|fitted| fitted.model.effects == model.effects[..count])
-                    .copied()
+        let (effects, terms) = (model.effects.as_slice(), model.terms.as_slice());
+        let first_effects = (0..=effects.len()).map(|count| (&effects[..count], &terms[..0]));
+        let first_terms = (1..=terms.len()).map(|count| (effects, &terms[..count]));
+        first_effects
+            .chain(first_terms)
+            .filter_map(|(effects, terms)| {
+                let of = |fitted: &&&Arc<Fitted>| {
+                    fitted.model.effects == effects && fitted.model.terms == terms
+                };
+                kin.iter().find(of).copied()
             })
             .collect()
+    }
+
+    /// Stops what nobody has asked after for so long, in words where the page would not begin it again by itself.
+    pub(super) fn stop_abandoned(&mut self) {
+        let Some(job) = &self.job else { return };
+        let what = match job.kind {
+            Kind::Compare | Kind::Chain => None,
+            Kind::Diagnose => Some(("the search", "Diagnose")),
+            Kind::Design => Some(("the design of the experiment", "What would tell?")),
+        };
+        self.stop();
+        if let Some((what, button)) = what {
+            self.fail(format!(
+                "{what} was stopped, because this page had not asked after it for three minutes, as one that sleeps does not; {button} starts it again"
+            ));
+        }
     }
 
     /// Stops the computation that runs.
@@ -324,15 +413,18 @@ pub(super) fn same(a: &ModelFile, b: &ModelFile) -> bool {
     bare(a) == bare(b)
 }
 
-/// The model without the effects of the catalogue and what is said of their parameters.
+/// The model without effects and terms and what is said of their parameters.
 fn without_effects(model: &ModelFile) -> ModelFile {
     let mut bare = model.clone();
-    for placed in &model.effects {
-        let own = format!("{}.", placed.effect.id);
+    let effects = model.effects.iter().map(|placed| placed.effect.id);
+    let terms = model.terms.iter().map(|own| own.term.name.as_str());
+    for name in effects.chain(terms) {
+        let own = format!("{name}.");
         bare.start.retain(|name, _| !name.starts_with(&own));
         bare.fixed.retain(|name| !name.starts_with(&own));
     }
     bare.effects.clear();
+    bare.terms.clear();
     bare.waiting.clear();
     bare
 }

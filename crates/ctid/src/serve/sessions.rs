@@ -9,8 +9,9 @@ use super::upload::Upload;
 
 /// Tabs at most; the one that was not seen for the longest time goes.
 const MOST: usize = 8;
-/// Bytes of records over all tabs.
-const BYTES: usize = 256 << 20;
+/// Bytes over all tabs: records as they were sent and as they were read, and what was computed. One tab may hold more, and is then
+/// alone.
+const BYTES: usize = 512 << 20;
 /// A computation whose page has not asked for so long is nobody's. Browsers let a page in the background ask once a minute.
 const ALONE: Duration = Duration::from_secs(180);
 
@@ -70,19 +71,32 @@ impl Sessions {
         (id, session)
     }
 
-    /// Makes room after a record was taken by `id`.
-    pub(super) fn make_room(&self, id: &str) {
-        let bytes = || -> usize {
+    /// Makes room where the tabs hold too much; the one that was seen last stays.
+    pub(super) fn make_room(&self) {
+        self.make_room_for(BYTES);
+    }
+
+    fn make_room_for(&self, bytes: usize) {
+        let held = || -> usize {
             let sessions = self.those(|_| true);
-            sessions.iter().map(|session| lock(session).bytes()).sum()
+            sessions.iter().map(|session| lock(session).held()).sum()
         };
-        while bytes() > BYTES && self.forget_oldest(id) {}
+        let last = || {
+            let all = lock(&self.all);
+            let last = all.iter().max_by_key(|tab| tab.seen);
+            last.map(|tab| tab.id.clone())
+        };
+        while held() > bytes && last().is_some_and(|id| self.forget_oldest(&id)) {}
     }
 
     /// Stops what nobody waits for.
     pub(super) fn stop_abandoned(&self) {
-        for session in self.those(|tab| tab.seen.elapsed() > ALONE) {
-            lock(&session).stop();
+        self.stop_unseen_for(ALONE);
+    }
+
+    fn stop_unseen_for(&self, alone: Duration) {
+        for session in self.those(|tab| tab.seen.elapsed() >= alone) {
+            lock(&session).stop_abandoned();
         }
     }
 
@@ -107,7 +121,13 @@ impl Sessions {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::sync::atomic::Ordering;
+
+    use super::super::session::{Job, Kind};
     use super::*;
+    use crate::model_file;
 
     #[test]
     fn the_oldest_tab_goes() {
@@ -121,6 +141,81 @@ mod tests {
         assert!(sessions.find(&second).is_none(), "it was not seen since");
         assert!(sessions.find(&first).is_some());
         assert_eq!(lock(&sessions.all).len(), MOST);
+    }
+
+    /// Two records that take little as they were sent, and more once they are read.
+    #[test]
+    fn what_is_read_needs_room_too() {
+        let sessions = Sessions::new(None, Vec::new());
+        let tabs = [sessions.open(), sessions.open()];
+        let rows: String = (0..500)
+            .map(|k| format!("{k},{},{}\n", k % 3, k % 9))
+            .collect();
+        let text = format!("t,u,y\n{rows}");
+        let sent = 2 * text.len();
+        for (_, session) in &tabs {
+            let upload = Upload::new("a.csv", false, text.clone().into()).unwrap();
+            lock(session).take(upload).unwrap();
+        }
+        sessions.make_room_for(sent);
+        assert_eq!(lock(&sessions.all).len(), 2);
+        for (_, session) in &tabs {
+            let state = super::super::state::state(&mut lock(session));
+            assert!(state["records"][0]["error"].is_null(), "{state}");
+        }
+        sessions.make_room_for(sent + 2 * 500 * 3 * 8);
+        assert_eq!(lock(&sessions.all).len(), 2);
+        sessions.make_room_for(sent + 2 * 500 * 3 * 8 - 1);
+        assert!(sessions.find(&tabs[0].0).is_none(), "the older one goes");
+        // Alone it stays, whatever it holds.
+        sessions.make_room_for(0);
+        assert!(sessions.find(&tabs[1].0).is_some());
+    }
+
+    fn job(kind: Kind) -> Job {
+        Job {
+            number: 1,
+            kind,
+            model: model_file::parse("m.toml", "plant = \"single-tank\"").unwrap(),
+            begun: Instant::now(),
+            stop: Arc::default(),
+            progress: Arc::default(),
+        }
+    }
+
+    #[test]
+    fn what_was_stopped_because_nobody_asked_says_so() {
+        let sessions = Sessions::new(None, Vec::new());
+        let (id, session) = sessions.open();
+        for (kind, button) in [
+            (Kind::Diagnose, "Diagnose"),
+            (Kind::Design, "What would tell?"),
+        ] {
+            let job = job(kind);
+            let (stop, version) = (job.stop.clone(), lock(&session).version);
+            lock(&session).job = Some(job);
+            sessions.stop_unseen_for(Duration::from_secs(60));
+            assert!(lock(&session).job.is_some(), "it was just seen");
+            sessions.stop_unseen_for(Duration::ZERO);
+            assert!(stop.load(Ordering::Relaxed));
+            let seen = sessions.find(&id).unwrap();
+            let seen = lock(&seen);
+            assert!(seen.job.is_none() && seen.version > version);
+            let said = seen.failure.clone().unwrap();
+            assert!(
+                said.contains("was stopped")
+                    && said.ends_with(&format!("{button} starts it again")),
+                "{said}"
+            );
+        }
+        // A fit begins again by itself: there is nothing to say.
+        lock(&session).failure = None;
+        lock(&session).job = Some(job(Kind::Compare));
+        sessions.stop_unseen_for(Duration::ZERO);
+        assert!(lock(&session).job.is_none() && lock(&session).failure.is_none());
+        // Where nothing runs there is nothing to stop.
+        sessions.stop_unseen_for(Duration::ZERO);
+        assert!(lock(&session).failure.is_none());
     }
 
     #[test]

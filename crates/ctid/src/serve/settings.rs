@@ -48,6 +48,52 @@ struct Controller {
     u_max: Option<f64>,
 }
 
+/// What a form sends: what it says, and what stood in it before anybody typed. A form of an empty model was empty.
+#[derive(Debug, Deserialize)]
+pub(super) struct Form {
+    #[serde(flatten)]
+    to: Settings,
+    #[serde(default)]
+    from: Settings,
+}
+
+impl Form {
+    /// The text with what the form says.
+    ///
+    /// # Errors
+    /// [`Error::Changed`] where the text says something else than the form was filled from; where the result is no model file.
+    pub(super) fn written_into(&self, file: &str, text: &str) -> Result<Edited, Error> {
+        let differing = differing(&self.from, &Settings::of(text));
+        if !differing.is_empty() {
+            let what = format!(
+                "{} changed meanwhile, in another tab or by a command",
+                differing.join(", ")
+            );
+            return Err(edit::changed(file, &what));
+        }
+        self.to.written_into(file, text)
+    }
+}
+
+/// What two settings differ in, by the keys of the model file.
+fn differing(a: &Settings, b: &Settings) -> Vec<String> {
+    // As the page has them: there what is not finite is null.
+    let [a, b] = [a, b].map(|settings| serde_json::to_value(settings).unwrap_or_default());
+    let keys = a.as_object().into_iter().flat_map(|all| all.keys());
+    let mut differing = Vec::new();
+    for key in keys {
+        match (a[key].as_object(), b[key].as_object()) {
+            (Some(x), Some(y)) => {
+                let inner = x.keys().filter(|inner| x.get(*inner) != y.get(*inner));
+                differing.extend(inner.map(|inner| format!("{key}.{inner}")));
+            }
+            _ if a[key] != b[key] => differing.push(key.clone()),
+            _ => {}
+        }
+    }
+    differing
+}
+
 impl Settings {
     /// Those of a text; what cannot be read is empty, and [`model_file::parse`] says why.
     pub(super) fn of(text: &str) -> Self {
@@ -58,7 +104,7 @@ impl Settings {
     ///
     /// # Errors
     /// Where the result is no model file.
-    pub(super) fn into_text(self, file: &str, text: &str) -> Result<Edited, Error> {
+    fn written_into(&self, file: &str, text: &str) -> Result<Edited, Error> {
         // Where they cannot be read the form is empty, and all that it does not show would be deleted.
         if toml::from_str::<Self>(text).is_err() {
             model_file::parse(file, text)?;
@@ -76,18 +122,21 @@ impl Settings {
         if root.contains_key("hold") || self.hold != Hold::Zero {
             put(root, "hold", Some(hold.into()));
         }
-        let word = |word: Option<String>| word.filter(|w| !w.trim().is_empty()).map(Value::from);
+        let word = |word: &Option<String>| {
+            let word = word.as_deref().filter(|w| !w.trim().is_empty());
+            word.map(Value::from)
+        };
         let columns = [
-            ("time", word(self.columns.time)),
-            ("input", word(self.columns.input)),
-            ("input_2", word(self.columns.input_2)),
-            ("output", word(self.columns.output)),
-            ("reference", word(self.columns.reference)),
+            ("time", word(&self.columns.time)),
+            ("input", word(&self.columns.input)),
+            ("input_2", word(&self.columns.input_2)),
+            ("output", word(&self.columns.output)),
+            ("reference", word(&self.columns.reference)),
         ];
         section(&mut document, file, "columns", columns)?;
         let number = |value: Option<f64>| value.map(Value::from);
         let known = [
-            ("measured", word(self.known.measured)),
+            ("measured", word(&self.known.measured)),
             ("area", number(self.known.area)),
             ("area_upper", number(self.known.area_upper)),
             ("area_lower", number(self.known.area_lower)),
@@ -100,20 +149,22 @@ impl Settings {
             ("input_range", number(self.known.input_range)),
         ];
         section(&mut document, file, "known", known)?;
-        match self.controller {
+        match &self.controller {
             None => {
                 document.remove("controller");
             }
             Some(controller) => {
-                let list =
-                    |list: Option<Vec<f64>>| list.map(|l| Value::Array(l.into_iter().collect()));
+                let list = |list: &Option<Vec<f64>>| {
+                    list.as_ref()
+                        .map(|l| Value::Array(l.iter().copied().collect()))
+                };
                 let entries = [
-                    ("type", word(Some(controller.kind))),
+                    ("type", word(&Some(controller.kind.clone()))),
                     ("gain", number(controller.gain)),
                     ("integral_time", number(controller.integral_time)),
-                    ("variable", word(controller.variable)),
-                    ("r", list(controller.r)),
-                    ("s", list(controller.s)),
+                    ("variable", word(&controller.variable)),
+                    ("r", list(&controller.r)),
+                    ("s", list(&controller.s)),
                     ("u_min", number(controller.u_min)),
                     ("u_max", number(controller.u_max)),
                 ];
@@ -204,8 +255,33 @@ rim = 20.0
 
     #[test]
     fn what_is_not_changed_stays_as_it_is_written() {
-        let same = Settings::of(COMMENTED).into_text("m.toml", COMMENTED);
+        let same = Settings::of(COMMENTED).written_into("m.toml", COMMENTED);
         assert_eq!(same.unwrap().text, COMMENTED);
+    }
+
+    /// A form that was filled before another tab has written overwrites nothing, and says what has changed.
+    #[test]
+    fn a_form_of_an_older_text_is_refused() {
+        let form = |from: &str, to: &str| Form {
+            from: Settings::of(from),
+            to: Settings::of(to),
+        };
+        let newer = COMMENTED.replace("154 ", "150.5 ");
+        let error = form(COMMENTED, COMMENTED).written_into("m.toml", &newer);
+        assert!(
+            matches!(&error, Err(Error::Changed { what, .. }) if what.starts_with("known.area changed"))
+        );
+        // What no field of the form speaks of may change: an effect, a comment.
+        let other = COMMENTED.replace("\"overflow\"]", "\"overflow\", \"sensor_lag\"] # both");
+        let said = form(COMMENTED, &newer)
+            .written_into("m.toml", &other)
+            .unwrap();
+        assert_eq!(said.text, other.replace("154 ", "150.5 "));
+        // What cannot be shown is no change.
+        let endless = COMMENTED.replace("154 ", "inf ");
+        let error =
+            form(&COMMENTED.replace("area = 154 ", ""), COMMENTED).written_into("m.toml", &endless);
+        assert!(!matches!(error, Err(Error::Changed { .. })));
     }
 
     #[test]
@@ -213,7 +289,7 @@ rim = 20.0
         let mut settings = Settings::of(COMMENTED);
         settings.known.area = Some(150.5);
         settings.columns.output = Some("y [cm]".into());
-        let text = settings.into_text("m.toml", COMMENTED).unwrap().text;
+        let text = settings.written_into("m.toml", COMMENTED).unwrap().text;
         let expected = COMMENTED.replace("154 ", "150.5 ");
         assert!(text.contains("[columns]\noutput = \"y [cm]\"\n"), "{text}");
         let rest: String = text.replace("\n[columns]\noutput = \"y [cm]\"\n", "");
@@ -232,7 +308,7 @@ rim = 20.0
             }),
             ..Settings::default()
         };
-        let text = settings.clone().into_text("m.toml", "").unwrap().text;
+        let text = settings.clone().written_into("m.toml", "").unwrap().text;
         assert!(
             text.starts_with("plant = \"cascaded-tanks\"\neffects = []\n"),
             "{text}"
@@ -258,7 +334,7 @@ rim = 20.0
             },
             ..Settings::default()
         };
-        let text = settings.clone().into_text("m.toml", "").unwrap().text;
+        let text = settings.clone().written_into("m.toml", "").unwrap().text;
         assert_eq!(Settings::of(&text), settings);
     }
 
@@ -271,7 +347,7 @@ rim = 20.0
         let text =
             "plant = \"single-tank\"\n[known]\narea = \"154\"\n[controller]\ntype = \"PI\"\n";
         assert_eq!(Settings::of(text), Settings::default());
-        let error = settings.into_text("m.toml", text).err().unwrap();
+        let error = settings.written_into("m.toml", text).err().unwrap();
         assert!(error.to_string().starts_with("m.toml:3: not a number"));
     }
 
@@ -285,7 +361,11 @@ rim = 20.0
             },
             ..Settings::default()
         };
-        let error = settings.into_text("m.toml", "").err().unwrap().to_string();
+        let error = settings
+            .written_into("m.toml", "")
+            .err()
+            .unwrap()
+            .to_string();
         assert!(error.contains("area_upper"), "{error}");
     }
 }

@@ -1,13 +1,16 @@
 //! What the page is told of its session, whenever something has changed.
 
+use std::sync::Arc;
+
 use ct_signals::{Columns, Record};
 use missing_effect::numbers;
 use plants::{CATALOGUE, Outlet, Placed, Plant};
 use serde_json::{Value, json};
 
-use super::session::{Fitted, Found, Session, lock, same};
+use super::session::{Fitted, Found, Kind, Session, lock, same};
 use super::settings::Settings;
 use super::words;
+use crate::model_file::ModelFile;
 
 /// How far the computation is, if there is one.
 pub(super) fn job(session: &Session) -> Value {
@@ -16,7 +19,11 @@ pub(super) fn job(session: &Session) -> Value {
     };
     let progress = *lock(&job.progress);
     json!({
-        "what": job.what,
+        "what": match job.kind {
+            Kind::Compare | Kind::Chain => "compare",
+            Kind::Diagnose => "diagnose",
+            Kind::Design => "design",
+        },
         "phase": progress.map(|p| p.phase),
         "done": progress.map(|p| p.done),
         "total": progress.map(|p| p.total),
@@ -56,6 +63,12 @@ pub(super) fn state(session: &mut Session) -> Value {
     let kin = model
         .as_ref()
         .map_or(Vec::new(), |model| session.kin(model));
+    let choices = model
+        .as_ref()
+        .map_or(Vec::new(), |model| choices(session, model, &kin));
+    let controlled = model
+        .as_ref()
+        .is_some_and(|model| model.controller.is_some());
     let diagnosis = session.diagnosis.as_deref().map(|found| {
         let mut words = words::diagnosis(found);
         words["of_this_model"] = json!(is_of(found, session));
@@ -69,12 +82,15 @@ pub(super) fn state(session: &mut Session) -> Value {
         "model_error": error,
         "settings": Settings::of(&session.text),
         "effects": words::effects(session),
+        "waiting": model.as_ref().map_or(Vec::new(), words::waiting),
         "records": records,
         "headings": headings,
         "guessed": guessed,
         "current": current.map(|fitted| fitted.id),
         "trail": trail.iter().map(|fitted| point(fitted)).collect::<Vec<_>>(),
         "models": kin.iter().map(|fitted| point(fitted)).collect::<Vec<_>>(),
+        "chains": choices.iter().map(|chain| json!({ "name": chain_name(chain), "effects": chain })).collect::<Vec<_>>(),
+        "loop": json!({ "known": controlled, "measured": session.measured }),
         "diagnosis": diagnosis,
         "design": session.design.as_deref().map(|found| words::design(found.id, &found.found.0)),
         "job": job(session),
@@ -84,7 +100,9 @@ pub(super) fn state(session: &mut Session) -> Value {
 
 fn is_of<T>(found: &Found<T>, session: &Session) -> bool {
     let model = session.model();
-    found.data == session.data && model.is_ok_and(|model| same(&model, &found.model))
+    found.data == session.data
+        && found.measured == session.measured
+        && model.is_ok_and(|model| same(&model, &found.model))
 }
 
 /// What a record holds, in words.
@@ -110,22 +128,47 @@ fn about(record: &Record) -> Value {
     })
 }
 
-fn effects_of(model: &crate::model_file::ModelFile) -> Vec<(String, Option<&'static str>)> {
-    let placed = model.effects.iter();
-    placed
-        .map(|placed| (placed.effect.id.to_string(), placed.place_name(model.plant)))
-        .collect()
+/// Effects and where each acts, where there is a choice; terms of the user's own by their name.
+type Chain = Vec<(String, Option<String>)>;
+
+fn effects_of(model: &ModelFile) -> Chain {
+    let placed = model.effects.iter().map(|placed| {
+        let place = placed.place_name(model.plant);
+        (placed.effect.id.to_string(), place.map(str::to_string))
+    });
+    let terms = model.terms.iter().map(|own| (own.term.name.clone(), None));
+    placed.chain(terms).collect()
 }
 
-fn chain_name(effects: &[(String, Option<&'static str>)]) -> String {
-    if effects.is_empty() {
+fn chain_name(chain: &Chain) -> String {
+    if chain.is_empty() {
         return "base model".to_string();
     }
-    let named = effects.iter().map(|(effect, place)| match place {
+    let named = chain.iter().map(|(effect, place)| match place {
         Some(place) => format!("{effect} ({place})"),
         None => effect.clone(),
     });
-    format!("+ {}", named.collect::<Vec<_>>().join(" + "))
+    named.collect::<Vec<_>>().join(" + ")
+}
+
+/// Chains worth a look: none, the model's own, those that were fitted, and each found or ranked effect on the model as it stands.
+fn choices(session: &Session, model: &ModelFile, kin: &[&Arc<Fitted>]) -> Vec<Chain> {
+    let now = effects_of(model);
+    let mut all = vec![Chain::new(), now.clone()];
+    all.extend(kin.iter().map(|fitted| effects_of(&fitted.model)));
+    let found = session.diagnosis.iter();
+    for (effect, place) in found.flat_map(|found| words::candidates(&found.found)) {
+        if now.iter().all(|(on, _)| *on != effect) {
+            all.push([now.clone(), vec![(effect, place)]].concat());
+        }
+    }
+    let mut choices: Vec<Chain> = Vec::new();
+    for chain in all {
+        if !choices.contains(&chain) {
+            choices.push(chain);
+        }
+    }
+    choices
 }
 
 fn point(fitted: &Fitted) -> Value {

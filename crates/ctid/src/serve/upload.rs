@@ -6,6 +6,7 @@ use axum::body::Bytes;
 use ct_signals::{Columns, Heading, Hold, Record, csv_header, parse_csv};
 
 use super::guard::Refusal;
+use super::held::of_record;
 
 /// Columns of a file at most: what the page can offer for a choice.
 const MOST_COLUMNS: usize = 500;
@@ -46,6 +47,16 @@ impl Upload {
         })
     }
 
+    /// Bytes that it holds, as it was sent and as it was read. A number is two bytes at least in the file, with what parts it from
+    /// the next, and eight in memory: what is read takes at most four times the file.
+    pub(super) fn held(&self) -> usize {
+        let read = self
+            .read
+            .as_ref()
+            .and_then(|(_, _, read)| read.as_ref().ok());
+        self.content.len() + read.map_or(0, |record| of_record(record))
+    }
+
     /// The record, read again only where the columns have changed.
     pub(super) fn record(&mut self, columns: &Columns, hold: Hold) -> Result<Arc<Record>, String> {
         match &self.read {
@@ -73,4 +84,42 @@ fn head<'a>(name: &str, content: &'a [u8]) -> Result<&'a [u8], Refusal> {
         ))
     })?;
     Ok(&first[..=end])
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::fmt::Write;
+
+    use super::*;
+
+    /// As many rows as bytes allow: every command and reading is one digit.
+    #[test]
+    fn what_is_read_is_counted_and_takes_at_most_four_times_the_file() {
+        let mut text = "t,u,y,u2,r\n".to_string();
+        for k in 0..2000 {
+            writeln!(text, "{k},{},{},4,5", k % 2, k % 3).unwrap();
+        }
+        let sent = text.len();
+        let mut upload = Upload::new("dense.csv", false, text.into()).unwrap();
+        assert_eq!(upload.held(), sent);
+        let columns = Columns {
+            time: Some("t".into()),
+            input: Some("u".into()),
+            input_2: Some("u2".into()),
+            output: Some("y".into()),
+            reference: Some("r".into()),
+        };
+        upload.record(&columns, Hold::Zero).unwrap();
+        assert_eq!(upload.held(), sent + 2000 * 5 * 8);
+        assert!(upload.held() <= 5 * sent);
+        // What cannot be read takes nothing.
+        let columns = Columns {
+            input: Some("no such".into()),
+            ..columns
+        };
+        upload.record(&columns, Hold::Zero).unwrap_err();
+        assert_eq!(upload.held(), sent);
+    }
 }

@@ -7,6 +7,7 @@ use serde_json::{Value, json, value::RawValue};
 
 use super::session::{Found, Session};
 use crate::findings;
+use crate::model_file::ModelFile;
 use crate::report;
 
 /// Experiments of a design that the table shows.
@@ -93,9 +94,32 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "before": with_unit(&numbers::significant(diagnosis.steps.first().map_or(f64::NAN, |s| s.rmse), 3), unit),
         "noise": with_unit(&numbers::significant(diagnosis.noise_floor, 2), unit),
         "ranking": ranked.collect::<Vec<_>>(),
-        "unknown": diagnosis.unknown.is_some(),
+        // What the shape depends on, where nothing explains it.
+        "unknown": diagnosis.unknown.as_ref().map(|unknown| unknown.variable),
         "seconds": diagnosis.seconds,
     })
+}
+
+/// Ranked effects that are worth a fit of their own.
+const RANKED: usize = 8;
+
+/// The effects that were found and the best of the ranking, each with its place.
+pub(super) fn candidates(diagnosis: &Diagnosis) -> Vec<(String, Option<String>)> {
+    let found = diagnosis.effects.iter().enumerate();
+    let found = found.map(|(k, effect)| {
+        (
+            effect.clone(),
+            findings::tank(diagnosis, k).map(str::to_string),
+        )
+    });
+    let ranked = diagnosis
+        .scores
+        .iter()
+        .filter(|score| score.effect != "none");
+    let ranked = ranked
+        .take(RANKED)
+        .map(|score| (score.effect.clone(), score.place.clone()));
+    found.chain(ranked).collect()
 }
 
 fn headline(diagnosis: &Diagnosis) -> (String, &'static str) {
@@ -189,6 +213,15 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
         "time": sequence.time,
         "values": sequence.values,
     })
+}
+
+/// Terms of the user's own that stand in the model file and are not on.
+pub(super) fn waiting(model: &ModelFile) -> Vec<Value> {
+    let waiting = model.waiting.iter();
+    let terms = waiting.filter_map(|table| table.strip_prefix("term."));
+    terms
+        .map(|name| json!({ "effect": name, "place": null }))
+        .collect()
 }
 
 /// The effects and terms of the model as it stands.

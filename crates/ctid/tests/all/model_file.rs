@@ -8,6 +8,8 @@ use ct_signals::Hold;
 use ctid::model_file::{self, ControllerLaw, ModelFile};
 use plants::Plant;
 
+use crate::common::Place;
+
 fn parse(text: &str) -> ModelFile {
     model_file::parse("tank.toml", text).unwrap()
 }
@@ -573,5 +575,32 @@ fn what_three_tanks_lack_is_said() {
         ),
     ] {
         refuses(&text, start, mend);
+    }
+}
+
+/// Two programs that edit one file at the same moment: neither loses what the other does.
+#[test]
+fn no_change_of_two_programs_is_lost() {
+    let place = Place::empty();
+    place.write("m.toml", "plant = \"single-tank\"\neffects = []\n");
+    for _ in 0..10 {
+        for way in ["add", "remove"] {
+            let effects = ["overflow", "pump_deadzone", "sensor_lag", "const_leak"];
+            let edits = effects.map(|effect| {
+                let mut command = place.command(&format!("{way} {effect} --model m.toml"));
+                (effect, command.spawn().unwrap())
+            });
+            for (effect, mut edit) in edits {
+                assert!(edit.wait().unwrap().success(), "{way} {effect}");
+            }
+            let text = place.read("m.toml");
+            for effect in effects {
+                assert_eq!(
+                    text.contains(effect),
+                    way == "add",
+                    "{way} {effect}: {text}"
+                );
+            }
+        }
     }
 }

@@ -259,7 +259,8 @@ impl<'a> Setup<'a> {
     }
 
     /// Nobody waits any more.
-    pub(crate) fn stopped(&self) -> bool {
+    #[must_use]
+    pub fn stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 

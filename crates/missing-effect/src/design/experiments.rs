@@ -287,6 +287,9 @@ impl Search<'_, '_> {
         let before = self.before()?;
         let (mut tried, [overfull, limited]) = self.promises(bounds, seed, &before)?;
         self.refit(&mut tried, bounds, &before);
+        if self.nodes[0].setup.stopped() {
+            return Err(greybox::Error::Stopped.into());
+        }
         let Some((best, sequence)) = tried.first().cloned() else {
             return Err(Refused::Overfull {
                 low: bounds.low,

@@ -104,7 +104,7 @@ fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64)
     }
 }
 
-/// Plays a sequence; `None` where the simulation does not stay finite.
+/// Plays a sequence; `None` where the simulation does not stay finite, or nobody waits any more.
 pub(crate) fn play(
     node: &Node,
     into: &Loop,
@@ -113,6 +113,9 @@ pub(crate) fn play(
     time_constant: f64,
 ) -> Option<Played> {
     let setup = &node.setup;
+    if setup.stopped() {
+        return None;
+    }
     let of = &setup.records[0];
     let first = *values.first()?;
     let mut rest = rest(node, into, first, interval, time_constant)?;

@@ -1,5 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use ct_signals::{ArModel, Record, excitation, noise};
 use greybox::{Triangle, fit_from};
 use plants::{EffectInfo, Known, Placed, Plant, Scales, Structure};
@@ -12,7 +14,7 @@ use super::{
     separation::{imagined, information, linear, misfit_before, refitted, unlooped, vector},
 };
 use crate::{
-    Error, Options, Problem,
+    Error, Options, Problem, Progress,
     node::FINE,
     simulated::{self, INTERVAL, NOISE},
 };
@@ -286,4 +288,35 @@ fn a_tank_that_would_overflow_is_left_out() {
     let bounds: &Bounds = &found.limits;
     let within = |u: &f64| (bounds.low..=bounds.high).contains(u);
     assert!(found.experiment.values.iter().all(within));
+}
+
+/// What is stopped while sequences are played plays no more of them, and says that it was stopped.
+#[test]
+fn a_design_that_is_stopped_plays_nothing_more() {
+    let problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);
+    let fitted = leak_or_curve(&problem);
+    let stop = AtomicBool::new(true);
+    let mut node = fitted.nodes[0].clone();
+    node.setup.stop = Some(&stop);
+    let values = vec![5.0; 300];
+    let playable = || play(&node, &Loop::Open, &values, INTERVAL, 100.0).is_some();
+    assert!(!playable());
+    stop.store(false, Ordering::Relaxed);
+    assert!(playable());
+
+    let pair = between("const_leak", "pump_nonlinearity");
+    let options = Options {
+        stop: Some(&stop),
+        ..Options::default()
+    };
+    let stop_there = |now: Progress| {
+        if now.phase == "trying experiments" {
+            stop.store(true, Ordering::Relaxed);
+        }
+    };
+    let refused = design(&problem, pair, &Limits::default(), &options, &stop_there);
+    assert!(
+        matches!(refused, Err(Error::Fit(greybox::Error::Stopped))),
+        "{refused:?}"
+    );
 }

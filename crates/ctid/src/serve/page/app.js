@@ -6,6 +6,7 @@ import * as model from "./model.js";
 import * as fit from "./fit.js";
 import * as findings from "./findings.js";
 import * as chains from "./chains.js";
+import * as unknown from "./unknown.js";
 import * as experiment from "./experiment.js";
 
 const WORK = { compare: "fitting the model", diagnose: "searching what is missing", design: "designing the next experiment" };
@@ -108,6 +109,7 @@ function show(state, trouble) {
   experiment.show(state);
   fall(state);
   fit.show(state).catch((e) => fail(e.message));
+  unknown.show(state).catch((e) => fail(e.message));
   chains.show(state).catch((e) => fail(e.message));
   compareIfNeeded(state);
 }
@@ -115,14 +117,14 @@ function show(state, trouble) {
 try {
   const opened = await server.begin(show);
   data.start(model.changed, fail);
-  model.start(opened.plants);
+  model.start(opened.plants, fail);
   findings.start(fail);
   chains.start(fail);
   experiment.start(fail);
   $("cancel").addEventListener("click", cancel);
   $("fit").addEventListener("click", compare);
   show(opened.state);
-  plots.start(() => { fit.draw(); chains.draw(); experiment.draw(); });
+  plots.start(() => { fit.draw(); unknown.draw(); chains.draw(); experiment.draw(); });
 } catch (error) {
   fail(error.message);
 }

@@ -2,7 +2,6 @@
 import { $, button, fill, figure, make, plot, table, units } from "./dom.js";
 import * as server from "./server.js";
 
-const chainName = (effects) => (effects.length ? effects.map(([effect, place]) => (place ? `${effect} (${place})` : effect)).join(" + ") : "base model");
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 let wanted = null;
@@ -10,20 +9,6 @@ let drawn = "";
 let report = null;
 let options = "";
 let touched = false;
-
-/** Chains worth a look: those that were fitted, and each found or ranked effect on the model as it stands. */
-function choices(state) {
-  const now = state.effects.map((one) => [one.effect, one.place]);
-  const chains = [[], now, ...state.models.map((one) => one.effects)];
-  const of = state.diagnosis;
-  if (of) {
-    const ranked = of.ranking.filter((one) => one.effect !== "none").slice(0, 8);
-    for (const one of [...of.groups, ...ranked]) {
-      if (!now.some(([effect]) => effect === one.effect)) chains.push([...now, [one.effect, one.place ?? null]]);
-    }
-  }
-  return chains.filter((chain, k) => chains.findIndex((other) => same(other, chain)) === k);
-}
 
 export function start(fail) {
   const select = (id, text) => [make("label", { htmlFor: id }, text), make("select", { id })];
@@ -39,16 +24,16 @@ export const forget = () => { wanted = null; };
 
 export async function show(state) {
   $("chains-part").hidden = !state.models.length;
-  const all = choices(state);
+  const all = state.chains.map((one) => ({ name: one.name, value: JSON.stringify(one.effects) }));
   const texts = JSON.stringify(all);
   if (texts !== options) {
     options = texts;
     ["chain-a", "chain-b"].forEach((id, k) => {
       const before = $(id).value;
-      fill($(id), all.map((chain) => make("option", { value: JSON.stringify(chain) }, chainName(chain))));
+      fill($(id), all.map((chain) => make("option", { value: chain.value }, chain.name)));
       // What somebody has chosen stays; else it is the base model and the model as it stands.
-      const kept = touched && all.some((chain) => JSON.stringify(chain) === before);
-      $(id).value = kept ? before : JSON.stringify(all[Math.min(k, all.length - 1)]);
+      const kept = touched && all.some((chain) => chain.value === before);
+      $(id).value = kept ? before : all[Math.min(k, all.length - 1)]?.value ?? "";
     });
   }
   // What cannot be fitted is not tried again.
@@ -80,9 +65,9 @@ function result(pair, bodies) {
   if (pair.some((one) => one.rmse_test_text)) rows.push(["On held-out data", ...pair.map((one) => [one.rmse_test_text, " ", ...units(out)])]);
   rows.push(["BIC (smaller is better)", ...pair.map((one) => one.bic)]);
   for (const name of names) rows.push([make("code", {}, name), ...bodies.map((body) => estimate(body, name))]);
-  table(sheet, [[""], [chainName(pair[0].effects), true], [chainName(pair[1].effects), true]], rows);
+  table(sheet, [[""], [pair[0].name, true], [pair[1].name, true]], rows);
   fill($("chain-result"), figure("chains", "Both over the measurements"), make("div", { className: "scroll", tabIndex: 0, role: "region", ariaLabel: "Two chains" }, sheet));
-  const steps = bodies.map((body, k) => ({ ...body.drawing.steps[body.drawing.steps.length - 1], label: chainName(pair[k].effects) }));
+  const steps = bodies.map((body, k) => ({ ...body.drawing.steps[body.drawing.steps.length - 1], label: pair[k].name }));
   report = { ...bodies[0].drawing, steps };
   draw();
 }

@@ -8,9 +8,9 @@ const OPTIONAL = { reference: "none", input_2: "none (off)" };
 
 /** Another model in place of this one; what stands in a file of the user's goes, so it is asked first. */
 async function replace(file) {
-  const old = server.current().file;
+  const { file: old, text: from } = server.current();
   if (old && !confirm(`Overwrite ${old} with ${file.name}? What stands there is not kept.`)) return;
-  await server.send("/api/text", { text: await file.text() });
+  await server.send("/api/text", { text: await file.text(), from });
 }
 
 /** Takes dropped files: a model file is taken for the model, everything else for a record. */
@@ -103,8 +103,17 @@ export function columns() {
 
 export const hold = () => $("hold").value;
 
+// What the model said when the fields were filled.
+const from = { hold: "zero", columns: {} };
+export const filled = () => from;
+export function wrote(said) {
+  from.hold = said.hold;
+  from.columns = said.columns;
+}
+
 /** The columns as the model names them; before there is one, as they were chosen. */
 export function columnFields(state, pumps) {
+  from.columns = state.settings.columns;
   const { columns: named, plant } = state.settings;
   const kept = plant ? named : Object.fromEntries(Object.entries(columns()).filter(([, said]) => meant(state.headings || [], said)));
   const roles = ROLES.filter(([role]) => role !== "input_2" || pumps > 1);
@@ -123,7 +132,11 @@ export function show(state, fail, pumps, draft) {
   if ($("columns").contains(document.activeElement)) return;
   // What the file says shows without a record too.
   if (state.settings.plant) $("hold").value = state.settings.hold;
-  if (!state.headings) return;
+  from.hold = state.settings.hold;
+  if (!state.headings) {
+    from.columns = state.settings.columns;
+    return;
+  }
   if (!draft || !$("column-fields").childElementCount) columnFields(state, pumps);
   if (state.records.some((one) => one.error)) $("columns").open = true;
 }

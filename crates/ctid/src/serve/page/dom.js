@@ -29,6 +29,9 @@ export const button = (text, properties, press) => {
   return element;
 };
 
+/** An effect, and where it acts where there is a choice. */
+export const named = ({ effect, place }) => (place ? `${effect} (${place})` : effect);
+
 /** A text in which units have raised exponents. */
 export function units(text) {
   const parts = String(text ?? "").split(/\^(-?\d+(?:\.\d+)?)/);

@@ -1,14 +1,17 @@
 // What a diagnosis found: the effects that are missing, each with what cannot be told from it, and the ranking.
-import { $, button, fill, make, units } from "./dom.js";
+import { $, button, fill, make, named, units } from "./dom.js";
 import * as experiment from "./experiment.js";
 import * as server from "./server.js";
 
-const named = (one) => (one.place ? `${one.effect} (${one.place})` : one.effect);
-
 export function start(fail) {
   $("diagnose").addEventListener("click", () => {
+    const most = $("most").value.trim();
+    if (most && !/^([1-9]\d?|1\d\d|2[0-4]\d|25[0-5])$/.test(most)) {
+      fail(`"${most}" is no number of effects; write a whole number from 1 to 255, or nothing`);
+      return;
+    }
     asked = true;
-    server.run("diagnose").catch((e) => fail(e.message));
+    server.run("diagnose", { max_effects: most ? Number(most) : null }).catch((e) => fail(e.message));
   });
 }
 
@@ -49,6 +52,26 @@ function row(state, one, k, widest, fail) {
     make("div", { className: "track" }, bar));
 }
 
+// Under which names the shape of a diagnosis was kept.
+const kept = new Map();
+
+/** What nothing explains becomes a term of the user's own. */
+function keep(state, found, fail) {
+  const name = kept.get(found.id);
+  if (state.effects.some((one) => one.effect === name)) return make("p", { className: "caption" }, `Kept as ${name}: the fits scale its shape.`);
+  const box = make("input", { id: "keep-name", size: 12, autocomplete: "off", placeholder: "its name", spellcheck: false });
+  box.setAttribute("aria-label", "Name of the effect of your own");
+  const press = async () => {
+    const wanted = box.value.trim();
+    if (!wanted) { box.focus(); return; }
+    kept.set(found.id, wanted);
+    await server.send("/api/effect", { do: "keep", effect: wanted }).catch((e) => { kept.delete(found.id); fail(e.message); });
+  };
+  box.addEventListener("keydown", (event) => { if (event.key === "Enter") press(); });
+  return [make("p", { className: "caption" }, "Whatever it is, its shape can stand in the model as an effect of your own; the fits scale it. It is drawn beside, under “What nothing explains”."),
+    make("p", { className: "line" }, box, button("Keep the shape", { id: "keep" }, press))];
+}
+
 let all = false;
 let shown = null;
 // What stands there: what was unfolded stays so while that does.
@@ -76,6 +99,7 @@ export function show(state, fail) {
     make("p", { className: "caption" }, `Diagnosed of ${found.of}: error ${found.before}, noise floor ${found.noise}, ${found.seconds.toFixed(1)} s.`),
     found.groups.length ? make("ul", { className: "groups" }, found.groups.map((one, k) => group(state, one, k, fail))) : null,
     found.sentences.map((sentence) => make("p", {}, units(sentence))),
+    found.unknown ? keep(state, found, fail) : null,
     make("h3", {}, "One effect at a time, refitted"),
     make("p", { className: "caption" }, "The larger the evidence (fall of BIC), the better; below 6 is none, and effects within 6 of each other are not told apart."),
     make("ol", { className: "ranking" }, found.ranking.slice(0, most).map((one, k) => row(state, one, k, widest, fail))),

@@ -1,5 +1,5 @@
 // The models over the measurements: the trail of the falling error, curves, residuals, parameters.
-import { $, fill, figure, make, plot, table, units } from "./dom.js";
+import { $, fill, figure, make, named, plot, table, units } from "./dom.js";
 import * as server from "./server.js";
 
 const BINNED = "Above the samples with the mean of each bin, below the root mean square of each bin; hatched bars fail clearly.";
@@ -20,7 +20,7 @@ let state = null;
 const label = (trail, k) => {
   if (k === 0 || trail[k].effects.length - trail[k - 1].effects.length !== 1) return trail[k].name;
   const [effect, place] = trail[k].effects[trail[k].effects.length - 1];
-  return place ? `+ ${effect} (${place})` : `+ ${effect}`;
+  return `+ ${named({ effect, place })}`;
 };
 
 /** One report of all models on the trail. */

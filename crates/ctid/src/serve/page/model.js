@@ -1,11 +1,17 @@
 // The form of the model: the plant, what is known of it, the controller, and the effects that it has.
-import { $, button, fill, make, units } from "./dom.js";
+import { $, button, fill, make, named, units } from "./dom.js";
 import * as server from "./server.js";
 import * as data from "./data.js";
 
 let plants = [];
 // What was typed and refused, or waits for more, stays until it is mended or the settings are others: those that it was typed over.
 let draft = null;
+// What the model said when the fields were filled: the server writes over nothing else.
+let from = { plant: "", known: {}, controller: null };
+// What stands in the model once what was sent is answered: what is sent before that was filled in over it.
+let turn = null;
+// Somebody else has written what the form was about to write over.
+let overtaken = null;
 // The list of effects as it stands there.
 let written = "";
 
@@ -100,8 +106,11 @@ function knownFields(known, state) {
       const box = $(`known-${key}`);
       if (box !== at) box.value = values[key] ?? "";
     }
+    const here = at.id.replace("known-", "");
+    from.known = { ...values, [here]: from.known[here] };
     return;
   }
+  from.known = values;
   $("known-fields").dataset.of = form;
   const measured = known.measured.length ? [make("label", { htmlFor: "known-measured" }, "The reading is the level of"),
     make("select", { id: "known-measured" }, make("option", { value: "" }, "choose…"),
@@ -143,13 +152,37 @@ export async function changed() {
       if (!columns[role] && said.columns[role] === guessed[role]) delete said.columns[role];
     }
     draft = null;
-    await server.send("/api/settings", said);
+    overtaken = null;
+    const before = turn ?? Promise.resolve({ ...from, ...data.filled() });
+    const written = before.then((stands) => server.send("/api/settings", { ...said, from: stands }));
+    const after = written.then(() => said, () => before);
+    turn = after;
+    after.then(() => { if (turn === after) turn = null; });
+    await written;
+    from = { plant: said.plant, known: said.known, controller: said.controller };
+    data.wrote(said);
     trouble(null);
   } catch (error) {
+    if (error.status === 409) { await refill(error.message); return; }
     keep();
     trouble(error.message);
     $("model-error").scrollIntoView({ block: "nearest" });
   }
+}
+
+/** The form as the model is now, whoever has changed it. */
+async function refill(why) {
+  draft = null;
+  const at = document.activeElement;
+  at.blur();
+  await server.renew();
+  const state = server.current();
+  overtaken = { why, text: state.text };
+  form(state);
+  if (state.headings) data.columnFields(state, pumps());
+  trouble(why);
+  $("model-error").scrollIntoView({ block: "nearest" });
+  if (at.id) $(at.id)?.focus();
 }
 
 function trouble(what) {
@@ -159,11 +192,12 @@ function trouble(what) {
 
 function laws(settings) {
   const law = $("law").value;
+  from.controller = settings.controller;
   const said = settings.controller || {};
   fill($("law-fields"), law ? [...LAWS[law], ...LIMITS].flatMap(([key, label]) => input(`law-${key}`, label, said[key], "")) : []);
 }
 
-export function start(known) {
+export function start(known, fail) {
   plants = known;
   fill($("plant"), make("option", { value: "" }, "choose a plant…"), plants.map((one) => make("option", { value: one.id }, one.id)));
   $("plant").addEventListener("change", chosen);
@@ -174,6 +208,7 @@ export function start(known) {
     if (!$("law").value || server.current().settings.controller) changed();
     else $("law-fields").querySelector("input").focus();
   });
+  $("loop").addEventListener("change", () => server.send("/api/loop", { measured: $("loop").value === "measured" }).catch((e) => fail(e.message)));
   $("law-fields").addEventListener("change", () => {
     const boxes = [...$("law-fields").querySelectorAll("input")].slice(0, 2);
     if (boxes.every((box) => box.value.trim())) changed();
@@ -181,7 +216,7 @@ export function start(known) {
 }
 
 function effect(one, fail) {
-  const name = one.place ? `${one.effect} (${one.place})` : one.effect;
+  const name = named(one);
   const remove = () => server.send("/api/effect", { do: "remove", effect: one.effect }).catch((e) => fail(e.message));
   return make("li", { title: one.physics }, make("code", {}, name), button("Remove", { className: "quiet", ariaLabel: `Remove ${name}` }, remove));
 }
@@ -190,7 +225,7 @@ function effect(one, fail) {
 function more(state, known, fail) {
   const free = known.effects.filter((one) => !state.effects.some((on) => on.effect === one.effect));
   const select = make("select", { id: "any-effect" }, make("option", { value: "" }, "any other effect…"),
-    free.map((one) => make("option", { value: JSON.stringify(one) }, one.place ? `${one.effect} (${one.place})` : one.effect)));
+    [...free, ...state.waiting].map((one) => make("option", { value: JSON.stringify(one) }, named(one))));
   select.setAttribute("aria-label", "An effect to add");
   return make("li", { className: "more" }, select, button("Add", { id: "add-any" }, () => {
     if (!select.value) return;
@@ -202,25 +237,31 @@ export function show(state, fail) {
   $("model").hidden = !state.records.length && !state.file;
   const known = plant(state.settings.plant);
   $("h-effects").hidden = !known;
-  const wanted = JSON.stringify([state.effects, known]);
+  const wanted = JSON.stringify([state.effects, state.waiting, known]);
   if (known && wanted !== written) {
     written = wanted;
     fill($("effects"), state.effects.map((one) => effect(one, fail)), state.effects.length ? null : make("li", { className: "caption" }, "none"), more(state, known, fail));
   }
   $("text").textContent = state.text || "(written once a plant is chosen)";
+  $("loop").value = state.loop.measured ? "measured" : "simulated";
+  const fitted = state.records.filter((one) => !one.held_out);
+  $("loop-line").hidden = !(state.loop.known && fitted.length && fitted.every((one) => one.read?.reference));
   if (drafting()) return;
-  trouble(state.text && state.model_error ? state.model_error : null);
+  if (overtaken && overtaken.text !== state.text) overtaken = null;
+  trouble(overtaken?.why ?? (state.text && state.model_error ? state.model_error : null));
   form(state);
 }
 
 /** The form as the model has it. */
 function form(state) {
   const known = plant(state.settings.plant);
+  from.plant = state.settings.plant;
   $("plant").value = state.settings.plant;
   $("known").hidden = !known;
   $("controller").hidden = !known;
   $("equation").textContent = known ? known.model : "";
   if (known) knownFields(known, state);
+  else from.known = state.settings.known;
   if ($("law-fields").contains(document.activeElement)) return;
   const said = state.settings.controller;
   $("law").value = said ? (said.type === "PI" ? "PI" : said.variable === "p" ? "RSp" : "RS") : "";

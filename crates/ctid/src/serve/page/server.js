@@ -12,8 +12,10 @@ let timer = 0;
 
 async function answer(response) {
   const body = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Error(body.error || `the server answers ${response.status}`);
-  return body;
+  if (response.ok) return body;
+  const error = new Error(body.error || `the server answers ${response.status}`);
+  error.status = response.status;
+  throw error;
 }
 
 async function ask(path, more = {}) {
@@ -52,9 +54,12 @@ function later() {
 }
 
 let lost = false;
+/** Takes the state as it is now. */
+export const renew = async () => take(await ask("/api/state", { since: state ? state.version : 0 }));
+
 async function poll() {
   try {
-    take(await ask("/api/state", { since: state ? state.version : 0 }));
+    await renew();
     if (lost) { lost = false; told(state); }
   } catch (error) {
     lost = true;

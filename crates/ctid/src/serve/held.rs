@@ -1,0 +1,29 @@
+//! What is held in memory, in bytes: what grows with the records and stays.
+
+use ct_signals::Record;
+use missing_effect::Diagnosis;
+
+fn bytes<'a>(series: impl IntoIterator<Item = &'a Vec<f64>>) -> usize {
+    let series = series.into_iter();
+    series.map(|values| size_of_val(values.as_slice())).sum()
+}
+
+/// The numbers of a record.
+pub(super) fn of_record(record: &Record) -> usize {
+    let always = [&record.time, &record.input.values, &record.output.values];
+    let sometimes = [&record.input_2, &record.reference];
+    bytes(always) + bytes(sometimes.into_iter().flatten().map(|signal| &signal.values))
+}
+
+/// Its copy of the records, what its models give on them, and the path of what nothing explains.
+pub(super) fn of_diagnosis(diagnosis: &Diagnosis) -> usize {
+    let records = diagnosis.records.iter();
+    let records = records.flat_map(|shown| {
+        let always = [&shown.time, &shown.input, &shown.output];
+        always.into_iter().chain(&shown.input_2)
+    });
+    let runs = diagnosis.steps.iter().flat_map(|step| &step.simulated);
+    let paths = diagnosis.unknown.iter();
+    let paths = paths.flat_map(|unknown| [&unknown.time, &unknown.value, &unknown.std_error]);
+    bytes(records) + bytes(runs) + bytes(paths)
+}

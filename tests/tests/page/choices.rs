@@ -144,8 +144,8 @@ fn the_unexplained_is_kept_by_name() {
 #[test]
 fn so_many_effects_and_no_more() {
     let rig = Rig {
-        samples: 400,
-        hidden: vec![("pump_deadzone", 0, vec![2.0]), ("overflow", 0, vec![17.0])],
+        samples: 1000,
+        hidden: vec![("pump_lag", 0, vec![25.0]), ("overflow", 0, vec![17.0])],
         ..Rig::single_tank()
     };
     let _alone = alone();

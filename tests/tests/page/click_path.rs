@@ -275,6 +275,19 @@ fn two_undecided_effects_show_their_experiment() {
         .filter_map(Value::as_f64)
         .collect();
     assert!(values.len() >= 300 && values.iter().all(|u| (1.5..=8.5).contains(u)));
+    // Of two that cannot be told apart one is in the model.
+    browser.click("#add-found-0");
+    wait_for_models(&mut browser, 2);
+    let first = browser.text("#effects code");
+    let other = "[id^=add-other-0-]";
+    assert_eq!(browser.text(other), "Take instead");
+    browser.click(other);
+    browser.until(&format!(
+        "document.querySelectorAll('#effects code').length === 1 && document.querySelector('#effects code').innerText !== '{first}'"
+    ));
+    wait_for_models(&mut browser, 2);
+    assert_eq!(browser.text("#add-found-0"), "Take instead");
+    browser.picture("instead");
     browser.assert_quiet(&address);
 }
 

@@ -60,7 +60,7 @@ function fall(state) {
   const unit = state.records.find((one) => one.read)?.read.output.unit || "";
   $("fall").hidden = !trail.length;
   if (!trail.length) return;
-  const numbers = trail.map((one, k) => make("b", { className: k === trail.length - 1 ? "last" : "" }, one.rmse_text));
+  const numbers = trail.map((one, k) => make("b", { className: k === trail.length - 1 && (k > 0 || one.adequate) ? "last" : "" }, one.rmse_text));
   const last = trail[trail.length - 1];
   const explained = last.adequate && state.current === last.id ? make("span", { className: "explained" }, " What is left looks like noise.") : null;
   fill($("fall"), "Simulation error ", numbers.flatMap((one, k) => (k ? [" → ", one] : [one])), ` ${unit}.`, explained);

@@ -32,10 +32,14 @@ export const button = (text, properties, press) => {
 /** An effect, and where it acts where there is a choice. */
 export const named = ({ effect, place }) => (place ? `${effect} (${place})` : effect);
 
-/** A text in which units have raised exponents. */
+const raised = (text) => text.split(/\^(-?\d+(?:\.\d+)?)/).map((part, k) => (k % 2 ? make("sup", {}, part) : part));
+
+/** A command of which no option breaks between two lines. */
+const command = (text) => make("code", {}, text.split(/(--[\w-]+)/).map((part, k) => (k % 2 ? make("span", { className: "option" }, part) : part)));
+
+/** A text in which units have raised exponents, and commands look like it. */
 export function units(text) {
-  const parts = String(text ?? "").split(/\^(-?\d+(?:\.\d+)?)/);
-  return parts.map((part, k) => (k % 2 ? make("sup", {}, part) : part));
+  return String(text ?? "").split(/`([^`]+)`/).flatMap((part, k) => (k % 2 ? command(part) : raised(part)));
 }
 
 export function table(element, heads, rows) {

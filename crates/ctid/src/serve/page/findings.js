@@ -15,24 +15,41 @@ export function start(fail) {
   });
 }
 
+const isOn = (state, effect) => state.effects.some((one) => one.effect === effect);
+
+/** Takes an effect in the place of one that these data cannot tell from it: both together would not be determined. */
+function instead(on, effect, place, fail, id) {
+  const press = async () => {
+    try {
+      await server.send("/api/effect", { do: "remove", effect: on });
+      await server.send("/api/effect", { do: "add", effect, place });
+    } catch (error) {
+      fail(error.message);
+    }
+  };
+  return button("Take instead", { id, ariaLabel: `Take ${named({ effect, place })} instead of ${on}` }, press);
+}
+
 /** Adds an effect, or takes it out where it is on. */
 function toggle(state, effect, place, fail, id) {
-  const on = state.effects.some((one) => one.effect === effect);
+  const on = isOn(state, effect);
   const name = named({ effect, place });
   const press = () => server.send("/api/effect", { do: on ? "remove" : "add", effect, place: on ? null : place }).catch((e) => fail(e.message));
   return button(on ? "Remove" : "Add", { id, className: on ? "added" : "primary", ariaLabel: `${on ? "Remove" : "Add"} ${name}` }, press);
 }
 
 function group(state, one, k, fail) {
+  const on = [one.effect, ...one.others].find((effect) => isOn(state, effect));
+  const choice = (effect, place, id) => (on && on !== effect ? instead(on, effect, place, fail, id) : toggle(state, effect, place, fail, id));
   const others = one.others.map((other) => {
     const place = state.diagnosis.ranking.find((score) => score.effect === other)?.place ?? null;
     return make("li", {}, make("code", {}, other), " ",
-      toggle(state, other, place, fail, `add-other-${k}-${other}`),
+      choice(other, place, `add-other-${k}-${other}`),
       button("What would tell?", { id: `tell-${k}-${other}`, ariaLabel: `Which experiment tells ${one.effect} from ${other}?` },
         () => experiment.ask({ group: k, between: [one.effect, other] }, fail)));
   });
   return make("li", { className: "found" },
-    make("div", { className: "head" }, make("code", { className: "name" }, named(one)), toggle(state, one.effect, one.place, fail, `add-found-${k}`)),
+    make("div", { className: "head" }, make("code", { className: "name" }, named(one)), choice(one.effect, one.place, `add-found-${k}`)),
     make("p", { className: "figures" }, one.size ? make("span", {}, units(one.size)) : null, one.rmse ? make("span", {}, "error then ", make("b", {}, units(one.rmse))) : null),
     one.sentence ? make("p", {}, units(one.sentence)) : null,
     others.length ? [make("p", { className: "caption" }, "These data cannot tell it from:"), make("ul", { className: "others" }, others)] : null);
@@ -68,7 +85,8 @@ function keep(state, found, fail) {
     await server.send("/api/effect", { do: "keep", effect: wanted }).catch((e) => { kept.delete(found.id); fail(e.message); });
   };
   box.addEventListener("keydown", (event) => { if (event.key === "Enter") press(); });
-  return [make("p", { className: "caption" }, "Whatever it is, its shape can stand in the model as an effect of your own; the fits scale it. It is drawn beside, under “What nothing explains”."),
+  const alone = found.unknown === "time" ? " It is a function of time, so it says nothing of other records." : "";
+  return [make("p", { className: "caption" }, `Whatever it is, its shape can stand in the model as an effect of your own; the fits scale it. It is drawn under “What nothing explains”.${alone}`),
     make("p", { className: "line" }, box, button("Keep the shape", { id: "keep" }, press))];
 }
 

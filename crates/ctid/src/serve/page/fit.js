@@ -117,7 +117,8 @@ export function draw() {
   if (!drawing || !window.Plotly) return;
   for (const [id, figure] of Object.entries(drawing.figures)) {
     const box = $(`plot-${id}`);
-    if (!box || !id.startsWith("record-") && !fits.length) continue;
+    // What nothing explains is that of the diagnosis, not of these fits.
+    if (!box || id.startsWith("unknown-") || !id.startsWith("record-") && !fits.length) continue;
     const made = id === "trail" && fits.length < 2 ? null : figure();
     if (made && id === "trail") {
       made.layout.height = 240;

@@ -160,9 +160,18 @@ impl<T: Scalar> Simulator<T> {
         let second_gain = structure.scales.input_2.map(|_| theta[1]);
         let mut actuators = [Vec::new(), Vec::new()];
         let (mut vessels, mut sensor) = (Vec::new(), Vec::new());
+        // The laws of joined vessels once more without derivatives.
+        let plain: Vec<f64> = theta.iter().map(|value| value.value()).collect();
+        let mut values = Vec::new();
         let mut at = own;
         for (&placed, count) in structure.effects().iter().zip(counts) {
             let site = structure.site(placed);
+            if plant.joined()
+                && placed.effect.place == Place::Vessel
+                && let Some(law) = effects::bind(placed.effect, &site, &plain[at..at + count])
+            {
+                values.push((placed.vessel, law));
+            }
             if let Some(law) = effects::bind(placed.effect, &site, &theta[at..at + count]) {
                 match placed.effect.place {
                     Place::Actuator => actuators[placed.vessel.min(1)].push(law),
@@ -173,6 +182,9 @@ impl<T: Scalar> Simulator<T> {
             at += count;
         }
         for (term, count) in structure.terms().iter().zip(term_counts) {
+            if plant.joined() && term.place == Place::Vessel {
+                values.push((term.vessel, term::bind(term, &plain[at..at + count])));
+            }
             let law = term::bind(term, &theta[at..at + count]);
             match term.place {
                 Place::Actuator => actuators[term.vessel.min(1)].push(law),
@@ -203,10 +215,15 @@ impl<T: Scalar> Simulator<T> {
         let layout = if plant.joined() {
             let (low, high) = structure.scales.level[measured];
             let valves = Valves::new(low.abs().max(high.abs()));
-            Layout::Joined(Box::new(Joined {
-                vessels: Vessels::new(parts, vessels, levels, (measured, Some(valves))),
-                second,
-            }))
+            let plain_parts = parts
+                .iter()
+                .map(|&(area, outlet, coefficient)| (area.value(), outlet, coefficient.value()));
+            let plain_levels: Vec<f64> = levels.iter().map(|level| level.value()).collect();
+            let seen = (measured, Some(valves));
+            let values = Vessels::new(plain_parts.collect(), values, &plain_levels, seen);
+            let mut vessels = Vessels::new(parts, vessels, levels, seen);
+            vessels.cut_by(values);
+            Layout::Joined(Box::new(Joined { vessels, second }))
         } else {
             Layout::Series(Vessels::new(parts, vessels, levels, (measured, None)))
         };

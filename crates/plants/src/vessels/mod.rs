@@ -2,9 +2,10 @@
 //!
 //! [`balance`] has the equations, [`losses`] how fast they become by what leaves beside the outlets, [`parts`] cuts a step,
 //! [`rims`] finds what happens in a part, [`runge_kutta`], [`exponential`] and [`implicit`] take it. [`joined`] has the valves between
-//! tanks, and how steps are cut and taken there.
+//! tanks, and how steps are cut there, [`exchange`] the implicit one.
 
 mod balance;
+mod exchange;
 mod exponential;
 mod implicit;
 mod joined;
@@ -81,6 +82,8 @@ pub(crate) struct Vessels<T: Scalar, const N: usize> {
     /// Of vessels that are joined: their valves, and what the second pump brings.
     valves: Option<Valves>,
     feed: Option<Feed<T>>,
+    /// The same vessels without derivatives, where they are joined: how a step is cut is found on them.
+    values: Option<Box<Vessels<f64, N>>>,
     /// The vessel whose level is measured.
     measured: usize,
     /// One over the shortest time constant of linear vessels; zero for others \[1/s\].
@@ -201,6 +204,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             damping: None,
             valves,
             feed: None,
+            values: None,
             measured,
             fastest,
         };

@@ -41,6 +41,9 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
                 q = q.part(share, T::constant(1.0));
             }
             self.laws[law].switch_over();
+            if let Some(values) = &mut self.values {
+                values.laws[law].switch_over();
+            }
             self.switches.retain(|&waiting| waiting != law);
         }
         self.stretch(h, &q, start, watch);

@@ -3,7 +3,7 @@
 use crate::Scalar;
 
 /// Below this level Torricelli's root, whose slope is infinite at zero, gives way to a parabola \[level unit\].
-const NEARLY_EMPTY: f64 = 1e-4;
+pub(super) const NEARLY_EMPTY: f64 = 1e-4;
 /// What stands for an empty vessel where its slope is asked by outflow over content \[level unit\].
 pub(super) const A_LITTLE: f64 = 1e-3 * NEARLY_EMPTY;
 

@@ -40,7 +40,7 @@ const LARGEST: f64 = 1e15;
 /// # Errors
 /// [`Error::CannotOpen`], [`Error::Folder`], [`Error::NotText`], [`Error::EmptyFile`],
 /// [`Error::NoHeader`], [`Error::Column`], [`Error::UnknownTimeUnit`], [`Error::WrongFieldCount`],
-/// [`Error::EmptyCell`], [`Error::TextInCell`], [`Error::NotFinite`], [`Error::MixedDecimalMarks`],
+/// [`Error::UnitRow`], [`Error::EmptyCell`], [`Error::TextInCell`], [`Error::NotFinite`], [`Error::MixedDecimalMarks`],
 /// [`Error::RepeatedTime`], [`Error::BackwardTime`], [`Error::TooFewRows`] (below
 /// [`MIN_ROWS`]), [`Error::Gap`], [`Error::ConstantInput`],
 /// [`Error::ConstantOutput`], [`Error::InvalidInterval`], [`Error::TooLarge`], [`Error::TooSmall`],
@@ -176,6 +176,16 @@ fn read_table(file: &str, text: &str, columns: &Columns) -> Result<(Layout, Tabl
                 },
             });
         }
+        if table.time.is_empty() && record.iter().all(is_word) {
+            let (name, unit) = unit::split(&layout.time.header);
+            let below = &record[layout.time.index];
+            let unit = if below.is_empty() { unit } else { below };
+            return Err(Error::UnitRow {
+                file: file.into(),
+                row,
+                header: unit::shown(&format!("{name} [{unit}]")),
+            });
+        }
         let mut cell = |column: &Found| numbers.parse(row, column, &record[column.index]);
         let time = numbers_time(&mut cell, &layout.time)?;
         table.input.push(cell(&layout.input)?);
@@ -196,6 +206,14 @@ fn read_table(file: &str, text: &str, columns: &Columns) -> Result<(Layout, Tabl
         Some((layout, _)) => Ok((layout, table)),
         None => Err(Error::EmptyFile { file: file.into() }),
     }
+}
+
+/// Whether a cell may be a unit: no number, and nothing that begins as a date or a number does.
+fn is_word(cell: &str) -> bool {
+    let cell_is_number = cell.parse::<f64>().is_ok();
+    cell.is_empty()
+        || cell == "-"
+        || !(cell_is_number || cell.starts_with(|c: char| c.is_ascii_digit() || "+-.,".contains(c)))
 }
 
 /// The time's cell; text there is most often a date, which has its own mend.

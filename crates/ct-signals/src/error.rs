@@ -129,6 +129,18 @@ pub enum Error {
         /// What to do.
         mend: &'static str,
     },
+    /// Below the header stands a row without a number.
+    #[error(
+        "{file}, row {row}: no cell is a number; if these are units, write them into the header, \"{header}\", and delete this row"
+    )]
+    UnitRow {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// The time's header with its unit.
+        header: String,
+    },
     /// A cell holds NaN or an infinity.
     #[error(
         "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or split the file there: each part is a record of its own"

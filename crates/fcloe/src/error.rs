@@ -168,8 +168,8 @@ pub enum Error {
     },
     /// The measured u is not what the controller makes of r - y.
     #[error(
-        "{record}: the measured u is not R/S (r - y): they differ by {mismatch:.3e} rms where u moves by {size:.3e} rms ({percent:.1} %); \
-         check the controller's coefficients, their units of time, the sign, and the signals' order; if it is right, leave u out",
+        "{record}: the measured u is not R/S (r - y): they differ by {mismatch:.3} rms where u moves by {size:.3} rms ({percent:.0} %); \
+         check the controller's coefficients, their units of time, the sign, and that u is the command as it was recorded",
         percent = 100.0 * mismatch / size
     )]
     ControllerMismatch {

@@ -45,13 +45,11 @@ pub enum Error {
     },
     /// A state of another model.
     #[error(
-        "the state belongs to another model: it was saved for {saved}, and the model now is {now}; name another state file, or delete it to begin anew"
+        "the state belongs to another model: {differences}; name another state file, or delete it to begin anew"
     )]
     OtherModel {
-        /// The model of the state.
-        saved: String,
-        /// The model that was given.
-        now: String,
+        /// What differs, in the words of the model file.
+        differences: String,
     },
     /// A state whose numbers do not go together.
     #[error("the state is damaged: {what}; delete it to begin anew")]

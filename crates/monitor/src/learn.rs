@@ -52,24 +52,6 @@ impl Model {
         let value = |name: &String| Some((name.clone(), *self.start.get(name)?));
         self.fixed.iter().filter_map(value).collect()
     }
-
-    /// What a state has to agree with.
-    pub(crate) fn fingerprint(&self) -> String {
-        let effects: Vec<String> = self
-            .effects
-            .iter()
-            .map(|placed| format!("{} ({})", placed.effect.id, placed.vessel))
-            .collect();
-        format!(
-            "{} with effects {effects:?}, terms {:?}, known {:?}, start {:?}, fixed {:?}, hold {:?}",
-            self.plant.id(),
-            self.terms,
-            self.known,
-            self.start,
-            self.fixed,
-            self.hold
-        )
-    }
 }
 
 /// What was learned.

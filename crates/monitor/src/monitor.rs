@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 use crate::{
     Alarm, Error, Model, Refused, ScatterAlarm, Settings, Units,
     core::{Checkpoint, Core, Phase},
+    fingerprint::{Fingerprint, differences, fingerprint},
     intake::{Intake, Sample},
 };
 
 /// The version of [`State`].
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// A command above so many times its full range is in another unit, or none, as in a record.
 const BEYOND: f64 = 1.01;
 /// A reading above so many times the tank's height is in another unit, or none; below it a sensor may be off, which is to be seen.
@@ -147,11 +148,26 @@ pub enum Progress {
     },
 }
 
+/// What is there to learn from, and what is needed at least before the next fit is tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gathered {
+    /// Rows.
+    pub rows: usize,
+    /// From the first to the last \[s\].
+    pub span: f64,
+    /// Rows that are needed.
+    pub rows_needed: usize,
+    /// Slowest time constants that are needed.
+    pub time_constants: f64,
+    /// What these last \[s\], by the latest fit; `None` before the first.
+    pub span_needed: Option<f64>,
+}
+
 /// A saved monitor: all of it, for [`Monitor::restore`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct State {
     version: u32,
-    model: String,
+    model: Fingerprint,
     units: Units,
     intake: Intake,
     checkpoint: Checkpoint,
@@ -170,7 +186,7 @@ impl State {
 pub struct Monitor {
     intake: Intake,
     core: Core,
-    fingerprint: String,
+    fingerprint: Fingerprint,
     units: Units,
 }
 
@@ -208,7 +224,7 @@ impl Monitor {
         ))?;
         Ok(Self {
             intake: Intake::new(),
-            fingerprint: model.fingerprint(),
+            fingerprint: fingerprint(&model),
             core: Core::new(model, settings, units.clone()),
             units,
         })
@@ -228,8 +244,7 @@ impl Monitor {
         }
         if state.model != monitor.fingerprint {
             return Err(Error::OtherModel {
-                saved: state.model,
-                now: monitor.fingerprint,
+                differences: differences(&state.model, &monitor.fingerprint),
             });
         }
         if !state.intake.sound() {
@@ -315,6 +330,12 @@ impl Monitor {
     #[must_use]
     pub fn estimates(&self) -> Vec<Estimate> {
         self.core.estimates()
+    }
+
+    /// What there is to learn from; `None` where the learning is over.
+    #[must_use]
+    pub fn gathered(&self) -> Option<Gathered> {
+        self.core.gathered()
     }
 
     /// Where it is.

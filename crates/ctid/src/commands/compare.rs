@@ -58,8 +58,7 @@ impl Compare {
     }
 
     /// What stands in the model file and has no effect, where there is such.
-    fn notes(&self, look: Look) -> Result<String, Error> {
-        let waiting = model_file::read(&self.model)?.waiting;
+    fn notes(waiting: &[String], look: Look) -> String {
         let note = |table: &String| {
             let name = table.split_once('.').map_or("", |(_, name)| name);
             look.paragraph(
@@ -67,7 +66,7 @@ impl Compare {
                 &format!("note: [{table}] has no effect until `ctid add {name}`"),
             )
         };
-        Ok(waiting.iter().map(note).collect())
+        waiting.iter().map(note).collect()
     }
 
     fn options(&self) -> Options<'static> {
@@ -79,7 +78,9 @@ impl Compare {
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
-        let problem = files.read()?;
+        let model = model_file::read(&self.model)?;
+        let waiting = model.waiting.clone();
+        let problem = files.read_with(model)?;
         let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
@@ -88,7 +89,7 @@ impl Compare {
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
-            &(self.notes(look)? + &terminal::comparison(&diagnosis, look)),
+            &(Self::notes(&waiting, look) + &terminal::comparison(&diagnosis, look)),
             &outputs,
             out,
             look,
@@ -99,7 +100,9 @@ impl Compare {
 impl Diagnose {
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
-        let problem = files.read()?;
+        let model = model_file::read(&self.compare.model)?;
+        let waiting = model.waiting.clone();
+        let problem = files.read_with(model)?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
         let mut options = self.compare.options();
@@ -113,7 +116,7 @@ impl Diagnose {
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
-            &(self.compare.notes(look)? + &terminal::diagnosis(&diagnosis, look)),
+            &(Compare::notes(&waiting, look) + &terminal::diagnosis(&diagnosis, look)),
             &outputs,
             out,
             look,

@@ -233,14 +233,17 @@ pub(crate) fn drift_verdict(found: &Identification) -> String {
 }
 
 fn error(found: &Identification, look: Look) -> String {
-    let unit = &found.shown.output.unit;
+    let unit = match found.shown.output.unit.as_str() {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
     let deviation = {
         let values = &found.shown.output.values;
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
         rms(values.iter().map(|y| y - mean))
     };
     let line = format!(
-        "{} {unit} root mean square, of an output that deviates by {} {unit}: fit {} %",
+        "{}{unit} root mean square, of an output that deviates by {}{unit}: fit {} %",
         numbers::significant(found.simulation_rmse, 3),
         numbers::significant(deviation, 3),
         numbers::significant(found.fit_percent, 3),

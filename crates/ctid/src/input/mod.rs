@@ -14,6 +14,20 @@ use crate::Error;
 use crate::model_file::{self, ModelFile};
 use crate::output::same_file;
 
+/// What is wrong with a record, where its name says that it is none.
+fn perhaps_a_model(path: &Path, error: ct_signals::Error) -> Error {
+    let named_as_model = path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    if named_as_model {
+        Error::Usage(format!(
+            "{error}; is this the model file? DATA takes the record, a .csv"
+        ))
+    } else {
+        error.into()
+    }
+}
+
 /// The files of a problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Files {
@@ -38,13 +52,21 @@ impl Files {
     /// # Errors
     /// One line that names the file, the place and the mend.
     pub fn read(&self) -> Result<Problem, Error> {
+        self.read_with(model_file::read(&self.model)?)
+    }
+
+    /// As [`Files::read`], where the model file has been read: a pipe can be read only once.
+    ///
+    /// # Errors
+    /// As [`Files::read`].
+    pub(crate) fn read_with(&self, model: ModelFile) -> Result<Problem, Error> {
         self.check_repetition()?;
-        let model = model_file::read(&self.model)?;
         let read = |paths: &[PathBuf]| -> Result<Vec<Record>, Error> {
             paths
                 .iter()
                 .map(|path| {
-                    let mut record = read_csv(path, &model.columns, model.hold)?;
+                    let mut record = read_csv(path, &model.columns, model.hold)
+                        .map_err(|error| perhaps_a_model(path, error))?;
                     record.name = self.name_of(path);
                     Ok(record)
                 })

@@ -36,16 +36,20 @@ impl Source<'_> {
                 names::suggestion(written, known.iter().copied())
             );
         } else if let Some((_, rest)) = what.split_once("unknown variant `") {
-            what = format!("unknown word `{rest}");
+            // The only key that takes one of some words without being looked at afterwards.
+            let word = rest.split('`').next().unwrap_or_default();
+            what = format!(
+                "hold = \"{word}\" is not known; write hold = \"zero\" (the command is held between rows) or hold = \"first\" (a straight line between rows)"
+            );
         } else if let Some(word) = what
             .strip_prefix("invalid type: string ")
             .and_then(|rest| rest.strip_suffix(", expected a sequence"))
         {
-            let start = error.span().map_or(0, |span| span.start);
-            let before = self.text.get(..start).unwrap_or_default();
-            let line = before.rsplit('\n').next().unwrap_or_default();
+            let line = self.line(error);
             let key = line.split('=').next().unwrap_or_default().trim();
             what = format!("{key} is a list; write {key} = [{word}]");
+        } else if let Some(mend) = number_with_more(self.line(error)) {
+            what = format!("numbers without a unit and with a decimal point: {mend}");
         } else if toml::from_str::<toml::Table>(self.text).is_err() {
             // what is wrong is the writing, not what it says
             what += "; write `key = value`, words in quotes, numbers without quotes and without a unit, each key once";
@@ -57,6 +61,15 @@ impl Source<'_> {
             };
         };
         self.at(span.start, what)
+    }
+
+    /// The line that the parser refuses.
+    fn line(&self, error: &toml::de::Error) -> &str {
+        let start = error.span().map_or(0, |span| span.start);
+        let (before, behind) = self.text.split_at_checked(start).unwrap_or_default();
+        let begin = before.rfind('\n').map_or(0, |at| at + 1);
+        let end = start + behind.find('\n').unwrap_or(behind.len());
+        self.text.get(begin..end).unwrap_or_default()
     }
 
     pub(super) fn plant(&self, name: Option<&Spanned<String>>) -> Result<Plant, Error> {
@@ -271,4 +284,26 @@ impl Source<'_> {
             )),
         }
     }
+}
+
+/// A line as it was meant, where its value begins as a number and has a unit behind it or a decimal comma.
+fn number_with_more(line: &str) -> Option<String> {
+    let (key, value) = line.split_once('=')?;
+    let word = value.split_whitespace().next()?;
+    let begins = word.trim_start_matches(['+', '-']);
+    if !begins.starts_with(|c: char| c.is_ascii_digit())
+        || toml::from_str::<toml::Table>(line).is_ok()
+    {
+        return None;
+    }
+    let key = key.trim();
+    // 1,000.0 may be a thousand, or a slip.
+    if word.matches([',', '.']).count() > 1 {
+        return Some(format!("{key} = 154.0, say"));
+    }
+    let point = word.replace(',', ".");
+    let number = (1..=point.len())
+        .rev()
+        .find_map(|end| point.get(..end)?.parse::<f64>().ok())?;
+    Some(format!("{key} = {number:?}"))
 }

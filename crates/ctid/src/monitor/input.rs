@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use ::monitor::{Monitor, Refused, Row, Units, instant};
-use ct_signals::{BadLine, Line, Rows};
+use ct_signals::{BadLine, Columns, Line, Rows};
 
 use super::{
     Halt, INPUT, Session, blame,
@@ -13,6 +13,8 @@ use crate::{Error, one_line};
 
 /// So many lines at the beginning may be parts of rows.
 const PARTS: usize = 2;
+/// The mend where names are missing: `tail -f` alone begins in the middle of the file.
+const HEADER_FIRST: &str = "begin with the header: tail -n +1 -f FILE";
 
 impl Session<'_> {
     pub(super) fn line(&mut self, cut: Cut) -> Result<(), Halt> {
@@ -102,15 +104,28 @@ impl Session<'_> {
         if said.is_empty() || said.starts_with('#') {
             return Ok(false);
         }
+        let named = self.columns != Columns::default();
         let (rows, is_row) = match Rows::begin(INPUT, self.line, text, &self.columns) {
             Err(ct_signals::Error::NoOrder { found, .. }) if self.parts < PARTS => {
                 self.parts += 1;
                 self.bad(|| format!("{found} numbers and no header; if this is no part of a row, give t,u,y or t,r,u,y"));
                 return Ok(false);
             }
+            Err(ct_signals::Error::NoOrder { .. }) | Ok((_, true)) if named => {
+                return Err(Error::Usage(format!(
+                    "{INPUT}, row {}: no header, and [columns] of {} names columns by it; {HEADER_FIRST}",
+                    self.line,
+                    self.arguments.model.display()
+                )));
+            }
             begun => begun?,
         };
-        self.screen.say(&format!("{INPUT}: {}", rows.order()));
+        let hint = if is_row {
+            format!("; where that is wrong, {HEADER_FIRST}")
+        } else {
+            String::new()
+        };
+        self.screen.say(&format!("{INPUT}: {}{hint}", rows.order()));
         let [input, output] = rows.units();
         let units = Units {
             output: output.to_string(),
@@ -121,6 +136,9 @@ impl Session<'_> {
         } else {
             self.monitor = Monitor::new(self.model.clone(), self.settings, units)
                 .map_err(|error| blame(error, self.arguments))?;
+        }
+        if self.monitor.gathered().is_some() {
+            self.screen.say("learning the plant from the first rows");
         }
         self.screen.units(rows.units()[1]);
         self.rows = Some(rows);

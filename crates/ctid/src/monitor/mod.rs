@@ -214,6 +214,10 @@ impl<'a> Session<'a> {
             Some(path) if saved => format!("; the state is in {}", path.display()),
             _ => String::new(),
         };
+        let learning = self.still_learning();
+        if !learning.is_empty() {
+            self.screen.say(&learning);
+        }
         self.screen
             .say(&format!("{why} after {} lines{bad}{saved}", self.line));
         Ok(())

@@ -31,9 +31,13 @@ impl Session<'_> {
                     .as_ref()
                     .map_or("", |rows| rows.name("time"))
                     .to_string();
+                let rows = match missing {
+                    1 => "1 row is".to_string(),
+                    n => format!("{n} rows are"),
+                };
                 match self.trouble.bad(|| {
                     format!(
-                        "{INPUT}, row {line}, column \"{name}\": {missing} rows are missing (the time steps from {from} to {to} s); {what}"
+                        "{INPUT}, row {line}, column \"{name}\": {rows} missing (the time steps from {from} to {to} s); {what}"
                     )
                 }) {
                     Some(text) => text,
@@ -105,6 +109,24 @@ impl Session<'_> {
         };
         self.screen.say(&one_line(&text));
         Ok(())
+    }
+
+    /// What is still needed, where nothing has been learned; empty where it has.
+    pub(super) fn still_learning(&self) -> String {
+        let Some(gathered) = self.monitor.gathered() else {
+            return String::new();
+        };
+        let number = significant(gathered.time_constants, 3);
+        let span = match gathered.span_needed {
+            Some(span) => format!("{} s ({number} time constants)", significant(span, 3)),
+            None => format!("{number} of the plant's slowest time constants"),
+        };
+        format!(
+            "still learning, nothing has been watched: {} rows over {} s; it needs at least {} rows and {span}",
+            gathered.rows,
+            significant(gathered.span, 4),
+            gathered.rows_needed
+        )
     }
 
     /// Says where the parameters are, when it is time.

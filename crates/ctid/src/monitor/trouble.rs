@@ -39,10 +39,7 @@ impl Trouble {
             };
             Some(message() + last)
         } else if power {
-            Some(format!(
-                "{} ({recent} such rows in a row or nearly so)",
-                message()
-            ))
+            Some(format!("{} ({recent} such rows by now)", message()))
         } else {
             None
         }

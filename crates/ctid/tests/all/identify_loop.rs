@@ -442,7 +442,11 @@ fn what_cannot_be_is_refused() {
         place.write("other.toml", model(0.5, ""));
         bad(
             &format!("loop.csv --model other.toml --method {method}"),
-            &["loop.csv", "is not R/S (r - y)", "they differ by", "rms"],
+            &[
+                "loop.csv: the measured command disagrees with the controller of the model file",
+                " V rms, ",
+                "check gain, integral_time (s), u_min and u_max, the sign",
+            ],
         );
         // the sign
         place.write("sign.toml", model(-PI.0, ""));

@@ -201,6 +201,23 @@ fn text_where_a_number_belongs() {
 }
 
 #[test]
+fn a_number_with_a_unit_or_a_decimal_comma() {
+    for (written, meant) in [
+        ("154 cm^2", "area = 154.0"),
+        ("154.5cm^2 # measured", "area = 154.5"),
+        ("154,0", "area = 154.0"),
+        ("1.5e2 cm^2", "area = 150.0"),
+        ("1,154.0", "area = 154.0, say"),
+    ] {
+        refuses(
+            &format!("plant = \"single-tank\"\n[known]\narea = {written}\ntank_height = 60.0"),
+            "tank.toml:3: numbers without a unit and with a decimal point",
+            meant,
+        );
+    }
+}
+
+#[test]
 fn a_syntax_error() {
     refuses("plant = \"single-tank\"\neffects = [", "tank.toml:2: ", "");
     refuses(
@@ -219,8 +236,8 @@ fn a_syntax_error() {
 fn an_unknown_hold() {
     refuses(
         "plant = \"single-tank\"\nhold = \"linear\"",
-        "tank.toml:2: unknown word `linear`",
-        "first",
+        "tank.toml:2: hold = \"linear\" is not known",
+        "hold = \"zero\" (the command is held between rows) or hold = \"first\" (a straight line",
     );
 }
 

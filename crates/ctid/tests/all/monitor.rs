@@ -372,7 +372,7 @@ fn a_state_goes_on_where_it_was() {
     refused(
         "--state s.json",
         "0,1,2,3\n",
-        "the state belongs to another model",
+        "the state belongs to another model: area: 154 then, 155 now; name another state file",
     );
 }
 
@@ -476,4 +476,54 @@ fn peak(child: &Child) -> u64 {
         .find(|line| line.starts_with("VmHWM"))
         .unwrap();
     line.split_whitespace().nth(1).unwrap().parse().unwrap()
+}
+
+/// Silence would say that all is well.
+#[test]
+fn rows_that_end_before_anything_is_learned() {
+    let place = place();
+    let outcome = fed(&place, "", text(HEADER, &rows(900, 9999)));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+    assert_says(&outcome, "learning the plant from the first rows\n");
+    assert_says(
+        &outcome,
+        "still learning, nothing has been watched: 900 rows over 1798 s; it needs at least 1000 rows and 20 of the plant's slowest time constants\n",
+    );
+    // A plant that is sampled four times as fast needs more rows for its twenty time constants.
+    let mut fast = rows(1100, 9999);
+    for row in &mut fast {
+        row[0] /= 10.0;
+    }
+    let model = MODEL.replace("154.0", "15.4");
+    place.write("m.toml", model);
+    let outcome = fed(&place, "--learn 100", text(HEADER, &fast[..110]));
+    assert_says(
+        &outcome,
+        "still learning, nothing has been watched: 110 rows",
+    );
+    assert_says(&outcome, " s (20 time constants)\n");
+    let learned = fed(&place, "", text(HEADER, &rows(2200, 9999)));
+    assert!(!learned.err.contains("still learning"), "{}", learned.err);
+}
+
+/// `tail -f` begins in the middle of the file.
+#[test]
+fn names_without_a_header_are_refused() {
+    let place = place();
+    let lines = text("", &rows(10, 9999));
+    let outcome = fed(&place, "", &lines);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+    let hint = "begin with the header: tail -n +1 -f FILE";
+    assert_says(&outcome, hint);
+    place.write(
+        "m.toml",
+        MODEL.to_string() + "[columns]\ninput = \"u [V]\"\n",
+    );
+    let outcome = fed(&place, "", &lines);
+    assert_eq!(outcome.code, Some(2), "{}", outcome.err);
+    assert_says(&outcome, "row 1: no header, and [columns] of m.toml");
+    assert_says(&outcome, hint);
+    let outcome = fed(&place, "", HEADER.to_string() + &lines);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+    assert!(!outcome.err.contains(hint), "{}", outcome.err);
 }

@@ -578,3 +578,21 @@ fn a_tour_writes_its_report_and_a_second_one_destroys_nothing() {
     before.insert(place.path("report-3.html"), Some(page.into_bytes()));
     assert!(place.snapshot() == before);
 }
+
+/// A shell's `--model <(...)` is a pipe, which gives its content once.
+#[cfg(unix)]
+#[test]
+fn a_model_file_may_be_a_pipe() {
+    let place = Place::new();
+    let mut child = place
+        .command("compare tour.csv --model /dev/stdin")
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    std::io::Write::write_all(&mut input, bundled("tour.toml").as_bytes()).unwrap();
+    drop(input);
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+}

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::{Core, Fed, KEPT, Phase};
 use crate::{
-    Notice,
+    Gathered, Notice,
     bank::Bank,
     intake::Sample,
     isolate::Kept,
@@ -18,6 +18,7 @@ impl Core {
     pub(super) fn begin(&mut self, every: usize) {
         self.now.phase = Phase::Learning {
             next: self.settings.learning_rows,
+            span: None,
         };
         self.now.every = every;
         self.now.kept.clear();
@@ -31,8 +32,23 @@ impl Core {
         self.set_checkpoint();
     }
 
-    /// Gathers a row to learn from; a fit is tried at `next` rows.
-    pub(super) fn gather(&mut self, sample: Sample, next: usize) -> Fed {
+    /// What there is to learn from, while it learns.
+    pub(crate) fn gathered(&self) -> Option<Gathered> {
+        let Phase::Learning { next, span } = self.now.phase else {
+            return None;
+        };
+        let ends = self.now.kept.front().zip(self.now.kept.back());
+        Some(Gathered {
+            rows: self.now.kept.len() * self.now.every,
+            span: ends.map_or(0.0, |(first, last)| last.sample.time - first.sample.time),
+            rows_needed: next.min(KEPT) * self.now.every,
+            time_constants: self.settings.learning_time_constants,
+            span_needed: span,
+        })
+    }
+
+    /// Gathers a row to learn from; a fit is tried at `next` rows. `span`: so many seconds are known to be needed.
+    pub(super) fn gather(&mut self, sample: Sample, next: usize, span: Option<f64>) -> Fed {
         self.now.kept.push_back(Kept {
             sample,
             levels: [0.0; plants::MAX_VESSELS],
@@ -50,7 +66,7 @@ impl Core {
         let notice = match learn(&self.model, &records) {
             Err(why) => {
                 // The older half goes: what comes next may say more.
-                self.later(2 * next, |kept| {
+                self.later(2 * next, span, |kept| {
                     kept.drain(..KEPT / 2);
                 });
                 Some(Notice::NotLearned { why })
@@ -62,7 +78,7 @@ impl Core {
                     let full = self.now.kept.len() == KEPT;
                     let rows = self.now.kept.len() as f64 * needed / span;
                     // A little more, for the estimate of the time constant moves.
-                    self.later((1.02 * rows).ceil() as usize, halve);
+                    self.later((1.02 * rows).ceil() as usize, Some(needed), halve);
                     if full {
                         self.now.every *= 2;
                         self.set_checkpoint();
@@ -80,14 +96,14 @@ impl Core {
     }
 
     /// Puts the next try off to so many rows; where no more fit in, room is made.
-    fn later(&mut self, next: usize, room: impl FnOnce(&mut VecDeque<Kept>)) {
+    fn later(&mut self, next: usize, span: Option<f64>, room: impl FnOnce(&mut VecDeque<Kept>)) {
         let next = if self.now.kept.len() < KEPT {
             next.min(KEPT)
         } else {
             room(&mut self.now.kept);
             KEPT
         };
-        self.now.phase = Phase::Learning { next };
+        self.now.phase = Phase::Learning { next, span };
         if self.now.kept.len() < KEPT && self.since.len() >= KEPT {
             self.set_checkpoint();
         }

@@ -35,8 +35,8 @@ const BAND: f64 = 1.96;
 /// Where the watching is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Phase {
-    /// Rows are gathered; at so many a fit is tried.
-    Learning { next: usize },
+    /// Rows are gathered; at `next` a fit is tried. The one before has found that `span` seconds are needed.
+    Learning { next: usize, span: Option<f64> },
     /// The learned model is watched.
     Watching,
     /// It does not fit, and stays as it was learned until it fits again.
@@ -113,6 +113,7 @@ impl Core {
         let now = Checkpoint {
             phase: Phase::Learning {
                 next: settings.learning_rows,
+                span: None,
             },
             every: 1,
             kept: VecDeque::with_capacity(KEPT),
@@ -250,7 +251,7 @@ impl Core {
         // Behind a checkpoint that a new beginning has set: the sample belongs to what follows it.
         self.since.push(sample);
         let fed = match self.now.phase {
-            Phase::Learning { next } => self.gather(sample, next),
+            Phase::Learning { next, span } => self.gather(sample, next, span),
             _ => self.watch(sample),
         };
         Fed {

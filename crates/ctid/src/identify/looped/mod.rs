@@ -292,6 +292,16 @@ impl Task<'_> {
     /// The record's name before what the crate says, which does not always know it.
     fn named(&self, error: Error) -> Error {
         match error {
+            Error::Loop(fcloe::Error::ControllerMismatch { mismatch, size, .. }) => Error::File {
+                file: self.record.name.clone(),
+                what: format!(
+                    "the measured command disagrees with the controller of the model file, R/S (r - y), by {} {} rms, {:.0} % of what it moves: \
+                     check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+                    crate::numbers::significant(mismatch, 3),
+                    self.record.input.unit,
+                    100.0 * mismatch / size
+                ),
+            },
             Error::Loop(what) => {
                 let what = what.to_string();
                 let name = format!("{}: ", self.record.name);

@@ -236,3 +236,18 @@ fn too_few_rows_for_the_parameters() {
         ],
     );
 }
+
+#[test]
+fn units_in_a_row_of_their_own() {
+    let rows = Rows::new().text();
+    let (header, numbers) = rows.split_once('\n').unwrap();
+    for units in ["s,V,cm", "s,-,°C", "s,,m3/h"] {
+        record_refused(
+            format!("{header}\n{units}\n{numbers}"),
+            &[
+                "bad.csv, row 2: no cell is a number",
+                "write them into the header, \"t [s]\", and delete this row",
+            ],
+        );
+    }
+}

@@ -118,6 +118,13 @@ fn wrong_usage() {
                 "is this the record? --model takes the .toml",
             ],
         ),
+        (
+            "compare tour.toml --model tour.toml",
+            [
+                "tour.toml, row 1",
+                "is this the model file? DATA takes the record, a .csv",
+            ],
+        ),
     ] {
         place.refuses(words, &says);
     }

@@ -634,3 +634,19 @@ fn a_nonsense_file_is_an_error_and_no_panic() {
         assert!(read(text).is_err(), "{text:?}");
     }
 }
+
+#[test]
+fn a_row_of_units_below_the_header() {
+    let columns = named("Time", "Pump", "Level");
+    let numbers = text("", &rows()).trim_start().replace(',', ";");
+    let with = |units: &str| format!("Time;Pump;Level\n{units}{numbers}");
+    let error = read_bytes(with("s;V;cm\n").as_bytes(), &columns).unwrap_err();
+    assert!(matches!(error, Error::UnitRow { row: 2, .. }), "{error:?}");
+    says(&error, &["write them into the header, \"Time [s]\""]);
+    assert!(read_bytes(with("").as_bytes(), &columns).is_ok());
+    // One word among numbers, and a date, are no units.
+    for row in ["s;1;2\n", "2026-01-01;1.2.3;-x\n"] {
+        let error = read_bytes(with(row).as_bytes(), &columns).unwrap_err();
+        assert!(matches!(error, Error::TextInCell { .. }), "{error:?}");
+    }
+}

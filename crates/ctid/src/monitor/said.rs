@@ -116,7 +116,7 @@ impl Session<'_> {
         let Some(gathered) = self.monitor.gathered() else {
             return String::new();
         };
-        let number = significant(gathered.time_constants, 3);
+        let number = gathered.time_constants;
         let span = match gathered.span_needed {
             Some(span) => format!("{} s ({number} time constants)", significant(span, 3)),
             None => format!("{number} of the plant's slowest time constants"),

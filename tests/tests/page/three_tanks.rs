@@ -1,4 +1,4 @@
-//! Three tanks and two pumps with the mouse: what has to be said of them, and what another plant leaves of it.
+//! Three tanks and two pumps with the mouse: what has to be said of them, and a leak that is found and added.
 
 use ctid_tests::three_tanks::record;
 use serde_json::json;
@@ -22,7 +22,6 @@ fn written(browser: &mut Browser, id: &str, text: &str) {
 }
 
 #[test]
-#[ignore = "not yet seen to end: it ran for 200 s on a busy machine"]
 fn a_leak_of_three_tanks_is_found_and_added() {
     let address = format!("http://{}/", serve(&[]));
     let _alone = alone();
@@ -53,8 +52,20 @@ fn a_leak_of_three_tanks_is_found_and_added() {
     browser.press("Tab", 9, "");
     browser.until("document.getElementById('model-error').innerText.includes('which tank')");
     assert!(!browser.text("#text").contains("three-tank"));
+    // The two letters are two changes; the answer to the first one does not take the second one back.
     browser.choose("known-measured", "T3", "value === 'T3'");
     wait_for_models(&mut browser, 1);
+    assert!(
+        browser
+            .evaluate("document.getElementById('text').textContent")
+            .as_str()
+            .unwrap()
+            .contains("measured = \"T3\"")
+    );
+    assert_eq!(
+        browser.evaluate("document.getElementById('known-measured').value"),
+        json!("T3")
+    );
     assert_eq!(browser.text("#model-error"), "");
     let about = browser.text("#records");
     assert!(about.contains("u1 ") && about.contains("u2 "), "{about}");
@@ -77,17 +88,5 @@ fn a_leak_of_three_tanks_is_found_and_added() {
         .evaluate("document.getElementById('plot-record-0').data.slice(-2).map((one) => one.name)");
     assert_eq!(drawn, json!(["input 1", "input 2"]));
 
-    // One pump has no second command, and whoever chooses no plant has the one that the model has.
-    choose_plant(&mut browser, "single-tank");
-    browser.until("document.getElementById('text').textContent.includes('single-tank') && !document.getElementById('column-input_2')");
-    let text = browser.text("#text");
-    assert!(
-        !text.contains("input_2") && !text.contains("measured"),
-        "{text}"
-    );
-    choose_plant(&mut browser, "three-tank");
-    browser.until("document.getElementById('known-measured')?.value === ''");
-    browser.choose("plant", "c", "value === ''");
-    browser.until("document.getElementById('plant').value === 'single-tank' && !document.getElementById('known-measured')");
     browser.assert_quiet(&address);
 }

@@ -10,6 +10,8 @@ let draft = null;
 let from = { plant: "", known: {}, controller: null };
 // What stands in the model once what was sent is answered: what is sent before that was filled in over it.
 let turn = null;
+// So many changes were sent and are not answered: until then the form is ahead of the model, and is not filled.
+let unanswered = 0;
 // Somebody else has written what the form was about to write over.
 let overtaken = null;
 // The list of effects as it stands there.
@@ -145,6 +147,8 @@ function chosen() {
 /** Sends the form. Columns are said to the model only where they differ from what is guessed, or stand there already. */
 export async function changed() {
   if (!$("plant").value) return;
+  unanswered += 1;
+  let refused = null;
   try {
     const said = settings();
     const { guessed, settings: { columns } } = server.current();
@@ -161,11 +165,15 @@ export async function changed() {
     await written;
     from = { plant: said.plant, known: said.known, controller: said.controller };
     data.wrote(said);
-    trouble(null);
   } catch (error) {
-    if (error.status === 409) { await refill(error.message); return; }
+    refused = error;
+  }
+  unanswered -= 1;
+  if (!refused) settle(server.current());
+  else if (refused.status === 409) await refill(refused.message);
+  else {
     keep();
-    trouble(error.message);
+    trouble(refused.message);
     $("model-error").scrollIntoView({ block: "nearest" });
   }
 }
@@ -246,7 +254,12 @@ export function show(state, fail) {
   $("loop").value = state.loop.measured ? "measured" : "simulated";
   const fitted = state.records.filter((one) => !one.held_out);
   $("loop-line").hidden = !(state.loop.known && fitted.length && fitted.every((one) => one.read?.reference));
-  if (drafting()) return;
+  settle(state);
+}
+
+/** The form as the model has it, once nothing is under way, and what is wrong with the model. */
+function settle(state) {
+  if (unanswered || drafting()) return;
   if (overtaken && overtaken.text !== state.text) overtaken = null;
   trouble(overtaken?.why ?? (state.text && state.model_error ? state.model_error : null));
   form(state);

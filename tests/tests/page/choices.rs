@@ -6,7 +6,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
-use crate::click_path::{choose_plant, wait_for_models};
+use crate::click_path::{choose_measured_tank, wait_for_models};
 use crate::server::{Tab, alone, command, csv, serve};
 
 /// A tank in a loop, its model file with the controller, and what `ctid compare` says of them in either way.
@@ -99,13 +99,7 @@ fn the_unexplained_is_kept_by_name() {
     std::fs::write(&file, wave(1)).unwrap();
     browser.drop_files("#drop-fitted", &[&file]);
     browser.until("document.querySelector('#records li')");
-    choose_plant(&mut browser, "single-tank");
-    wait_for_models(&mut browser, 1);
-    browser.click("#known-area");
-    browser.type_text("154");
-    browser.press("Enter", 13, "\r");
-    browser.until("document.getElementById('text').textContent.includes('area = 154') && document.querySelector('#parameters').innerText.includes('cm3/(V s)')");
-    wait_for_models(&mut browser, 1);
+    choose_measured_tank(&mut browser);
     browser.click("#most");
     browser.type_text("0");
     browser.click("#diagnose");

@@ -55,6 +55,17 @@ pub fn choose_plant(browser: &mut Browser, plant: &str) {
     browser.choose("plant", &plant[..1], &format!("value === '{plant}'"));
 }
 
+/// A tank of 154 cm^2, fitted before and after its area is said.
+pub fn choose_measured_tank(browser: &mut Browser) {
+    choose_plant(browser, "single-tank");
+    wait_for_models(browser, 1);
+    browser.click("#known-area");
+    browser.type_text("154");
+    browser.press("Enter", 13, "\r");
+    browser.until("document.getElementById('text').textContent.includes('area = 154') && document.querySelector('#parameters').innerText.includes('cm3/(V s)')");
+    wait_for_models(browser, 1);
+}
+
 /// Downloads the model by a click.
 fn download(browser: &mut Browser) -> PathBuf {
     let folder = browser.folder.path().join("downloads");
@@ -179,13 +190,7 @@ fn the_bundled_record_with_the_mouse() {
         serde_json::json!([["t [s]", "s"], ["u [V]", "V"], ["y [cm]", "cm"]])
     );
 
-    choose_plant(&mut browser, "single-tank");
-    wait_for_models(&mut browser, 1);
-    browser.click("#known-area");
-    browser.type_text("154");
-    browser.press("Enter", 13, "\r");
-    browser.until("document.getElementById('text').textContent.includes('area = 154') && document.querySelector('#parameters').innerText.includes('cm3/(V s)')");
-    wait_for_models(&mut browser, 1);
+    choose_measured_tank(&mut browser);
     let failing = "document.getElementById('plot-record-0').layout.shapes.length";
     assert!(
         browser.evaluate(failing).as_u64().unwrap() > 0,

@@ -1,6 +1,7 @@
 //! What somebody else has written meanwhile is not written over.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::MutexGuard;
 
 use serde_json::json;
 use tempfile::TempDir;
@@ -23,19 +24,25 @@ fn type_over(browser: &mut Browser, id: &str, text: &str) {
     browser.type_text(text);
 }
 
-/// Somebody is in a field when an editor writes the same field, and then another one.
-#[test]
-fn a_field_that_was_overtaken_is_filled_again_and_says_so() {
-    let (_folder, file, text) = model();
+/// A page that shows a model file; `None` where there is no browser.
+fn opened(file: &Path) -> Option<(Browser, String, MutexGuard<'static, ()>)> {
     let address = format!(
         "http://{}/",
         serve(&["--model", &file.display().to_string()])
     );
-    let _alone = alone();
-    let Some(mut browser) = Browser::open(&address) else {
+    let alone = alone();
+    let mut browser = Browser::open(&address)?;
+    browser.until("document.getElementById('known-area')?.value === '154'");
+    Some((browser, address, alone))
+}
+
+/// Somebody is in a field when an editor writes the same field, and then another one.
+#[test]
+fn a_field_that_was_overtaken_is_filled_again_and_says_so() {
+    let (_folder, file, text) = model();
+    let Some((mut browser, _, _alone)) = opened(&file) else {
         return;
     };
-    browser.until("document.getElementById('known-area')?.value === '154'");
     type_over(&mut browser, "known-area", "160");
     let newer = text.replace("154.0 ", "150.0 ");
     std::fs::write(&file, &newer).unwrap();
@@ -78,15 +85,9 @@ fn a_field_that_was_overtaken_is_filled_again_and_says_so() {
 #[test]
 fn fields_that_are_filled_in_quickly_do_not_overtake_each_other() {
     let (_folder, file, _) = model();
-    let address = format!(
-        "http://{}/",
-        serve(&["--model", &file.display().to_string()])
-    );
-    let _alone = alone();
-    let Some(mut browser) = Browser::open(&address) else {
+    let Some((mut browser, address, _alone)) = opened(&file) else {
         return;
     };
-    browser.until("document.getElementById('known-area')?.value === '154'");
     browser.evaluate(
         "for (const [id, value] of [['known-area', '155'], ['known-tank_height', '62'], ['known-input_range', '11']]) {
            const box = document.getElementById(id); box.value = value; box.dispatchEvent(new Event('change', { bubbles: true })); }",

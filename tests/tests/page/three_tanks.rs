@@ -88,5 +88,16 @@ fn a_leak_of_three_tanks_is_found_and_added() {
         .evaluate("document.getElementById('plot-record-0').data.slice(-2).map((one) => one.name)");
     assert_eq!(drawn, json!(["input 1", "input 2"]));
 
+    // Once the leak is taken out its tank does not stand in the way of a plant that has no such tank, nor does the second command.
+    browser.click("#effects button[aria-label^='Remove']");
+    browser.until("document.getElementById('text').textContent.includes('effects = []')");
+    choose_plant(&mut browser, "single-tank");
+    browser.until("document.getElementById('text').textContent.includes('single-tank') && !document.getElementById('column-input_2')");
+    let text = browser.evaluate("document.getElementById('text').textContent");
+    let text = text.as_str().unwrap();
+    assert!(
+        !text.contains("input_2") && !text.contains("measured"),
+        "{text}"
+    );
     browser.assert_quiet(&address);
 }

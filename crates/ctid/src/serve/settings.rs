@@ -1,6 +1,7 @@
 //! What the page's form says of the model: read from a model file, and written into it, comments and layout kept.
 
 use ct_signals::{Columns, Hold};
+use plants::{EffectInfo, Plant};
 use serde::{Deserialize, Serialize};
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 
@@ -112,6 +113,7 @@ impl Settings {
         let mut document = edit::document(file, text)?;
         let root = document.as_table_mut();
         put(root, "plant", Some(self.plant.as_str().into()));
+        forget_places(root, &self.plant);
         if !root.contains_key("effects") {
             root.insert("effects", Item::Value(Array::new().into()));
         }
@@ -177,6 +179,33 @@ impl Settings {
             text,
             done: format!("{file}: settings written"),
         })
+    }
+}
+
+/// Of effects that are not on, the places that this plant does not have: an effect that was taken out of one would stand in the way of
+/// another plant for ever, and where it stands next is said when it is added.
+fn forget_places(root: &mut Table, plant: &str) {
+    let Ok(plant) = plant.parse::<Plant>() else {
+        return;
+    };
+    let on = root.get("effects").and_then(Item::as_array);
+    let on: Vec<String> = on
+        .into_iter()
+        .flatten()
+        .filter_map(|id| id.as_str().map(str::to_string))
+        .collect();
+    let Some(tables) = root.get_mut("effect").and_then(Item::as_table_like_mut) else {
+        return;
+    };
+    for (id, table) in tables.iter_mut() {
+        let effect = EffectInfo::find(id.get()).filter(|_| !on.iter().any(|on| on == id.get()));
+        let (Some(effect), Some(table)) = (effect, table.as_table_like_mut()) else {
+            continue;
+        };
+        let place = table.get("where").and_then(Item::as_str);
+        if place.is_some_and(|word| model_file::vessel(plant, effect, word).is_err()) {
+            table.remove("where");
+        }
     }
 }
 
@@ -314,6 +343,24 @@ rim = 20.0
             "{text}"
         );
         assert_eq!(Settings::of(&text), settings);
+    }
+
+    #[test]
+    fn an_effect_that_was_taken_out_does_not_stand_in_the_way_of_another_plant() {
+        let of = |effects: &str| {
+            format!(
+                "plant = \"three-tank\"\neffects = [{effects}]\n[known]\nmeasured = \"T3\"\n[effect.leak_at_height]\nwhere = \"T1\"\n"
+            )
+        };
+        let settings = Settings {
+            plant: "single-tank".into(),
+            ..Settings::default()
+        };
+        let edited = settings.clone().written_into("m.toml", &of("")).unwrap();
+        assert!(!edited.text.contains("where"), "{}", edited.text);
+        // One that is on is not moved in silence.
+        let refused = settings.written_into("m.toml", &of("\"leak_at_height\""));
+        assert!(refused.is_err_and(|error| error.to_string().contains("T1")));
     }
 
     #[test]

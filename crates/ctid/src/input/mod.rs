@@ -52,6 +52,7 @@ impl Files {
     /// # Errors
     /// One line that names the file, the place and the mend.
     pub fn read(&self) -> Result<Problem, Error> {
+        self.check_repetition()?;
         self.read_with(model_file::read(&self.model)?)
     }
 

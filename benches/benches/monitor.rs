@@ -7,7 +7,7 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use ct_signals::{Hold, excitation, noise};
+use ct_signals::{excitation, noise};
 use monitor::{Model, Monitor, Row, Settings, Units};
 use plants::{Command, Dual, Known, Plant, Scalar, Scales, Simulator, Structure};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -48,15 +48,7 @@ fn rows() -> Vec<Row> {
 }
 
 fn learned(rows: &[Row]) -> Monitor {
-    let model = Model {
-        plant: Plant::SingleTank,
-        known: known(),
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        hold: Hold::Zero,
-    };
+    let model = Model::new(Plant::SingleTank, known());
     let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
     for row in &rows[..LEARNED] {
         monitor.update(row).unwrap();

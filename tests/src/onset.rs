@@ -206,13 +206,8 @@ impl Onset {
     pub fn watched(&self, settings: Settings, seed: u64) -> Option<Vec<Alarm>> {
         let record = self.run(true, seed)?;
         let model = Model {
-            plant: self.rig.plant,
-            known: self.rig.known(),
-            effects: Vec::new(),
-            terms: Vec::new(),
-            start: BTreeMap::new(),
-            fixed: Vec::new(),
             hold: record.hold,
+            ..Model::new(self.rig.plant, self.rig.known())
         };
         let units = Units {
             output: record.output.unit.clone(),

@@ -82,8 +82,8 @@ pub(crate) fn minimise(
         let step = at.solve(free, &vec![1.0; p], 0.0);
         (at.cost() - at.predicted(&step)) / at.cost()
     };
-    let end = |at: &Triangle, free: &[usize]| {
-        if promised(at, free) <= 1e3 * stopping.cost {
+    let end = |promised: f64| {
+        if promised <= 1e3 * stopping.cost {
             Stop::Converged
         } else {
             Stop::Stuck
@@ -97,7 +97,8 @@ pub(crate) fn minimise(
         let free: Vec<usize> = (0..p)
             .filter(|&j| !held(x[j], bounds[j], at.descent(j)))
             .collect();
-        if free.is_empty() || cost == 0.0 || promised(&at, &free) <= stopping.cost {
+        let here = promised(&at, &free);
+        if free.is_empty() || cost == 0.0 || here <= stopping.cost {
             return Minimum {
                 x,
                 triangle: at,
@@ -125,11 +126,10 @@ pub(crate) fn minimise(
         let moved: Vec<f64> = trial.iter().zip(&x).map(|(to, from)| to - from).collect();
         let predicted = cost - at.predicted(&moved);
         if moved.iter().all(|d| *d == 0.0) || predicted.abs() <= 1e-15 * cost {
-            let stop = end(&at, &free);
             return Minimum {
                 x,
                 triangle: at,
-                stop,
+                stop: end(here),
             };
         }
         evaluations += 1;
@@ -151,7 +151,7 @@ pub(crate) fn minimise(
             } else {
                 0
             };
-            if small_steps >= 2 && end(&at, &free) == Stop::Converged {
+            if small_steps >= 2 && end(promised(&at, &free)) == Stop::Converged {
                 return Minimum {
                     x,
                     triangle: at,
@@ -160,11 +160,10 @@ pub(crate) fn minimise(
             }
         } else {
             if damping > 1e12 || predicted.abs() <= 1e-3 * stopping.cost * cost {
-                let stop = end(&at, &free);
                 return Minimum {
                     x,
                     triangle: at,
-                    stop,
+                    stop: end(here),
                 };
             }
             damping *= growth;

@@ -36,6 +36,20 @@ pub struct Model {
 }
 
 impl Model {
+    /// The plant alone, with nothing said of its parameters, under a command that is held between rows.
+    #[must_use]
+    pub fn new(plant: Plant, known: Known) -> Self {
+        Self {
+            plant,
+            known,
+            effects: Vec::new(),
+            terms: Vec::new(),
+            start: BTreeMap::new(),
+            fixed: Vec::new(),
+            hold: Hold::Zero,
+        }
+    }
+
     /// The plant with its effects.
     pub(crate) fn structure(&self, scales: Scales) -> Result<Structure, plants::Error> {
         let plant = Structure::new(self.plant, self.known.clone(), scales);

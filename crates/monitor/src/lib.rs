@@ -20,15 +20,8 @@
 //! use plants::{Known, Plant};
 //! use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 //!
-//! let model = Model {
-//!     plant: Plant::SingleTank,
-//!     known: Known { area: [Some(154.0), None, None], ..Known::default() },
-//!     effects: Vec::new(),
-//!     terms: Vec::new(),
-//!     start: Default::default(),
-//!     fixed: Vec::new(),
-//!     hold: ct_signals::Hold::Zero,
-//! };
+//! let known = Known { area: [Some(154.0), None, None], ..Known::default() };
+//! let model = Model::new(Plant::SingleTank, known);
 //! let units = Units { output: "cm".into(), input: "V".into() };
 //! let mut monitor = Monitor::new(model, Settings::default(), units)?;
 //!

@@ -1,7 +1,7 @@
 //! A believed model that remembers: what came before the onset that is looked for is on its way yet.
 #![allow(clippy::unwrap_used)]
 
-use ct_signals::{Hold, excitation, noise};
+use ct_signals::{excitation, noise};
 use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
 use plants::{EffectInfo, Known, Placed, Plant};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -29,13 +29,8 @@ fn a_leak_behind_a_dead_time_is_named_and_measured() {
     }
     let noise = noise::white(count, 0.05, rng);
     let model = Model {
-        plant: Plant::SingleTank,
-        known,
         effects: vec![placed("transport_delay")],
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        hold: Hold::Zero,
+        ..Model::new(Plant::SingleTank, known)
     };
     let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
     let mut alarms: Vec<Alarm> = Vec::new();

@@ -68,18 +68,11 @@ impl Tank {
 }
 
 fn model() -> Model {
-    Model {
-        plant: Plant::SingleTank,
-        known: Known {
-            area: [Some(154.0), None, None],
-            ..Known::default()
-        },
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        hold: Hold::Zero,
-    }
+    let known = Known {
+        area: [Some(154.0), None, None],
+        ..Known::default()
+    };
+    Model::new(Plant::SingleTank, known)
 }
 
 fn units() -> Units {
@@ -484,21 +477,27 @@ fn gaps_are_said_and_bridged_or_waited_out() {
     assert!(matches!(monitor.progress(), Progress::Watching { .. }));
 }
 
+/// Why a first row of input and output is refused, beside one that is taken.
+fn refused(model: Model, row: [f64; 2], taken: [f64; 2]) -> Refused {
+    let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
+    let row_of = |[input, output]: [f64; 2]| Row {
+        time: 0.0,
+        input,
+        output,
+    };
+    let refused = monitor.update(&row_of(row)).unwrap_err();
+    assert_eq!(monitor.rows(), 0);
+    monitor.update(&row_of(taken)).unwrap();
+    refused
+}
+
 #[test]
 fn a_command_that_no_pump_gets_is_refused() {
     let mut model = model();
     model.known.input_range = Some(10.0);
-    let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
-    let row = |input| Row {
-        time: 0.0,
-        input,
-        output: 16.0,
-    };
-    let refused = monitor.update(&row(65535.0)).unwrap_err();
+    let refused = refused(model, [65535.0, 16.0], [10.0, 16.0]);
     assert!(matches!(refused, Refused::BeyondRange { .. }));
     assert_eq!(refused.column(), "input");
-    assert_eq!(monitor.rows(), 0);
-    monitor.update(&row(10.0)).unwrap();
 }
 
 /// A reading a little above the tank is a sensor that is off, and to be seen; one far above it is none.
@@ -506,17 +505,9 @@ fn a_command_that_no_pump_gets_is_refused() {
 fn a_reading_that_no_tank_of_this_height_gives_is_refused() {
     let mut model = model();
     model.known.tank_height = Some(30.0);
-    let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
-    let row = |output| Row {
-        time: 0.0,
-        input: 5.0,
-        output,
-    };
-    let refused = monitor.update(&row(160.0)).unwrap_err();
+    let refused = refused(model, [5.0, 160.0], [5.0, 33.0]);
     assert!(matches!(refused, Refused::AboveTank { .. }));
     assert_eq!(refused.column(), "output");
-    assert_eq!(monitor.rows(), 0);
-    monitor.update(&row(33.0)).unwrap();
 }
 
 /// A row whose time lies far ahead, or a clock that begins anew, makes the monitor deaf for a hundred rows and no longer.

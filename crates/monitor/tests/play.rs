@@ -1,7 +1,7 @@
 //! A pump behind a valve with play: where it stands hangs on commands that may lie further back than any rows that are kept.
 #![allow(clippy::unwrap_used)]
 
-use ct_signals::{Hold, excitation, noise};
+use ct_signals::{excitation, noise};
 use monitor::{Model, Monitor, Row, Settings, Units};
 use plants::{EffectInfo, Known, Placed, Plant};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -16,27 +16,19 @@ fn a_command_that_rests_within_the_play_raises_no_alarm() {
     let rests = (0..8000).map(|k| [5.0, 4.5, 5.2, 4.7][k / 2000]);
     let command: Vec<f64> = lively.into_iter().chain(rests).collect();
     let noise = noise::white(command.len(), 0.05, rng);
-    let mut monitor = Monitor::new(
-        Model {
-            plant: Plant::SingleTank,
-            known: Known {
-                area: [Some(154.0), None, None],
-                input_range: Some(10.0),
-                ..Known::default()
-            },
-            effects: vec![Placed {
-                effect: EffectInfo::find("stiction_backlash").unwrap(),
-                vessel: 0,
-            }],
-            terms: Vec::new(),
-            start: Default::default(),
-            fixed: Vec::new(),
-            hold: Hold::Zero,
-        },
-        Settings::default(),
-        Units::default(),
-    )
-    .unwrap();
+    let known = Known {
+        area: [Some(154.0), None, None],
+        input_range: Some(10.0),
+        ..Known::default()
+    };
+    let model = Model {
+        effects: vec![Placed {
+            effect: EffectInfo::find("stiction_backlash").unwrap(),
+            vessel: 0,
+        }],
+        ..Model::new(Plant::SingleTank, known)
+    };
+    let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
     let (mut level, mut stem) = (16.0_f64, command[0]);
     for (k, (&u, noise)) in command.iter().zip(noise).enumerate() {
         let row = Row {

@@ -9,8 +9,9 @@ use missing_effect::Options;
 use super::{Results, finish};
 use crate::input::Files;
 use crate::look::Look;
+use crate::model_file::ModelFile;
 use crate::progress::Bar;
-use crate::{Error, model_file, terminal};
+use crate::{Error, terminal};
 
 #[derive(Debug, Args)]
 pub(super) struct Compare {
@@ -78,9 +79,7 @@ impl Compare {
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
-        let model = model_file::read(&self.model)?;
-        let waiting = model.waiting.clone();
-        let problem = files.read_with(model)?;
+        let (ModelFile { waiting, .. }, problem) = files.read_both()?;
         let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
@@ -100,9 +99,7 @@ impl Compare {
 impl Diagnose {
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
-        let model = model_file::read(&self.compare.model)?;
-        let waiting = model.waiting.clone();
-        let problem = files.read_with(model)?;
+        let (ModelFile { waiting, .. }, problem) = files.read_both()?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
         let mut options = self.compare.options();

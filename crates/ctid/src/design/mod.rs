@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use ct_signals::Columns;
+use missing_effect::Options;
 use missing_effect::design::{Candidacy, Design, Limits, Prospect};
-use missing_effect::{Options, Problem};
 use plants::{EffectInfo, Placed, Plant};
 use serde::Serialize;
 
 use crate::input::Files;
-use crate::model_file::{self, ModelFile};
+use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
 use crate::{Error, names};
@@ -185,7 +185,7 @@ impl Arguments {
             test: Vec::new(),
             model: self.model.clone(),
         };
-        let model = model_file::read(&self.model)?;
+        let (model, problem) = files.read_both()?;
         let mut between = Vec::with_capacity(2);
         for name in &self.between {
             between.push(candidacy(&model, &self.model, name)?);
@@ -193,7 +193,6 @@ impl Arguments {
         let &[first, second] = &between[..] else {
             return Err(Error::Usage("--between takes two effects".to_owned()));
         };
-        let problem: Problem = files.read()?;
         let mut outputs = self.outputs(&files.all())?;
         let bar = Bar::new();
         let design = missing_effect::design::design(

@@ -52,16 +52,16 @@ impl Files {
     /// # Errors
     /// One line that names the file, the place and the mend.
     pub fn read(&self) -> Result<Problem, Error> {
-        self.check_repetition()?;
-        self.read_with(model_file::read(&self.model)?)
+        self.read_both().map(|(_, problem)| problem)
     }
 
-    /// As [`Files::read`], where the model file has been read: a pipe can be read only once.
+    /// As [`Files::read`], with the model file as it was read: a pipe can be read only once.
     ///
     /// # Errors
     /// As [`Files::read`].
-    pub(crate) fn read_with(&self, model: ModelFile) -> Result<Problem, Error> {
+    pub(crate) fn read_both(&self) -> Result<(ModelFile, Problem), Error> {
         self.check_repetition()?;
+        let model = model_file::read(&self.model)?;
         let read = |paths: &[PathBuf]| -> Result<Vec<Record>, Error> {
             paths
                 .iter()
@@ -74,7 +74,9 @@ impl Files {
                 .collect()
         };
         let (records, test) = (read(&self.data)?, read(&self.test)?);
-        problem(&self.model.display().to_string(), model, records, test)
+        let name = self.model.display().to_string();
+        let problem = problem(&name, model.clone(), records, test)?;
+        Ok((model, problem))
     }
 
     /// An error of the computation, with the file that is to blame where that is known.

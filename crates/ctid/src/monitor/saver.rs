@@ -70,21 +70,12 @@ impl Saver {
 mod tests {
     use super::*;
     use ::monitor::{Model, Row, Settings, Units};
-    use ct_signals::Hold;
     use plants::{Known, Plant};
 
     #[test]
     fn a_folder_that_goes_and_comes_back_is_said_twice() {
         let folder = tempfile::tempdir().unwrap();
-        let model = Model {
-            plant: Plant::SingleTank,
-            known: Known::default(),
-            effects: Vec::new(),
-            terms: Vec::new(),
-            start: Default::default(),
-            fixed: Vec::new(),
-            hold: Hold::Zero,
-        };
+        let model = Model::new(Plant::SingleTank, Known::default());
         let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
         let inside = folder.path().join("rig");
         let path = inside.join("s.json");

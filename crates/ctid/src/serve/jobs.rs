@@ -93,6 +93,18 @@ impl Work {
         })
     }
 
+    /// What was found, with what it was found from.
+    fn found<F>(self, id: u64, found: F) -> Arc<Found<F>> {
+        Arc::new(Found {
+            id,
+            model: self.model,
+            text: self.text,
+            data: self.data,
+            measured: self.measured,
+            found,
+        })
+    }
+
     fn options<'a>(&self, stop: &'a AtomicBool) -> Options<'a> {
         Options {
             simulate_loop: !self.measured,
@@ -205,13 +217,6 @@ fn compute(
 /// Puts what came out where the page finds it.
 fn settle(session: &mut Session, work: Work, outcome: Outcome) {
     let id = session.number();
-    let Work {
-        model,
-        text,
-        data,
-        measured,
-        ..
-    } = work;
     match outcome {
         Outcome::Fitted(found) => {
             let Some(step) = found.steps.last() else {
@@ -219,44 +224,22 @@ fn settle(session: &mut Session, work: Work, outcome: Outcome) {
             };
             session.keep(Fitted {
                 id,
-                data,
-                measured,
+                data: work.data,
+                measured: work.measured,
                 rmse: step.rmse,
                 rmse_test: step.rmse_test,
                 bic: step.bic,
                 adequate: found.verdict == Verdict::Adequate,
                 body: words::fitted(id, &found).into(),
-                model: model.clone(),
+                model: work.model.clone(),
             });
-            session.fitted = Some(Arc::new(Found {
-                id,
-                model,
-                text,
-                data,
-                measured,
-                found,
-            }));
+            session.fitted = Some(work.found(id, found));
         }
         Outcome::Diagnosed(found) => {
-            session.diagnosis = Some(Arc::new(Found {
-                id,
-                model,
-                text,
-                data,
-                measured,
-                found,
-            }));
+            session.diagnosis = Some(work.found(id, found));
         }
         Outcome::Designed(design, columns) => {
-            let found = (*design, columns);
-            session.design = Some(Arc::new(Found {
-                id,
-                model,
-                text,
-                data,
-                measured,
-                found,
-            }));
+            session.design = Some(work.found(id, (*design, columns)));
         }
     }
 }

@@ -36,6 +36,7 @@ const SHARE: f64 = 0.125;
 const LONGEST: f64 = 0.5;
 /// The most parts that a step is cut into.
 const UNITS: usize = 128;
+
 /// The valves between tanks.
 #[derive(Clone, Copy)]
 pub(crate) struct Valves {

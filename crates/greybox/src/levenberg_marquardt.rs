@@ -54,9 +54,6 @@ pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
     (x <= lower + room && descent <= 0.0) || (x >= upper - room && descent >= 0.0)
 }
 
-/// A trial that promises less than this part of the cost, or follows one that failed, may well fail.
-const DOUBTFUL: f64 = 1e-2;
-
 /// From `x`, which lies in the box, and its rows `at`, where they are known. `evaluate` gives the folded rows `[J, r]`, `r` =
 /// measured minus model, and may give nothing where the cost is above its second argument; `worse` says, without derivatives
 /// and so much sooner, that it is.
@@ -133,7 +130,8 @@ pub(crate) fn minimise(
             };
         }
         evaluations += 1;
-        let doubtful = growth > 2.0 || predicted < DOUBTFUL * cost;
+        // A trial that follows one that failed fails as often as not; any other one hardly ever does.
+        let doubtful = growth > 2.0;
         let next = (!(doubtful && worse(&trial, cost)))
             .then(|| evaluate(&trial, cost))
             .flatten()

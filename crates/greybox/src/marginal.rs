@@ -13,12 +13,13 @@
 //! minimised over the partial correlations of the model, `k_i = tanh z_i`, by BFGS from Burg's solution.
 //! `R_rr^2/(N - p)` is then the innovations' variance. The order is Burg's.
 //!
-//! **Cost**: `O(N (p + 1) (p + q))` for an evaluation, about ten evaluations for each coefficient.
+//! **Cost**: `O(N (p + 1) (p + q))` for an evaluation, about ten evaluations for each coefficient, most of them side by side.
 //!
 //! **Reference**: G. Tunnicliffe Wilson, On the use of marginal likelihood in time series model estimation,
 //! J. R. Statist. Soc. B 51 (1989) 15-27.
 
 use ct_signals::ArModel;
+use rayon::prelude::*;
 
 use crate::{Error, Rows};
 
@@ -62,7 +63,7 @@ pub(crate) fn freedom(
     rows: &Rows,
     columns: &[usize],
     noise: &ArModel,
-    variances: impl Fn(&ArModel, f64) -> Option<Vec<f64>>,
+    variances: impl Fn(&ArModel, f64) -> Option<Vec<f64>> + Sync,
 ) -> Option<Vec<f64>> {
     const STEP: f64 = 1e-3;
     let z = coordinates(noise);
@@ -79,10 +80,8 @@ pub(crate) fn freedom(
     let (_, centre) = at(&[])?;
     // The criterion's curvature is twice the information on the partial correlations.
     let value = |moves: &[(usize, f64)]| Some(at(moves)?.1.value);
-    // The lower triangle.
-    let mut hessian: Vec<Vec<f64>> = Vec::with_capacity(q);
-    let mut gradient: Vec<Vec<f64>> = Vec::with_capacity(q);
-    for i in 0..q {
+    // A row of the curvature's lower triangle, and of the variances' gradient.
+    let row = |i: usize| {
         let ((above, up), (below, down)) = (at(&[(i, 1.0)])?, at(&[(i, -1.0)])?);
         let own = (up.value - 2.0 * centre.value + down.value) / (STEP * STEP);
         let mixed = |j: usize| {
@@ -90,21 +89,28 @@ pub(crate) fn freedom(
             let other = value(&[(i, 1.0), (j, -1.0)])? + value(&[(i, -1.0), (j, 1.0)])?;
             Some((same - other) / (4.0 * STEP * STEP))
         };
-        let mut row = (0..i).map(mixed).collect::<Option<Vec<f64>>>()?;
-        row.push(own);
-        hessian.push(row);
+        let mut curvature = (0..i)
+            .into_par_iter()
+            .map(mixed)
+            .collect::<Option<Vec<f64>>>()?;
+        curvature.push(own);
         let (above, below) = (
             variances(&above, up.variance)?,
             variances(&below, down.variance)?,
         );
-        gradient.push(
-            above
-                .iter()
-                .zip(&below)
-                .map(|(a, b)| (a / b).ln() / (2.0 * STEP))
-                .collect(),
-        );
-    }
+        let slope: Vec<f64> = above
+            .iter()
+            .zip(&below)
+            .map(|(a, b)| (a / b).ln() / (2.0 * STEP))
+            .collect();
+        Some((curvature, slope))
+    };
+    let (hessian, gradient): (Vec<_>, Vec<_>) = (0..q)
+        .into_par_iter()
+        .map(row)
+        .collect::<Option<Vec<_>>>()?
+        .into_iter()
+        .unzip();
     let factor = cholesky(hessian)?;
     let count = variances(&model(&z).ok()?, centre.variance)?.len();
     Some(
@@ -190,20 +196,18 @@ impl Criterion {
 }
 
 /// A local minimum of a smooth function by the BFGS method, derivatives by central differences, backtracking.
-fn bfgs(mut x: Vec<f64>, f: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+fn bfgs(mut x: Vec<f64>, f: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
     const STEP: f64 = 1e-4;
     let n = x.len();
     let gradient = |x: &[f64]| -> Vec<f64> {
-        let mut at = x.to_vec();
+        let moved = |i: usize, by: f64| {
+            let mut at = x.to_vec();
+            at[i] += by;
+            f(&at)
+        };
         (0..n)
-            .map(|i| {
-                at[i] = x[i] + STEP;
-                let above = f(&at);
-                at[i] = x[i] - STEP;
-                let below = f(&at);
-                at[i] = x[i];
-                (above - below) / (2.0 * STEP)
-            })
+            .into_par_iter()
+            .map(|i| (moved(i, STEP) - moved(i, -STEP)) / (2.0 * STEP))
             .collect()
     };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

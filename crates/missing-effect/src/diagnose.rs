@@ -85,8 +85,10 @@ pub fn diagnose(
     }
 
     tell("telling apart", 2, 3);
-    let scores = scores(believed, &single, metric);
-    let price = price_of_colour(&found.base, &single, &found.noise);
+    let (scores, price) = rayon::join(
+        || scores(believed, &single, metric),
+        || price_of_colour(&found.base, &single, &found.noise),
+    );
     let widen = ControlLoop::widens(control_loop.as_ref());
     let steps = course.steps(&floor, problem, widen)?;
     let Course { left, .. } = course;

@@ -29,13 +29,9 @@ pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a
     let mut confirmed = found.confirmed.clone();
     // Each model with the colour of its own residual: what a coloured noise explains needs no effect. The richest model has
     // taken a part of a slow noise for effects, and the colour that it leaves is too fast: chance is counted here too.
-    let own_base = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
-    let own_last = coloured(
-        &confirmed.setup,
-        confirmed.fit.clone(),
-        NOISE_ORDER,
-        STOPPING,
-    )?;
+    let own = |node: &Node<'a>| coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING);
+    let (own_base, own_last) = rayon::join(|| own(base), || own(&confirmed));
+    let (own_base, own_last) = (own_base?, own_last?);
     let in_own = |node: &Node<'a>, fit: &Fit| Node {
         fit: fit.clone(),
         ..node.clone()

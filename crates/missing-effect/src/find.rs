@@ -75,8 +75,11 @@ pub(crate) fn find<'a>(
 
     // Confirm in the metric of the noise.
     tell("confirming", 0, 3);
-    let base = refine(base, &noise, &[])?;
-    let mut confirmed = confirm(refine(&richest, &noise, &[])?, &noise)?;
+    let (base, confirmed) = rayon::join(
+        || refine(base, &noise, &[]),
+        || confirm(refine(&richest, &noise, &[])?, &noise),
+    );
+    let (base, mut confirmed) = (base?, confirmed?);
     let wandering = wanders(&richest, &noise);
     let by_simulation = wandering && !confirmed.added.is_empty();
     if noise.order() > 0 {

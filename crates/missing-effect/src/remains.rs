@@ -22,6 +22,7 @@ use std::f64::consts::SQRT_2;
 use ct_signals::{ArModel, Record, residual_tests::prewhitened_input_test};
 use greybox::Fit;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use statrs::{
     distribution::{ChiSquared, ContinuousCDF},
     function::erf::erfc,
@@ -150,8 +151,12 @@ fn least_p(
             .unwrap_or(&record.input);
         let all = [Some(from_outside), record.input_2.as_ref()];
         let all = all.into_iter().flatten();
-        for signal in all.flat_map(|command| signals(&command.values)) {
-            let (_, p) = prewhitened_input_test(&signal, residual, lags)?;
+        let all: Vec<Vec<f64>> = all.flat_map(|command| signals(&command.values)).collect();
+        let tests: Vec<(Vec<f64>, f64)> = all
+            .par_iter()
+            .map(|signal| prewhitened_input_test(signal, residual, lags))
+            .collect::<Result<_, _>>()?;
+        for (_, p) in tests {
             if p < least {
                 (least, at) = (p, Some(k));
             }

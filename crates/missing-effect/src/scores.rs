@@ -13,7 +13,7 @@ const ABSORBED: f64 = 1e-6;
 /// The scores, in the order of `single`; `noise` is the metric in which both were fitted.
 pub(crate) fn scores(base: &Node, single: &[Node], noise: &ArModel) -> Vec<Score> {
     single
-        .iter()
+        .par_iter()
         .filter_map(|node| {
             let placed = *node.added.last()?;
             let (_, at) = node.size_of(placed)?;

@@ -31,7 +31,15 @@ pub fn diagnose(
     tell("fitting the model", 0, 1);
     let (base, control_loop) = base(problem, options)?;
     let found = find(&base, options.max_effects, &tell)?;
-    let doubted = doubt(&base, &found)?;
+    // The metric in which single effects were refitted last: a noise that is white has the same one whatever its size.
+    let white = ArModel::white(1.0);
+    let (metric, believed) = if found.by_simulation || found.noise.order() == 0 {
+        (&white, &base)
+    } else {
+        (&found.noise, &found.base)
+    };
+    let (doubted, single) = rayon::join(|| doubt(&base, &found), || found.grown.singles(metric));
+    let doubted = doubted?;
     let mut confirmed = doubted.confirmed;
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;
@@ -42,15 +50,7 @@ pub fn diagnose(
 
     tell("telling apart", 1, 3);
     let jumped = doubted.jumped.map(|jump| jump.left(&problem.records[0]));
-    // The metric in which single effects were refitted last: a noise that is white has the same one whatever its size.
-    let white = ArModel::white(1.0);
-    let (metric, believed) = if found.by_simulation || found.noise.order() == 0 {
-        (&white, &base)
-    } else {
-        (&found.noise, &found.base)
-    };
-    let single = found.grown.singles(metric);
-    let judged = Judge {
+    let judge = Judge {
         base: &base,
         noise: &found.noise,
         wandering: found.wandering,
@@ -58,8 +58,17 @@ pub fn diagnose(
         stopped,
         jumped,
         singles: &single,
-    }
-    .judge(confirmed)?;
+    };
+    let (judged, (scores, price)) = rayon::join(
+        || judge.judge(confirmed),
+        || {
+            rayon::join(
+                || scores(believed, &single, metric),
+                || price_of_colour(&found.base, &single, &found.noise),
+            )
+        },
+    );
+    let judged = judged?;
     let (mut course, mut groups) = (judged.course, judged.groups);
     let mut floor = floor(
         &found.noise,
@@ -85,10 +94,6 @@ pub fn diagnose(
     }
 
     tell("telling apart", 2, 3);
-    let (scores, price) = rayon::join(
-        || scores(believed, &single, metric),
-        || price_of_colour(&found.base, &single, &found.noise),
-    );
     let widen = ControlLoop::widens(control_loop.as_ref());
     let steps = course.steps(&floor, problem, widen)?;
     let Course { left, .. } = course;

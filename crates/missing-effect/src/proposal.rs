@@ -128,6 +128,7 @@ fn promise(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
 }
 
 /// One effect more, at its most promising starts.
+#[derive(Clone)]
 pub(crate) struct Proposal<'a> {
     pub setup: Setup<'a>,
     pub added: Vec<Placed>,

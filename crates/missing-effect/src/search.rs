@@ -99,9 +99,9 @@ impl<'a> Grown<'a> {
     }
 
     /// What [`singles`](crate::proposal::singles) gives for the base in the metric in which it was grown.
-    pub fn singles(self, noise: &ArModel) -> Vec<Node<'a>> {
-        let mut nodes = self.refitted;
-        nodes.extend(realise_all(self.unpromising, noise, ROUGH));
+    pub fn singles(&self, noise: &ArModel) -> Vec<Node<'a>> {
+        let mut nodes = self.refitted.clone();
+        nodes.extend(realise_all(self.unpromising.clone(), noise, ROUGH));
         best_first(nodes)
     }
 }

@@ -24,7 +24,7 @@ pub enum Kind {
     Json,
     /// The result as a page.
     Report,
-    /// A record as CSV.
+    /// A record as CSV; nothing is written where there is none to play.
     Record,
     /// The shape of what is missing, as CSV; nothing is written where nothing is.
     Unknown,
@@ -38,8 +38,8 @@ pub trait Found: Serialize {
     }
 
     /// The record as CSV, where there is one.
-    fn record(&self) -> String {
-        String::new()
+    fn record(&self) -> Option<String> {
+        None
     }
 
     /// The shape of what nothing explains as CSV, where there is one.
@@ -68,8 +68,8 @@ impl Found for baysse::Study {
         report::baysse(self)
     }
 
-    fn record(&self) -> String {
-        baysse::csv(&self.second.record)
+    fn record(&self) -> Option<String> {
+        Some(baysse::csv(&self.second.record))
     }
 }
 
@@ -153,14 +153,14 @@ impl Output {
             Kind::Json => {
                 let text = serde_json::to_string_pretty(found)
                     .map_err(|error| Error::file(&self.path, error.to_string()))?;
-                text + "\n"
+                Some(text + "\n")
             }
-            Kind::Report => found.page(),
+            Kind::Report => Some(found.page()),
             Kind::Record => found.record(),
-            Kind::Unknown => match found.unknown() {
-                Some(text) => text,
-                None => return Ok(false),
-            },
+            Kind::Unknown => found.unknown(),
+        };
+        let Some(content) = content else {
+            return Ok(false);
         };
         atomic::write(&self.path, content.as_bytes())?;
         Ok(true)

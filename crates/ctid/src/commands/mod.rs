@@ -167,10 +167,12 @@ fn finish(
     }
     for (output, written) in outputs.iter().zip(written) {
         let path = output.path().display();
-        text += &look.faint(if written {
-            format!("wrote {path}")
-        } else {
-            format!("{path} is not written: nothing is left unexplained that has a shape")
+        text += &look.faint(match (written, output.kind()) {
+            (true, _) => format!("wrote {path}"),
+            (false, Kind::Record) => format!("{path} is not written: nothing is worth playing"),
+            (false, _) => {
+                format!("{path} is not written: nothing is left unexplained that has a shape")
+            }
         });
         text.push('\n');
     }

@@ -80,6 +80,11 @@ impl Proposal {
             seconds,
         }
     }
+
+    /// No experiment tells the two apart.
+    fn twins(&self) -> bool {
+        self.design.prospect == Prospect::Twins
+    }
 }
 
 /// Nine digits, without zeros at the end.
@@ -91,7 +96,11 @@ fn digits(value: f64) -> String {
 }
 
 impl Found for Proposal {
-    fn record(&self) -> String {
+    fn record(&self) -> Option<String> {
+        // What tells nothing apart is not worth playing.
+        if self.twins() {
+            return None;
+        }
         let sequence = &self.design.experiment;
         let mut header = sequence.name.clone();
         if !sequence.unit.is_empty() {
@@ -101,7 +110,7 @@ impl Found for Proposal {
         for (time, value) in sequence.time.iter().zip(&sequence.values) {
             text += &format!("{},{}\n", digits(time / self.seconds), digits(*value));
         }
-        text
+        Some(text)
     }
 }
 
@@ -204,10 +213,11 @@ impl Arguments {
         );
         bar.clear();
         let design = design.map_err(|error| files.blame(error))?;
-        // What tells nothing apart is not worth playing.
-        if design.prospect == Prospect::Twins {
+        let proposal = Proposal::new(design, &model.columns);
+        // Of a file that was asked for it is said that it is not there.
+        if proposal.twins() && self.out.is_none() {
             outputs.retain(|output| output.kind() != Kind::Record);
         }
-        Ok((Proposal::new(design, &model.columns), outputs))
+        Ok((proposal, outputs))
     }
 }

@@ -137,6 +137,7 @@ async fn file(
                 let found = found.ok_or_else(|| missing("no experiment was designed yet"))?;
                 let (design, columns) = &found.found;
                 let text = Proposal::new(design.clone(), columns).record();
+                let text = text.ok_or_else(|| missing("no experiment tells the two apart"))?;
                 ("next.csv".to_string(), "text/csv; charset=utf-8", text)
             }
         };

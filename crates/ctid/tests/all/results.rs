@@ -37,8 +37,27 @@ fn parameters(step: &Value) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// The keys, types and rules that DESIGN.md promises of the JSON of `diagnose`.
+/// Every key of a result is explained to its readers.
+fn keys_are_explained(json: &Value) {
+    let doc = include_str!("../../../../docs/results.md");
+    match json {
+        Value::Object(entries) => {
+            for (key, value) in entries {
+                assert!(
+                    doc.contains(&format!("`{key}`")),
+                    "docs/results.md lacks {key}"
+                );
+                keys_are_explained(value);
+            }
+        }
+        Value::Array(values) => values.iter().for_each(keys_are_explained),
+        _ => {}
+    }
+}
+
+/// The keys, types and rules that `docs/results.md` promises of the JSON of `diagnose`.
 fn fulfils_the_contract(json: &Value, held_out: bool) {
+    keys_are_explained(json);
     assert_eq!(json["schema"], 1);
     let verdict = json["verdict"].as_str().unwrap();
     let effects = texts(&json["effects"]);

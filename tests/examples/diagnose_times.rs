@@ -1,5 +1,5 @@
 //! What a diagnosis costs: seconds of wall and of processor time on two threads, for records of 4000 samples from a closed
-//! loop, singles and sets; and what it found, so that a change of the search shows.
+//! loop with one hidden effect or two, singles and sets; and what it found, so that a change of the search shows.
 //!
 //! `RAYON_NUM_THREADS=2 cargo run --release -p ctid-tests --example diagnose_times`; an argument chooses the cells whose name
 //! holds it, a second one the largest number of effects (1, then 6).
@@ -31,18 +31,26 @@ fn main() -> Result<(), missing_effect::Error> {
         None => vec![1, 6],
     };
     let rigs = [
-        (Rig::single_tank(), "pump_deadzone", 0, vec![0.5]),
-        (Rig::single_tank(), "pump_lag", 0, vec![8.0]),
-        (Rig::cascaded_tanks(), "sensor_lag", 0, vec![10.0]),
-        (Rig::cascaded_tanks(), "const_leak", 0, vec![3.0]),
+        (Rig::single_tank(), vec![("pump_deadzone", 0, vec![0.5])]),
+        (Rig::single_tank(), vec![("pump_lag", 0, vec![8.0])]),
+        (Rig::cascaded_tanks(), vec![("sensor_lag", 0, vec![10.0])]),
+        (Rig::cascaded_tanks(), vec![("const_leak", 0, vec![3.0])]),
+        (
+            Rig::cascaded_tanks(),
+            vec![
+                ("sensor_lag", 0, vec![10.0]),
+                ("pump_deadzone", 0, vec![0.5]),
+            ],
+        ),
     ];
     println!(
-        "{:<42} {:>4} {:>7} {:>7}  found",
+        "{:<46} {:>4} {:>7} {:>7}  found",
         "cell", "most", "wall", "cpu"
     );
-    for (rig, effect, vessel, size) in rigs {
+    for (rig, hidden) in rigs {
+        let names: Vec<&str> = hidden.iter().map(|(effect, ..)| *effect).collect();
         for colour in [0.0, 0.9] {
-            let cell = format!("{} {effect} {colour}", rig.plant.id());
+            let cell = format!("{} {} {colour}", rig.plant.id(), names.join("+"));
             if !cell.contains(&wanted) {
                 continue;
             }
@@ -51,7 +59,7 @@ fn main() -> Result<(), missing_effect::Error> {
                 colour,
                 noise: 0.1,
                 samples: 4000,
-                hidden: vec![(effect, vessel, size.clone())],
+                hidden: hidden.clone(),
                 ..rig.clone()
             };
             let record = rig.run(&mut ChaCha8Rng::seed_from_u64(7));
@@ -65,7 +73,7 @@ fn main() -> Result<(), missing_effect::Error> {
                 let before = processor();
                 let found = diagnose(&problem, &options, &|_| {})?;
                 println!(
-                    "{cell:<42} {max_effects:>4} {:>7.2} {:>7.2}  {:?} {:?} {:?}",
+                    "{cell:<46} {max_effects:>4} {:>7.2} {:>7.2}  {:?} {:?} {:?}",
                     found.seconds,
                     processor() - before,
                     found.verdict,

@@ -226,7 +226,7 @@ impl Rig {
         scales.input_range = 10.0;
         let mut structure = Structure::new(self.plant, self.known(), scales);
         let mut theta = self.theta.clone();
-        for (id, vessel, parameters) in &self.hidden {
+        for (id, vessel, _) in &self.hidden {
             let effect = EffectInfo::find(id).expect("an effect of the catalogue");
             structure = structure
                 .with(Placed {
@@ -234,6 +234,14 @@ impl Rig {
                     vessel: *vessel,
                 })
                 .expect("an effect of this plant");
+        }
+        // A structure has its effects in the order of the chain, in whatever order they were hidden.
+        for placed in structure.effects() {
+            let own = self
+                .hidden
+                .iter()
+                .find(|(id, vessel, _)| *id == placed.effect.id && *vessel == placed.vessel);
+            let (.., parameters) = own.expect("what was hidden");
             theta.extend(parameters);
         }
         for term in &self.terms {

@@ -32,7 +32,7 @@ pub enum Drive {
 pub struct Rig {
     /// The plant.
     pub plant: Plant,
-    /// What is built into it, with its parameters, in chain order.
+    /// What is built into it, with its parameters, in any order.
     pub hidden: Vec<(&'static str, usize, Vec<f64>)>,
     /// What is built into it that no effect of the catalogue describes.
     pub terms: Vec<Term>,
@@ -291,5 +291,28 @@ impl Rig {
             reference: (self.drive == Drive::Closed).then(|| Signal::new("r", "cm", wanted)),
             hold: Hold::Zero,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn effects_may_be_hidden_in_any_order() {
+        let hidden = vec![
+            ("sensor_lag", 0, vec![10.0]),
+            ("const_leak", 1, vec![3.0]),
+            ("pump_deadzone", 0, vec![0.5]),
+        ];
+        let built = |hidden| {
+            let rig = Rig {
+                hidden,
+                ..Rig::cascaded_tanks()
+            };
+            rig.built().1
+        };
+        let turned = hidden.iter().rev().cloned().collect();
+        assert_eq!(built(hidden), built(turned));
     }
 }

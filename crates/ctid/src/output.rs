@@ -271,10 +271,14 @@ fn check(kind: Kind, path: &Path) -> Result<(), Error> {
             ));
         }
         Standing::NotOurs => {
-            return Err(Error::file(
-                path,
-                "it is there already, and ctid did not write it; choose another name or delete it",
-            ));
+            // A record does not say who wrote it.
+            let why = match kind {
+                Kind::Record => "it is there already; choose another name or delete it",
+                _ => {
+                    "it is there already, and ctid did not write it; choose another name or delete it"
+                }
+            };
+            return Err(Error::file(path, why));
         }
         Standing::Nothing | Standing::Ours => {}
     }

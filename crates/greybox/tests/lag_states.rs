@@ -6,9 +6,11 @@ mod support;
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Record};
+use ct_signals::{ArModel, Record, noise};
 use greybox::{Fit, Setup, fit_from};
 use plants::{EffectInfo, Placed};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use support::{PRECISE, Rig};
 
@@ -17,8 +19,7 @@ const BEFORE: usize = 90;
 const LAGS: [&str; 2] = ["pump_lag", "sensor_lag"];
 
 /// A record whose beginning was not kept.
-fn cut(rig: &Rig, seed: u64) -> Record {
-    let mut record = rig.record(seed);
+fn cut(mut record: Record) -> Record {
     record.time.drain(..BEFORE);
     record.input.values.drain(..BEFORE);
     record.output.values.drain(..BEFORE);
@@ -64,7 +65,7 @@ fn right_and_wrong(rig: &Rig, lag: usize, time_constant: f64, free: bool) -> (us
     let behind: Vec<f64> = (0..SEEDS)
         .into_par_iter()
         .map(|seed| {
-            let record = cut(&rig, seed);
+            let record = cut(rig.record(seed));
             let [own, other] = [lag, 1 - lag].map(|i| with_lag(&rig, &record, LAGS[i], free));
             own.bic() - other.bic()
         })
@@ -94,6 +95,41 @@ fn the_lag_that_is_there_fits_better_than_the_other() {
                 // Taken for at rest, one of the two is the better imitation of what came before.
                 assert!(lag == 0 || rest.1 > 5, "{id} {time_constant}: {rest:?}");
             }
+        }
+    }
+}
+
+/// The state behind the lag is then that of a pump at rest, which no command of the record is.
+#[test]
+fn a_pump_that_starts_with_the_record_is_a_lag() {
+    for rig in [Rig::single_tank(), Rig::cascaded_tanks()] {
+        for time_constant in [6.0, 15.0] {
+            let rig = Rig {
+                effects: vec![(LAGS[0], 0, vec![time_constant])],
+                interval: 2.0,
+                samples: rig.samples + BEFORE,
+                ..rig.clone()
+            };
+            let found: Vec<(f64, f64)> = (0..SEEDS)
+                .into_par_iter()
+                .map(|seed| {
+                    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                    let mut u = rig.record(seed).input.values;
+                    u[BEFORE - 45..BEFORE].fill(0.0);
+                    let record = cut(rig.run(&u, &noise::white(rig.samples, rig.noise, &mut rng)));
+                    let [own, other] = LAGS.map(|lag| with_lag(&rig, &record, lag, true));
+                    let at = rig.theta.len();
+                    let error = own.std_errors()[at].unwrap();
+                    ((own.x[at] - time_constant) / error, own.bic() - other.bic())
+                })
+                .collect();
+            let wrong = found.iter().filter(|(_, behind)| *behind > 6.0).count();
+            let off = found.iter().filter(|(off, _)| off.abs() > 2.0).count();
+            println!(
+                "{} {time_constant} s: decidedly wrong {wrong}, off by two standard errors {off} of {SEEDS}",
+                rig.plant.id()
+            );
+            assert!(wrong <= 1 && off <= 5, "{time_constant} s: {found:?}");
         }
     }
 }

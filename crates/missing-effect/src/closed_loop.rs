@@ -6,6 +6,7 @@
 
 use ct_signals::{ArModel, residual_tests};
 use greybox::{Replay, Setup, coloured, fit_from};
+use plants::Variable;
 use statrs::{
     distribution::{ChiSquared, ContinuousCDF},
     function::erf::erfc,
@@ -36,8 +37,14 @@ pub(crate) fn enclose<'a>(
     node: Node<'a>,
 ) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
     let Some(controller) = &problem.controller else {
+        // A term in time that was kept from this record has followed its noise, what came later too: the residual beside it says
+        // nothing of what the command answers to.
+        let timed = problem
+            .terms
+            .iter()
+            .any(|term| term.variable == Variable::Time);
         return Ok(match feedback_p(&node)? {
-            p if p < FEEDBACK => {
+            p if p < FEEDBACK && !timed => {
                 let said = format!(
                     "The command answers to the noise (p {}): there is feedback, and no [controller] in the model file; give it, and the reference, and the loop is simulated. {MEASURED}",
                     chance(p)

@@ -14,7 +14,8 @@ pub enum Verdict {
     Effect,
     /// Something is missing, and at least one added effect has a stand-in that fits as well.
     Undecided,
-    /// What the model leaves is not noise, and nothing in the catalogue explains it.
+    /// What the model leaves is not noise, and nothing in the catalogue explains it; after a comparison, which searches nothing: the
+    /// model lacks something.
     Unexplained,
     /// Nothing is missing that these data would show.
     Adequate,
@@ -33,7 +34,7 @@ pub struct Parameter {
     pub unit: String,
 }
 
-/// Residual tests of one fit; the bounds are for 95 %.
+/// Residual tests of one fit, of its first record but for `input_p`; the bounds are for 95 %.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResidualTests {
     /// Autocorrelation of the simulation residual at lags 0, 1, ...
@@ -46,7 +47,7 @@ pub struct ResidualTests {
     pub cross_correlation_bound: f64,
     /// p-value of the Ljung-Box test: whiteness of the simulation residual.
     pub whiteness_p: f64,
-    /// p-value of the portmanteau test of the cross-correlation with the input.
+    /// p-value of the portmanteau test of the cross-correlation with the input (in a simulated loop the reference), of all records.
     pub input_p: f64,
 }
 
@@ -60,9 +61,9 @@ pub struct Bin {
     pub from: f64,
     /// Upper edge.
     pub to: f64,
-    /// Samples in it.
+    /// Samples in it; of frequencies the lines of the spectrum.
     pub count: usize,
-    /// Mean residual (measured minus model), in the output's unit.
+    /// Mean residual (measured minus model), in the output's unit; zero of frequencies.
     pub mean: f64,
     /// Root mean square of the residual, in the output's unit.
     pub rms: f64,
@@ -92,7 +93,7 @@ pub struct Failures {
 pub struct Step {
     /// The effect that this step added; `None` for the base.
     pub added: Option<String>,
-    /// The vessel it acts in, where the plant has more than one: `upper` or `lower`.
+    /// The vessel or pump it acts in, where the plant has more than one: `upper` or `lower` of two tanks.
     pub place: Option<String>,
     /// Root mean square of the simulation error on the fitted records, in the output's unit.
     pub rmse: f64,
@@ -118,9 +119,9 @@ pub struct Step {
 /// One candidate of the catalogue at the first step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Score {
-    /// The effect, or `none`.
+    /// The effect.
     pub effect: String,
-    /// The vessel it acts in, where the plant has more than one.
+    /// The vessel or pump it acts in, where the plant has more than one.
     pub place: Option<String>,
     /// Fall of the Bayesian information criterion when it is added and everything is refitted; larger is better.
     pub bic_gain: f64,
@@ -130,7 +131,8 @@ pub struct Score {
     pub visibility: f64,
     /// The size that was found: the effect's leading parameter.
     pub size: Option<Parameter>,
-    /// The smallest size that these data would show, in the unit of `size`.
+    /// The smallest size that these data would show, in the unit of `size`; `None` where the effect has no signature while it is absent, or
+    /// the fitted parameters imitate all of it.
     pub smallest_visible: Option<f64>,
 }
 
@@ -227,7 +229,7 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The effects that were added, in order.
     pub effects: Vec<String>,
-    /// For each of them all that cannot be told apart from it on these data, best first.
+    /// For each of them itself, then all that cannot be told apart from it on these data, best first.
     pub groups: Vec<Vec<String>>,
     /// For each of them whether it is in doubt: its size ends at the edge of what is plausible, so that it describes the data
     /// rather than explains them.

@@ -267,6 +267,7 @@ pub(crate) fn period_of(setup: &Setup) -> Option<usize> {
 }
 
 /// The period that shows most in what a node does not explain \[s\].
+// A cell is filled by it: it must not wait for other threads, for the reason that is given at the hidden step.
 fn strongest_period(node: &Node) -> Option<f64> {
     let residuals = node.setup.disturbance(&node.fit.x).ok()?;
     let lines = residuals.iter().zip(node.setup.records);

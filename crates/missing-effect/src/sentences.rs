@@ -74,7 +74,7 @@ fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
             "{residual} follows the level, which noise does not: the balance lacks {effect}"
         ),
         Remains::Slow(wander, process) => format!(
-            "{residual} wanders more slowly than the process: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or {effect}",
+            "{residual} wanders as slowly as the process, or more: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or {effect}",
             if wander < record {
                 format!("{} s", significant(wander, 2))
             } else {
@@ -123,7 +123,7 @@ pub(crate) fn of_a_part(last: &Node, unit: &str) -> String {
         .map(|placed| placed.effect.id.to_string())
         .collect();
     format!(
-        "The best that the catalogue has is {}, which leaves {:.3} {unit} rms: too much would be left that is not noise, so it is not taken for the answer.",
+        "What comes nearest by more than chance, a course of time aside, is {}, which leaves {:.3} {unit} rms: too much would be left that is not noise, so it is not taken for the answer.",
         list(&names, "and"),
         last.fit.rmse
     )
@@ -274,7 +274,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
                     .iter()
                     .filter_map(|p| Some((p, p.name.strip_prefix(&prefix)?)))
                     // Where a lag stood before the record says nothing of the effect.
-                    .filter(|(_, name)| *name != "before")
+                    .filter(|(_, name)| !name.starts_with("before"))
                     .enumerate()
                     .filter(|(k, (p, _))| *k == 0 || p.std_error.is_some())
                     .map(|(_, (p, name))| format!("{name} = {}", with_error(p)))

@@ -93,9 +93,9 @@ pub struct Units {
     pub input: String,
 }
 
-/// What a look at the rows found.
+/// What a look at the rows found; `raised`: when the alarm was.
 pub(crate) fn alarm(
-    (event, time): (Stage, f64),
+    (event, time, raised): (Stage, f64, f64),
     (score, threshold): (f64, f64),
     suspects: &[Suspect],
     structure: &Structure,
@@ -147,7 +147,7 @@ pub(crate) fn alarm(
                 .map(str::to_string),
         });
     }
-    alarm.sentence = sentence(&alarm);
+    alarm.sentence = sentence(&alarm, raised);
     alarm
 }
 
@@ -159,12 +159,12 @@ pub fn instant(time: f64) -> String {
     if time.abs() < 1e12 { rounded } else { time }.to_string()
 }
 
-fn sentence(alarm: &Alarm) -> String {
+fn sentence(alarm: &Alarm, raised: f64) -> String {
     let (Some(since), Some(evidence), Some(size)) = (alarm.since, alarm.evidence, &alarm.size)
     else {
         return format!(
             "The model does not fit since about t = {} s or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}).",
-            instant(alarm.time),
+            instant(raised),
             alarm.score,
             alarm.threshold
         );

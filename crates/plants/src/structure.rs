@@ -362,12 +362,16 @@ impl Structure {
     }
 
     /// The name and bounds of the initial value of one of [`Structure::lags`], `at_rest` the first command: what is
-    /// behind the lag lay within the range of the record.
+    /// behind the lag lay within the range of the record, and a pump may have stood still or run as fast as it can.
     #[must_use]
     pub fn lag_before(&self, lag: Placed, at_rest: f64) -> (String, (f64, f64)) {
         let (low, high) = if lag.effect.place == Place::Actuator {
             let (low, high) = self.site(lag).input();
-            (low.min(at_rest) - at_rest, high.max(at_rest) - at_rest)
+            let (low, high) = (low.min(0.0), high.max(self.scales.input_range.abs()));
+            // So much when the record begins: an interval before it was more, by the factor of e for a lag of that length.
+            let more = std::f64::consts::E;
+            let at = |bound: f64| more * (bound - at_rest);
+            (at(low.min(at_rest)), at(high.max(at_rest)))
         } else {
             let (low, high) = self.site(lag).measured_level();
             (low - high, high - low)

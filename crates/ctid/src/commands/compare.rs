@@ -4,14 +4,19 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use missing_effect::Options;
+use missing_effect::{Options, Problem};
 
 use super::{Results, finish};
 use crate::input::Files;
 use crate::look::Look;
-use crate::model_file::ModelFile;
 use crate::progress::Bar;
 use crate::{Error, terminal};
+
+/// What waits in the model file, and all that was read.
+fn read(files: &Files) -> Result<(Vec<String>, Problem), Error> {
+    let model = files.read_model()?;
+    Ok((model.waiting.clone(), files.read_with(model)?))
+}
 
 #[derive(Debug, Args)]
 pub(super) struct Compare {
@@ -79,7 +84,7 @@ impl Compare {
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
-        let (ModelFile { waiting, .. }, problem) = files.read_both()?;
+        let (waiting, problem) = read(&files)?;
         let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
@@ -99,7 +104,7 @@ impl Compare {
 impl Diagnose {
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
-        let (ModelFile { waiting, .. }, problem) = files.read_both()?;
+        let (waiting, problem) = read(&files)?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
         let mut options = self.compare.options();

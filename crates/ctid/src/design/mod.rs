@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use ct_signals::Columns;
 use missing_effect::Options;
-use missing_effect::design::{Candidacy, Design, Limits, Prospect};
+use missing_effect::design::{Candidacy, Design, Limits};
 use plants::{EffectInfo, Placed, Plant};
 use serde::Serialize;
 
@@ -41,7 +41,7 @@ pub struct Arguments {
     /// What sequences are drawn from
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
-    /// Where the experiment goes as CSV; without it next.csv, or next-2.csv where that is there
+    /// Where the experiment goes as CSV, if one is worth playing; without it next.csv, or next-2.csv where that is there
     #[arg(long, value_name = "F.csv")]
     out: Option<PathBuf>,
     /// Write the result as JSON
@@ -80,11 +80,6 @@ impl Proposal {
             seconds,
         }
     }
-
-    /// No experiment tells the two apart.
-    fn twins(&self) -> bool {
-        self.design.prospect == Prospect::Twins
-    }
 }
 
 /// Nine digits, without zeros at the end.
@@ -98,7 +93,7 @@ fn digits(value: f64) -> String {
 impl Found for Proposal {
     fn record(&self) -> Option<String> {
         // What tells nothing apart is not worth playing.
-        if self.twins() {
+        if self.design.twins() {
             return None;
         }
         let sequence = &self.design.experiment;
@@ -194,7 +189,7 @@ impl Arguments {
             test: Vec::new(),
             model: self.model.clone(),
         };
-        let (model, problem) = files.read_both()?;
+        let model = files.read_model()?;
         let mut between = Vec::with_capacity(2);
         for name in &self.between {
             between.push(candidacy(&model, &self.model, name)?);
@@ -202,6 +197,8 @@ impl Arguments {
         let &[first, second] = &between[..] else {
             return Err(Error::Usage("--between takes two effects".to_owned()));
         };
+        let columns = model.columns.clone();
+        let problem = files.read_with(model)?;
         let mut outputs = self.outputs(&files.all())?;
         let bar = Bar::new();
         let design = missing_effect::design::design(
@@ -213,11 +210,10 @@ impl Arguments {
         );
         bar.clear();
         let design = design.map_err(|error| files.blame(error))?;
-        let proposal = Proposal::new(design, &model.columns);
         // Of a file that was asked for it is said that it is not there.
-        if proposal.twins() && self.out.is_none() {
+        if design.twins() && self.out.is_none() {
             outputs.retain(|output| output.kind() != Kind::Record);
         }
-        Ok((proposal, outputs))
+        Ok((Proposal::new(design, &columns), outputs))
     }
 }

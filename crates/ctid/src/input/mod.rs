@@ -52,16 +52,23 @@ impl Files {
     /// # Errors
     /// One line that names the file, the place and the mend.
     pub fn read(&self) -> Result<Problem, Error> {
-        self.read_both().map(|(_, problem)| problem)
+        self.read_with(self.read_model()?)
     }
 
-    /// As [`Files::read`], with the model file as it was read: a pipe can be read only once.
+    /// The model file, where no record is given twice.
     ///
     /// # Errors
     /// As [`Files::read`].
-    pub(crate) fn read_both(&self) -> Result<(ModelFile, Problem), Error> {
+    pub(crate) fn read_model(&self) -> Result<ModelFile, Error> {
         self.check_repetition()?;
-        let model = model_file::read(&self.model)?;
+        model_file::read(&self.model)
+    }
+
+    /// The rest, where the model file was read: a pipe can be read only once.
+    ///
+    /// # Errors
+    /// As [`Files::read`].
+    pub(crate) fn read_with(&self, model: ModelFile) -> Result<Problem, Error> {
         let read = |paths: &[PathBuf]| -> Result<Vec<Record>, Error> {
             paths
                 .iter()
@@ -74,9 +81,7 @@ impl Files {
                 .collect()
         };
         let (records, test) = (read(&self.data)?, read(&self.test)?);
-        let name = self.model.display().to_string();
-        let problem = problem(&name, model.clone(), records, test)?;
-        Ok((model, problem))
+        problem(&self.model.display().to_string(), model, records, test)
     }
 
     /// An error of the computation, with the file that is to blame where that is known.

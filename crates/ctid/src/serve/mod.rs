@@ -75,9 +75,9 @@ use self::connections::Bounds;
 use self::guard::{Guard, LARGEST_BODY};
 use self::sessions::Sessions;
 use self::upload::Upload;
+use crate::Error;
 use crate::commands::say;
 use crate::input::Files;
-use crate::{Error, model_file};
 
 /// Where the page is, if nothing else is there.
 const PORT: u16 = 8420;
@@ -135,12 +135,13 @@ impl Arguments {
             test: self.test.clone(),
             model: self.model.clone().unwrap_or_default(),
         };
-        files.check_repetition()?;
-        if let Some(model) = &self.model {
-            model_file::read(model)?;
+        if self.model.is_some() {
+            let model = files.read_model()?;
             if !self.data.is_empty() {
-                files.read()?;
+                files.read_with(model)?;
             }
+        } else {
+            files.check_repetition()?;
         }
         let fitted = self.data.iter().map(|path| (path, false));
         let held_out = self.test.iter().map(|path| (path, true));

@@ -200,7 +200,7 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
         }),
         "sentences": design.sentences,
         "rows": candidates.chain(&design.again).map(row).collect::<Vec<_>>(),
-        "twins": design.prospect == missing_effect::design::Prospect::Twins,
+        "twins": design.twins(),
         "limits": format!(
             "{} to {} ({}), {}",
             numbers::significant(design.limits.low, 3),

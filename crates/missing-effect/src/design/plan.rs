@@ -169,3 +169,11 @@ pub struct Design {
     /// How long it took \[s\].
     pub seconds: f64,
 }
+
+impl Design {
+    /// No experiment tells the two apart: none is worth playing.
+    #[must_use]
+    pub fn twins(&self) -> bool {
+        self.prospect == Prospect::Twins
+    }
+}

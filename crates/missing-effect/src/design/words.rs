@@ -142,7 +142,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     } else {
         "command"
     };
-    if design.prospect == Prospect::Twins {
+    if design.twins() {
         said.push(format!(
             "No experiment within these limits tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters shows what {} would show.",
             design.candidates.len(),

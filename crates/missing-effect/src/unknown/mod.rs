@@ -71,7 +71,7 @@ pub struct Window {
 /// What is missing where the catalogue does not explain it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unknown {
-    /// Where it acts: `actuator`, `vessel` (`upper` or `lower` of two) or `sensor`.
+    /// Where it acts: `actuator`, `vessel` (of several by its name, `upper` or `T1`) or `sensor`.
     pub place: String,
     /// Unit of the term: of the command, of a flow, or of the reading.
     pub unit: String,

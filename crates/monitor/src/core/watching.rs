@@ -207,8 +207,12 @@ impl Core {
         let rows: Vec<Kept> = self.now.kept.range(from..).copied().collect();
         let growth = self.now.scatter.growth();
         let suspects = isolate(&running.structure, learned, self.hold(), &rows, growth);
+        let raised = match &self.now.phase {
+            Phase::Alarmed(following) => following.since,
+            _ => time,
+        };
         let alarm = alarm(
-            (stage, time),
+            (stage, time, raised),
             (score, running.threshold),
             &suspects,
             &running.structure,

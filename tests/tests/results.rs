@@ -1,0 +1,142 @@
+//! The result as other programs read it: the same however many threads compute it, and every key of it explained.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::collections::BTreeSet;
+
+use ctid_tests::{Drive, Rig};
+use missing_effect::{Diagnosis, Options, Primitive, Problem, Verdict, diagnose};
+use plants::{Fitted, Place, Term, Variable};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+
+/// A lag in a loop under coloured noise.
+fn named() -> Problem {
+    let rig = Rig {
+        drive: Drive::Closed,
+        colour: 0.8,
+        hidden: vec![("sensor_lag", 0, vec![12.0])],
+        samples: 800,
+        ..Rig::single_tank()
+    };
+    let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1));
+    Problem {
+        controller: Some(rig.controller()),
+        ..rig.problem(record)
+    }
+}
+
+/// A loss over a range of levels, which no effect describes.
+fn unexplained() -> Problem {
+    let rig = Rig {
+        colour: 0.5,
+        terms: vec![Term {
+            name: "hidden".to_string(),
+            place: Place::Vessel,
+            vessel: 0,
+            variable: Variable::Level,
+            knots: vec![0.0, 12.0, 14.0, 16.0, 40.0],
+            ordinates: vec![0.0, 0.0, -5.0, 0.0, 0.0],
+            fitted: Fitted::Scale,
+        }],
+        ..Rig::single_tank()
+    };
+    let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1));
+    rig.problem(record)
+}
+
+fn found(problem: &Problem, threads: usize) -> Diagnosis {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    pool.build()
+        .unwrap()
+        .install(|| diagnose(problem, &Options::default(), &|_| {}).unwrap())
+}
+
+/// What `--json` writes.
+fn json(found: &Diagnosis) -> Value {
+    serde_json::to_value(found).unwrap()
+}
+
+#[test]
+fn a_result_is_the_same_with_any_number_of_threads() {
+    for problem in [named(), unexplained()] {
+        let [mut alone, mut beside] = [1, 4].map(|threads| json(&found(&problem, threads)));
+        for result in [&mut alone, &mut beside] {
+            assert_ne!(result["noise"]["coefficients"], serde_json::json!([]));
+            result.as_object_mut().unwrap().remove("seconds").unwrap();
+        }
+        assert!(alone == beside, "{alone:#}\n{beside:#}");
+    }
+}
+
+/// A part of the page: its rows, each the keys of its first cell, and all of it.
+type Part<'p> = Vec<(BTreeSet<&'p str>, &'p str)>;
+
+fn quoted(text: &str) -> BTreeSet<&str> {
+    text.split('`').skip(1).step_by(2).collect()
+}
+
+/// The part under a heading; the first one has none.
+fn part_of<'p>(page: &'p str, heading: &str) -> Option<Part<'p>> {
+    let mut parts = page.split("\n## ");
+    let text = if heading.is_empty() {
+        parts.next()?
+    } else {
+        parts.find(|text| text.starts_with(&format!("`{heading}`\n")))?
+    };
+    let rows = text.lines().filter(|line| line.starts_with("| `"));
+    let keys = |row: &'p str| quoted(row.split('|').nth(1).unwrap());
+    Some(rows.map(|row| (keys(row), row)).collect())
+}
+
+/// All keys within a value.
+fn keys(value: &Value) -> BTreeSet<&str> {
+    match value {
+        Value::Object(entries) => entries
+            .iter()
+            .flat_map(|(key, value)| std::iter::once(key.as_str()).chain(keys(value)))
+            .collect(),
+        Value::Array(values) => values.iter().flat_map(keys).collect(),
+        _ => BTreeSet::new(),
+    }
+}
+
+/// What is in objects is explained in a part of their own or, where there is none, in their row; no row explains what is not there.
+fn explained(page: &str, name: &str, value: &Value) {
+    let part = part_of(page, name).unwrap();
+    let entries = value.as_object().unwrap();
+    for (key, value) in entries {
+        let row = part.iter().find(|(keys, _)| keys.contains(key.as_str()));
+        let (_, row) = row.unwrap_or_else(|| panic!("no row for {key} of {name:?}"));
+        match value {
+            Value::Array(values) if part_of(page, key).is_some() => {
+                values.iter().for_each(|value| explained(page, key, value));
+            }
+            Value::Object(_) if part_of(page, key).is_some() => explained(page, key, value),
+            _ => {
+                let lacking: Vec<_> = keys(value).difference(&quoted(row)).copied().collect();
+                assert!(lacking.is_empty(), "{lacking:?} of {key} of {name:?}");
+            }
+        }
+    }
+    for key in part.iter().flat_map(|(keys, _)| keys) {
+        assert!(entries.contains_key(*key), "there is no {key} in {name:?}");
+    }
+}
+
+#[test]
+fn every_key_of_a_result_is_explained() {
+    let page = include_str!("../../docs/results.md");
+    let named = json(&found(&named(), 2));
+    assert!(named["control_loop"]["mismatch"].is_number());
+    explained(page, "", &named);
+    let mut found = found(&unexplained(), 2);
+    assert_eq!(found.verdict, Verdict::Unexplained);
+    // A dip comes near to no simple shape; a step would.
+    found.unknown.as_mut().unwrap().primitive = Some(Primitive {
+        name: "step",
+        at: Some(14.0),
+        effects: vec!["overflow"],
+    });
+    explained(page, "", &json(&found));
+}

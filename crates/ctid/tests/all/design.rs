@@ -222,7 +222,7 @@ fn what_does_not_go_together_is_one_line() {
         ),
         (
             &format!("{pair} --out notes.csv"),
-            &["notes.csv", "did not write it"],
+            &["notes.csv", "it is there already"],
         ),
         (
             &format!("{pair} --out no/next.csv"),

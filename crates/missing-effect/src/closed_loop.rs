@@ -43,8 +43,11 @@ pub(crate) fn enclose<'a>(
             .terms
             .iter()
             .any(|term| term.variable == Variable::Time);
+        if timed {
+            return Ok((node, None));
+        }
         return Ok(match feedback_p(&node)? {
-            p if p < FEEDBACK && !timed => {
+            p if p < FEEDBACK => {
                 let said = format!(
                     "The command answers to the noise (p {}): there is feedback, and no [controller] in the model file; give it, and the reference, and the loop is simulated. {MEASURED}",
                     chance(p)

@@ -141,7 +141,7 @@ impl Core {
                     explained: false,
                     quiet: 0,
                 });
-                let alarm = self.look(Stage::Alarm, score, time);
+                let alarm = self.look(Stage::Alarm, time);
                 self.let_go();
                 (alarm, None)
             }
@@ -191,7 +191,7 @@ impl Core {
         } else {
             Stage::Final
         };
-        let alarm = self.look(stage, following.score, time);
+        let alarm = self.look(stage, time);
         if at < LET_GO {
             self.let_go();
         } else {
@@ -201,26 +201,26 @@ impl Core {
     }
 
     /// Looks which effect the latest rows are consistent with.
-    fn look(&mut self, stage: Stage, score: f64, time: f64) -> Option<Alarm> {
+    fn look(&mut self, stage: Stage, time: f64) -> Option<Alarm> {
+        let Phase::Alarmed(following) = self.now.phase else {
+            return None;
+        };
         let (learned, running) = (self.now.learned.as_ref()?, self.running.as_ref()?);
         let from = self.now.kept.len() - self.now.judged;
         let rows: Vec<Kept> = self.now.kept.range(from..).copied().collect();
         let growth = self.now.scatter.growth();
         let suspects = isolate(&running.structure, learned, self.hold(), &rows, growth);
-        let raised = match &self.now.phase {
-            Phase::Alarmed(following) => following.since,
-            _ => time,
-        };
         let alarm = alarm(
-            (stage, time, raised),
-            (score, running.threshold),
+            (stage, time, following.since),
+            (following.score, running.threshold),
             &suspects,
             &running.structure,
             &self.units,
         );
-        if let Phase::Alarmed(following) = &mut self.now.phase {
-            following.explained = alarm.verdict != Verdict::Unexplained;
-        }
+        self.now.phase = Phase::Alarmed(Following {
+            explained: alarm.verdict != Verdict::Unexplained,
+            ..following
+        });
         Some(alarm)
     }
 }

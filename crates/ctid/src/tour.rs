@@ -161,7 +161,7 @@ fn add(diagnosis: &Diagnosis, look: Look) -> Result<String, Error> {
 
 fn watch(diagnosis: &Diagnosis, look: Look) -> String {
     let text = match diagnosis.verdict {
-        Verdict::Effect | Verdict::Undecided => {
+        Verdict::Effect | Verdict::Undecided | Verdict::Partial => {
             "The same simulation, with the effect in the model. What is left is noise when the bars meet the \
              noise floor and the residual has no shape."
         }

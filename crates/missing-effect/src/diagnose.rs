@@ -5,8 +5,8 @@ use std::time::Instant;
 use ct_signals::{ArModel, Record};
 
 use crate::{
-    ControlLoop, Diagnosis, Error, NoiseFloor, Options, Problem, Progress, Score, Shown, Step,
-    Verdict,
+    ControlLoop, Diagnosis, Effort, Error, NoiseFloor, Options, Problem, Progress, Rankings, Score,
+    Shown, Step, Verdict,
     doubt::doubt,
     find::{find, shortened},
     judge::{Course, Judge},
@@ -184,6 +184,10 @@ pub(crate) fn assemble(
         effects: Vec::new(),
         groups: Vec::new(),
         in_doubt: Vec::new(),
+        places: Vec::new(),
+        acceptance: None,
+        rankings: Rankings::default(),
+        effort: Effort::default(),
         residual_unexplained: false,
         ranked: Vec::new(),
         steps,

@@ -14,6 +14,8 @@ pub enum Verdict {
     Effect,
     /// Something is missing, and at least one added effect has a stand-in that fits as well.
     Undecided,
+    /// The added effects explain the larger part of the error, and something else remains that is not noise.
+    Partial,
     /// What the model leaves is not noise, and nothing in the catalogue explains it; after a comparison, which searches nothing: the
     /// model lacks something.
     Unexplained,
@@ -99,6 +101,8 @@ pub struct Step {
     pub rmse: f64,
     /// The same on the held-out record, whose first five samples set its initial states and are not scored.
     pub rmse_test: Option<f64>,
+    /// The parts of `rmse_test`; `None` without held-out records.
+    pub held_out_error: Option<HeldOutError>,
     /// Bayesian information criterion with this model's own noise colour; smaller is better.
     pub bic: f64,
     /// Parameters in chain order, initial states last.
@@ -134,6 +138,77 @@ pub struct Score {
     /// The smallest size that these data would show, in the unit of `size`; `None` where the effect has no signature while it is absent, or
     /// the fitted parameters imitate all of it.
     pub smallest_visible: Option<f64>,
+}
+
+/// The acceptance test of the effects that are reported or, where none is, of the best that were refused: one test for all
+/// verdicts.
+///
+/// An effect is the answer (`effect`, `undecided`) where it leaves noise, or explains `required` of the excess error; it is a
+/// part of the answer (`partial`) where it explains `required_partial`; else nothing explains the record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Acceptance {
+    /// The effects that were tested; empty where no candidate lowers the error.
+    pub effects: Vec<String>,
+    /// Part of the excess error that they explain on the fitted records: the fall of the mean squared simulation error over
+    /// its excess above `floor` squared, at most 1.
+    pub share: Option<f64>,
+    /// The same on the held-out records; it takes no part in the verdict.
+    pub share_test: Option<f64>,
+    /// Least `share` of an answer that leaves more than noise.
+    pub required: f64,
+    /// Least `share` of a partial answer.
+    pub required_partial: f64,
+    /// Standard deviation of the noise that is no excess \[output unit\].
+    pub floor: f64,
+    /// Fall of the criterion (BIC), each model under the noise model of its own residual.
+    pub bic_fall: Option<f64>,
+    /// What it has to exceed.
+    pub required_bic_fall: f64,
+    /// Why the effects were refused, or are a part of the answer only; empty where they are the answer.
+    pub reasons: Vec<String>,
+}
+
+/// Where an effect may act, and how likely each place is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlaceScore {
+    /// The vessel or pump.
+    pub place: String,
+    /// Likelihood relative to the best place, 0 to 1, everything else refitted.
+    pub relative_likelihood: f64,
+}
+
+/// The mean squared error on held-out records, split into what an offset, a gain and neither of them explains, as root mean
+/// squares \[output unit\].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HeldOutError {
+    /// Mean of measured minus model, record by record.
+    pub offset: f64,
+    /// What a factor on the model's deviations from its mean explains beside the offset.
+    pub gain: f64,
+    /// What is left: the shape.
+    pub shape: f64,
+}
+
+/// The single effects ranked under two weightings of the residual.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Rankings {
+    /// By the simulation error (white noise), best first.
+    pub white: Vec<String>,
+    /// Prewhitened by the noise model (GLS), best first; empty where the noise is white.
+    pub prewhitened: Vec<String>,
+    /// The best effects differ beyond what data of this kind tell apart.
+    pub disagree: bool,
+}
+
+/// What was spent, and what the limit on the time left out.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Effort {
+    /// Limit on the search \[s\]; `None`: no limit.
+    pub limit: Option<f64>,
+    /// Steps of the search that were cut short or left out; empty where all were done.
+    pub left_out: Vec<String>,
+    /// The user ended the search, and this is the best so far.
+    pub interrupted: bool,
 }
 
 /// The noise floor and how it was obtained.
@@ -234,6 +309,10 @@ pub struct Diagnosis {
     /// For each of them whether it is in doubt: its size ends at the edge of what is plausible, so that it describes the data
     /// rather than explains them.
     pub in_doubt: Vec<bool>,
+    /// For each of them the places where it may act, most likely first; one where there is no choice.
+    pub places: Vec<Vec<PlaceScore>>,
+    /// The acceptance test; `None` after a comparison, which searches nothing, and where the model is adequate.
+    pub acceptance: Option<Acceptance>,
     /// What the last model leaves is more than noise: something is missing still, or a disturbance acts.
     pub residual_unexplained: bool,
     /// The single effects, best first, at the first step; `none` first when the model is adequate.
@@ -244,6 +323,10 @@ pub struct Diagnosis {
     pub noise_floor: f64,
     /// How the noise floor was found.
     pub noise: NoiseFloor,
+    /// The single effects under both weightings.
+    pub rankings: Rankings,
+    /// The limit on the time, and what it left out.
+    pub effort: Effort,
     /// The scores of the single effects at the first step, best first.
     pub scores: Vec<Score>,
     /// What is missing where the catalogue does not explain it.

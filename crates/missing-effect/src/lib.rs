@@ -41,10 +41,10 @@ mod unknown;
 pub use compare::compare;
 pub use diagnose::diagnose;
 pub use diagnosis::{
-    Bin, ControlLoop, Diagnosis, Failures, NoiseFloor, Parameter, ResidualTests, Score, Shown,
-    Step, Verdict,
+    Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor, Parameter,
+    PlaceScore, Rankings, ResidualTests, Score, Shown, Step, Verdict,
 };
 pub use error::Error;
 pub use groups::GROUP_MARGIN;
-pub use problem::{Options, Problem, Progress};
+pub use problem::{Options, Problem, Progress, TIME_LIMIT};
 pub use unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window};

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, fit_from, random_starts};
@@ -50,9 +51,17 @@ pub struct Options<'a> {
     /// Where a controller is known and the records hold its reference: the loop is simulated; otherwise the model runs on
     /// the measured command.
     pub simulate_loop: bool,
-    /// Set by whoever does not wait any longer: the computation ends soon, and what it gives then is of no use.
+    /// Cancellation flag: when set, the computation ends soon with [`greybox::Error::Stopped`].
     pub stop: Option<&'a AtomicBool>,
+    /// Limit on the time of the search: what it does not allow is left out, and [`crate::Effort`] says what. `None`: no limit. A
+    /// result depends on the speed of the machine only where the limit is reached.
+    pub time_limit: Option<Duration>,
+    /// Interruption flag: when set, the search ends soon with the best that was found so far.
+    pub interrupt: Option<&'a AtomicBool>,
 }
+
+/// The limit that [`Options::default`] sets.
+pub const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 impl Default for Options<'_> {
     fn default() -> Self {
@@ -62,6 +71,8 @@ impl Default for Options<'_> {
             seed: 1,
             simulate_loop: true,
             stop: None,
+            time_limit: Some(TIME_LIMIT),
+            interrupt: None,
         }
     }
 }

@@ -3,7 +3,7 @@
 use plants::Placed;
 
 use crate::{
-    Diagnosis, Parameter, Problem, Step, Unknown, Verdict,
+    Acceptance, Diagnosis, Parameter, Problem, Step, Unknown, Verdict,
     node::Node,
     numbers::{significant, value_and_error},
     remains::{Left, Remains},
@@ -260,49 +260,8 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
                 )
             )),
         },
-        Verdict::Effect | Verdict::Undecided => {
-            for (k, ((effect, group), step)) in diagnosis
-                .effects
-                .iter()
-                .zip(&diagnosis.groups)
-                .zip(diagnosis.steps.iter().skip(1))
-                .enumerate()
-            {
-                let prefix = format!("{effect}.");
-                let sizes: Vec<String> = last
-                    .parameters
-                    .iter()
-                    .filter_map(|p| Some((p, p.name.strip_prefix(&prefix)?)))
-                    // Where a lag stood before the record says nothing of the effect.
-                    .filter(|(_, name)| !name.starts_with("before"))
-                    .enumerate()
-                    .filter(|(k, (p, _))| *k == 0 || p.std_error.is_some())
-                    .map(|(_, (p, name))| format!("{name} = {}", with_error(p)))
-                    .collect();
-                let size = if sizes.is_empty() {
-                    String::new()
-                } else {
-                    format!(" ({})", sizes.join(", "))
-                };
-                let place = step
-                    .place
-                    .as_ref()
-                    .map_or(String::new(), |place| format!(" in the {place} tank"));
-                let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
-                    " In doubt: its size ends at the edge of what is plausible, so it describes the data rather than explains them."
-                } else {
-                    ""
-                };
-                if group.len() > 1 {
-                    said.push(format!(
-                        "It is {}: these data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
-                        list(group, "or"),
-                        next_experiment(group, diagnosis.effects.len())
-                    ));
-                } else {
-                    said.push(format!("It is {effect}{place}{size}.{doubt}"));
-                }
-            }
+        Verdict::Effect | Verdict::Undecided | Verdict::Partial => {
+            said.extend(of_effects(diagnosis, last));
             said.push(format!(
                 "The simulation error falls from {:.3} to {:.3} {unit} rms{}.",
                 first.rmse,
@@ -313,6 +272,9 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
                     _ => String::new(),
                 }
             ));
+            if diagnosis.verdict == Verdict::Partial {
+                said.extend(diagnosis.acceptance.as_ref().and_then(of_acceptance));
+            }
             if let Some(left) = left {
                 said.push(format!(
                     "Something remains: {}.",
@@ -323,6 +285,85 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
     }
     said.extend(shaped);
     said
+}
+
+/// A sentence for each effect of the answer: its group, its place and its size.
+fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
+    let added = diagnosis.effects.iter().zip(&diagnosis.groups);
+    added
+        .zip(diagnosis.steps.iter().skip(1))
+        .enumerate()
+        .map(|(k, ((effect, group), step))| {
+            let it_is = if diagnosis.verdict == Verdict::Partial && k == 0 {
+                "It is mostly"
+            } else {
+                "It is"
+            };
+            let size = size_of(effect, last);
+            let place = match diagnosis.places.get(k).map(Vec::as_slice) {
+                Some([best, other, ..]) if other.relative_likelihood > SAME_PLACE_LIKELIHOOD => {
+                    format!(
+                        " (in the {} tank or the {} one: the place cannot be told)",
+                        best.place, other.place
+                    )
+                }
+                _ => step
+                    .place
+                    .as_ref()
+                    .map_or(String::new(), |place| format!(" in the {place} tank")),
+            };
+            let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
+                " In doubt: its size stands at a bound of what is plausible, so it describes the data rather than explains them."
+            } else {
+                ""
+            };
+            if group.len() > 1 {
+                format!(
+                    "{it_is} {}: these data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
+                    list(group, "or"),
+                    next_experiment(group, diagnosis.effects.len())
+                )
+            } else {
+                format!("{it_is} {effect}{place}{size}.{doubt}")
+            }
+        })
+        .collect()
+}
+
+/// Another place is said to be possible from this relative likelihood on.
+const SAME_PLACE_LIKELIHOOD: f64 = 0.05;
+
+/// The parameters of an effect with their standard errors, in brackets.
+fn size_of(effect: &str, step: &Step) -> String {
+    let prefix = format!("{effect}.");
+    let sizes: Vec<String> = step
+        .parameters
+        .iter()
+        .filter_map(|p| Some((p, p.name.strip_prefix(&prefix)?)))
+        // Where a lag stood before the record says nothing of the effect.
+        .filter(|(_, name)| !name.starts_with("before"))
+        .enumerate()
+        .filter(|(k, (p, _))| *k == 0 || p.std_error.is_some())
+        .map(|(_, (p, name))| format!("{name} = {}", with_error(p)))
+        .collect();
+    if sizes.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", sizes.join(", "))
+    }
+}
+
+/// How much of the excess error the effects of a partial answer explain.
+fn of_acceptance(acceptance: &Acceptance) -> Option<String> {
+    let share = acceptance.share?;
+    let held_out = acceptance.share_test.map_or(String::new(), |share| {
+        format!(", {:.0} % on held-out data", 100.0 * share)
+    });
+    Some(format!(
+        "That is {:.0} % of the squared error above the noise floor{held_out}; {:.0} % would make it the whole answer.",
+        100.0 * share,
+        100.0 * acceptance.required
+    ))
 }
 
 /// The command that proposes what would tell the first two of a group apart.

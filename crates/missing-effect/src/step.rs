@@ -148,6 +148,7 @@ pub(crate) fn report(
         place: last.and_then(|placed| place_name(node, *placed)),
         rmse: fit.rmse,
         rmse_test,
+        held_out_error: None,
         bic,
         parameters: parameters(setup, fit, &errors),
         starts: fit.starts,

@@ -102,6 +102,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
             return format!("{found}{rest}");
         }
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
+        Verdict::Partial => "The larger part of the error is explained; something else remains",
         Verdict::Unexplained => {
             "What is left is not noise, and no effect of the catalogue explains it"
         }

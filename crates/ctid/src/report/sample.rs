@@ -2,7 +2,8 @@
 //! zone, with the base model, the overflow, and both. The simulations are real, the scores made up.
 
 use missing_effect::{
-    Bin, Diagnosis, Failures, NoiseFloor, Parameter, ResidualTests, Score, Shown, Step, Verdict,
+    Bin, Diagnosis, Effort, Failures, NoiseFloor, Parameter, Rankings, ResidualTests, Score, Shown,
+    Step, Verdict,
 };
 
 use crate::identify::rms;
@@ -195,6 +196,7 @@ fn step(effects: &[(&str, Parameter)], records: &[Shown], model: (f64, f64, f64)
         added,
         rmse,
         rmse_test: Some(rms(residuals[1].iter().copied())),
+        held_out_error: None,
         bic: 2.0 * 600.0 * rmse.ln(),
         parameters,
         starts: 12,
@@ -256,6 +258,10 @@ pub(crate) fn two_tanks() -> Diagnosis {
             vec!["pump_deadzone".into(), "pump_nonlinearity".into()],
         ],
         in_doubt: vec![false, false],
+        places: Vec::new(),
+        acceptance: None,
+        rankings: Rankings::default(),
+        effort: Effort::default(),
         residual_unexplained: false,
         ranked: [
             "overflow",

@@ -132,6 +132,13 @@ fn headline(diagnosis: &Diagnosis) -> (String, &'static str) {
             "Something is missing, and more than one effect fits these data".to_owned(),
             "open",
         ),
+        Verdict::Partial => (
+            format!(
+                "Mostly: {}; something else remains",
+                diagnosis.effects.join(", ")
+            ),
+            "open",
+        ),
         Verdict::Unexplained => (
             "What is left is not noise, and no effect of the catalogue explains it".to_owned(),
             "open",

@@ -345,6 +345,13 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
         Verdict::Undecided => {
             look.warning("Something is missing, and more than one effect fits these data")
         }
+        Verdict::Partial => {
+            let part = format!(
+                "Mostly: {}; something else remains",
+                diagnosis.effects.join(", ")
+            );
+            look.warning(look.paragraph("", &part).trim_end())
+        }
         Verdict::Unexplained => {
             look.warning("What is left is not noise, and no effect of the catalogue explains it")
         }

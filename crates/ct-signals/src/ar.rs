@@ -153,6 +153,41 @@ impl ArModel {
         Self::from_coefficients(&coefficients, sigma)
     }
 
+    /// The process with its memory limited to so many samples: poles that decay more slowly than `exp(-1/samples)` a sample are
+    /// drawn in until none does. The innovations' standard deviation is kept.
+    ///
+    /// A model whose root is near one takes any slow misfit for noise. All poles are scaled by one factor, `a_i gamma^i`, which hardly
+    /// moves those that decay fast (bandwidth expansion; R. Viswanathan, J. Makhoul, IEEE Trans. ASSP 23 (1975) 309-321).
+    ///
+    /// `samples`: above 0; a model within the limit is returned as it is.
+    #[must_use]
+    pub fn with_memory_at_most(&self, samples: f64) -> Self {
+        let radius = (-1.0 / samples.max(f64::MIN_POSITIVE)).exp();
+        let scaled = |factor: f64| -> Vec<f64> {
+            let powers = std::iter::successors(Some(factor), |power| Some(power * factor));
+            let terms = self.coefficients.iter().zip(powers);
+            terms.map(|(a, power)| a * power).collect()
+        };
+        // All poles lie within a radius where the process with its poles divided by the radius is stationary.
+        let within = |factor: f64| {
+            Self::from_coefficients(&scaled(factor / radius.max(f64::MIN_POSITIVE)), 1.0).is_ok()
+        };
+        if self.coefficients.is_empty() || within(1.0) {
+            return self.clone();
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if within(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Self::from_coefficients(&scaled(low), self.sigma)
+            .unwrap_or_else(|_| ArModel::white(self.sigma))
+    }
+
     /// Of partial correlations that are within -1..1.
     fn of_stationary(reflections: &[f64]) -> Self {
         ArModel {

@@ -87,6 +87,28 @@ impl Record {
         self.time.is_empty()
     }
 
+    /// A part of it, by positions of its rows, under the same name; times are kept.
+    ///
+    /// Positions beyond the last row are left out.
+    #[must_use]
+    pub fn rows(&self, range: std::ops::Range<usize>) -> Self {
+        let range = range.start.min(self.len())..range.end.min(self.len());
+        let part = |signal: &Signal| Signal {
+            name: signal.name.clone(),
+            unit: signal.unit.clone(),
+            values: signal.values[range.clone()].to_vec(),
+        };
+        Self {
+            name: self.name.clone(),
+            time: self.time[range.clone()].to_vec(),
+            input: part(&self.input),
+            input_2: self.input_2.as_ref().map(part),
+            output: part(&self.output),
+            reference: self.reference.as_ref().map(part),
+            hold: self.hold,
+        }
+    }
+
     /// The median step of the time \[s\]; 0 with fewer than two samples.
     pub fn sample_interval(&self) -> f64 {
         median_step(&self.time)

@@ -317,3 +317,30 @@ fn partial_correlations_and_coefficients_invert_each_other() {
     }
     assert!(ArModel::from_reflections(&[1.0], 1.0).is_err());
 }
+
+#[test]
+fn memory_is_limited_and_short_memories_are_left_alone() {
+    let short = ArModel::from_coefficients(&[0.5, 0.2], 0.3).unwrap();
+    assert_eq!(short.with_memory_at_most(50.0), short);
+    // A slow pole and a fast one: (1 - 0.999 q)(1 - 0.4 q).
+    let long = ArModel::from_coefficients(&[1.399, -0.3996], 0.3).unwrap();
+    let limited = long.with_memory_at_most(40.0);
+    assert_eq!(limited.sigma(), 0.3);
+    // Roots of z^2 - a_1 z - a_2.
+    let [a1, a2] = limited.coefficients() else {
+        panic!("{limited:?}")
+    };
+    let root = (a1 * a1 / 4.0 + a2).sqrt();
+    let (slow, fast) = (a1 / 2.0 + root, a1 / 2.0 - root);
+    assert_relative_eq!(slow, (-1.0_f64 / 40.0).exp(), max_relative = 1e-9);
+    assert_relative_eq!(fast, 0.4, max_relative = 0.03);
+    // A slow oscillation is limited too.
+    let (radius, angle) = (0.9999_f64, 0.3_f64);
+    let swings = ArModel::from_coefficients(&[2.0 * radius * angle.cos(), -radius * radius], 1.0);
+    let limited = swings.unwrap().with_memory_at_most(40.0);
+    assert_relative_eq!(
+        -limited.coefficients()[1],
+        (-2.0_f64 / 40.0).exp(),
+        max_relative = 1e-9
+    );
+}

@@ -257,7 +257,12 @@ pub fn fit_onward(
     let count = starts.len();
     let minima: Vec<_> = starts
         .into_par_iter()
-        .map(|Start { x: given, triangle }| {
+        .enumerate()
+        .filter_map(|(k, Start { x: given, triangle })| {
+            // Out of time a fit still needs one start.
+            if k > 0 && setup.out_of_time() {
+                return None;
+            }
             let mut start = given.clone();
             setup.impose_fixed(&mut start);
             for (&i, bounds) in free.iter().zip(&bounds) {
@@ -279,8 +284,9 @@ pub fn fit_onward(
                 stopping,
                 |x, limit| setup.linearise_below(&full(x), noise, limit),
                 |x, limit| setup.costs_more(&full(x), noise, limit),
+                || setup.out_of_time(),
             );
-            (full(&minimum.x), minimum)
+            Some((full(&minimum.x), minimum))
         })
         .filter(|(_, minimum)| minimum.stop != Stop::NotFinite)
         .collect();
@@ -343,27 +349,7 @@ pub fn fit_onward(
 /// As [`fit_from`].
 pub fn coloured(setup: &Setup, fit: Fit, order: usize, stopping: Stopping) -> Result<Fit, Error> {
     let (starts, agree) = (fit.starts, fit.agree);
-    let mut fit = fit;
-    for _ in 0..8 {
-        let residuals = setup.disturbance(&fit.x)?;
-        let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-        let noise = ArModel::fit(&segments, order)?;
-        let same = noise.order() == fit.noise.order()
-            && noise
-                .coefficients()
-                .iter()
-                .zip(fit.noise.coefficients())
-                .all(|(a, b)| (a - b).abs() < 1e-4);
-        if same {
-            break;
-        }
-        let next = fit_from(setup, std::slice::from_ref(&fit.x), &noise, stopping)?;
-        let settled = fit.noise.order() > 0 && (next.deviance - fit.deviance).abs() < 1e-3;
-        fit = next;
-        if settled {
-            break;
-        }
-    }
+    let mut fit = prewhitened(setup, fit, order, None, stopping)?;
     // The likelihood, by which models are compared, is at its best now; the errors follow from the colour that
     // the fit has not bent.
     if fit.noise.order() > 0 {
@@ -390,6 +376,46 @@ pub fn coloured(setup: &Setup, fit: Fit, order: usize, stopping: Stopping) -> Re
     }
     fit.starts = starts;
     fit.agree = agree;
+    Ok(fit)
+}
+
+/// The prewhitened fit (iterated GLS): an autoregressive noise model of order zero to `order` from the residual, a fit in its
+/// weighting, until the two agree. `memory`: the noise model's memory is at most so many samples, so that no root near one takes
+/// slow physics for noise ([`ArModel::with_memory_at_most`]).
+///
+/// # Errors
+/// As [`fit_from`].
+pub fn prewhitened(
+    setup: &Setup,
+    fit: Fit,
+    order: usize,
+    memory: Option<f64>,
+    stopping: Stopping,
+) -> Result<Fit, Error> {
+    let mut fit = fit;
+    for _ in 0..8 {
+        let residuals = setup.disturbance(&fit.x)?;
+        let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+        let mut noise = ArModel::fit(&segments, order)?;
+        if let Some(memory) = memory {
+            noise = noise.with_memory_at_most(memory);
+        }
+        let same = noise.order() == fit.noise.order()
+            && noise
+                .coefficients()
+                .iter()
+                .zip(fit.noise.coefficients())
+                .all(|(a, b)| (a - b).abs() < 1e-4);
+        if same {
+            break;
+        }
+        let next = fit_from(setup, std::slice::from_ref(&fit.x), &noise, stopping)?;
+        let settled = fit.noise.order() > 0 && (next.deviance - fit.deviance).abs() < 1e-3;
+        fit = next;
+        if settled {
+            break;
+        }
+    }
     Ok(fit)
 }
 

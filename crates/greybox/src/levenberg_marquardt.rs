@@ -25,7 +25,7 @@ pub enum Stop {
     Converged,
     /// The cost falls no more although its slope is not zero: the simulation is not smooth here.
     Stuck,
-    /// The evaluations were used up.
+    /// The evaluations were used up, or the time.
     Evaluations,
     /// The simulation is not finite at the start.
     NotFinite,
@@ -56,7 +56,8 @@ pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
 
 /// From `x`, which lies in the box, and its rows `at`, where they are known. `evaluate` gives the folded rows `[J, r]`, `r` =
 /// measured minus model, and may give nothing where the cost is above its second argument; `worse` says, without derivatives
-/// and so much sooner, that it is.
+/// and so much sooner, that it is. No step is taken once it is
+/// `out_of_time`.
 pub(crate) fn minimise(
     mut x: Vec<f64>,
     at: Option<Triangle>,
@@ -64,6 +65,7 @@ pub(crate) fn minimise(
     stopping: Stopping,
     evaluate: impl Fn(&[f64], f64) -> Option<Triangle>,
     worse: impl Fn(&[f64], f64) -> bool,
+    out_of_time: impl Fn() -> bool,
 ) -> Minimum {
     let p = x.len();
     let at = at.or_else(|| evaluate(&x, f64::INFINITY));
@@ -89,7 +91,7 @@ pub(crate) fn minimise(
     let (mut damping, mut growth) = (1e-3, 2.0);
     let mut evaluations = 1;
     let mut small_steps = 0;
-    while evaluations < stopping.evaluations {
+    while evaluations < stopping.evaluations && !out_of_time() {
         let cost = at.cost();
         let free: Vec<usize> = (0..p)
             .filter(|&j| !held(x[j], bounds[j], at.descent(j)))

@@ -11,15 +11,18 @@ mod reading_step;
 mod sandwich;
 mod setup;
 mod starts;
+mod time_limit;
 mod triangle;
 
 pub use error::Error;
 pub use feedback::{LinearPlant, Replay, replay};
 pub use fit::{
     Fit, FitOptions, Start, coloured, fit, fit_from, fit_initial_levels, fit_onward, noise_of,
+    prewhitened,
 };
 pub use levenberg_marquardt::{Stop, Stopping};
 pub use sandwich::{Robust, robust};
 pub use setup::{LoopRun, Rows, Setup, Simulated, at_rest, commands};
 pub use starts::{random_starts, starts_around};
+pub use time_limit::TimeLimit;
 pub use triangle::Triangle;

@@ -4,16 +4,12 @@
 //! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that
 //! depends on the colour of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
 
-use ct_signals::{ArModel, residual_tests};
+use ct_signals::ArModel;
 use greybox::{Replay, Setup, coloured, fit_from};
 use plants::Variable;
-use statrs::{
-    distribution::{ChiSquared, ContinuousCDF},
-    function::erf::erfc,
-};
 
 use crate::{
-    ControlLoop, Error, Options, Problem, control_loop::check_stable, node::Node,
+    ControlLoop, Error, Options, Problem, control_loop::check_stable, feedback_test, node::Node,
     noise_floor::NOISE_ORDER, problem::STOPPING,
 };
 
@@ -22,10 +18,6 @@ const FEEDBACK: f64 = 1e-4;
 /// A controller whose command differs from the measured one by more than this part of what that moves is another one.
 /// What it differs by less is known, and simulated with the loop.
 const OTHER_CONTROLLER: f64 = 0.05;
-/// Lags at which the residual is looked for in the command.
-const LAGS: usize = 10;
-/// Highest order of the filters that whiten the residual and the command.
-const WHITENING_ORDER: usize = 20;
 
 /// What follows where a model runs on the measured command of a loop.
 const MEASURED: &str = "The model runs on the measured command, which holds the noise: where the noise has another colour than the one that was found, estimates and scores are biased, and the standard errors are made wider for it.";
@@ -49,7 +41,8 @@ pub(crate) fn enclose<'a>(
         return Ok(match feedback_p(&node)? {
             p if p < FEEDBACK => {
                 let said = format!(
-                    "The command answers to the noise (p {}): there is feedback, and no [controller] in the model file; give it, and the reference, and the loop is simulated. {MEASURED}",
+                    "Feedback detected: the command depends on the last {} residuals (F test beside the command's own past, p {}), and no [controller] is in the model file; give it, and the reference, and the loop is simulated. {MEASURED}",
+                    feedback_test::LAGS,
                     chance(p)
                 );
                 (node, Some(ControlLoop::measured(Some(p), None, said)))
@@ -121,61 +114,19 @@ fn disagreement(replays: &[Replay]) -> (f64, f64) {
         )
 }
 
-/// p-value of the test that the past and present of the residual do not show in the command, which a controller makes of
-/// the reading; of several records the smallest, corrected for having taken it.
-///
-/// Haugh's test with the command as what follows, on the ranks of the two whitened series: a few large steps of a set
-/// point, which a command holds beside the noise, would otherwise drown it. The ranks are whitened once more: those of a
-/// command that is held for long are not white.
+/// p-value of the test that the command does not depend on past residuals; of several records the smallest, corrected for
+/// having taken it.
 fn feedback_p(node: &Node) -> Result<f64, Error> {
     let residuals = node.setup.residuals(&node.fit.x)?;
-    let (mut least, mut count) = (1.0_f64, 0.0);
-    for (record, residual) in node.setup.records.iter().zip(&residuals) {
-        let lags = LAGS.min(record.len() / 4).max(1);
-        let (before, after) = (
-            whitened(&ranks(&whitened(residual)?))?,
-            whitened(&ranks(&whitened(&record.input.values)?))?,
-        );
-        let n = record.len() as f64;
-        let correlation = residual_tests::cross_correlation(&before, &after, lags);
-        let q: f64 = correlation
-            .iter()
-            .enumerate()
-            .map(|(lag, r)| n * (n + 2.0) * r * r / (n - lag as f64))
-            .sum();
-        let all = ChiSquared::new((lags + 1) as f64).map_or(1.0, |chi| chi.sf(q));
-        // The present alone: a proportional part shows there.
-        let now = erfc(correlation[0].abs() * (0.5 * n).sqrt());
-        least = least.min(all).min(now);
-        count += 2.0;
-    }
-    Ok((least * count).min(1.0))
-}
-
-/// A series about its mean, made white by an autoregressive filter of its own.
-fn whitened(x: &[f64]) -> Result<Vec<f64>, Error> {
-    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-    let x: Vec<f64> = x.iter().map(|value| value - mean).collect();
-    Ok(ArModel::fit(&[&x], WHITENING_ORDER)?.whiten(&x))
-}
-
-/// The place of each value in the order of all of them; equal ones share theirs.
-fn ranks(x: &[f64]) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..x.len()).collect();
-    order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
-    let mut ranks = vec![0.0; x.len()];
-    let mut from = 0;
-    while from < order.len() {
-        let mut to = from;
-        while to + 1 < order.len() && x[order[to + 1]] <= x[order[from]] {
-            to += 1;
-        }
-        for &at in &order[from..=to] {
-            ranks[at] = 0.5 * (from + to) as f64;
-        }
-        from = to + 1;
-    }
-    ranks
+    let pairs = node.setup.records.iter().zip(&residuals);
+    let least = pairs
+        .map(|(record, residual)| {
+            // The first parameter of every plant is its gain.
+            let gain = record.reference.is_none().then_some(node.fit.x[0]);
+            feedback_test::feedback_p(&record.input.values, residual, gain)
+        })
+        .fold(1.0, f64::min);
+    Ok((least * residuals.len() as f64).min(1.0))
 }
 
 /// Standard errors that allow for a bias from feedback: the fits in the metric of white noise and of the noise that was

@@ -7,7 +7,7 @@ use greybox::coloured;
 use crate::{
     ControlLoop, Diagnosis, Error, Options, Problem, Verdict,
     confirm::{BIC_MARGIN, beyond_chance},
-    diagnose::{assemble, floor},
+    diagnose::{allow, assemble, effort, floor},
     node::Node,
     noise_floor::{NOISE_ORDER, wanders},
     problem::{STOPPING, base},
@@ -16,13 +16,22 @@ use crate::{
     sentences, step,
 };
 
+/// Share of a diagnosis' time limit that a comparison has.
+const SHARE: f64 = 0.2;
+
 /// Fits the believed model and says where it fails: a diagnosis of one step without a search of sets.
 ///
 /// # Errors
 /// Where the records, the plant or the fit do not allow it.
 pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
     let begun = Instant::now();
+    // One model has to be fitted, and no sets of effects are searched.
+    let options = &Options {
+        time_limit: options.time_limit.map(|limit| limit.mul_f64(SHARE)),
+        ..*options
+    };
     let (base, control_loop) = base(problem, options)?;
+    allow(&base, 0.7);
     let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
     // The model lacks something where its residual is not noise, or where some effect would lower the error by more than
     // chance does: the one needs no catalogue, the other sees what is small.
@@ -65,6 +74,7 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     let more = [held_out, minimum, sentences::of_terms(problem)];
     diagnosis.sentences.extend(more.into_iter().flatten());
     diagnosis.speak_of_the_loop(control_loop);
+    diagnosis.effort = effort(&shown, options);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     Ok(diagnosis)
 }

@@ -1,21 +1,29 @@
 //! The algorithm, from records to a verdict.
 
-use std::time::Instant;
+use std::{sync::atomic::Ordering, time::Instant};
 
 use ct_signals::{ArModel, Record};
+use plants::Placed;
 
 use crate::{
-    ControlLoop, Diagnosis, Effort, Error, NoiseFloor, Options, Problem, Progress, Rankings, Score,
-    Shown, Step, Verdict,
+    Acceptance, ControlLoop, Diagnosis, Effort, Error, GROUP_MARGIN, NoiseFloor, Options, Problem,
+    Progress, Rankings, Score, Shown, Step, Verdict,
+    confirm::BIC_MARGIN,
     doubt::doubt,
-    find::{find, shortened},
-    judge::{Course, Judge},
+    find::{Found, find, shortened},
+    judge::{Course, Grade, Judge, PART, WHOLE},
+    node::Node,
+    partial::largest_part,
     problem::base,
     remains::remains,
     scores::{price_of_colour, scores},
     sentences,
     unknown::unknown,
 };
+
+/// Shares of the time limit after which the phases end: the search of sets, then all that follows but the report.
+const SEARCHED: f64 = 0.65;
+const CONFIRMED: f64 = 0.9;
 
 /// Searches the catalogue for what the believed model is missing.
 ///
@@ -30,15 +38,19 @@ pub fn diagnose(
     let tell = |phase, done, total| progress(Progress { phase, done, total });
     tell("fitting the model", 0, 1);
     let (base, control_loop) = base(problem, options)?;
+    allow(&base, SEARCHED);
     let found = find(&base, options.max_effects, &tell)?;
-    // The metric in which single effects were refitted last: a noise that is white has the same one whatever its size.
+    allow(&base, CONFIRMED);
+    // The weighting in which single effects are ranked: white where the residual wanders, since a noise model takes slow effects for
+    // noise.
     let white = ArModel::white(1.0);
-    let (metric, believed) = if found.by_simulation || found.noise.order() == 0 {
-        (&white, &base)
-    } else {
-        (&found.noise, &found.base)
+    let (metric, believed, grown) = match &found.prewhitened {
+        Some(grown) if !found.by_simulation && !found.wandering => {
+            (&found.noise, &found.base, grown)
+        }
+        _ => (&white, &base, &found.grown),
     };
-    let (doubted, single) = rayon::join(|| doubt(&base, &found), || found.grown.singles(metric));
+    let (doubted, single) = rayon::join(|| doubt(&base, &found), || grown.singles(metric));
     let doubted = doubted?;
     let mut confirmed = doubted.confirmed;
     let needed = confirmed.added.len();
@@ -70,6 +82,60 @@ pub fn diagnose(
     );
     let judged = judged?;
     let (mut course, mut groups) = (judged.course, judged.groups);
+    let mut remark = sentences::of_courses(&judged.dropped);
+    let mut acceptance = Acceptance {
+        effects: ids(&course.last().added),
+        share: (!course.last().added.is_empty()).then_some(judged.share),
+        share_test: None,
+        required: WHOLE,
+        required_partial: PART,
+        floor: found.noise.sigma(),
+        bic_fall: None,
+        required_bic_fall: BIC_MARGIN,
+        reasons: Vec::new(),
+    };
+    let mut partial = false;
+    // Noise whose memory had to be limited may hold slow physics.
+    let unexplained = course.left.is_some() || found.limited;
+    if judged.grade != Grade::Whole || (course.last().added.is_empty() && unexplained) {
+        let by_error = found.grown.promising_singles();
+        let tested = largest_part(&base, &found, &by_error, found.noise.sigma())?;
+        if let Some(tested) = &tested {
+            acceptance.effects = ids(&tested.node.added);
+            acceptance.share = Some(tested.share);
+            acceptance.bic_fall = Some(tested.bic_fall);
+            acceptance.reasons.clone_from(&tested.reasons);
+        }
+        match tested.filter(|tested| {
+            tested.reasons.is_empty() && tested.node.added.len() <= options.max_effects
+        }) {
+            Some(tested) => {
+                let judge = Judge {
+                    wandering: true,
+                    by_simulation: true,
+                    singles: &by_error,
+                    ..judge
+                };
+                course = judge.course(&tested.node)?;
+                groups = judge.groups(course.last())?;
+                remark = None;
+                partial = true;
+            }
+            None if judged.grade != Grade::Whole => {
+                remark = Some(sentences::of_a_part(
+                    course.last(),
+                    &problem.records[0].output.unit,
+                ));
+                course = Course {
+                    left: remains(&base, &doubted.own_base)?,
+                    own: doubted.own_base,
+                    nodes: vec![course.nodes.swap_remove(0)],
+                };
+                groups.clear();
+            }
+            None => {}
+        }
+    }
     let mut floor = floor(
         &found.noise,
         if course.last().added.len() == found.richest.added.len() && !stopped {
@@ -78,22 +144,13 @@ pub fn diagnose(
             "the residual of the richest model that was tried"
         },
     );
-    if course.left.is_some() && !stopped {
+    if (course.left.is_some() || partial) && !stopped {
         floor = floor.of_what_is_new();
     }
-    let unit = &problem.records[0].output.unit;
-    let mut remark = sentences::of_courses(&judged.dropped);
-    if !judged.fair {
-        remark = Some(sentences::of_a_part(course.last(), unit));
-        course = Course {
-            left: remains(&base, &doubted.own_base)?,
-            own: doubted.own_base,
-            nodes: vec![course.nodes.swap_remove(0)],
-        };
-        groups.clear();
-    }
+    let floor = floor.at_most(course.last().fit.rmse);
 
     tell("telling apart", 2, 3);
+    allow(&base, 1.0);
     let widen = ControlLoop::widens(control_loop.as_ref());
     let steps = course.steps(&floor, problem, widen)?;
     let Course { left, .. } = course;
@@ -102,25 +159,34 @@ pub fn diagnose(
         (true, Some(_)) => Verdict::Unexplained,
         (true, None) if remark.is_some() => Verdict::Unexplained,
         (true, None) => Verdict::Adequate,
-        (false, _) if groups.iter().any(|group| group.len() > 1) => Verdict::Undecided,
+        (false, _) if partial => Verdict::Partial,
+        (false, _) if groups.iter().any(|group| group.members.len() > 1) => Verdict::Undecided,
         (false, _) => Verdict::Effect,
     };
     let mut diagnosis = assemble(problem, verdict, steps, floor);
-    diagnosis.effects = last
-        .added
-        .iter()
-        .map(|placed| placed.effect.id.to_string())
-        .collect();
+    diagnosis.effects = ids(&last.added);
     diagnosis.in_doubt = last
         .added
         .iter()
         .map(|placed| last.at_the_edge(*placed))
         .collect();
     diagnosis.residual_unexplained = left.is_some() || verdict == Verdict::Unexplained;
-    diagnosis.groups = groups;
+    (diagnosis.groups, diagnosis.places) = groups
+        .into_iter()
+        .map(|group| (group.members, group.places))
+        .unzip();
+    if verdict != Verdict::Adequate {
+        acceptance.share_test = share_on_held_out(&diagnosis.steps, acceptance.floor);
+        acceptance.bic_fall = acceptance.bic_fall.or_else(|| {
+            let (first, last) = (diagnosis.steps.first()?, diagnosis.steps.last()?);
+            (diagnosis.steps.len() > 1).then_some(first.bic - last.bic)
+        });
+        diagnosis.acceptance = Some(acceptance);
+    }
+    diagnosis.rankings = rankings(&found, &base);
     diagnosis.ranked = ranked(&scores, verdict);
     diagnosis.scores = scores;
-    if left.is_some() && !stopped {
+    if left.is_some() && !stopped && !base.setup.leaves_out("the shape of what is not explained") {
         tell("shaping the unknown", 2, 3);
         diagnosis.unknown = unknown(last)?;
     }
@@ -130,12 +196,84 @@ pub fn diagnose(
     let terms = sentences::of_terms(problem);
     let stop = stopped.then(|| sentences::of_a_stop(options.max_effects, needed));
     let colour = price.and_then(sentences::of_the_colour);
-    let more = [remark, held_out, minimum, stop, terms, colour];
+    let disagree = sentences::of_rankings(&diagnosis.rankings);
+    let more = [remark, held_out, minimum, stop, terms, colour, disagree];
     diagnosis.sentences.extend(more.into_iter().flatten());
     diagnosis.speak_of_the_loop(control_loop);
+    diagnosis.effort = effort(&base, options);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     tell("done", 3, 3);
     Ok(diagnosis)
+}
+
+fn ids(added: &[Placed]) -> Vec<String> {
+    let ids = added.iter().map(|placed| placed.effect.id.to_string());
+    ids.collect()
+}
+
+/// Lets the fits of a search go on until this share of its time has passed.
+pub(crate) fn allow(node: &Node, share: f64) {
+    if let Some(limit) = &node.setup.time_limit {
+        limit.allow(share);
+    }
+}
+
+/// What the time limit left out of a search.
+pub(crate) fn effort(node: &Node, options: &Options) -> Effort {
+    let limit = node.setup.time_limit.as_ref();
+    let interrupted = options
+        .interrupt
+        .is_some_and(|interrupt| interrupt.load(Ordering::Relaxed));
+    Effort {
+        limit: options.time_limit.map(|limit| limit.as_secs_f64()),
+        left_out: limit.map_or_else(Vec::new, |limit| limit.left_out()),
+        interrupted,
+    }
+}
+
+/// The share of the excess error on held-out records that the last model explains of the first one's.
+fn share_on_held_out(steps: &[Step], floor: f64) -> Option<f64> {
+    let [first, .., last] = steps else {
+        return None;
+    };
+    let (before, after) = (first.rmse_test?.powi(2), last.rmse_test?.powi(2));
+    let floor = after.min(floor * floor);
+    Some((before - after) / (before - floor).max(f64::MIN_POSITIVE))
+}
+
+/// The single effects under both weightings, those that were promising enough for a refit.
+fn rankings(found: &Found, base: &Node) -> Rankings {
+    let first_of_each = |nodes: &[Node]| {
+        let mut ranked: Vec<String> = Vec::new();
+        for placed in nodes.iter().filter_map(|node| node.added.last()) {
+            if !ranked.iter().any(|known| known == placed.effect.id) {
+                ranked.push(placed.effect.id.to_string());
+            }
+        }
+        ranked
+    };
+    let white = found.grown.promising_singles();
+    let Some(grown) = &found.prewhitened else {
+        return Rankings {
+            white: first_of_each(&white),
+            ..Rankings::default()
+        };
+    };
+    let prewhitened = grown.promising_singles();
+    // A best effect of the one weighting that is far behind in the other, or does not pay there.
+    let behind = |best: &[Node], others: &[Node], base: &Node| {
+        let (Some(best), Some(first)) = (best.first(), others.first()) else {
+            return false;
+        };
+        let own = others.iter().find(|other| other.added == best.added);
+        first.gain_over(base) > BIC_MARGIN
+            && own.is_none_or(|own| first.gain_over(own) > GROUP_MARGIN)
+    };
+    Rankings {
+        disagree: behind(&white, &prewhitened, &found.base) && behind(&prewhitened, &white, base),
+        white: first_of_each(&white),
+        prewhitened: first_of_each(&prewhitened),
+    }
 }
 
 /// The single effects best first, each once; `none` first where nothing is missing.

@@ -235,6 +235,15 @@ impl NoiseFloor {
         }
     }
 
+    /// The floor, which no model that was fitted lies below: what it leaves holds the noise.
+    pub(crate) fn at_most(self, rmse: f64) -> Self {
+        Self {
+            level: self.level.min(rmse),
+            innovation: self.innovation.min(rmse),
+            ..self
+        }
+    }
+
     /// The floor where the residual is not noise alone: what a model lacks is in the residual too, but hardly in what
     /// cannot be predicted from the residual's own past.
     pub(crate) fn of_what_is_new(self) -> Self {

@@ -26,6 +26,9 @@ pub(crate) fn exchanges<'a>(
     noise: &ArModel,
     singles: Option<&[Node<'a>]>,
 ) -> Result<Vec<Node<'a>>, Error> {
+    if node.setup.leaves_out("the exchange of confirmed effects") {
+        return Ok(Vec::new());
+    }
     let lacking = without(node, position, noise)?;
     let own = node.added[position];
     let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());

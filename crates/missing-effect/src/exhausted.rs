@@ -12,6 +12,9 @@ use crate::{
 /// The colour is that of the set's own residual, so that a coloured noise does not keep the search going. A set beside this
 /// one, which leaves as little, is found where this one's effects are exchanged.
 pub(crate) fn exhausted(node: &Node) -> Result<bool, Error> {
+    if node.setup.out_of_time() {
+        return Ok(false);
+    }
     let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?;
     if remains(node, &own)?.is_some() {
         return Ok(false);

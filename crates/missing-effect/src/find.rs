@@ -8,7 +8,7 @@ use crate::{
     exhausted::exhausted,
     minima::begun_again,
     node::{Node, refine},
-    noise_floor::{bic_in_colour, colour, wanders},
+    noise_floor::{bic_in_colour, colour, longest_memory, wanders},
     search::{Breadth, Grown, grow},
 };
 
@@ -25,13 +25,17 @@ const PAIR: usize = 2;
 pub(crate) struct Found<'a> {
     /// The richest model in play, by simulation error; its residual gives the noise.
     pub richest: Node<'a>,
+    /// The noise model in whose weighting effects are confirmed; its memory is limited.
     pub noise: ArModel,
+    /// The memory of the residual's own noise model was longer, so that it may hold slow physics.
+    pub limited: bool,
     /// The base, and what is confirmed, in the metric of the noise.
     pub base: Node<'a>,
     pub confirmed: Node<'a>,
-    /// The sets that were grown by simulation error, and the single effects in the metric of the noise where models are not shown
-    /// by their simulation error.
+    /// The sets that were grown by simulation error.
     pub grown: Grown<'a>,
+    /// Those that were grown in the weighting of the noise, where it is not white.
+    pub prewhitened: Option<Grown<'a>>,
     /// Whether the noise wanders.
     pub wandering: bool,
     /// Whether it does and something is confirmed: then models are compared and shown by their simulation error.
@@ -58,7 +62,7 @@ pub(crate) fn find<'a>(
         pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
     };
     let white = ArModel::white(1.0);
-    let mut grown = grow(
+    let grown = grow(
         base,
         &white,
         breadth,
@@ -71,7 +75,9 @@ pub(crate) fn find<'a>(
         let effects = richest.added.clone();
         begun_again(&mut richest, &effects, &white)?;
     }
-    let noise = colour(&richest)?;
+    let whole = colour(&richest)?;
+    let noise = whole.with_memory_at_most(longest_memory(&base.setup));
+    let limited = noise != whole;
 
     // Confirm in the metric of the noise.
     tell("confirming", 0, 3);
@@ -82,7 +88,12 @@ pub(crate) fn find<'a>(
     let (base, mut confirmed) = (base?, confirmed?);
     let wandering = wanders(&richest, &noise);
     let by_simulation = wandering && !confirmed.added.is_empty();
-    if noise.order() > 0 {
+    let mut prewhitened = None;
+    if noise.order() > 0
+        && !base
+            .setup
+            .leaves_out("the search in the weighting of the noise")
+    {
         // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
         // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
         // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many
@@ -107,19 +118,19 @@ pub(crate) fn find<'a>(
         {
             confirmed = other;
         }
-        if !by_simulation {
-            grown = coloured.with_sizes_of(grown);
-        }
+        prewhitened = Some(coloured);
     }
-    if !by_simulation {
+    if !by_simulation && !base.setup.leaves_out("the exchange of confirmed effects") {
         confirmed = improve(confirmed, &noise)?;
     }
     Ok(Found {
         richest,
         noise,
+        limited,
         base,
         confirmed,
         grown,
+        prewhitened,
         wandering,
         by_simulation,
     })

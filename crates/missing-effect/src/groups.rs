@@ -1,12 +1,21 @@
 //! What cannot be told apart: the effects that fit as well in the place of another.
 
 use ct_signals::ArModel;
+use plants::Placed;
 use rayon::prelude::*;
 
-use crate::{Error, exchange::exchanges, node::Node};
+use crate::{Error, PlaceScore, exchange::exchanges, node::Node, step::place_name};
 
 /// What stands in for another lies within this of its criterion.
 pub const GROUP_MARGIN: f64 = 6.0;
+
+/// An effect, what cannot be told apart from it, and where it may act.
+pub(crate) struct Group {
+    /// Identifiers: the effect itself, then what fits as well in its place, best first.
+    pub members: Vec<String>,
+    /// The places of the effect itself, most likely first, where there are several.
+    pub places: Vec<PlaceScore>,
+}
 
 /// For every added effect, itself and all that fit as well in its place.
 pub(crate) fn groups<'a>(
@@ -14,15 +23,35 @@ pub(crate) fn groups<'a>(
     metric: &ArModel,
     per_sample: f64,
     singles: Option<&[Node<'a>]>,
-) -> Result<Vec<Vec<String>>, Error> {
+) -> Result<Vec<Group>, Error> {
     (0..last.added.len())
         .into_par_iter()
         .map(|position| {
-            let mut group = vec![last.added[position].effect.id.to_string()];
+            let own = last.added[position];
+            let mut group = vec![own.effect.id.to_string()];
+            let place_of = |placed: Placed| place_name(last, placed);
+            let mut places: Vec<PlaceScore> = place_of(own)
+                .map(|place| PlaceScore {
+                    place,
+                    relative_likelihood: 1.0,
+                })
+                .into_iter()
+                .collect();
             for node in exchanges(last, position, metric, singles)? {
                 let stand_in = node.added.last().map_or("", |placed| placed.effect.id);
                 // In the white metric a coloured residual counts each sample for less than one.
                 let behind = (node.fit.bic() - last.fit.bic()) / per_sample;
+                if let Some(other) = node.added.last().copied()
+                    && other.effect.id == own.effect.id
+                    && let Some(place) = place_of(other)
+                {
+                    let deviance = (node.fit.deviance - last.fit.deviance) / per_sample;
+                    places.push(PlaceScore {
+                        place,
+                        relative_likelihood: (-0.5 * deviance).exp(),
+                    });
+                    continue;
+                }
                 // A size at its edge speaks against a stand-in, but where the final model has it too.
                 let plausible = node.added.iter().all(|placed| {
                     !node.at_the_edge(*placed)
@@ -32,7 +61,20 @@ pub(crate) fn groups<'a>(
                     group.push(stand_in.to_string());
                 }
             }
-            Ok(group)
+            Ok(Group {
+                members: group,
+                places: relative(places),
+            })
         })
         .collect()
+}
+
+/// The places relative to the best one, most likely first.
+fn relative(mut places: Vec<PlaceScore>) -> Vec<PlaceScore> {
+    places.sort_by(|a, b| b.relative_likelihood.total_cmp(&a.relative_likelihood));
+    let best = places.first().map_or(1.0, |best| best.relative_likelihood);
+    for place in &mut places {
+        place.relative_likelihood /= best;
+    }
+    places
 }

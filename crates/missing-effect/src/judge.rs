@@ -8,23 +8,36 @@ use rayon::prelude::*;
 use crate::{
     Error, NoiseFloor, Problem, Step,
     confirm::confirm,
-    groups::groups,
+    groups::{Group, groups},
     node::{Node, refine, without},
-    noise_floor::{NOISE_ORDER, residual_colour, slowness},
+    noise_floor::{NOISE_ORDER, longest_memory, residual_colour, slowness},
     problem::STOPPING,
     remains::{Left, Remains, remains},
     step,
     trail::trail,
 };
 
-/// Where something remains that is not noise, effects are the answer if they explain this part at least of the mean
-/// square above the noise floor.
+/// Where something remains that is not noise, effects are the whole answer if they explain this share at least of the excess
+/// error: the mean squared simulation error above the noise floor.
 ///
 /// The tests that confirm an effect take what remains for noise. Against a disturbance from outside, which is none, their
 /// probabilities do not hold: whatever effect happens to resemble it is "beyond chance". Over records of nine
 /// simulated disturbances such effects imitate up to six sevenths of one as a rule; a true effect beside which something small
 /// remains explains nineteen twentieths and more.
-const FAIR_PART: f64 = 0.9;
+pub(crate) const WHOLE: f64 = 0.9;
+/// They are a partial answer if they explain this share.
+pub(crate) const PART: f64 = 0.35;
+
+/// How much of an answer a set of effects is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Grade {
+    /// It leaves noise, or explains [`WHOLE`] of the excess error.
+    Whole,
+    /// It explains [`PART`] of it.
+    Part,
+    /// Less.
+    None,
+}
 
 /// What a set is judged by.
 pub(crate) struct Judge<'s, 'a> {
@@ -44,10 +57,11 @@ pub(crate) struct Judge<'s, 'a> {
 /// What was found of a set.
 pub(crate) struct Judged<'a> {
     pub course: Course<'a>,
-    /// The set is the answer.
-    pub fair: bool,
-    /// Of an answer: what stands in for each of its effects.
-    pub groups: Vec<Vec<String>>,
+    pub grade: Grade,
+    /// The share of the excess error that it explains.
+    pub share: f64,
+    /// Of an answer: what stands in for each of its effects, and where each may act.
+    pub groups: Vec<Group>,
     /// What was taken out of it.
     pub dropped: Vec<Placed>,
 }
@@ -63,7 +77,7 @@ impl<'a> Judge<'_, 'a> {
         loop {
             let courses = judged.courses_of_time();
             // What remains beside a set that was cut is what was cut off, and the result says so.
-            if self.stopped || courses.is_empty() {
+            if self.stopped || courses.is_empty() || judged.grade != Grade::Whole {
                 return Ok(judged);
             }
             for course in &courses {
@@ -74,14 +88,15 @@ impl<'a> Judge<'_, 'a> {
             set = confirm(set, self.noise)?;
             let others = (!set.added.is_empty()).then(|| self.as_it_is(&set, judged.course.left));
             match others.transpose()? {
-                Some(others) if others.fair => {
+                Some(others) if others.grade == Grade::Whole => {
                     let mut dropped = judged.dropped;
                     dropped.extend(courses);
                     judged = Judged { dropped, ..others };
                 }
+                // What follows time alone may be a part of the answer, and no more.
                 _ => {
                     return Ok(Judged {
-                        fair: false,
+                        grade: Grade::Part,
                         ..judged
                     });
                 }
@@ -93,31 +108,43 @@ impl<'a> Judge<'_, 'a> {
     fn as_it_is(&self, set: &Node<'a>, beside: Option<Left>) -> Result<Judged<'a>, Error> {
         let mut course = self.course(set)?;
         course.left = course.left.or(beside);
-        // What leaves the greater part of the error to something else is a remark, and not the answer.
-        let fair = match course.left {
+        let (share, grade) = match course.left {
             Some(left) if !self.stopped && !course.last().added.is_empty() => {
-                explained(self.base, course.last(), left.above(self.noise))? >= FAIR_PART
+                let share = explained(self.base, course.last(), left.above(self.noise))?;
+                let grade = match share {
+                    share if share >= WHOLE => Grade::Whole,
+                    share if share >= PART => Grade::Part,
+                    _ => Grade::None,
+                };
+                (share, grade)
             }
-            _ => true,
+            _ => (
+                explained(self.base, course.last(), self.noise.stationary_std())?,
+                Grade::Whole,
+            ),
         };
-        let groups = if fair {
+        let groups = if grade == Grade::Whole {
             self.groups(course.last())?
         } else {
             Vec::new()
         };
         Ok(Judged {
             course,
-            fair,
+            grade,
+            share,
             groups,
             dropped: Vec::new(),
         })
     }
 
-    fn groups(&self, last: &Node<'a>) -> Result<Vec<Vec<String>>, Error> {
+    /// The groups of a set's effects.
+    pub fn groups(&self, last: &Node<'a>) -> Result<Vec<Group>, Error> {
         let white = ArModel::white(1.0);
         let (metric, per_sample) = if self.by_simulation || self.stopped {
             let residuals = last.setup.disturbance(&last.fit.x)?;
-            (&white, slowness(&residual_colour(&residuals)?))
+            let noise = residual_colour(&residuals)?;
+            let limited = noise.with_memory_at_most(longest_memory(&last.setup));
+            (&white, slowness(&limited))
         } else {
             (self.noise, 1.0)
         };
@@ -126,8 +153,8 @@ impl<'a> Judge<'_, 'a> {
         groups(&refine(last, metric, &[])?, metric, per_sample, singles)
     }
 
-    /// The trail to a set.
-    fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
+    /// The models on the way to a set.
+    pub fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
         let mut nodes = trail(self.base, set, &ArModel::white(1.0))?;
         let mut last = nodes.pop().unwrap_or_else(|| self.base.clone());
         let in_noise = if self.by_simulation || self.stopped {
@@ -157,13 +184,13 @@ impl<'a> Judge<'_, 'a> {
 impl Judged<'_> {
     /// The effects of an answer that one of the clock stands in for, where something remains beside them.
     fn courses_of_time(&self) -> Vec<Placed> {
-        if !self.fair || self.course.left.is_none() {
+        if self.grade != Grade::Whole || self.course.left.is_none() {
             return Vec::new();
         }
         let by_clock = |id: &String| EffectInfo::find(id).is_some_and(|effect| effect.by_clock);
         let added = self.course.last().added.iter().zip(&self.groups);
         added
-            .filter(|(_, group)| group.iter().any(by_clock))
+            .filter(|(_, group)| group.members.iter().any(by_clock))
             .map(|(placed, _)| *placed)
             .collect()
     }
@@ -206,8 +233,8 @@ impl<'a> Course<'a> {
     }
 }
 
-/// The part of what stands above the noise floor, in mean square, that a model explains of its base.
-fn explained(base: &Node, last: &Node, floor: f64) -> Result<f64, Error> {
+/// The share of the excess error, in mean square above the noise floor, that a model explains of its base.
+pub(crate) fn explained(base: &Node, last: &Node, floor: f64) -> Result<f64, Error> {
     let mean_square = |node: &Node| -> Result<f64, Error> {
         let series = node.setup.disturbance(&node.fit.x)?.concat();
         Ok(series.iter().map(|e| e * e).sum::<f64>() / series.len().max(1) as f64)
@@ -259,7 +286,7 @@ mod tests {
         assert!(judged.course.left.is_some());
         let ids = |set: &[Placed]| set.iter().map(|placed| placed.effect.id).collect();
         let kept = ids(&judged.course.last().added);
-        (judged.fair, kept, ids(&judged.dropped))
+        (judged.grade == Grade::Whole, kept, ids(&judged.dropped))
     }
 
     #[test]

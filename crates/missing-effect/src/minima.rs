@@ -54,6 +54,9 @@ pub(crate) fn begun_again(
 
 /// Follows the starts down as long as they promise to come as low as the node's minimum.
 fn descend(node: &mut Node, starts: Vec<Vec<f64>>, noise: &ArModel) -> Result<(), Error> {
+    if node.setup.leaves_out("further starts of the final models") {
+        return Ok(());
+    }
     let count = starts.len();
     let mut starts: Vec<Start> = starts.into_iter().map(Start::from).collect();
     for hopeless in HOPELESS {

@@ -2,7 +2,7 @@
 
 use ct_signals::ArModel;
 use greybox::{Fit, Setup, Start, Stopping, fit_from, fit_onward};
-use plants::{ParameterInfo, Placed};
+use plants::{Outlet, ParameterInfo, Placed};
 
 use crate::Error;
 
@@ -21,6 +21,11 @@ pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
+/// A level this many times the largest reading is not physical where the height of the tanks is not known, ...
+const HIGHEST: f64 = 100.0;
+/// ... and one this many times that height where it is: an area that is a little wrong shifts levels that nobody measures.
+const ABOVE_RIM: f64 = 1.5;
+
 /// A structure with its fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Node<'a> {
@@ -36,9 +41,34 @@ impl Node<'_> {
         other.fit.bic() - self.fit.bic()
     }
 
-    /// The size of every added effect lies inside its plausible range, neither absent nor at the far end.
+    /// The size of every added effect lies inside its plausible range, neither absent nor at the far end, and no level is beyond
+    /// what is physical.
     pub fn plausible(&self) -> bool {
-        !self.added.iter().any(|placed| self.at_the_edge(*placed))
+        !self.added.iter().any(|placed| self.at_the_edge(*placed)) && self.physical()
+    }
+
+    /// No level lies above the tank's rim where that is known, or so far above the readings that the model has lost its way.
+    fn physical(&self) -> bool {
+        let structure = &self.setup.structure;
+        if structure.plant.outlet() != Outlet::Torricelli {
+            return true;
+        }
+        let readings = self
+            .setup
+            .records
+            .iter()
+            .map(|record| record.output_range());
+        let highest = readings.fold(0.0, |most: f64, (low, high)| {
+            most.max(low.abs()).max(high.abs())
+        });
+        let most = structure
+            .known
+            .tank_height
+            .map_or(HIGHEST * highest, |height| ABOVE_RIM * height.max(highest));
+        self.setup.simulate(&self.fit.x).is_ok_and(|simulated| {
+            let levels = &simulated.level[..structure.plant.vessels()];
+            levels.iter().all(|(_, high)| *high <= most)
+        })
     }
 
     /// The leading parameter of an added effect, its size, and where that stands in the vector.

@@ -1,9 +1,9 @@
 //! The noise floor: the colour of the residual of the richest model in play.
 
 use ct_signals::ArModel;
-use greybox::noise_of;
+use greybox::{Setup, noise_of, prewhitened};
 
-use crate::{Error, node::Node};
+use crate::{Error, node::Node, problem::STOPPING};
 
 /// Largest order of the noise model.
 pub(crate) const NOISE_ORDER: usize = 6;
@@ -11,6 +11,27 @@ pub(crate) const NOISE_ORDER: usize = 6;
 /// The autoregressive model of a node's residual, without the bias that fitting leaves in it.
 pub(crate) fn colour(node: &Node) -> Result<ArModel, Error> {
     Ok(noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
+}
+
+/// The memory of a noise model in whose weighting effects are searched is at most this part of the longest record.
+///
+/// A root near one takes every slow effect for noise, and lets the simulation drift off. Noise whose memory is longer than
+/// this has left fewer than some ten independent samples in the record: nothing says that it is noise.
+const LONGEST_MEMORY: f64 = 1.0 / 15.0;
+
+/// The longest memory of a noise model \[samples\].
+pub(crate) fn longest_memory(setup: &Setup) -> f64 {
+    let lengths = setup.records.iter().map(|record| record.len());
+    LONGEST_MEMORY * lengths.max().unwrap_or(1) as f64
+}
+
+/// A node fitted with the noise model of its own residual, whose memory is limited.
+pub(crate) fn in_own_noise<'a>(node: &Node<'a>) -> Result<Node<'a>, Error> {
+    let memory = Some(longest_memory(&node.setup));
+    Ok(Node {
+        fit: prewhitened(&node.setup, node.fit.clone(), NOISE_ORDER, memory, STOPPING)?,
+        ..node.clone()
+    })
 }
 
 /// The autoregressive model of residuals as they are, without what the fit has taken from the noise.

@@ -1,11 +1,11 @@
 //! What is to be diagnosed and how, and the fit of the believed model.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, atomic::AtomicBool};
 use std::time::Duration;
 
 use ct_signals::{ArModel, Record};
-use greybox::{Setup, Stopping, fit_from, random_starts};
+use greybox::{Setup, Stopping, TimeLimit, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 
 use crate::{ControlLoop, Error, closed_loop::enclose, minima::begun_again, node::Node};
@@ -15,6 +15,9 @@ pub(crate) const STOPPING: Stopping = Stopping {
     evaluations: 120,
     cost: 1e-9,
 };
+
+/// Share of the time limit after which the believed model has no further starts.
+const BASE_SHARE: f64 = 0.2;
 
 /// What is to be diagnosed.
 #[derive(Debug, Clone)]
@@ -114,6 +117,10 @@ pub(crate) fn base<'a>(
         })?;
     let mut setup = Setup::new(structure, &problem.records, fixed)?;
     setup.stop = options.stop;
+    setup.interrupt = options.interrupt;
+    let limit = Arc::new(TimeLimit::new(options.time_limit));
+    limit.allow(BASE_SHARE);
+    setup.time_limit = Some(limit);
     for record in &problem.records {
         record.require_rows(setup.free().len())?;
     }
@@ -129,7 +136,10 @@ pub(crate) fn base<'a>(
             all.push(guessed);
         }
         let fit = fit_from(&setup, &all, &white, STOPPING)?;
-        if fit.agree >= 2 || starts >= 96 {
+        if fit.agree >= 2
+            || starts >= 96
+            || setup.leaves_out("further starts of the believed model")
+        {
             break fit;
         }
         starts *= 2;

@@ -170,6 +170,13 @@ pub(crate) fn propose<'a>(
     placed: Placed,
     noise: &ArModel,
 ) -> Option<Proposal<'a>> {
+    if parent
+        .node
+        .setup
+        .leaves_out("effects that were not tried at all")
+    {
+        return None;
+    }
     let setup = parent.with(placed)?;
     let (promise, starts) = promising(parent.node, &setup, placed, noise)?;
     let mut added = parent.node.added.clone();
@@ -350,7 +357,20 @@ pub(crate) fn place<'a>(
     noise: &ArModel,
     stopping: Stopping,
 ) -> Option<Node<'a>> {
-    let mut proposal = propose(&Parent::new(parent), placed, noise)?;
+    let from = Parent::new(parent);
+    let proposal = propose(&from, placed, noise).or_else(|| {
+        // Out of time the larger set's values are the only start.
+        let setup = from.with(placed)?;
+        let mut added = parent.added.clone();
+        added.push(placed);
+        Some(Proposal {
+            setup,
+            added,
+            starts: Vec::new(),
+            promise: f64::INFINITY,
+        })
+    });
+    let mut proposal = proposal?;
     let start = transfer(known, &proposal.setup);
     proposal.starts.push(start.into());
     realise(proposal, noise, stopping)

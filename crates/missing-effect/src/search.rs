@@ -90,19 +90,16 @@ impl<'a> Grown<'a> {
         self.exhausted.as_ref().is_some_and(same)
     }
 
-    /// The same growth with the sets of another.
-    pub fn with_sizes_of(self, other: Self) -> Self {
-        Self {
-            sizes: other.sizes,
-            ..self
-        }
-    }
-
     /// What [`singles`](crate::proposal::singles) gives for the base in the metric in which it was grown.
     pub fn singles(&self, noise: &ArModel) -> Vec<Node<'a>> {
         let mut nodes = self.refitted.clone();
         nodes.extend(realise_all(self.unpromising.clone(), noise, ROUGH));
         best_first(nodes)
+    }
+
+    /// The single effects that were refitted, best first.
+    pub fn promising_singles(&self) -> Vec<Node<'a>> {
+        best_first(self.refitted.clone())
     }
 }
 
@@ -126,6 +123,13 @@ pub(crate) fn grow<'a>(
     let mut idle = 0;
     for size in 1..=breadth.most {
         progress(size - 1, breadth.most);
+        if size > 1
+            && base
+                .setup
+                .leaves_out(&format!("sets of {size} effects and more"))
+        {
+            break;
+        }
         let sizes = &mut grown.sizes;
         let best_before = sizes
             .iter()

@@ -3,7 +3,7 @@
 use plants::Placed;
 
 use crate::{
-    Acceptance, Diagnosis, Parameter, Problem, Step, Unknown, Verdict,
+    Acceptance, Diagnosis, Parameter, Problem, Rankings, Step, Unknown, Verdict,
     node::Node,
     numbers::{significant, value_and_error},
     remains::{Left, Remains},
@@ -129,6 +129,16 @@ pub(crate) fn of_a_part(last: &Node, unit: &str) -> String {
     )
 }
 
+/// That the two weightings of the residual rank different effects first.
+pub(crate) fn of_rankings(rankings: &Rankings) -> Option<String> {
+    let (white, prewhitened) = (rankings.white.first()?, rankings.prewhitened.first()?);
+    rankings.disagree.then(|| {
+        format!(
+            "The weightings disagree: by the simulation error {white} is the best single effect, prewhitened by the noise model {prewhitened}; the second one looks at fast changes more."
+        )
+    })
+}
+
 /// The effects that were taken out because any course of time would do in their place; `None` where there are none.
 pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
     let names: Vec<String> = dropped
@@ -146,7 +156,7 @@ pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
 /// That the minimum of the last model was not found twice.
 pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
-    (step.starts_agree < 2).then(|| {
+    (step.starts_agree < 2 && step.starts > 0).then(|| {
         format!(
             "Of {} starts {} the minimum that is shown: there may be a better one, and other values of the parameters.",
             step.starts,

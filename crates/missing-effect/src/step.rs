@@ -4,7 +4,7 @@ use ct_signals::{ArModel, Record, residual_tests};
 use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
 
 use crate::{
-    Error, Parameter, ResidualTests, Step,
+    Error, HeldOutError, Parameter, ResidualTests, Step,
     closed_loop::widened,
     locate::{Located, Series, locate},
     node::Node,
@@ -19,6 +19,7 @@ pub(crate) const HEAD: usize = 5;
 struct HeldOut {
     outputs: Vec<Vec<f64>>,
     rmse: f64,
+    error: HeldOutError,
 }
 
 /// Initial levels from the first [`HEAD`] samples with everything else frozen; scored on the rest.
@@ -29,16 +30,9 @@ fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
     let parameters = &node.fit.x[..node.setup.parameter_count()];
     let heads: Vec<Record> = test
         .iter()
-        .map(|record| {
-            let mut head = record.clone();
-            head.time.truncate(HEAD);
-            head.input.values.truncate(HEAD);
-            if let Some(second) = &mut head.input_2 {
-                second.values.truncate(HEAD);
-            }
-            head.output.values.truncate(HEAD);
-            head.reference = None;
-            head
+        .map(|record| Record {
+            reference: None,
+            ..record.rows(0..HEAD)
         })
         .collect();
     let x = fit_initial_levels(
@@ -50,17 +44,54 @@ fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
         },
     )?;
     let simulated = node.setup.with_records(test)?.simulate(&x)?.output;
-    let (mut squares, mut count) = (0.0, 0);
+    let mut parts = [0.0; 4];
+    let mut count = 0;
     for (record, model) in test.iter().zip(&simulated) {
-        for (y, m) in record.output.values.iter().zip(model).skip(HEAD) {
-            squares += (y - m) * (y - m);
-            count += 1;
+        let measured = record.output.values.iter().skip(HEAD);
+        let pairs: Vec<(f64, f64)> = measured
+            .copied()
+            .zip(model.iter().skip(HEAD).copied())
+            .collect();
+        for (sum, part) in parts.iter_mut().zip(error_parts(&pairs)) {
+            *sum += part;
         }
+        count += pairs.len();
     }
+    let [rmse, offset, gain, shape] = parts.map(|sum| (sum / count.max(1) as f64).sqrt());
     Ok(Some(HeldOut {
         outputs: simulated,
-        rmse: (squares / f64::from(count.max(1))).sqrt(),
+        rmse,
+        error: HeldOutError {
+            offset,
+            gain,
+            shape,
+        },
     }))
+}
+
+/// The error on held-out records \[output unit\]; `None` where there are none.
+pub(crate) fn held_out_rmse(node: &Node, test: &[Record]) -> Result<Option<f64>, Error> {
+    Ok(hold_out(node, test)?.map(|held_out| held_out.rmse))
+}
+
+/// Sums of squares of measured minus model: all of it, what its mean explains, what a factor on the model's deviations from
+/// their mean explains beside it, and what is left.
+fn error_parts(pairs: &[(f64, f64)]) -> [f64; 4] {
+    let n = pairs.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
+    let (error, model) = (mean(&|(y, m)| y - m), mean(&|(_, m)| *m));
+    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+        pairs.iter().map(|(y, m)| of(y - m, m - model)).sum()
+    };
+    let all = sum(&|e, _| e * e);
+    let offset = n * error * error;
+    let (cross, power) = (sum(&|e, m| e * m), sum(&|_, m| m * m));
+    let gain = if power > 0.0 {
+        cross * cross / power
+    } else {
+        0.0
+    };
+    [all, offset, gain, (all - offset - gain).max(0.0)]
 }
 
 /// Standard errors under the colour of the node's own residual, whatever metric it was fitted in.
@@ -141,6 +172,7 @@ pub(crate) fn report(
         errors = widened(node, errors)?;
     }
     let rmse_test = held_out.as_ref().map(|held_out| held_out.rmse);
+    let held_out_error = held_out.as_ref().map(|held_out| held_out.error);
     let mut series = simulated;
     series.extend(held_out.into_iter().flat_map(|held_out| held_out.outputs));
     Ok(Step {
@@ -148,7 +180,7 @@ pub(crate) fn report(
         place: last.and_then(|placed| place_name(node, *placed)),
         rmse: fit.rmse,
         rmse_test,
-        held_out_error: None,
+        held_out_error,
         bic,
         parameters: parameters(setup, fit, &errors),
         starts: fit.starts,
@@ -163,4 +195,22 @@ pub(crate) fn report(
 pub(crate) fn place_name(node: &Node, placed: plants::Placed) -> Option<String> {
     let name = placed.place_name(node.setup.structure.plant);
     name.map(str::to_string)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_held_out_error_is_split_into_offset_gain_and_shape() {
+        // Measured: the model's deviations from 5, half as large again, 2 above, and a wave that is neither.
+        let model = |k: usize| if k % 4 < 2 { 6.0 } else { 4.0 };
+        let wave = |k: usize| if k.is_multiple_of(2) { 0.3 } else { -0.3 };
+        let pairs: Vec<(f64, f64)> = (0..400)
+            .map(|k| (7.0 + 1.5 * (model(k) - 5.0) + wave(k), model(k)))
+            .collect();
+        let [all, offset, gain, shape] = error_parts(&pairs).map(|sum| (sum / 400.0).sqrt());
+        assert!((offset - 2.0).abs() < 1e-12 && (gain - 0.5).abs() < 1e-12);
+        assert!((shape - 0.3).abs() < 1e-12 && (all * all - 4.34).abs() < 1e-9);
+    }
 }

@@ -47,7 +47,7 @@ pub(crate) fn trail<'a>(
             ROUNDS.0
         };
         for round in 0..rounds {
-            if node.fit.agree < 2 {
+            if node.fit.agree < 2 && !node.setup.leaves_out("further starts of the final models") {
                 around(&mut node, STARTS_AROUND, noise, 100 * k as u64 + round)?;
             }
         }

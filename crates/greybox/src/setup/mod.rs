@@ -4,6 +4,7 @@ mod rows;
 mod simulation;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_signals::{Hold, Record};
@@ -13,7 +14,9 @@ pub use self::{
     rows::Rows,
     simulation::{LoopRun, Simulated},
 };
-use crate::{Error, LinearPlant, Replay, feedback::Feedback, reading_step::reading_step};
+use crate::{
+    Error, LinearPlant, Replay, TimeLimit, feedback::Feedback, reading_step::reading_step,
+};
 
 /// A structure, the records, and which parameters are free.
 ///
@@ -30,8 +33,12 @@ pub struct Setup<'a> {
     pub fixed: BTreeMap<String, f64>,
     /// Equal parts of a sampling interval in the simulation.
     pub substeps: usize,
-    /// Where somebody may say that nobody waits any more: nothing is simulated then, and every fit ends with [`Error::Stopped`].
+    /// Cancellation flag: when set, nothing is simulated, and fits end with [`Error::Stopped`].
     pub stop: Option<&'a AtomicBool>,
+    /// Interruption flag: when set, fits end where they are, as if the time limit had passed.
+    pub interrupt: Option<&'a AtomicBool>,
+    /// Limit on the time, shared by all fits of a search.
+    pub time_limit: Option<Arc<TimeLimit>>,
     names: Vec<String>,
     bounds: Vec<(f64, f64)>,
     /// Positions of the parameters that are fitted.
@@ -169,6 +176,8 @@ impl<'a> Setup<'a> {
             fixed,
             substeps: 1,
             stop: None,
+            interrupt: None,
+            time_limit: None,
             names,
             bounds,
             free,
@@ -204,8 +213,7 @@ impl<'a> Setup<'a> {
 
     fn rebuilt(&self, structure: Structure, feedback: Option<Feedback>) -> Result<Self, Error> {
         let mut setup = Self::build(structure, self.records, self.fixed.clone(), feedback)?;
-        setup.substeps = self.substeps;
-        setup.stop = self.stop;
+        setup.limited_as(self);
         Ok(setup)
     }
 
@@ -258,10 +266,36 @@ impl<'a> Setup<'a> {
         self.rebuilt(structure, self.feedback.clone())
     }
 
-    /// Nobody waits any more.
+    /// The computation was cancelled.
     #[must_use]
     pub fn stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+
+    /// The time limit has passed, or the user has ended the search: fits take no further steps.
+    #[must_use]
+    pub fn out_of_time(&self) -> bool {
+        self.interrupt
+            .is_some_and(|interrupt| interrupt.load(Ordering::Relaxed))
+            || self.time_limit.as_ref().is_some_and(|limit| limit.passed())
+    }
+
+    /// Whether a part of a search has to be left out for want of time; it is noted then.
+    #[must_use]
+    pub fn leaves_out(&self, part: &str) -> bool {
+        let out = self.out_of_time();
+        if out && let Some(limit) = &self.time_limit {
+            limit.leave_out(part);
+        }
+        out
+    }
+
+    /// Steps and limits of another setup.
+    fn limited_as<'c: 'a>(&mut self, other: &Setup<'c>) {
+        self.substeps = other.substeps;
+        self.stop = other.stop;
+        self.interrupt = other.interrupt;
+        self.time_limit.clone_from(&other.time_limit);
     }
 
     /// The same structure against other records, in the same scales, run on the measured command.
@@ -272,9 +306,8 @@ impl<'a> Setup<'a> {
     where
         'a: 'b,
     {
-        let mut setup = Setup::new(self.structure.clone(), records, self.fixed.clone())?;
-        setup.substeps = self.substeps;
-        setup.stop = self.stop;
+        let mut setup: Setup<'b> = Setup::new(self.structure.clone(), records, self.fixed.clone())?;
+        setup.limited_as(self);
         Ok(setup)
     }
 

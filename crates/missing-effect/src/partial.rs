@@ -1,0 +1,194 @@
+//! The largest part of the error that effects explain, where none explains all of it.
+//!
+//! Measured records often hold several causes, and noise that is nearly integrated. That no set of effects leaves noise does not mean
+//! that nothing was found: a set is a partial answer where
+//! - it explains [`PART`](crate::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one with an
+//!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::judge::WHOLE) of it;
+//! - the criterion falls beyond chance, each model under the noise model of its own residual, whose memory is limited, or what is
+//!   fitted to one half of the record helps on the other;
+//! - sizes are inside their bounds, and states are physical;
+//! - a single jump of the reading does not explain more.
+//!
+//! A larger set is taken where it explains half of what the smaller one leaves.
+
+use ct_signals::ArModel;
+use greybox::{fit_from, fit_initial_levels};
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    confirm::{BIC_MARGIN, beyond_chance},
+    find::Found,
+    judge::{PART, WHOLE, explained},
+    jump::jump,
+    node::{FINE, Node, ROUGH, refine},
+    noise_floor::in_own_noise,
+    step::held_out_rmse,
+};
+
+/// Sets of one size that are refitted, those with the least simulation error.
+const REFITTED: usize = 6;
+/// Largest set.
+const MOST: usize = 3;
+/// A larger set leaves at most this part of what the smaller one leaves of the excess error.
+const LEFT: f64 = 0.5;
+
+/// What noise may explain as well has to explain this part of the error on a half of the record that was not fitted.
+const CARRIED_OVER: f64 = 0.2;
+
+/// A set that was tested, and with what result.
+pub(crate) struct Tested<'a> {
+    /// The set, fitted to the simulation error.
+    pub node: Node<'a>,
+    /// The share of the excess error that it explains.
+    pub share: f64,
+    /// Fall of the criterion, each model under its own noise model.
+    pub bic_fall: f64,
+    /// Why it is refused; empty where it is accepted.
+    pub reasons: Vec<String>,
+}
+
+/// The set that explains the largest part of the excess error, accepted or, where none is, the best that was refused.
+///
+/// `floor`: standard deviation of the noise \[output unit\].
+pub(crate) fn largest_part<'a>(
+    base: &Node<'a>,
+    found: &Found<'a>,
+    singles: &[Node<'a>],
+    floor: f64,
+) -> Result<Option<Tested<'a>>, Error> {
+    let white = ArModel::white(1.0);
+    let own_base = in_own_noise(base)?;
+    let jump = jump(base, &white)?.map_or(f64::INFINITY, |jump| jump.bic);
+    let mut best: Option<Tested<'a>> = None;
+    for size in 1..=MOST {
+        if size > 1 && base.setup.out_of_time() {
+            break;
+        }
+        let of_size = |nodes: &[Node<'a>]| -> Vec<Node<'a>> {
+            let mut nodes: Vec<Node> = nodes
+                .iter()
+                .filter(|node| node.added.len() == size && node.plausible())
+                .cloned()
+                .collect();
+            nodes.sort_by(|a, b| a.fit.rmse.total_cmp(&b.fit.rmse));
+            nodes.truncate(REFITTED);
+            nodes
+        };
+        let mut sets = of_size(found.grown.sizes.get(size).map_or(&[], Vec::as_slice));
+        if size == 1 {
+            sets.extend(of_size(singles));
+        }
+        sets.extend(of_size(std::slice::from_ref(&found.confirmed)));
+        sets.extend(of_size(std::slice::from_ref(&found.richest)));
+        let tested = sets
+            .into_par_iter()
+            .filter_map(|set| refine(&set, &white, &[]).ok())
+            .map(|node| test(base, &own_base, node, floor, jump))
+            .collect::<Result<Vec<_>, _>>()?;
+        let accepted = tested.into_iter().max_by(|a, b| {
+            key(a)
+                .partial_cmp(&key(b))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
+        best = match (best, accepted) {
+            (None, found) => found,
+            (Some(best), Some(larger))
+                if key(&larger).0 > key(&best).0
+                    || (larger.reasons.is_empty()
+                        && 1.0 - larger.share <= LEFT * (1.0 - best.share)) =>
+            {
+                Some(larger)
+            }
+            (best, _) => best,
+        };
+    }
+    Ok(best)
+}
+
+/// The part of the mean squared error that a set explains on one half of a record when it was fitted to the other, both ways
+/// (two-fold cross-validation); initial states as on held-out records. Negative where it does harm; of several records the longest.
+///
+/// A noise model that is nearly integrated looks at changes from sample to sample alone, and takes any slow effect for noise. Physics
+/// that is real helps on data that were not fitted; what imitates a slow disturbance does not.
+fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
+    let white = ArModel::white(1.0);
+    let records = base.setup.records.iter();
+    let Some(record) = records.max_by_key(|record| record.len()) else {
+        return Ok(0.0);
+    };
+    let half = record.len() / 2;
+    let halves = [record.rows(0..half), record.rows(half..record.len())];
+    let error = |node: &Node, fitted: usize| -> Result<f64, Error> {
+        let own = node
+            .setup
+            .with_records(std::slice::from_ref(&halves[fitted]))?;
+        let begun = fit_initial_levels(&own, &node.fit.x[..own.parameter_count()], ROUGH)?;
+        let fit = fit_from(&own, &[begun], &white, FINE)?;
+        let half = Node {
+            setup: own,
+            fit,
+            added: node.added.clone(),
+        };
+        let other = std::slice::from_ref(&halves[1 - fitted]);
+        Ok(held_out_rmse(&half, other)?.map_or(f64::INFINITY, |rmse| rmse.powi(2)))
+    };
+    let of_both = |node: &Node| Ok::<f64, Error>(error(node, 0)? + error(node, 1)?);
+    Ok(1.0 - of_both(node)? / of_both(base)?)
+}
+
+/// Accepted sets before refused ones, then by what they explain.
+fn key(tested: &Tested) -> (bool, f64) {
+    (tested.reasons.is_empty(), tested.share)
+}
+
+fn test<'a>(
+    base: &Node<'a>,
+    own_base: &Node<'a>,
+    node: Node<'a>,
+    floor: f64,
+    jump: f64,
+) -> Result<Tested<'a>, Error> {
+    let share = explained(base, &node, floor)?;
+    let required = if node.added.iter().any(|placed| placed.effect.by_clock) {
+        WHOLE
+    } else {
+        PART
+    };
+    let mut reasons = Vec::new();
+    let mut bic_fall = node.gain_over(base);
+    if share < required {
+        reasons.push(format!(
+            "explains {:.0} % of the excess error, {:.0} % required{}",
+            100.0 * share,
+            100.0 * required,
+            if required > PART {
+                " of an effect that follows time alone"
+            } else {
+                ""
+            }
+        ));
+    } else {
+        let own = in_own_noise(&node)?;
+        bic_fall = own.gain_over(own_base);
+        let beyond_noise = bic_fall > BIC_MARGIN && beyond_chance(&own, own_base);
+        if !beyond_noise && carried_over(base, &node)? < CARRIED_OVER {
+            reasons.push(
+                "coloured noise explains as much, and one half of the record does not predict it in the other"
+                    .to_string(),
+            );
+        }
+    }
+    if !node.plausible() {
+        reasons.push("a size stands at a bound, or a state is not physical".to_string());
+    }
+    if jump < node.fit.bic() {
+        reasons.push("a single jump of the reading explains more".to_string());
+    }
+    Ok(Tested {
+        node,
+        share,
+        bic_fall,
+        reasons,
+    })
+}

@@ -1,17 +1,47 @@
-//! What a diagnosis costs: seconds of wall and of processor time on two threads, for records of 4000 samples from a closed
-//! loop with one hidden effect or two, singles and sets; and what it found, so that a change of the search shows.
+//! What a comparison and a diagnosis cost: seconds of wall and of processor time on two threads; and what the diagnosis found, so
+//! that a change of the search shows.
+//!
+//! Records of 4000 samples from a closed loop with one hidden effect or two; and records that take long: three tanks, two tanks in
+//! open loop with an effect whose threshold lies near the operating level, stamps that jitter.
 //!
 //! `RAYON_NUM_THREADS=2 cargo run --release -p ctid-tests --example diagnose_times`; an argument chooses the cells whose name
 //! holds it, a second one the largest number of effects (1, then 6).
 
-use ctid_tests::{Drive, Rig};
-use missing_effect::{Options, diagnose};
+use std::{error::Error, fs, path::PathBuf};
+
+use clap::Parser;
+use ctid_tests::{Drive, Rig, three_tanks};
+use missing_effect::{Options, Problem, compare, diagnose};
+use plants::Plant;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+/// Measures what a diagnosis costs.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// Only cells whose name holds this, as `three-tank`, `open` or `jitter`.
+    #[arg(default_value = "")]
+    filter: String,
+    /// Largest number of effects; 1, then 6, where it is not given.
+    most: Option<usize>,
+    /// Writes every cell.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+/// What is hidden: the effect, the vessel, its parameters.
+type Hidden = Vec<(&'static str, usize, Vec<f64>)>;
+
+/// A problem and its name.
+struct Cell {
+    name: String,
+    problem: Problem,
+}
 
 /// Seconds of processor time of this process so far; not a number where the system does not tell.
 fn processor() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let fields: Vec<&str> = stat
         .rsplit(')')
         .next()
@@ -24,13 +54,65 @@ fn processor() -> f64 {
         .map_or(f64::NAN, |(user, system)| (user + system) / 100.0)
 }
 
-fn main() -> Result<(), missing_effect::Error> {
-    let wanted = std::env::args().nth(1).unwrap_or_default();
-    let most: Vec<usize> = match std::env::args().nth(2).and_then(|n| n.parse().ok()) {
-        Some(most) => vec![most],
-        None => vec![1, 6],
-    };
-    let rigs = [
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = Arguments::parse();
+    let most = arguments.most.map_or(vec![1, 6], |most| vec![most]);
+    let mut cells = in_loop();
+    cells.extend(slow());
+    cells.retain(|cell| cell.name.contains(&arguments.filter));
+    println!(
+        "{:<56} {:>7} {:>7} {:>4} {:>7} {:>7}  found",
+        "cell", "compare", "cpu", "most", "wall", "cpu"
+    );
+    let mut all: Vec<Value> = Vec::new();
+    for Cell { name, problem } in cells {
+        let before = processor();
+        let compared = compare(&problem, &Options::default())?;
+        let compare_cpu = processor() - before;
+        for &max_effects in &most {
+            let options = Options {
+                max_effects,
+                ..Options::default()
+            };
+            let before = processor();
+            let found = diagnose(&problem, &options, &|_| {})?;
+            let cpu = processor() - before;
+            println!(
+                "{name:<56} {:>7.2} {compare_cpu:>7.2} {max_effects:>4} {:>7.2} {cpu:>7.2}  {:?} {:?} {:?}",
+                compared.seconds,
+                found.seconds,
+                found.verdict,
+                found.groups,
+                found.steps.iter().map(|step| step.rmse).collect::<Vec<_>>(),
+            );
+            all.push(json!({
+                "cell": name,
+                "compare_seconds": compared.seconds,
+                "compare_cpu": compare_cpu,
+                "max_effects": max_effects,
+                "seconds": found.seconds,
+                "cpu": cpu,
+                "verdict": found.verdict,
+                "groups": found.groups,
+                "left_out": found.effort.left_out,
+            }));
+        }
+    }
+    if let Some(path) = &arguments.json {
+        fs::write(path, serde_json::to_string_pretty(&all)? + "\n")?;
+        println!("wrote {}", path.display());
+    }
+    Ok(())
+}
+
+fn names(hidden: &Hidden) -> String {
+    let names: Vec<&str> = hidden.iter().map(|(effect, ..)| *effect).collect();
+    names.join("+")
+}
+
+/// Records of 4000 samples from a known loop.
+fn in_loop() -> Vec<Cell> {
+    let rigs: [(Rig, Hidden); 5] = [
         (Rig::single_tank(), vec![("pump_deadzone", 0, vec![0.5])]),
         (Rig::single_tank(), vec![("pump_lag", 0, vec![8.0])]),
         (Rig::cascaded_tanks(), vec![("sensor_lag", 0, vec![10.0])]),
@@ -43,17 +125,9 @@ fn main() -> Result<(), missing_effect::Error> {
             ],
         ),
     ];
-    println!(
-        "{:<46} {:>4} {:>7} {:>7}  found",
-        "cell", "most", "wall", "cpu"
-    );
+    let mut cells = Vec::new();
     for (rig, hidden) in rigs {
-        let names: Vec<&str> = hidden.iter().map(|(effect, ..)| *effect).collect();
         for colour in [0.0, 0.9] {
-            let cell = format!("{} {} {colour}", rig.plant.id(), names.join("+"));
-            if !cell.contains(&wanted) {
-                continue;
-            }
             let rig = Rig {
                 drive: Drive::Closed,
                 colour,
@@ -65,23 +139,87 @@ fn main() -> Result<(), missing_effect::Error> {
             let record = rig.run(&mut ChaCha8Rng::seed_from_u64(7));
             let mut problem = rig.problem(record);
             problem.controller = Some(rig.controller());
-            for &max_effects in &most {
-                let options = Options {
-                    max_effects,
-                    ..Options::default()
-                };
-                let before = processor();
-                let found = diagnose(&problem, &options, &|_| {})?;
-                println!(
-                    "{cell:<46} {max_effects:>4} {:>7.2} {:>7.2}  {:?} {:?} {:?}",
-                    found.seconds,
-                    processor() - before,
-                    found.verdict,
-                    found.groups,
-                    found.steps.iter().map(|step| step.rmse).collect::<Vec<_>>(),
-                );
-            }
+            cells.push(Cell {
+                name: format!("{} {} {colour}", rig.plant.id(), names(&hidden)),
+                problem,
+            });
         }
     }
-    Ok(())
+    cells
+}
+
+/// Records in open loop that take long.
+fn slow() -> Vec<Cell> {
+    let mut cells = Vec::new();
+    let leak: (&str, usize, &[f64]) = ("const_leak", 1, &[3.0]);
+    for hidden in [None, Some(leak)] {
+        let record = three_tanks::record(hidden, 800, 7);
+        let effect = hidden.map_or("nothing", |(effect, ..)| effect);
+        cells.push(Cell {
+            name: format!("three-tank {effect} open 800"),
+            problem: Problem {
+                plant: Plant::ThreeTank,
+                known: three_tanks::known(),
+                ..Rig::single_tank().problem(record)
+            },
+        });
+    }
+    // The lower tank works near 16 cm.
+    let thresholds: [Hidden; 2] = [
+        vec![("overflow", 1, vec![17.0])],
+        vec![("leak_at_height", 1, vec![4.0, 15.0])],
+    ];
+    for hidden in thresholds {
+        for samples in [2500, 4000] {
+            let rig = Rig {
+                samples,
+                hidden: hidden.clone(),
+                ..Rig::cascaded_tanks()
+            };
+            cells.push(open(&rig));
+        }
+    }
+    let linear = Rig::linear_tank();
+    let two = Rig {
+        plant: Plant::CascadedTanksLinear,
+        theta: vec![6.4, 60.0, 100.0, -16.0],
+        levels: vec![32.0, 16.0],
+        ..Rig::cascaded_tanks()
+    };
+    let jittered: [(Rig, Hidden); 4] = [
+        (linear.clone(), vec![]),
+        (
+            // Beside a dead zone the level stands as high from a larger offset.
+            Rig {
+                theta: vec![6.4, 100.0, 6.0],
+                ..linear
+            },
+            vec![("pump_deadzone", 0, vec![4.0])],
+        ),
+        (two.clone(), vec![]),
+        (two, vec![("sensor_lag", 0, vec![10.0])]),
+    ];
+    for (rig, hidden) in jittered {
+        cells.push(open(&Rig {
+            samples: 4000,
+            jitter: 0.03,
+            hidden,
+            ..rig
+        }));
+    }
+    cells
+}
+
+fn open(rig: &Rig) -> Cell {
+    let hidden = if rig.hidden.is_empty() {
+        "nothing".to_string()
+    } else {
+        names(&rig.hidden)
+    };
+    let jitter = if rig.jitter > 0.0 { " jitter" } else { "" };
+    let record = rig.run(&mut ChaCha8Rng::seed_from_u64(7));
+    Cell {
+        name: format!("{} {hidden} open {}{jitter}", rig.plant.id(), rig.samples),
+        problem: rig.problem(record),
+    }
 }

@@ -108,7 +108,7 @@ pub fn drawn(seed: u64) -> Option<Rig> {
 /// A rig's record, where its diagnosis is one group of several that holds the truth.
 #[must_use]
 pub fn undecided(rig: Rig, seed: u64) -> Option<Undecided> {
-    let truth = rig.hidden.first()?.0;
+    let truth = rig.missing().first()?.0;
     let record = rig.run(&mut ChaCha8Rng::seed_from_u64(seed));
     let problem = problem(&rig, vec![record])?;
     let found = diagnosed(&problem)?;

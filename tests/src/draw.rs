@@ -95,6 +95,9 @@ pub fn rig(plant: Plant, drive: Drive, colour: f64, samples: usize, rng: &mut Ch
 /// (a height, a time, a time constant, a phase) is drawn from the range that the catalogue's starts cover. The
 /// size goes from absent to the end of its plausible range until the ratio is met. Where it is not met, or the
 /// level leaves 0.1 to 3 times the level at rest, another rig is drawn; `None` where none of twelve would do.
+///
+/// Coarse quantisation is a converter behind the noise, as real ones are: its structural error is that of rounding, the step over
+/// the square root of 12.
 #[must_use]
 pub fn with_effect(
     effect: &'static EffectInfo,
@@ -123,7 +126,80 @@ pub fn with_effect(
     })
 }
 
+/// Effects that data of this kind can hardly split.
+const FAMILIES: [&[&str]; 3] = [
+    &["pump_lag", "sensor_lag", "transport_delay"],
+    &["sensor_drift", "valve_drift", "pump_gain_drift"],
+    &[
+        "const_leak",
+        "pipe_height",
+        "laminar_outflow",
+        "pump_deadzone",
+        "pump_nonlinearity",
+        "sensor_offset",
+    ],
+];
+
+/// Two effects may make a pair: they act at different places of the chain, are not of one family that data can hardly split, and
+/// at most one of them follows the clock.
+#[must_use]
+pub fn may_pair(one: &EffectInfo, other: &EffectInfo) -> bool {
+    let both = |family: &&[&str]| family.contains(&one.id) && family.contains(&other.id);
+    one.place != other.place && !(one.by_clock && other.by_clock) && !FAMILIES.iter().any(both)
+}
+
+/// A rig with two effects drawn from those that [`may_pair`], the structural error of each alone `ratio` times the noise; the rest
+/// as [`with_effect`].
+#[must_use]
+pub fn with_pair(ratio: f64, drive: Drive, colour: f64, samples: usize, seed: u64) -> Option<Rig> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..2 * DRAWS).find_map(|_| {
+        let plant = PLANTS[rng.random_range(0..PLANTS.len())];
+        let rig = rig(plant, drive, colour, samples, &mut rng);
+        let (one, other) = pair(plant, &mut rng);
+        let mut alone = |effect: &'static EffectInfo| {
+            let vessels: Vec<usize> = effect.sites(plant).collect();
+            let vessel = vessels[rng.random_range(0..vessels.len())];
+            let placed = Placed { effect, vessel };
+            built(rig.clone(), placed, ratio, seed, &mut rng)
+        };
+        let (one, other) = (alone(one)?, alone(other)?);
+        let both = Rig {
+            hidden: [one.hidden, other.hidden].concat(),
+            converter: one.converter.max(other.converter),
+            ..rig
+        };
+        misfit(&both, seed, None, 0).map(|_| both)
+    })
+}
+
+fn pair(plant: Plant, rng: &mut ChaCha8Rng) -> (&'static EffectInfo, &'static EffectInfo) {
+    let effects: Vec<&'static EffectInfo> = plants::CATALOGUE
+        .iter()
+        .copied()
+        .filter(|effect| effect.sites(plant).next().is_some())
+        .collect();
+    let mut one = || effects[rng.random_range(0..effects.len())];
+    loop {
+        let (a, b) = (one(), one());
+        if may_pair(a, b) {
+            return (a, b);
+        }
+    }
+}
+
+/// A rig whose converter rounds the noisy reading.
+fn rounded(rig: Rig, ratio: f64, seed: u64) -> Option<Rig> {
+    let converter = 12.0_f64.sqrt() * ratio * rig.noise;
+    // Half of what the level moves is the largest step that the catalogue knows.
+    let (low, high) = without_noise(&rig, seed).output_range();
+    (converter <= 0.5 * (high - low)).then_some(Rig { converter, ..rig })
+}
+
 fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) -> Option<Rig> {
+    if placed.effect.id == "coarse_quantisation" {
+        return rounded(rig, ratio, seed);
+    }
     let path = Path::draw(&rig, placed, seed, rng)?;
     // The minimum from which the next size's is sought; at the end others are looked for.
     let mut near: Option<Vec<f64>> = None;
@@ -184,6 +260,7 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
 pub fn without_noise(rig: &Rig, seed: u64) -> Record {
     let silent = Rig {
         noise: 0.0,
+        walk: 0.0,
         ..rig.clone()
     };
     silent.run(&mut ChaCha8Rng::seed_from_u64(seed))
@@ -286,4 +363,54 @@ fn beside(parameter: &ParameterInfo, rng: &mut ChaCha8Rng) -> f64 {
         between(rng, least..=most)
     };
     value.min(parameter.upper).max(parameter.lower)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paired(one: &str, other: &str) -> bool {
+        let find = |id| EffectInfo::find(id).unwrap();
+        may_pair(find(one), find(other))
+    }
+
+    #[test]
+    fn twins_and_two_that_follow_the_clock_make_no_pair() {
+        assert!(paired("pump_deadzone", "overflow"));
+        assert!(paired("sensor_drift", "overflow"));
+        assert!(!paired("pump_lag", "sensor_lag"));
+        assert!(!paired("const_leak", "sensor_offset"));
+        assert!(!paired("valve_step", "sensor_drift"));
+        assert!(!paired("overflow", "const_leak"));
+    }
+
+    #[test]
+    fn a_converter_rounds_the_reading_with_its_noise() {
+        let effect = EffectInfo::find("coarse_quantisation").unwrap();
+        let rig = with_effect(effect, 1.0, Drive::Open, 0.0, 300, 1).unwrap();
+        assert!((rig.converter / rig.noise - 12.0_f64.sqrt()).abs() < 1e-12);
+        let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1));
+        for y in &record.output.values {
+            let steps = y / rig.converter;
+            assert!((steps - steps.round()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn stamps_jitter_and_increase() {
+        let rig = Rig {
+            jitter: 0.03,
+            walk: 0.05,
+            ..Rig::single_tank()
+        };
+        let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1));
+        record.validate().unwrap();
+        let most = record
+            .time
+            .iter()
+            .enumerate()
+            .map(|(k, t)| (t / rig.interval - k as f64).abs())
+            .fold(0.0, f64::max);
+        assert!(most > 0.02 && most <= 0.03 + 1e-9);
+    }
 }

@@ -1,6 +1,7 @@
 //! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
 
 pub mod draw;
+pub mod measured;
 pub mod onset;
 pub mod outside;
 pub mod three_tanks;
@@ -11,6 +12,7 @@ use plants::{
     Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term,
     controller::{Controller, Regulator},
 };
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 pub mod design_cases;
@@ -46,6 +48,10 @@ pub struct Rig {
     pub noise: f64,
     /// Correlation of the noise from sample to sample; zero is white.
     pub colour: f64,
+    /// Standard deviation of a random walk beside the noise at the end of the record \[cm\]; zero: there is none.
+    pub walk: f64,
+    /// The step of the converter behind the sensor, which rounds the reading with its noise \[cm\]; zero: it does not round.
+    pub converter: f64,
     /// How the command comes about.
     pub drive: Drive,
     /// Fewest and most samples for which a step lasts.
@@ -56,6 +62,8 @@ pub struct Rig {
     pub samples: usize,
     /// Sampling interval \[s\].
     pub interval: f64,
+    /// Samples are taken up to this part of the interval before or after their time, and stamped when they are taken.
+    pub jitter: f64,
     /// What no model tells of: at a time \[s\], what the pump is given beside the command \[V\], and what the sensor
     /// reads beside the level \[cm\].
     pub outside: fn(f64) -> (f64, f64),
@@ -74,11 +82,14 @@ impl Rig {
             command: (3.5, 6.5),
             noise: 0.05,
             colour: 0.0,
+            walk: 0.0,
+            converter: 0.0,
             drive: Drive::Open,
             hold: (20, 90),
             pi: (0.4, 120.0),
             samples: 1000,
             interval: 2.0,
+            jitter: 0.0,
             outside: |_| (0.0, 0.0),
         }
     }
@@ -166,7 +177,8 @@ impl Rig {
             excitation::steps(self.samples, self.hold.0..=self.hold.1, low, high, rng);
         let wanted = wanted.expect("an excitation");
         let controller = self.controller().start(&[middle]);
-        self.from(&self.levels, middle, controller, wanted, &e)
+        let time = self.stamps(self.samples, rng);
+        self.from(&self.levels, middle, controller, wanted, (&time, &e))
     }
 
     /// Runs it on a given command, or in the loop on a given set point, from rest at its first value.
@@ -200,15 +212,49 @@ impl Rig {
         }
         let levels = simulator.levels()[..self.plant.vessels()].to_vec();
         let e = self.noises(wanted.len(), rng);
-        self.from(&levels, command, controller, wanted, &e)
+        let time = self.stamps(wanted.len(), rng);
+        self.from(&levels, command, controller, wanted, (&time, &e))
+    }
+
+    /// All that is hidden as effects of the catalogue: the converter's rounding too.
+    #[must_use]
+    pub fn missing(&self) -> Vec<(&'static str, usize, Vec<f64>)> {
+        let mut all = self.hidden.clone();
+        if self.converter > 0.0 {
+            all.push(("coarse_quantisation", 0, vec![self.converter]));
+        }
+        all
     }
 
     fn noises(&self, n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
-        if self.colour > 0.0 {
+        let mut e = if self.colour > 0.0 {
             noise::ar1(n, self.noise, self.colour, rng)
         } else {
             noise::white(n, self.noise, rng)
+        };
+        if self.walk > 0.0 {
+            let mut walk = 0.0;
+            let steps = noise::white(n, self.walk / (n as f64).sqrt(), rng);
+            for (e, step) in e.iter_mut().zip(steps) {
+                walk += step;
+                *e += walk;
+            }
         }
+        e
+    }
+
+    /// When samples are taken \[s\].
+    fn stamps(&self, n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        let jitter = self.jitter;
+        let mut stamp = |k: usize| {
+            let off = if jitter > 0.0 && k > 0 {
+                rng.random_range(-jitter..=jitter)
+            } else {
+                0.0
+            };
+            (k as f64 + off) * self.interval
+        };
+        (0..n).map(&mut stamp).collect()
     }
 
     /// The plant with what is hidden in it, and its parameters.
@@ -260,7 +306,7 @@ impl Rig {
         before: f64,
         mut controller: Regulator<f64>,
         wanted: Vec<f64>,
-        e: &[f64],
+        (time, e): (&[f64], &[f64]),
     ) -> Record {
         let (structure, theta) = self.built();
         let mut simulator =
@@ -270,21 +316,27 @@ impl Rig {
             Vec::with_capacity(wanted.len()),
         );
         for k in 0..wanted.len() {
-            let (unseen, misread) = (self.outside)(k as f64 * self.interval);
-            let reading = simulator.read() + misread + e[k];
+            let (unseen, misread) = (self.outside)(time[k]);
+            let mut reading = simulator.read() + misread + e[k];
+            if self.converter > 0.0 {
+                reading = self.converter * (reading / self.converter).round();
+            }
+            // Stamps that do not jitter are whole multiples of the interval, their differences only nearly.
+            let interval = match time.get(k + 1) {
+                Some(next) if self.jitter > 0.0 => next - time[k],
+                _ => self.interval,
+            };
             let command = match self.drive {
                 Drive::Open => wanted[k],
                 Drive::Closed => controller.command(wanted[k], reading, self.interval),
             };
-            simulator.advance(Command::held(command + unseen), self.interval);
+            simulator.advance(Command::held(command + unseen), interval);
             y.push(reading);
             u.push(command);
         }
         Record {
             name: "rig".to_string(),
-            time: (0..wanted.len())
-                .map(|k| k as f64 * self.interval)
-                .collect(),
+            time: time.to_vec(),
             input: Signal::new("u", "V", u),
             output: Signal::new("y", "cm", y),
             input_2: None,

@@ -1,55 +1,54 @@
-//! The measured Cascaded Tanks benchmark, where it is present beside the checkout.
+//! Measured records, where they lie beside the checkout (`ctid_tests::measured`); elsewhere these tests are ignored.
 
-use std::path::PathBuf;
+use ctid_tests::measured::{Mark, Source, case, cases, in_a_group, named};
+use missing_effect::{Diagnosis, Options, Problem, diagnose};
 
-use ct_signals::{Columns, Hold, read_csv};
-use missing_effect::{Options, Problem, Verdict, diagnose};
-use plants::{Known, Plant};
-
-/// `None`, with the reason printed, where the data are not there.
-fn data() -> Option<PathBuf> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/cascaded_tanks");
-    if folder.join("estimation.csv").exists() {
-        return Some(folder);
+fn diagnosed(problem: &Problem) -> Result<Diagnosis, missing_effect::Error> {
+    let found = diagnose(problem, &Options::default(), &|_| {})?;
+    for step in &found.steps {
+        println!(
+            "{:?} {:.4}, held out {:?}",
+            step.added, step.rmse, step.rmse_test
+        );
     }
     println!(
-        "skipped: the measured Cascaded Tanks data are not at {}",
-        folder.display()
+        "{:?} {:?} {:.2} s",
+        found.verdict, found.groups, found.seconds
     );
-    None
+    Ok(found)
+}
+
+/// All records are read, none is refused.
+#[test]
+#[cfg_attr(
+    not(measured_records),
+    ignore = "no measured records beside the checkout"
+)]
+fn every_record_is_read() {
+    let all = cases("");
+    for (name, case) in &all {
+        assert!(case.is_ok(), "{name}: {:?}", case.as_ref().err());
+    }
+    let of = |source| {
+        let own = |case: &&Result<ctid_tests::measured::Case, String>| {
+            case.as_ref().is_ok_and(|case| case.source == source)
+        };
+        all.iter().map(|(_, case)| case).filter(own).count()
+    };
+    assert_eq!(Source::ALL.map(of), [16, 17, 1, 12, 1]);
 }
 
 /// From the plain square-root model, with nothing told, the tool finds a chain of effects on the estimation record that
 /// halves the error on the test record, overflow and the pump's dead zone among them.
 #[test]
+#[cfg_attr(
+    not(measured_records),
+    ignore = "no measured records beside the checkout"
+)]
 fn the_cascaded_tanks_give_up_their_effects() {
-    let Some(folder) = data() else { return };
-    let read = |name: &str| read_csv(&folder.join(name), &Columns::default(), Hold::Zero).unwrap();
-    let problem = Problem {
-        plant: Plant::CascadedTanks,
-        known: Known::default(),
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        controller: None,
-        records: vec![read("estimation.csv")],
-        test: vec![read("test.csv")],
-    };
-    let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
-    for step in &found.steps {
-        println!(
-            "{:?} {:.4} V, held out {:.4} V",
-            step.added,
-            step.rmse,
-            step.rmse_test.unwrap()
-        );
-    }
-    println!("{:.2} s", found.seconds);
-    assert!(matches!(
-        found.verdict,
-        Verdict::Effect | Verdict::Undecided
-    ));
+    let case = case("cascaded_tanks").unwrap();
+    let found = diagnosed(&case.problem).unwrap();
+    assert!(named(&found));
     for effect in ["overflow", "pump_deadzone"] {
         assert!(
             found.effects.iter().any(|name| name == effect),
@@ -67,18 +66,54 @@ fn the_cascaded_tanks_give_up_their_effects() {
     assert!(*held_out.last().unwrap() <= 0.33, "{held_out:?}");
 
     // The test record decides nothing: without it the same effects are found.
-    let alone = diagnose(
-        &Problem {
-            test: Vec::new(),
-            ..problem
-        },
-        &Options::default(),
-        &|_| {},
-    )
+    let alone = diagnosed(&Problem {
+        test: Vec::new(),
+        ..case.problem
+    })
     .unwrap();
     assert_eq!(alone.effects, found.effects);
     assert_eq!(
         alone.steps.last().unwrap().rmse.to_bits(),
         found.steps.last().unwrap().rmse.to_bits()
     );
+}
+
+/// One heater of the board: the sensor lags behind it.
+#[test]
+#[cfg_attr(
+    not(measured_records),
+    ignore = "no measured records beside the checkout"
+)]
+fn the_sensor_of_a_heater_lags() {
+    for name in [
+        "tclab/single_heater_600s T1",
+        "tclab/open_loop_cace_validation_1h T1",
+    ] {
+        let case = case(name).unwrap();
+        let found = diagnosed(&case.problem).unwrap();
+        assert!(
+            in_a_group(&found, "sensor_lag") || in_a_group(&found, "pump_lag"),
+            "{name}: {:?}",
+            found.groups
+        );
+        assert!(found.steps.last().unwrap().rmse < 0.4 * found.steps[0].rmse);
+    }
+}
+
+/// Loops whose valves their authors call free.
+#[test]
+#[cfg_attr(
+    not(measured_records),
+    ignore = "no measured records beside the checkout"
+)]
+fn a_valve_that_moves_freely_is_not_said_to_stick() {
+    for name in [
+        "N_2411PDIC10321_1016_0008",
+        "N_2411FIC20502_0904_0005",
+        "N_2111PIC23001_20250222_0005",
+    ] {
+        let case = case(&format!("valve_loops/{name}.csv")).unwrap();
+        let found = diagnosed(&case.problem).unwrap();
+        assert_eq!(case.mark(&found), Mark::Right, "{name}: {:?}", found.groups);
+    }
 }

@@ -1,9 +1,9 @@
 //! How often a hidden effect is named rightly: `cargo run --release -p ctid-tests --example study` prints the tables of
 //! `docs/study.md`.
 //!
-//! Every effect of the catalogue, in three sizes, in open and closed loop, under white and coloured noise, in plants that
-//! are drawn at random; records that miss nothing; and disturbances that the catalogue does not hold. `--records 2` is a
-//! quick run. Every record has a seed of its own, whatever else is run.
+//! Every effect of the catalogue, in four sizes, in open and closed loop, under white and coloured noise, in plants that
+//! are drawn at random; pairs of effects; records that miss nothing, also under integrated noise; and disturbances that the
+//! catalogue does not hold. `--records 2 --pairs 2` is a quick run. Every record has a seed of its own, whatever else is run.
 
 mod mark;
 mod record;
@@ -29,7 +29,9 @@ use record::{Job, Outcome, kinds_of_unknown};
 use serde_json::json;
 
 /// Structural error over noise.
-const RATIOS: [f64; 3] = [0.5, 1.0, 3.0];
+const RATIOS: [f64; 4] = [0.5, 1.0, 3.0, 10.0];
+/// The same of each effect of a pair alone.
+const PAIR_RATIOS: [f64; 2] = [1.0, 3.0];
 
 /// A study of simulated records: how often an effect is seen, named, and named rightly.
 #[derive(Debug, Parser)]
@@ -43,9 +45,15 @@ struct Arguments {
     /// Structural errors over the noise.
     #[arg(long, value_delimiter = ',', default_values_t = RATIOS)]
     ratios: Vec<f64>,
+    /// Records with a pair of effects in a cell.
+    #[arg(long, default_value_t = 20)]
+    pairs: u64,
     /// Records in which nothing is missing.
     #[arg(long, default_value_t = 200)]
     null: u64,
+    /// Records in which nothing is missing, with white noise beside a random walk, and time stamps that jitter by 3 %.
+    #[arg(long, default_value_t = 100)]
+    integrated: u64,
     /// Records of each disturbance from outside the catalogue.
     #[arg(long, default_value_t = 20)]
     unknown: u64,
@@ -90,7 +98,20 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
     }
+    for ratio in PAIR_RATIOS {
+        for drive in [Drive::Open, Drive::Closed] {
+            for coloured in [false, true] {
+                jobs.extend((0..arguments.pairs).map(|number| Job::Pair {
+                    ratio,
+                    drive,
+                    coloured,
+                    number,
+                }));
+            }
+        }
+    }
     jobs.extend((0..arguments.null).map(Job::Nothing));
+    jobs.extend((0..arguments.integrated).map(Job::Integrated));
     for kind in 0..kinds_of_unknown() {
         jobs.extend((0..arguments.unknown).map(|number| Job::Unknown { kind, number }));
     }

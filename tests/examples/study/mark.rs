@@ -4,7 +4,7 @@
 use ct_signals::ArModel;
 use ctid_tests::Rig;
 use greybox::{Fit, Setup, Stopping, fit_from, random_starts};
-use missing_effect::Problem;
+use missing_effect::{Diagnosis, Problem};
 use plants::{EffectInfo, ParameterInfo, Placed};
 use serde_json::{Value, json};
 
@@ -30,13 +30,17 @@ impl Mark {
     }
 }
 
-/// The mark of a record with one effect; `None` where a fit is not possible.
-pub fn mark(rig: &Rig, problem: &Problem, named: &[String]) -> Option<Mark> {
-    let noise = if rig.colour > 0.0 {
-        ArModel::from_coefficients(&[rig.colour], 1.0).ok()?
+/// The noise's colour, of size one.
+fn colour(rig: &Rig) -> Option<ArModel> {
+    if rig.colour > 0.0 {
+        ArModel::from_coefficients(&[rig.colour], 1.0).ok()
     } else {
-        ArModel::white(1.0)
-    };
+        Some(ArModel::white(1.0))
+    }
+}
+
+/// The believed model, in its loop where that is known, and its fit.
+fn believed<'a>(rig: &Rig, problem: &'a Problem, noise: &ArModel) -> Option<(Setup<'a>, Fit)> {
     let white = ArModel::white(1.0);
     let records = &problem.records;
     let mut open = Setup::from_records(
@@ -54,8 +58,80 @@ pub fn mark(rig: &Rig, problem: &Problem, named: &[String]) -> Option<Mark> {
         Some(controller) => open.in_loop(controller, &rough.x).ok()?,
         None => (open, rough.x),
     };
-    let base = fit_from(&setup, &[x], &noise, STOPPING).ok()?;
-    let (id, vessel, values) = rig.hidden.first()?;
+    let base = fit_from(&setup, &[x], noise, STOPPING).ok()?;
+    Some((setup, base))
+}
+
+/// By how much the criterion is lower with both effects of a pair than with what the diagnosis added, each refitted with the colour
+/// known: the pair from its true values, the answer from where the diagnosis left it. `None` where a fit is not possible.
+pub fn pair(rig: &Rig, problem: &Problem, found: &Diagnosis) -> Option<f64> {
+    let noise = colour(rig)?;
+    let (setup, base) = believed(rig, problem, &noise)?;
+    let with_all = |all: &[Placed]| {
+        let structure = all
+            .iter()
+            .try_fold(setup.structure.clone(), |structure, placed| {
+                structure.with(*placed)
+            });
+        setup.with_structure(structure.ok()?).ok()
+    };
+    let from_base = |name: &String| {
+        let at = setup.names().iter().position(|other| other == name);
+        at.map_or(0.0, |at| base.x[at])
+    };
+
+    let missing = rig.missing();
+    let effects = missing.iter().map(|(id, vessel, _)| {
+        Some(Placed {
+            effect: EffectInfo::find(id)?,
+            vessel: *vessel,
+        })
+    });
+    let truth = with_all(&effects.collect::<Option<Vec<_>>>()?)?;
+    let mut near: Vec<f64> = truth.names().iter().map(from_base).collect();
+    for ((_, _, values), placed) in missing.iter().zip(truth_order(&truth, &missing)) {
+        for (parameter, value) in truth.structure.effect_parameters(placed).iter().zip(values) {
+            let name = format!("{}.{}", placed.effect.id, parameter.name);
+            let at = truth.names().iter().position(|other| *other == name)?;
+            near[at] = *value;
+        }
+    }
+    let mut own = near.clone();
+    own[..rig.theta.len()].copy_from_slice(&rig.theta);
+    let truth = fit_from(&truth, &[near, own], &noise, STOPPING).ok()?;
+
+    let last = found.steps.last()?;
+    let added = found.steps.iter().filter_map(|step| {
+        let effect = EffectInfo::find(step.added.as_deref()?)?;
+        effect
+            .sites(rig.plant)
+            .map(|vessel| Placed { effect, vessel })
+            .find(|placed| placed.place_name(rig.plant) == step.place.as_deref())
+    });
+    let answer = with_all(&added.collect::<Vec<_>>())?;
+    let start = answer.names().iter().map(|name| {
+        let known = last.parameters.iter().find(|own| own.name == *name);
+        known.map_or_else(|| from_base(name), |own| own.value)
+    });
+    let answer = fit_from(&answer, &[start.collect()], &noise, STOPPING).ok()?;
+    Some(answer.bic() - truth.bic())
+}
+
+/// The effects of a structure in the order of what is missing.
+fn truth_order(setup: &Setup, missing: &[(&'static str, usize, Vec<f64>)]) -> Vec<Placed> {
+    let of = |id: &str| {
+        let effects = setup.structure.effects().iter();
+        effects.copied().find(|placed| placed.effect.id == id)
+    };
+    missing.iter().filter_map(|(id, ..)| of(id)).collect()
+}
+
+/// The mark of a record with one effect; `None` where a fit is not possible.
+pub fn mark(rig: &Rig, problem: &Problem, named: &[String]) -> Option<Mark> {
+    let noise = colour(rig)?;
+    let (setup, base) = believed(rig, problem, &noise)?;
+    let missing = rig.missing();
+    let (id, vessel, values) = missing.first()?;
     let own = Placed {
         effect: EffectInfo::find(id)?,
         vessel: *vessel,

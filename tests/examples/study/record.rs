@@ -4,6 +4,7 @@ use ct_signals::Record;
 use ctid_tests::{
     Drive, Rig,
     draw::{self, PLANTS},
+    measured::claims_feedback,
     outside::OUTSIDE,
 };
 use missing_effect::{Diagnosis, Options, Problem, Verdict, diagnose};
@@ -16,6 +17,11 @@ use crate::mark;
 
 /// Correlation of the coloured noise from sample to sample, in turn.
 const COLOURS: [f64; 2] = [0.8, 0.95];
+
+/// Standard deviation of the random walk at the end of a record with integrated noise, over that of its white noise.
+const WALK: f64 = 0.5;
+/// Part of the interval by which its time stamps jitter.
+const JITTER: f64 = 0.03;
 
 /// A record of the study.
 #[derive(Debug, Clone, Copy)]
@@ -33,8 +39,21 @@ pub enum Job {
         /// Number in its cell.
         number: u64,
     },
+    /// Two effects are hidden in it, drawn at random.
+    Pair {
+        /// Structural error of each alone over noise.
+        ratio: f64,
+        /// Open or closed loop.
+        drive: Drive,
+        /// The noise is coloured.
+        coloured: bool,
+        /// Number in its cell.
+        number: u64,
+    },
     /// Nothing is missing.
     Nothing(u64),
+    /// Nothing is missing, but the noise is white beside a random walk, and the time stamps jitter.
+    Integrated(u64),
     /// Something that no effect describes.
     Unknown {
         /// Which.
@@ -57,11 +76,18 @@ pub struct Outcome {
 #[derive(Debug, Clone)]
 pub struct Answer {
     pub plant: &'static str,
+    pub drive: Drive,
+    /// What was hidden.
+    pub hidden: Vec<&'static str>,
     pub verdict: Verdict,
     pub effects: Vec<String>,
     pub groups: Vec<Vec<String>>,
     /// What an exhaustive refit says of a record whose effect is not in a group.
     pub mark: Option<mark::Mark>,
+    /// Of a pair that is not named whole: by how much the criterion is lower with it than with the answer, both refitted.
+    pub pair_falls: Option<f64>,
+    /// The command is said to answer to the noise.
+    pub feedback: bool,
     /// On one core.
     pub seconds: f64,
 }
@@ -69,7 +95,16 @@ pub struct Answer {
 impl Answer {
     /// Something of the catalogue is named.
     pub fn named(&self) -> bool {
-        matches!(self.verdict, Verdict::Effect | Verdict::Undecided)
+        matches!(
+            self.verdict,
+            Verdict::Effect | Verdict::Undecided | Verdict::Partial
+        )
+    }
+
+    /// How many of the hidden effects are in groups.
+    pub fn found(&self) -> usize {
+        let found = |effect: &&&str| self.named() && self.group(effect).is_some();
+        self.hidden.iter().filter(found).count()
     }
 
     /// The group that holds an effect.
@@ -86,10 +121,13 @@ impl Outcome {
             |answer| {
                 json!({
                     "plant": answer.plant,
+                    "hidden": answer.hidden,
                     "verdict": answer.verdict,
                     "effects": answer.effects,
                     "groups": answer.groups,
                     "mark": answer.mark.as_ref().map(mark::Mark::as_json),
+                    "pair_falls": answer.pair_falls,
+                    "feedback": answer.feedback,
                     "seconds": answer.seconds,
                 })
             },
@@ -135,7 +173,14 @@ impl Job {
                 effect.id,
                 condition(*drive, *coloured)
             ),
+            Self::Pair {
+                ratio,
+                drive,
+                coloured,
+                number,
+            } => format!("pair {ratio} {} {number}", condition(*drive, *coloured)),
             Self::Nothing(number) => format!("nothing {number}"),
+            Self::Integrated(number) => format!("integrated {number}"),
             Self::Unknown { kind, number } => format!("{} {number}", unknown_name(*kind)),
         }
     }
@@ -158,7 +203,17 @@ impl Job {
                     4 * position + 2 * u64::from(*drive == Drive::Closed) + u64::from(*coloured);
                 1_000_000 * cell + 1000 * (100.0 * ratio).round() as u64 + number
             }
+            Self::Pair {
+                ratio,
+                drive,
+                coloured,
+                number,
+            } => {
+                let cell = 2 * u64::from(*drive == Drive::Closed) + u64::from(*coloured);
+                3_000_000_000 + 1_000_000 * cell + 1000 * (100.0 * ratio).round() as u64 + number
+            }
             Self::Nothing(number) => 1_000_000_000 + number,
+            Self::Integrated(number) => 4_000_000_000 + number,
             Self::Unknown { kind, number } => 2_000_000_000 + 1000 * *kind as u64 + number,
         }
     }
@@ -182,6 +237,9 @@ impl Job {
                 {
                     answer.mark = mark::mark(&rig, &problem, &answer.effects);
                 }
+                if matches!(self, Self::Pair { .. }) && answer.found() < answer.hidden.len() {
+                    answer.pair_falls = mark::pair(&rig, &problem, &found);
+                }
                 Outcome {
                     answer: Some(answer),
                     refused: None,
@@ -204,12 +262,29 @@ impl Job {
                 let colour = colour(coloured, number);
                 draw::with_effect(effect, ratio, drive, colour, samples, seed)
             }
+            Self::Pair {
+                ratio,
+                drive,
+                coloured,
+                number,
+            } => draw::with_pair(ratio, drive, colour(coloured, number), samples, seed),
             Self::Nothing(number) => {
                 let plant = PLANTS[number as usize % PLANTS.len()];
                 let number = number / PLANTS.len() as u64;
                 let drive = [Drive::Open, Drive::Closed][number as usize % 2];
                 let colour = colour((number / 2).is_multiple_of(2), number / 4);
                 Some(draw::rig(plant, drive, colour, samples, rng))
+            }
+            Self::Integrated(number) => {
+                let plant = PLANTS[number as usize % PLANTS.len()];
+                let number = number / PLANTS.len() as u64;
+                let drive = [Drive::Open, Drive::Closed][number as usize % 2];
+                let rig = draw::rig(plant, drive, 0.0, samples, rng);
+                Some(Rig {
+                    walk: WALK * rig.noise,
+                    jitter: JITTER,
+                    ..rig
+                })
             }
             Self::Unknown { kind, .. } => {
                 let rig = draw::rig(Plant::SingleTank, Drive::Open, 0.0, samples, rng);
@@ -281,10 +356,14 @@ fn problem(rig: &Rig, record: Record) -> Problem {
 fn answer(rig: &Rig, found: &Diagnosis) -> Answer {
     Answer {
         plant: rig.plant.id(),
+        drive: rig.drive,
+        hidden: rig.missing().iter().map(|(id, ..)| *id).collect(),
         verdict: found.verdict,
         effects: found.effects.clone(),
         groups: found.groups.clone(),
         mark: None,
+        pair_falls: None,
+        feedback: claims_feedback(found),
         seconds: found.seconds,
     }
 }

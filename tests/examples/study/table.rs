@@ -15,6 +15,11 @@ const CONDITIONS: [(Drive, bool); 4] = [
     (Drive::Closed, true),
 ];
 
+/// A criterion that falls by more than this (BIC) tells two models apart.
+const MARGIN: f64 = 6.0;
+/// Upper edges of the histogram of seconds.
+const BELOW: [f64; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 30.0];
+
 /// The counts of some records with a hidden effect.
 #[derive(Debug, Clone, Default)]
 struct Count {
@@ -28,6 +33,7 @@ struct Count {
     /// It is the one named first in its group.
     first: usize,
     undecided: usize,
+    partial: usize,
     sizes: Vec<usize>,
     seconds: Vec<f64>,
 }
@@ -38,8 +44,9 @@ impl Count {
         self.seen += usize::from(answer.verdict != Verdict::Adequate);
         self.named += usize::from(answer.named());
         self.undecided += usize::from(answer.verdict == Verdict::Undecided);
+        self.partial += usize::from(answer.verdict == Verdict::Partial);
         self.first += usize::from(answer.effects.iter().any(|named| named == effect));
-        if let Some(group) = answer.group(effect) {
+        if let Some(group) = answer.group(effect).filter(|_| answer.named()) {
             self.in_group += 1;
             self.sizes.push(group.len());
         }
@@ -66,7 +73,7 @@ struct Column {
     figure: fn(&Count) -> String,
 }
 
-const COLUMNS: [Column; 8] = [
+const COLUMNS: [Column; 9] = [
     Column {
         short: "records",
         width: 7,
@@ -108,6 +115,13 @@ const COLUMNS: [Column; 8] = [
         long: "undecided",
         unit: " %",
         figure: |c| c.percent(c.undecided),
+    },
+    Column {
+        short: "partial",
+        width: 7,
+        long: "partial",
+        unit: " %",
+        figure: |c| c.percent(c.partial),
     },
     Column {
         short: "size",
@@ -182,6 +196,7 @@ fn together<K: Ord>(cells: &BTreeMap<Cell, Count>, key: impl Fn(&Cell) -> K) -> 
         sum.in_group += count.in_group;
         sum.first += count.first;
         sum.undecided += count.undecided;
+        sum.partial += count.partial;
         sum.sizes.extend(&count.sizes);
         sum.seconds.extend(&count.seconds);
     }
@@ -197,21 +212,187 @@ fn named_condition(at: usize) -> &'static str {
     condition(drive, coloured)
 }
 
-/// Records that miss nothing: how many there are, and those in which something was named or called unexplained.
-fn nulls(jobs: &[Job], outcomes: &[Outcome]) -> (usize, Vec<String>, Vec<String>) {
-    let (mut records, mut claims, mut doubted) = (0, Vec::new(), Vec::new());
+/// What was said of records that miss nothing.
+#[derive(Default)]
+struct Nulls {
+    records: usize,
+    /// Those in which something of the catalogue is named.
+    claims: Vec<String>,
+    /// Those called unexplained.
+    doubted: Vec<String>,
+    open: usize,
+    /// Those in open loop whose command is said to answer to the noise.
+    feedback: Vec<String>,
+}
+
+impl Nulls {
+    fn of(jobs: &[Job], outcomes: &[Outcome], kind: fn(&Job) -> bool) -> Self {
+        let mut all = Self::default();
+        for (job, outcome) in jobs.iter().zip(outcomes).filter(|(job, _)| kind(job)) {
+            let Some(answer) = &outcome.answer else {
+                continue;
+            };
+            all.records += 1;
+            if answer.named() {
+                let effects = answer.effects.join(", ");
+                all.claims
+                    .push(format!("{}: {:?}, {effects}", job.name(), answer.verdict));
+            } else if answer.verdict != Verdict::Adequate {
+                all.doubted.push(job.name());
+            }
+            if answer.drive == Drive::Open {
+                all.open += 1;
+                if answer.feedback {
+                    all.feedback.push(job.name());
+                }
+            }
+        }
+        all
+    }
+
+    fn said(&self, what: &str) -> String {
+        if self.records == 0 {
+            return String::new();
+        }
+        let verb = if self.doubted.len() == 1 { "is" } else { "are" };
+        format!(
+            "\nNothing is missing in {} records{what}: an effect is named in {}{}, and {} more {verb} called unexplained{}. Feedback is claimed in {} of the {} in open loop{}.\n",
+            self.records,
+            self.claims.len(),
+            listed(&self.claims),
+            self.doubted.len(),
+            listed(&self.doubted),
+            self.feedback.len(),
+            self.open,
+            listed(&self.feedback)
+        )
+    }
+}
+
+/// The counts of records with a hidden pair.
+#[derive(Debug, Default)]
+struct Pairs {
+    records: usize,
+    named: usize,
+    both: usize,
+    one: usize,
+    /// More is named than the pair.
+    more: usize,
+    undecided: usize,
+    partial: usize,
+    unexplained: usize,
+    adequate: usize,
+    /// Of those without both: the criterion is lower with the pair than with the answer by more than the margin.
+    search: usize,
+    /// It is not.
+    record: usize,
+    seconds: Vec<f64>,
+}
+
+impl Pairs {
+    fn add(&mut self, answer: &Answer) {
+        let said = |verdict| usize::from(answer.verdict == verdict);
+        self.records += 1;
+        self.named += usize::from(answer.named());
+        self.both += usize::from(answer.found() == 2);
+        self.one += usize::from(answer.found() == 1);
+        self.more += usize::from(answer.named() && answer.groups.len() > 2);
+        self.undecided += said(Verdict::Undecided);
+        self.partial += said(Verdict::Partial);
+        self.unexplained += said(Verdict::Unexplained);
+        self.adequate += said(Verdict::Adequate);
+        if let Some(falls) = answer.pair_falls {
+            self.search += usize::from(falls > MARGIN);
+            self.record += usize::from(falls <= MARGIN);
+        }
+        self.seconds.push(answer.seconds);
+    }
+}
+
+/// The table of the pairs, for a page.
+fn pairs(jobs: &[Job], outcomes: &[Outcome]) -> String {
+    let mut rows: BTreeMap<(u64, usize), Pairs> = BTreeMap::new();
     for (job, outcome) in jobs.iter().zip(outcomes) {
-        let (Job::Nothing(_), Some(answer)) = (job, &outcome.answer) else {
+        let (
+            Job::Pair {
+                ratio,
+                drive,
+                coloured,
+                ..
+            },
+            Some(answer),
+        ) = (job, &outcome.answer)
+        else {
             continue;
         };
-        records += 1;
-        if answer.named() {
-            claims.push(format!("{}: {}", job.name(), answer.effects.join(", ")));
-        } else if answer.verdict != Verdict::Adequate {
-            doubted.push(job.name());
-        }
+        let at = CONDITIONS
+            .iter()
+            .position(|known| *known == (*drive, *coloured));
+        let key = ((100.0 * ratio).round() as u64, at.unwrap_or(0));
+        rows.entry(key).or_default().add(answer);
     }
-    (records, claims, doubted)
+    if rows.is_empty() {
+        return String::new();
+    }
+    let mut out = "\n| pair: structural error of each / noise | loop, noise | records | named | both in named groups | one of them | more than two named | undecided | partial | unexplained | adequate | missed by the search | not in the record | seconds, median |\n".to_string();
+    let _ = writeln!(out, "|{}", "---|".repeat(14));
+    for ((hundredths, at), row) in rows {
+        let part = |count: usize| 100.0 * count as f64 / row.records as f64;
+        let _ = write!(
+            out,
+            "| {} | {} | {} |",
+            ratio(hundredths),
+            named_condition(at),
+            row.records
+        );
+        for count in [
+            row.named,
+            row.both,
+            row.one,
+            row.more,
+            row.undecided,
+            row.partial,
+            row.unexplained,
+            row.adequate,
+        ] {
+            let _ = write!(out, " {:.0} % |", part(count));
+        }
+        let _ = writeln!(
+            out,
+            " {} | {} | {} |",
+            row.search,
+            row.record,
+            shown(median(&row.seconds))
+        );
+    }
+    out
+}
+
+/// How many records took how long, and which one longest.
+fn times(jobs: &[Job], outcomes: &[Outcome]) -> String {
+    let taken: Vec<(f64, String)> = jobs
+        .iter()
+        .zip(outcomes)
+        .filter_map(|(job, outcome)| Some((outcome.answer.as_ref()?.seconds, job.name())))
+        .collect();
+    let Some((slowest, name)) = taken.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else {
+        return String::new();
+    };
+    let mut out = "\n| seconds of a record on one core | records |\n|---|---|\n".to_string();
+    let mut from = 0.0;
+    for to in BELOW.into_iter().chain([f64::INFINITY]) {
+        let within = |(seconds, _): &&(f64, String)| (from..to).contains(seconds);
+        let count = taken.iter().filter(within).count();
+        let range = if to.is_finite() {
+            format!("below {to}")
+        } else {
+            format!("{from} and above")
+        };
+        let _ = writeln!(out, "| {range} | {count} |");
+        from = to;
+    }
+    let _ = writeln!(out, "\nThe slowest, {name}, took {slowest:.1} s.");
+    out
 }
 
 /// For each kind of unknown: its name, records, those declared unexplained, and what the others were called.
@@ -283,6 +464,21 @@ pub fn text(jobs: &[Job], outcomes: &[Outcome]) -> String {
                 shown(mark.named)
             );
         }
+        if let (Job::Pair { .. }, Some(answer)) = (job, &outcome.answer)
+            && answer.found() < answer.hidden.len()
+        {
+            let _ = writeln!(
+                out,
+                "{} ({}): hidden {}, said {:?} {:?}; the pair lowers the criterion by {} against that; {:.1} s",
+                job.name(),
+                answer.plant,
+                answer.hidden.join(" + "),
+                answer.verdict,
+                answer.groups,
+                shown(answer.pair_falls),
+                answer.seconds
+            );
+        }
         if let Some(why) = &outcome.refused {
             let _ = writeln!(out, "{}: {why}", job.name());
         }
@@ -345,18 +541,10 @@ fn summary(jobs: &[Job], outcomes: &[Outcome], cells: &BTreeMap<Cell, Count>) ->
         }
         out.push('\n');
     }
-    let (records, claims, doubted) = nulls(jobs, outcomes);
-    if records > 0 {
-        let _ = writeln!(
-            out,
-            "\nNothing is missing in {records} records: an effect is named in {}{}, and {} more {} called unexplained{}.",
-            claims.len(),
-            listed(&claims),
-            doubted.len(),
-            if doubted.len() == 1 { "is" } else { "are" },
-            listed(&doubted)
-        );
-    }
+    out += &pairs(jobs, outcomes);
+    out += &Nulls::of(jobs, outcomes, |job| matches!(job, Job::Nothing(_))).said("");
+    out += &Nulls::of(jobs, outcomes, |job| matches!(job, Job::Integrated(_)))
+        .said(" whose noise is white beside a random walk and whose time stamps jitter");
     let unknowns = unknowns(jobs, outcomes);
     if !unknowns.is_empty() {
         out +=
@@ -373,7 +561,7 @@ fn summary(jobs: &[Job], outcomes: &[Outcome], cells: &BTreeMap<Cell, Count>) ->
         let percent = 100.0 * right as f64 / all.max(1) as f64;
         let _ = writeln!(out, "| all | {all} | {right} ({percent:.1} %) | |");
     }
-    out
+    out + &times(jobs, outcomes)
 }
 
 fn listed(records: &[String]) -> String {

@@ -26,6 +26,7 @@ mod minima;
 mod node;
 mod noise_floor;
 pub mod numbers;
+mod pairs;
 mod partial;
 mod problem;
 mod proposal;

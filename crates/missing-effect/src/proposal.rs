@@ -290,11 +290,34 @@ pub(crate) fn realise<'a>(
     stopping: Stopping,
 ) -> Option<Node<'a>> {
     let fit = fit_onward(&proposal.setup, proposal.starts, noise, stopping).ok()?;
-    Some(Node {
+    let node = Node {
         setup: proposal.setup,
         fit,
         added: proposal.added,
-    })
+    };
+    Some(widened(node, noise, stopping))
+}
+
+/// The node with the range of its newest size widened and fitted again, where that ended at the bound and a larger size fits better.
+fn widened<'a>(node: Node<'a>, noise: &ArModel, stopping: Stopping) -> Node<'a> {
+    let again = || {
+        let placed = *node.added.last()?;
+        let (size, at) = node.size_of(placed)?;
+        // At the absent value there is nothing to widen.
+        let absent = (node.fit.x[at] - size.absent).abs() <= 1e-6 * (size.upper - size.lower);
+        if absent || !node.at_the_edge(placed) || node.setup.out_of_time() {
+            return None;
+        }
+        let wider = node.setup.structure.with_wider(placed.effect)?;
+        let setup = node.setup.with_structure(wider).ok()?;
+        let fit = fit_onward(&setup, vec![node.fit.x.clone().into()], noise, stopping).ok()?;
+        (fit.cost < node.fit.cost).then(|| Node {
+            setup,
+            fit,
+            added: node.added.clone(),
+        })
+    };
+    again().unwrap_or(node)
 }
 
 /// All single extensions of a node, refitted, best first.
@@ -372,6 +395,7 @@ pub(crate) fn place<'a>(
     });
     let mut proposal = proposal?;
     let start = transfer(known, &proposal.setup);
-    proposal.starts.push(start.into());
+    // First, since out of time one start is followed.
+    proposal.starts.insert(0, start.into());
     realise(proposal, noise, stopping)
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::{
     Error,
     node::{Node, ROUGH, best_first},
+    pairs::joint_pairs,
     proposal::{Parent, Proposal, candidates, proposals, propose, realise_all},
 };
 
@@ -25,6 +26,9 @@ pub(crate) struct Breadth {
     /// Largest number of effects.
     pub most: usize,
 }
+
+/// Pairs that are refitted for their joint score, beside those that grow from the best single effects.
+const JOINT_PAIRS: usize = 12;
 
 fn key(added: &[Placed]) -> Vec<(&'static str, usize)> {
     let mut key: Vec<_> = added
@@ -148,6 +152,22 @@ pub(crate) fn grow<'a>(
             extensions(base, &sizes[size - 1], factor * breadth.beam, noise)?
         };
         let unpromising = proposals.split_off(proposals.len().min(factor * breadth.refits));
+        if size == 2 && !base.setup.leaves_out("joint scores of all pairs") {
+            let known: Vec<_> = proposals
+                .iter()
+                .map(|proposal| key(&proposal.added))
+                .collect();
+            let (singles, others) = (&grown.refitted, &grown.unpromising);
+            let taken = |added: &[Placed]| known.contains(&key(added));
+            proposals.extend(joint_pairs(
+                base,
+                singles,
+                others,
+                noise,
+                JOINT_PAIRS,
+                taken,
+            ));
+        }
         let mut nodes = realise_all(proposals, noise, ROUGH);
         if size == 1 {
             (grown.refitted, grown.unpromising) = (nodes.clone(), unpromising);

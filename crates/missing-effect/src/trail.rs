@@ -53,5 +53,16 @@ pub(crate) fn trail<'a>(
         }
         trail.push(node);
     }
+    // Out of time the models on the way may have ended above the set that they lead to.
+    if let Some(end) = trail.last_mut()
+        && end.added.len() == last.added.len()
+        && end.added.iter().all(|placed| last.added.contains(placed))
+    {
+        let known = refine(last, noise, &[])?;
+        if known.fit.cost < end.fit.cost {
+            end.fit = known.fit.continuing(&end.fit);
+            end.setup = known.setup;
+        }
+    }
     Ok(trail)
 }

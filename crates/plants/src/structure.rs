@@ -13,6 +13,9 @@ pub const MAX_VESSELS: usize = 3;
 /// The most vessels of a plant whose vessels stand in series, each above the next. Three are joined by valves.
 pub(crate) const SERIES: usize = 2;
 
+/// How many times wider the range of a size becomes that ended at its bound.
+pub const WIDENED: f64 = 4.0;
+
 /// The best of many values that were looked at: a start whose choice a claim has to pay for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Picked {
@@ -179,6 +182,8 @@ pub struct Structure {
     pub known: Known,
     /// The effects that are on; kept in chain order, whatever the order they were added in.
     effects: Vec<Placed>,
+    /// Effects whose sizes may go beyond what is plausible, as far as physics allows.
+    widened: Vec<&'static str>,
     /// Terms of the user's own, in the order they were added in.
     pub(crate) terms: Vec<Term>,
     /// What the data visit.
@@ -193,6 +198,7 @@ impl Structure {
             plant,
             known,
             effects: Vec::new(),
+            widened: Vec::new(),
             terms: Vec::new(),
             scales,
         };
@@ -253,6 +259,18 @@ impl Structure {
         with.effects
             .sort_by_key(|on| effects::chain_position(on.effect));
         Ok(with)
+    }
+
+    /// The same structure with the plausible range of an effect's size [`WIDENED`] times as wide, for a size that ended at its
+    /// bound; `None` where that bound is physical (a command that is never given, a share of one), or the range is wide already.
+    #[must_use]
+    pub fn with_wider(&self, effect: &'static EffectInfo) -> Option<Self> {
+        if effect.bound_is_physical() || self.widened.contains(&effect.id) {
+            return None;
+        }
+        let mut wider = self.clone();
+        wider.widened.push(effect.id);
+        Some(wider)
     }
 
     /// The same structure without an effect.
@@ -322,6 +340,15 @@ impl Structure {
     #[must_use]
     pub fn effect_parameters(&self, placed: Placed) -> Vec<ParameterInfo> {
         let mut parameters = (placed.effect.parameters)(&self.site(placed));
+        if self.widened.contains(&placed.effect.id)
+            && let Some(size) = parameters.first_mut()
+        {
+            size.upper *= WIDENED;
+            // A flow or a gain does not fall by more than all of it.
+            if size.lower < -1.0 || (size.lower < 0.0 && size.unit != crate::Unit::ONE) {
+                size.lower *= WIDENED;
+            }
+        }
         for info in &mut parameters {
             for start in &mut info.starts {
                 *start = start.min(info.upper).max(info.lower);

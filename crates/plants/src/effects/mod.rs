@@ -58,6 +58,22 @@ impl EffectInfo {
         CATALOGUE.iter().copied().find(|effect| effect.id == id)
     }
 
+    /// The bound of its size is one of physics, not of what is plausible: a limit or a rim beyond all that was visited does nothing, a
+    /// share is at most one.
+    #[must_use]
+    pub fn bound_is_physical(&self) -> bool {
+        let physical = [
+            "pump_saturation",
+            "pump_deadzone",
+            "stiction_backlash",
+            "coupled_tank",
+            "overflow",
+            "sensor_saturation",
+            "coarse_quantisation",
+        ];
+        physical.contains(&self.id)
+    }
+
     /// The vessel that it acts in, or the pump, where nobody says which.
     #[must_use]
     pub fn usual_site(&'static self, plant: Plant) -> usize {

@@ -13,7 +13,12 @@ pub use self::{
     rows::Rows,
     simulation::{LoopRun, Simulated},
 };
-use crate::{Error, LinearPlant, Replay, feedback::Feedback, reading_step::reading_step};
+use crate::{
+    Error, LinearPlant, Replay,
+    clock::{Clock, span},
+    feedback::Feedback,
+    reading_step::reading_step,
+};
 
 /// A structure, the records, and which parameters are free.
 ///
@@ -40,6 +45,8 @@ pub struct Setup<'a> {
     parameters: usize,
     /// The controller, where the loop is simulated.
     feedback: Option<Feedback>,
+    /// When each record begins on the clock of drifts, steps and periods.
+    clock: Clock,
 }
 
 /// What an initial state costs in [`Setup::price`].
@@ -62,8 +69,7 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
         .iter()
         .map(Record::sample_interval)
         .fold(f64::INFINITY, f64::min);
-    let duration = records.iter().map(Record::duration).fold(0.0, f64::max);
-    let mut scales = Scales::from_ranges(input, output, sample, duration);
+    let mut scales = Scales::from_ranges(input, output, sample, span(records));
     scales.input_2 = input_2;
     if let Some((low, high)) = input_2 {
         scales.input_range = scales.input_range.max(low.abs()).max(high.abs());
@@ -174,6 +180,7 @@ impl<'a> Setup<'a> {
             free,
             parameters,
             feedback,
+            clock: Clock::of(records),
         })
     }
 
@@ -206,6 +213,7 @@ impl<'a> Setup<'a> {
         let mut setup = Self::build(structure, self.records, self.fixed.clone(), feedback)?;
         setup.substeps = self.substeps;
         setup.stop = self.stop;
+        setup.clock = self.clock.clone();
         Ok(setup)
     }
 
@@ -264,7 +272,8 @@ impl<'a> Setup<'a> {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
-    /// The same structure against other records, in the same scales, run on the measured command.
+    /// The same structure against other records, in the same scales, run on the measured command. Those that begin after the
+    /// records of this setup have ended continue its clock.
     ///
     /// # Errors
     /// As [`Setup::new`].
@@ -275,6 +284,7 @@ impl<'a> Setup<'a> {
         let mut setup = Setup::new(self.structure.clone(), records, self.fixed.clone())?;
         setup.substeps = self.substeps;
         setup.stop = self.stop;
+        setup.clock = self.clock.with_records(records);
         Ok(setup)
     }
 

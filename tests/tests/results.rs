@@ -4,7 +4,10 @@
 use std::collections::BTreeSet;
 
 use ctid_tests::{Drive, Rig};
-use missing_effect::{Diagnosis, Options, Primitive, Problem, Verdict, diagnose};
+use missing_effect::{
+    Acceptance, Diagnosis, Effort, HeldOutError, Options, PlaceScore, Primitive, Problem, Verdict,
+    diagnose,
+};
 use plants::{Fitted, Place, Term, Variable};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -139,4 +142,56 @@ fn every_key_of_a_result_is_explained() {
         effects: vec!["overflow"],
     });
     explained(page, "", &json(&found));
+    explained(page, "", &json(&partial(found)));
+}
+
+/// The same with everything that a partial answer has, so that every key is there.
+fn partial(mut found: Diagnosis) -> Diagnosis {
+    found.verdict = Verdict::Partial;
+    found.places = vec![vec![PlaceScore {
+        place: "upper".to_string(),
+        relative_likelihood: 1.0,
+    }]];
+    found.acceptance = Some(Acceptance {
+        effects: vec!["overflow".to_string()],
+        share: Some(0.6),
+        share_test: Some(0.5),
+        required: 0.9,
+        required_partial: 0.5,
+        floor: 0.1,
+        bic_fall: Some(100.0),
+        required_bic_fall: 6.0,
+        reasons: vec!["the residual is not noise".to_string()],
+    });
+    found.effort = Effort {
+        limit: Some(20.0),
+        left_out: vec!["pairs of effects".to_string()],
+        interrupted: false,
+    };
+    for step in &mut found.steps {
+        step.held_out_error = Some(HeldOutError {
+            offset: 0.1,
+            gain: 0.2,
+            shape: 0.3,
+        });
+    }
+    found
+}
+
+#[test]
+fn every_verdict_is_explained() {
+    let page = include_str!("../../docs/results.md");
+    let part = part_of(page, "").unwrap();
+    let row = part.iter().find(|(keys, _)| keys.contains("verdict"));
+    let named = quoted(row.unwrap().1);
+    for verdict in [
+        Verdict::Effect,
+        Verdict::Undecided,
+        Verdict::Partial,
+        Verdict::Unexplained,
+        Verdict::Adequate,
+    ] {
+        let name = serde_json::to_value(verdict).unwrap();
+        assert!(named.contains(name.as_str().unwrap()), "{name}");
+    }
 }

@@ -46,6 +46,25 @@ const LARGEST: f64 = 1e15;
 /// [`Error::ConstantOutput`], [`Error::InvalidInterval`], [`Error::TooLarge`], [`Error::TooSmall`],
 /// [`Error::Saturated`].
 pub fn read_csv(path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Error> {
+    named_by_file(path, |file, bytes| parse_csv(file, bytes, columns, hold))
+}
+
+/// As [`read_csv`], and the input may be constant: for a record that is simulated beside others, or scored only. Whether a
+/// record moves says [`Record::require_moving_input`].
+///
+/// # Errors
+/// As [`read_csv`], but for [`Error::ConstantInput`].
+pub fn read_csv_any_input(path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Error> {
+    named_by_file(path, |file, bytes| {
+        parse_csv_any_input(file, bytes, columns, hold)
+    })
+}
+
+/// A record from a file, which names it.
+fn named_by_file(
+    path: &Path,
+    parse: impl FnOnce(&str, &[u8]) -> Result<Record, Error>,
+) -> Result<Record, Error> {
     let file = path.display().to_string();
     if path.is_dir() {
         return Err(Error::Folder { file });
@@ -54,7 +73,7 @@ pub fn read_csv(path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Er
         file: file.clone(),
         source,
     })?;
-    let record = parse_csv(&file, &bytes, columns, hold)?;
+    let record = parse(&file, &bytes)?;
     let name = path.file_name().map(|name| name.to_string_lossy());
     Ok(Record {
         name: name.map_or(file, |name| name.into_owned()),
@@ -74,23 +93,23 @@ pub fn parse_csv(
 ) -> Result<Record, Error> {
     let (layout, table) = read_table(file, decode(file, content)?, columns)?;
     table.check(file, &layout)?;
+    table.check_input(file, &layout)?;
+    Ok(table.into_record(file, layout, hold))
+}
 
-    let signal = |found: &Found, values: Vec<f64>| Signal::new(&*found.name, &*found.unit, values);
-    Ok(Record {
-        name: file.into(),
-        time: table.time.iter().map(|t| t * layout.seconds).collect(),
-        input: signal(&layout.input, table.input),
-        output: signal(&layout.output, table.output),
-        input_2: layout
-            .input_2
-            .as_ref()
-            .map(|found| signal(found, table.input_2)),
-        reference: layout
-            .reference
-            .as_ref()
-            .map(|found| signal(found, table.reference)),
-        hold,
-    })
+/// As [`read_csv_any_input`], from the content of a file.
+///
+/// # Errors
+/// As [`read_csv_any_input`], but for those of opening.
+pub fn parse_csv_any_input(
+    file: &str,
+    content: &[u8],
+    columns: &Columns,
+    hold: Hold,
+) -> Result<Record, Error> {
+    let (layout, table) = read_table(file, decode(file, content)?, columns)?;
+    table.check(file, &layout)?;
+    Ok(table.into_record(file, layout, hold))
 }
 
 /// The header of a file: what there is to choose from, before anything is read.
@@ -410,6 +429,39 @@ fn check_order(file: &str, row: u64, column: &str, previous: f64, time: f64) -> 
 }
 
 impl Table {
+    fn into_record(self, file: &str, layout: Layout, hold: Hold) -> Record {
+        let signal =
+            |found: &Found, values: Vec<f64>| Signal::new(&*found.name, &*found.unit, values);
+        Record {
+            name: file.into(),
+            time: self.time.iter().map(|t| t * layout.seconds).collect(),
+            input: signal(&layout.input, self.input),
+            output: signal(&layout.output, self.output),
+            input_2: layout
+                .input_2
+                .as_ref()
+                .map(|found| signal(found, self.input_2)),
+            reference: layout
+                .reference
+                .as_ref()
+                .map(|found| signal(found, self.reference)),
+            hold,
+        }
+    }
+
+    /// An input that never moves.
+    fn check_input(&self, file: &str, layout: &Layout) -> Result<(), Error> {
+        match constant(&self.input) {
+            Some(value) => Err(Error::ConstantInput {
+                file: file.into(),
+                column: layout.input.header.clone(),
+                value,
+                rows: self.time.len(),
+            }),
+            None => Ok(()),
+        }
+    }
+
     /// What can only be seen in the whole record.
     fn check(&self, file: &str, layout: &Layout) -> Result<(), Error> {
         let rows = self.time.len();
@@ -422,14 +474,6 @@ impl Table {
             });
         }
         self.check_gaps(file, &layout.time)?;
-        if let Some(value) = constant(&self.input) {
-            return Err(Error::ConstantInput {
-                file: file.into(),
-                column: layout.input.header.clone(),
-                value,
-                rows,
-            });
-        }
         if let Some(value) = constant(&self.output) {
             return Err(Error::ConstantOutput {
                 file: file.into(),
@@ -547,7 +591,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// The value of a signal that stays the same to a part in a billion.
-fn constant(values: &[f64]) -> Option<f64> {
+pub(crate) fn constant(values: &[f64]) -> Option<f64> {
     let first = *values.first()?;
     values
         .iter()

@@ -74,7 +74,7 @@ mod unit;
 pub use ar::{ArModel, Whitener};
 pub use column_fault::ColumnFault;
 pub use columns::{Columns, Heading};
-pub use csv_file::{csv_header, parse_csv, read_csv};
+pub use csv_file::{csv_header, parse_csv, parse_csv_any_input, read_csv, read_csv_any_input};
 pub use error::Error;
 pub use record::{Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, Signal};
 pub use stream::{BadLine, Line, Rows};

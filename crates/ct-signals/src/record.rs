@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::statistics::{Data, OrderStatistics};
 
-use crate::Error;
+use crate::{Error, csv_file::constant};
 
 /// The fewest rows that a record needs, whatever the model.
 pub const MIN_ROWS: usize = 20;
@@ -130,6 +130,27 @@ impl Record {
     /// Smallest and largest output, in its unit; `(NaN, NaN)` when the record is empty.
     pub fn output_range(&self) -> (f64, f64) {
         self.output.range()
+    }
+
+    /// Checks that the input moves.
+    ///
+    /// # Errors
+    /// [`Error::ConstantInput`], which names the record and the column.
+    pub fn require_moving_input(&self) -> Result<(), Error> {
+        let Some(value) = constant(&self.input.values) else {
+            return Ok(());
+        };
+        let Signal { name, unit, .. } = &self.input;
+        let column = match unit.as_str() {
+            "" => name.clone(),
+            unit => format!("{name} [{unit}]"),
+        };
+        Err(Error::ConstantInput {
+            file: self.name.clone(),
+            column,
+            value,
+            rows: self.len(),
+        })
     }
 
     /// Checks a record that was put together in code: equal lengths, finite values, increasing time.

@@ -1,6 +1,12 @@
-//! What a diagnosis says of its parts, for the terminal and the page alike.
+//! What a diagnosis says of its parts, for the terminal, the report and the page alike.
 
-use missing_effect::{Diagnosis, Score};
+use missing_effect::{Acceptance, Diagnosis, GROUP_MARGIN, HeldOutError, PlaceScore, Score};
+
+use crate::effort::{EffortLevel, limit_text};
+use crate::numbers;
+
+/// Effects of each ranking that are shown where two rankings differ.
+const COMPARED: usize = 5;
 
 /// This effect, in this tank, is one of those that were added.
 pub(crate) fn is_added(diagnosis: &Diagnosis, score: &Score) -> bool {
@@ -23,4 +29,359 @@ pub(crate) fn fits_as_well(diagnosis: &Diagnosis, score: &Score) -> bool {
 /// The tank of the added effect of this index, where the plant has two.
 pub(crate) fn tank(diagnosis: &Diagnosis, index: usize) -> Option<&str> {
     diagnosis.steps.get(index + 1)?.place.as_deref()
+}
+
+/// A part of something in whole percent; `-` where there is none.
+pub(crate) fn percent(part: f64) -> String {
+    if part.is_finite() {
+        let rounded = (100.0 * part).clamp(-999.0, 999.0).round();
+        // No negative zero.
+        format!("{:.0} %", rounded + 0.0)
+    } else {
+        "-".to_string()
+    }
+}
+
+/// `Mostly overflow: 62 % of the squared error above the noise floor (55 % on held-out data); what remains: ...`
+pub(crate) fn partial_headline(diagnosis: &Diagnosis) -> String {
+    let acceptance = diagnosis.acceptance.as_ref();
+    let share = acceptance.and_then(|test| test.share);
+    let explained = match share {
+        Some(share) => format!(
+            "{} of the squared error above the noise floor",
+            percent(share)
+        ),
+        None => "the larger part of the squared error".to_string(),
+    };
+    let held_out = acceptance
+        .and_then(|test| test.share_test)
+        .map_or(String::new(), |share| {
+            format!(" ({} on held-out data)", percent(share))
+        });
+    let remains = diagnosis.steps.last().map_or(String::new(), |last| {
+        let unit = &diagnosis.output_unit;
+        let mut floor = String::new();
+        if diagnosis.noise_floor.is_finite() {
+            let level = numbers::significant(diagnosis.noise_floor, 2);
+            floor = format!(" (noise floor {})", with_unit(&level, unit));
+        }
+        let error = with_unit(&numbers::significant(last.rmse, 2), unit);
+        format!("; what remains: {error} rms{floor}")
+    });
+    format!(
+        "Mostly {}: {explained}{held_out}{remains}",
+        diagnosis.effects.join(", ")
+    )
+}
+
+/// A row of the acceptance test: what was measured, its value, and what is required.
+pub(crate) type AcceptanceRow = (&'static str, String, String);
+
+/// The acceptance test as a table.
+pub(crate) fn acceptance_rows(test: &Acceptance, unit: &str) -> Vec<AcceptanceRow> {
+    let share = |share: Option<f64>| share.map_or("-".to_string(), percent);
+    let mut rows = vec![(
+        "Squared error above the floor that is explained, fitted data",
+        share(test.share),
+        format!(
+            "{} where more than noise remains; {} for a partial answer",
+            percent(test.required),
+            percent(test.required_partial)
+        ),
+    )];
+    if test.share_test.is_some() {
+        rows.push((
+            "The same on held-out data",
+            share(test.share_test),
+            "not used for the verdict".to_string(),
+        ));
+    }
+    rows.push((
+        "Fall of BIC",
+        test.bic_fall.map_or("-".to_string(), numbers::whole),
+        format!("more than {}", numbers::whole(test.required_bic_fall)),
+    ));
+    rows.push((
+        "Floor: noise that counts as no error",
+        with_unit(&numbers::significant(test.floor, 2), unit),
+        String::new(),
+    ));
+    rows
+}
+
+/// What the acceptance test was made of.
+pub(crate) fn acceptance_title(diagnosis: &Diagnosis, test: &Acceptance) -> String {
+    if test.effects.is_empty() {
+        return "Acceptance test: no candidate lowers the error".to_string();
+    }
+    let names = test.effects.join(" + ");
+    if diagnosis.effects.is_empty() {
+        format!("Acceptance test of {names}, the best candidate, which was refused")
+    } else {
+        format!("Acceptance test of {names}")
+    }
+}
+
+/// Where each effect may act, for those that have a choice: `overflow: upper tank 1.00, lower tank 0.31: cannot be told`.
+pub(crate) fn places(diagnosis: &Diagnosis) -> Vec<String> {
+    let of_effects = diagnosis.effects.iter().zip(&diagnosis.places);
+    of_effects
+        .filter(|(_, places)| places.len() > 1)
+        .map(|(effect, places)| format!("{effect}: {}", place_scores(places)))
+        .collect()
+}
+
+/// `upper tank 1.00, lower tank 0.31: cannot be told`.
+pub(crate) fn place_scores(places: &[PlaceScore]) -> String {
+    let scores: Vec<String> = places
+        .iter()
+        .map(|score| {
+            let likelihood = if score.relative_likelihood < 0.005 {
+                "below 0.01".to_string()
+            } else {
+                format!("{:.2}", score.relative_likelihood)
+            };
+            format!("{} {likelihood}", place_name(&score.place))
+        })
+        .collect();
+    // As far apart as effects that are told apart: a difference of BIC of the margin of a group.
+    let least = (-0.5 * GROUP_MARGIN).exp();
+    let possible = places
+        .iter()
+        .filter(|score| score.relative_likelihood >= least)
+        .count();
+    let finding = match (places.first(), possible) {
+        (Some(best), 1) => format!("it is the {}", place_name(&best.place)),
+        _ => "cannot be told".to_string(),
+    };
+    format!("{}: {finding}", scores.join(", "))
+}
+
+/// A vessel or a pump in words.
+fn place_name(place: &str) -> String {
+    match place {
+        "upper" | "lower" => format!("{place} tank"),
+        _ if place.starts_with("pump_") => place.replace('_', " "),
+        _ => format!("tank {place}"),
+    }
+}
+
+/// The two rankings side by side where they disagree: rank, by simulation error, prewhitened.
+pub(crate) fn rankings(diagnosis: &Diagnosis) -> Vec<(String, String, String)> {
+    let rankings = &diagnosis.rankings;
+    if !rankings.disagree {
+        return Vec::new();
+    }
+    let name = |list: &[String], k: usize| list.get(k).cloned().unwrap_or_default();
+    let longest = rankings.white.len().max(rankings.prewhitened.len());
+    (0..longest.min(COMPARED))
+        .map(|k| {
+            (
+                (k + 1).to_string(),
+                name(&rankings.white, k),
+                name(&rankings.prewhitened, k),
+            )
+        })
+        .collect()
+}
+
+/// Why two rankings are shown.
+pub(crate) const RANKINGS_DISAGREE: &str = "The ranking of the effects depends on the noise model: as if the noise were white (least simulation error), and \
+     prewhitened by the noise model (GLS). Take both for candidates.";
+
+/// Heads of the two rankings.
+pub(crate) const RANKINGS_HEADS: [&str; 2] =
+    ["by simulation error (white noise)", "prewhitened (GLS)"];
+
+/// `1.9 degC: offset 1.9, gain 0.1, shape 0.3 degC`.
+pub(crate) fn held_out_error(error: &HeldOutError, unit: &str) -> String {
+    let total = error.offset.hypot(error.gain).hypot(error.shape);
+    if !total.is_finite() || total <= 0.0 {
+        return with_unit(&numbers::significant(total, 2), unit);
+    }
+    // Parts to the decimals of the whole, so that they can be compared at a glance.
+    let places = (1 - numbers::exponent(total)).max(0);
+    let [total, offset, gain, shape] =
+        [total, error.offset, error.gain, error.shape].map(|part| numbers::decimals(part, places));
+    let total = with_unit(&total, unit);
+    let shape = with_unit(&shape, unit);
+    format!("{total}: offset {offset}, gain {gain}, shape {shape}")
+}
+
+/// What the parts of the error on held-out data mean.
+pub(crate) const HELD_OUT_PARTS: &str = "Held-out error: its offset is the mean of measured minus model, its gain what a factor on the model's deviations from \
+     its mean would remove, its shape the rest; root mean squares.";
+
+/// Where the reader can ask for more time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Reader {
+    /// On the command line, or of its report.
+    Commands,
+    /// On the page that is served.
+    Page,
+}
+
+/// What the limit on the time, or the user, has left out, and how to get more.
+pub(crate) fn effort(diagnosis: &Diagnosis, reader: Reader) -> Vec<String> {
+    let effort = &diagnosis.effort;
+    let mut said = Vec::new();
+    if effort.interrupted {
+        said.push(
+            "The search was interrupted: this is the best result that was found until then."
+                .to_string(),
+        );
+    }
+    if !effort.left_out.is_empty() {
+        let why = match effort.limit.filter(|_| !effort.interrupted) {
+            Some(limit) => format!("Left out by the time limit of {}", limit_text(limit)),
+            None => "Left out".to_string(),
+        };
+        said.push(format!("{why}: {}.", effort.left_out.join("; ")));
+    }
+    if effort.interrupted || effort.left_out.is_empty() {
+        return said;
+    }
+    let most = EffortLevel::Thorough.limit().as_secs_f64();
+    let more = match reader {
+        _ if effort.limit.is_none_or(|limit| limit >= most) => {
+            "For a complete search use fewer rows: thin the record, or split it.".to_string()
+        }
+        Reader::Commands => format!(
+            "For a longer search: `--effort thorough` (limit {}).",
+            limit_text(most)
+        ),
+        Reader::Page => format!(
+            "For a longer search choose the effort thorough (limit {}) and diagnose again.",
+            limit_text(most)
+        ),
+    };
+    said.push(more);
+    said
+}
+
+fn with_unit(number: &str, unit: &str) -> String {
+    format!("{number} {unit}").trim_end().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use missing_effect::{Effort, Rankings};
+
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn a_partial_answer_says_how_much_it_explains_and_what_remains() {
+        let mut diagnosis = sample::partial();
+        assert_eq!(
+            partial_headline(&diagnosis),
+            "Mostly overflow: 85 % of the squared error above the noise floor (86 % on held-out data); what remains: \
+             0.26 V rms (noise floor 0.080 V)"
+        );
+        diagnosis.acceptance = None;
+        diagnosis.noise_floor = f64::NAN;
+        assert_eq!(
+            partial_headline(&diagnosis),
+            "Mostly overflow: the larger part of the squared error; what remains: 0.26 V rms"
+        );
+    }
+
+    #[test]
+    fn percents_are_whole_and_have_no_negative_zero() {
+        assert_eq!(percent(0.617), "62 %");
+        assert_eq!(percent(-0.001), "0 %");
+        assert_eq!(percent(-0.2), "-20 %");
+        assert_eq!(percent(-1e9), "-999 %");
+        assert_eq!(percent(f64::NAN), "-");
+    }
+
+    #[test]
+    fn places_that_are_as_likely_are_not_told_apart() {
+        let scores = |likelihoods: &[(&str, f64)]| {
+            let scores: Vec<PlaceScore> = likelihoods
+                .iter()
+                .map(|&(place, relative_likelihood)| PlaceScore {
+                    place: place.to_string(),
+                    relative_likelihood,
+                })
+                .collect();
+            place_scores(&scores)
+        };
+        assert_eq!(
+            scores(&[("upper", 1.0), ("lower", 0.31)]),
+            "upper tank 1.00, lower tank 0.31: cannot be told"
+        );
+        assert_eq!(
+            scores(&[("T3", 1.0), ("T1", 0.04), ("T2", 1e-9)]),
+            "tank T3 1.00, tank T1 0.04, tank T2 below 0.01: it is the tank T3"
+        );
+        assert_eq!(
+            scores(&[("pump_1", 1.0), ("pump_2", 0.05)]),
+            "pump 1 1.00, pump 2 0.05: cannot be told"
+        );
+    }
+
+    #[test]
+    fn the_held_out_error_is_said_to_the_digits_of_the_whole() {
+        let error = HeldOutError {
+            offset: 1.9,
+            gain: 0.1,
+            shape: 0.3,
+        };
+        assert_eq!(
+            held_out_error(&error, "degC"),
+            "1.9 degC: offset 1.9, gain 0.1, shape 0.3 degC"
+        );
+        let small = HeldOutError {
+            offset: 0.0,
+            gain: 0.003,
+            shape: 0.004,
+        };
+        assert_eq!(
+            held_out_error(&small, ""),
+            "0.0050: offset 0.0000, gain 0.0030, shape 0.0040"
+        );
+    }
+
+    #[test]
+    fn rankings_stand_side_by_side_only_where_they_disagree() {
+        let mut diagnosis = sample::partial();
+        assert_eq!(rankings(&diagnosis).len(), 3);
+        diagnosis.rankings.disagree = false;
+        assert!(rankings(&diagnosis).is_empty());
+        diagnosis.rankings = Rankings::default();
+        assert!(rankings(&diagnosis).is_empty());
+    }
+
+    #[test]
+    fn what_was_left_out_is_said_with_how_to_get_more() {
+        let mut diagnosis = sample::two_tanks();
+        assert!(effort(&diagnosis, Reader::Commands).is_empty());
+        diagnosis.effort = Effort {
+            limit: Some(20.0),
+            left_out: vec![
+                "pairs of effects".into(),
+                "refits from random starts".into(),
+            ],
+            interrupted: false,
+        };
+        assert_eq!(
+            effort(&diagnosis, Reader::Commands),
+            [
+                "Left out by the time limit of 20 s: pairs of effects; refits from random starts.",
+                "For a longer search: `--effort thorough` (limit 10 min)."
+            ]
+        );
+        diagnosis.effort.limit = Some(600.0);
+        let said = effort(&diagnosis, Reader::Page);
+        assert!(said[1].contains("fewer rows"), "{said:?}");
+        diagnosis.effort.interrupted = true;
+        assert_eq!(
+            effort(&diagnosis, Reader::Page),
+            [
+                "The search was interrupted: this is the best result that was found until then.",
+                "Left out: pairs of effects; refits from random starts."
+            ]
+        );
+    }
 }

@@ -1,6 +1,7 @@
 //! Fits a plant to records by simulation error: bounds, many starts, exact sensitivities, a noise model,
 //! and uncertainty that is right.
 
+mod clock;
 mod error;
 mod feedback;
 mod fit;
@@ -14,6 +15,7 @@ mod starts;
 mod time_limit;
 mod triangle;
 
+pub use clock::common_clock;
 pub use error::Error;
 pub use feedback::{LinearPlant, Replay, replay};
 pub use fit::{

@@ -98,6 +98,21 @@ impl<T: Scalar> Simulator<T> {
         initial: &[T],
         at_rest: [f64; 2],
     ) -> Result<Self, Error> {
+        Self::starting_at(0.0, structure, theta, initial, at_rest)
+    }
+
+    /// The same for a record that begins at `start` \[s\] on the clock that drifts, steps and periods follow: a later part of an
+    /// experiment.
+    ///
+    /// # Errors
+    /// As [`Simulator::new`].
+    pub fn starting_at(
+        start: f64,
+        structure: &Structure,
+        theta: &[T],
+        initial: &[T],
+        at_rest: [f64; 2],
+    ) -> Result<Self, Error> {
         let plant = structure.plant;
         let n = plant.vessels();
         let (levels, before) = initial.split_at(n.min(initial.len()));
@@ -194,9 +209,9 @@ impl<T: Scalar> Simulator<T> {
             at += count;
         }
         let [first, second] = actuators;
-        let mut actuator = Actuator::new(first, at_rest[0], 0.0);
+        let mut actuator = Actuator::new(first, at_rest[0], start);
         let mut second = second_gain.map(|gain| SecondPump {
-            actuator: Actuator::new(second, at_rest[1], 0.0),
+            actuator: Actuator::new(second, at_rest[1], start),
             gain,
             pieces: Vec::new(),
         });
@@ -233,7 +248,7 @@ impl<T: Scalar> Simulator<T> {
             sensor,
             pump_gain,
             measured,
-            time: 0.0,
+            time: start,
             substeps: 1,
         })
     }
@@ -270,7 +285,7 @@ impl<T: Scalar> Simulator<T> {
         self.actuator.stands()
     }
 
-    /// Time since the record began \[s\].
+    /// Time since the clock of drifts, steps and periods began \[s\]: since the record began, unless that is a later part.
     pub fn time(&self) -> f64 {
         self.time
     }

@@ -1,6 +1,7 @@
 //! `ctid serve` from outside: its page in a browser, driven by real clicks, and its server against hostile input.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod asked;
 mod browser;
 mod cancelled;
 mod choices;

@@ -7,7 +7,10 @@ use clap::{Args, ValueEnum};
 use missing_effect::{Options, Problem};
 
 use super::{Results, finish};
+use crate::effort::EffortLevel;
 use crate::input::Files;
+use crate::input::excitation::{self, ExcitationWarning};
+use crate::interrupt;
 use crate::look::Look;
 use crate::progress::Bar;
 use crate::{Error, terminal};
@@ -32,6 +35,9 @@ pub(super) struct Compare {
     /// In a loop whose [controller] is known: simulate it from its reference, or run on the measured command
     #[arg(long = "loop", value_enum, default_value_t = LoopWay::Simulated, value_name = "WAY")]
     way: LoopWay,
+    /// Limit on the time of the search; Ctrl-C ends it earlier with the best result so far
+    #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
+    effort: EffortLevel,
     #[command(flatten)]
     results: Results,
 }
@@ -63,8 +69,8 @@ impl Compare {
         }
     }
 
-    /// What stands in the model file and has no effect, where there is such.
-    fn notes(waiting: &[String], look: Look) -> String {
+    /// What stands in the model file and has no effect, and what the records cannot tell, where there is such.
+    fn notes(waiting: &[String], problem: &Problem, look: Look) -> String {
         let note = |table: &String| {
             let name = table.split_once('.').map_or("", |(_, name)| name);
             look.paragraph(
@@ -72,12 +78,27 @@ impl Compare {
                 &format!("note: [{table}] has no effect until `ctid add {name}`"),
             )
         };
-        waiting.iter().map(note).collect()
+        let warning = |warning: &ExcitationWarning| {
+            look.warning(
+                look.paragraph("", &format!("warning: {warning}"))
+                    .trim_end(),
+            ) + "\n"
+        };
+        let warnings = excitation::of_problem(problem);
+        let clock = greybox::common_clock(&problem.records).map(|_| {
+            let names: Vec<&str> = problem.records.iter().map(|r| r.name.as_str()).collect();
+            let what = "the time stamps continue from file to file, so drifts, steps and periods run through them";
+            look.paragraph("", &format!("note: {}: {what}", names.join(", ")))
+        });
+        let notes = waiting.iter().map(note).chain(clock);
+        notes.chain(warnings.iter().map(warning)).collect()
     }
 
     fn options(&self) -> Options<'static> {
         Options {
             simulate_loop: self.way == LoopWay::Simulated,
+            time_limit: Some(self.effort.limit()),
+            interrupt: Some(interrupt::flag()),
             ..Options::default()
         }
     }
@@ -86,14 +107,15 @@ impl Compare {
         let files = self.files();
         let (waiting, problem) = read(&files)?;
         let outputs = self.results.plan(&files.all(), None)?;
-        let bar = Bar::new();
+        let options = self.options();
+        let bar = Bar::with_limit(options.time_limit);
         bar.phase("fitting the model");
-        let diagnosis = missing_effect::compare(&problem, &self.options());
+        let diagnosis = missing_effect::compare(&problem, &options);
         bar.clear();
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
-            &(Self::notes(&waiting, look) + &terminal::comparison(&diagnosis, look)),
+            &(Self::notes(&waiting, &problem, look) + &terminal::comparison(&diagnosis, look)),
             &outputs,
             out,
             look,
@@ -111,14 +133,14 @@ impl Diagnose {
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
         }
-        let bar = Bar::new();
+        let bar = Bar::with_limit(options.time_limit);
         let diagnosis =
             missing_effect::diagnose(&problem, &options, &|progress| bar.show(progress));
         bar.clear();
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
-            &(Compare::notes(&waiting, look) + &terminal::diagnosis(&diagnosis, look)),
+            &(Compare::notes(&waiting, &problem, look) + &terminal::diagnosis(&diagnosis, look)),
             &outputs,
             out,
             look,

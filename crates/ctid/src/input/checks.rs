@@ -110,6 +110,15 @@ pub(super) fn check_units(records: &[Record], test: &[Record]) -> Result<(), Err
     Ok(())
 }
 
+/// Some fitted record has an input that moves; those beside it, and held-out ones, may be at rest.
+pub(super) fn check_movement(records: &[Record]) -> Result<(), Error> {
+    let mut still = records.iter().map(Record::require_moving_input);
+    match records.first() {
+        Some(first) if still.all(|moves| moves.is_err()) => Ok(first.require_moving_input()?),
+        _ => Ok(()),
+    }
+}
+
 /// A level above the tank is in another unit than the tank, or its sensor is not right.
 pub(super) fn check_height<'a>(
     model_name: &str,

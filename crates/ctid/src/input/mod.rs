@@ -1,14 +1,16 @@
 //! What `compare` and `diagnose` read: all of it, and checked, before anything is computed.
 
 mod checks;
+pub mod excitation;
 
 use std::path::{Path, PathBuf};
 
-use ct_signals::{Record, read_csv};
+use ct_signals::{Record, read_csv_any_input};
 use missing_effect::Problem;
 
 use self::checks::{
-    check_height, check_input, check_levels, check_rows, check_terms, check_units, controller,
+    check_height, check_input, check_levels, check_movement, check_rows, check_terms, check_units,
+    controller,
 };
 use crate::Error;
 use crate::model_file::{self, ModelFile};
@@ -73,7 +75,7 @@ impl Files {
             paths
                 .iter()
                 .map(|path| {
-                    let mut record = read_csv(path, &model.columns, model.hold)
+                    let mut record = read_csv_any_input(path, &model.columns, model.hold)
                         .map_err(|error| perhaps_a_model(path, error))?;
                     record.name = self.name_of(path);
                     Ok(record)
@@ -159,6 +161,7 @@ pub fn problem(
     test: Vec<Record>,
 ) -> Result<Problem, Error> {
     check_units(&records, &test)?;
+    check_movement(&records)?;
     check_height(model_name, &model, records.iter().chain(&test))?;
     check_input(model_name, &model, records.iter().chain(&test))?;
     check_levels(&model, records.iter().chain(&test))?;

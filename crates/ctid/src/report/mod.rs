@@ -28,6 +28,7 @@ use self::page::{NOTICES, Page, figure, figure_with, items, large, section};
 pub(crate) use self::page::{PLOTLY, PLOTS, STYLE};
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
+use crate::findings::{self, Reader};
 
 /// Stands in the head of every report: a file that holds it may be overwritten by a new one.
 pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
@@ -68,10 +69,12 @@ pub fn html(diagnosis: &Diagnosis) -> String {
 
 /// The verdict, the fall of the error in large numbers, and what was looked at.
 fn headline(diagnosis: &Diagnosis) -> String {
+    let effort = findings::effort(diagnosis, Reader::Commands);
     let sentences: String = diagnosis
         .sentences
         .iter()
-        .map(|sentence| format!("<p>{}</p>\n", escape(sentence)))
+        .chain(&effort)
+        .map(|sentence| format!("<p>{}</p>\n", text::prose(sentence)))
         .collect();
     format!(
         "<header>\n<p class=\"kicker\">ctid report · {plant}</p>\n<h1>{verdict}</h1>\n\
@@ -102,7 +105,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
             return format!("{found}{rest}");
         }
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
-        Verdict::Partial => "The larger part of the error is explained; something else remains",
+        Verdict::Partial => return escape(&findings::partial_headline(diagnosis)),
         Verdict::Unexplained => {
             "What is left is not noise, and no effect of the catalogue explains it"
         }
@@ -370,8 +373,10 @@ fn ranking(diagnosis: &Diagnosis) -> String {
          The larger the fall of the Bayesian information criterion (BIC), the better; a fall below 6 \
          is no evidence, and effects within 6 of each other are not told apart.",
         &format!(
-            "{}{}{}",
+            "{}{}{}{}{}",
             tables::groups(diagnosis),
+            tables::acceptance(diagnosis),
+            tables::rankings(diagnosis),
             figure(
                 "scores",
                 "Fall of BIC with one effect added",

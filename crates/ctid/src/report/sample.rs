@@ -2,8 +2,8 @@
 //! zone, with the base model, the overflow, and both. The simulations are real, the scores made up.
 
 use missing_effect::{
-    Bin, Diagnosis, Effort, Failures, NoiseFloor, Parameter, Rankings, ResidualTests, Score, Shown,
-    Step, Verdict,
+    Acceptance, Bin, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor, Parameter, PlaceScore,
+    Rankings, ResidualTests, Score, Shown, Step, Verdict,
 };
 
 use crate::identify::rms;
@@ -347,6 +347,64 @@ pub(crate) fn comparison() -> Diagnosis {
         step.rmse_test = None;
     }
     diagnosis.sentences = vec!["The model errs by 7 times the noise floor.".into()];
+    diagnosis
+}
+
+/// The overflow alone, as a part of the answer: what the acceptance test, the places, the rankings, the held-out error and the limit
+/// on the time have to say.
+pub(crate) fn partial() -> Diagnosis {
+    let mut diagnosis = two_tanks();
+    diagnosis.verdict = Verdict::Partial;
+    for list in [&mut diagnosis.effects, &mut diagnosis.ranked] {
+        list.retain(|effect| effect != "pump_deadzone");
+    }
+    diagnosis.groups.truncate(1);
+    diagnosis.in_doubt.truncate(1);
+    diagnosis.steps.truncate(2);
+    diagnosis.residual_unexplained = true;
+    let place = |place: &str, relative_likelihood: f64| PlaceScore {
+        place: place.to_owned(),
+        relative_likelihood,
+    };
+    diagnosis.places = vec![vec![place("upper", 1.0), place("lower", 0.31)]];
+    diagnosis.acceptance = Some(Acceptance {
+        effects: vec!["overflow".into()],
+        share: Some(0.85),
+        share_test: Some(0.86),
+        required: 0.9,
+        required_partial: 0.5,
+        floor: NOISE,
+        bic_fall: Some(512.4),
+        required_bic_fall: 6.0,
+        reasons: vec![
+            "The residual is not noise: it still depends on the command (p < 0.001).".into(),
+        ],
+    });
+    diagnosis.rankings = Rankings {
+        white: ["overflow", "sensor_saturation", "pump_deadzone"]
+            .map(String::from)
+            .to_vec(),
+        prewhitened: ["sensor_saturation", "overflow", "pump_nonlinearity"]
+            .map(String::from)
+            .to_vec(),
+        disagree: true,
+    };
+    diagnosis.effort = Effort {
+        limit: Some(20.0),
+        left_out: vec!["swap steps between pairs of effects".into()],
+        interrupted: false,
+    };
+    for step in &mut diagnosis.steps {
+        step.held_out_error = step.rmse_test.map(|rmse| HeldOutError {
+            offset: 0.6 * rmse,
+            gain: 0.48 * rmse,
+            shape: 0.64 * rmse,
+        });
+    }
+    diagnosis.sentences = vec![
+        "The model lacks an overflow of the upper tank: its rim is at 7.50 ± 0.03 V.".into(),
+        "Something remains that no effect of the catalogue explains.".into(),
+    ];
     diagnosis
 }
 

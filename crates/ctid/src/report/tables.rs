@@ -1,6 +1,6 @@
 //! The tables of the report.
 
-use missing_effect::{Diagnosis, Parameter, Step, Unknown};
+use missing_effect::{Diagnosis, HeldOutError, Parameter, Step, Unknown};
 
 use super::data::step_label;
 use super::text::{code, escape, significant, unit, with_error};
@@ -64,13 +64,84 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
             } else {
                 ""
             };
-            format!("<li>{}{tank}: {finding}{doubt}</li>\n", code(effect))
+            let places = match diagnosis.places.get(k).map(Vec::as_slice) {
+                Some(places @ [_, _, ..]) => {
+                    let scores = escape(&findings::place_scores(places));
+                    format!("; where it acts, with relative likelihood: {scores}")
+                }
+                _ => String::new(),
+            };
+            format!(
+                "<li>{}{tank}: {finding}{doubt}{places}</li>\n",
+                code(effect)
+            )
         })
         .collect();
     if items.is_empty() {
         return String::new();
     }
     format!("<p>Added to the model, in this order:</p>\n<ol class=\"groups\">\n{items}</ol>\n")
+}
+
+/// The acceptance test in numbers, and why the effects are not the whole answer.
+pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
+    let Some(test) = &diagnosis.acceptance else {
+        return String::new();
+    };
+    let rows: String = findings::acceptance_rows(test, &diagnosis.output_unit)
+        .iter()
+        .map(|(name, value, required)| {
+            format!(
+                "<tr><th scope=\"row\">{name}</th><td class=\"number\">{}</td><td>{}</td></tr>\n",
+                escape(value),
+                escape(required)
+            )
+        })
+        .collect();
+    let reasons = super::items(&test.reasons);
+    let reasons = if reasons.is_empty() {
+        reasons
+    } else {
+        let why = if diagnosis.effects.is_empty() {
+            "Why they were refused:"
+        } else {
+            "Why they are a part of the answer only:"
+        };
+        format!("<p>{why}</p>\n<ul>{reasons}</ul>\n")
+    };
+    table(
+        &escape(&findings::acceptance_title(diagnosis, test)),
+        "<tr><th scope=\"col\">Measure</th><th scope=\"col\" class=\"number\">Found</th><th scope=\"col\">Required</th></tr>",
+        &rows,
+        "The squared error above the floor is the mean squared simulation error less the variance of the noise. Effects that leave \
+         noise alone need no share of it.",
+    ) + &reasons
+}
+
+/// The two rankings side by side where they disagree.
+pub(super) fn rankings(diagnosis: &Diagnosis) -> String {
+    let rows: String = findings::rankings(diagnosis)
+        .iter()
+        .map(|(rank, white, prewhitened)| {
+            format!(
+                "<tr><td class=\"number\">{rank}</td><td>{}</td><td>{}</td></tr>\n",
+                code(white),
+                code(prewhitened)
+            )
+        })
+        .collect();
+    if rows.is_empty() {
+        return rows;
+    }
+    let [white, prewhitened] = findings::RANKINGS_HEADS;
+    table(
+        "Two rankings",
+        &format!(
+            "<tr><th scope=\"col\" class=\"number\">#</th><th scope=\"col\">{white}</th><th scope=\"col\">{prewhitened}</th></tr>"
+        ),
+        &rows,
+        findings::RANKINGS_DISAGREE,
+    )
 }
 
 /// How much of a missing term each variable predicts.
@@ -202,6 +273,21 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
             },
         ));
     }
+    let split = steps.iter().any(|step| step.held_out_error.is_some());
+    if split {
+        for (part, name) in ["Its offset", "Its gain", "Its shape"].iter().enumerate() {
+            rows.push_str(&row(name, &output, steps, |step| {
+                step.held_out_error.map_or(String::new(), |error| {
+                    let HeldOutError {
+                        offset,
+                        gain,
+                        shape,
+                    } = error;
+                    significant([offset, gain, shape][part], 2)
+                })
+            }));
+        }
+    }
     rows.push_str(&row("BIC (smaller is better)", "", steps, |step| {
         one_decimal(step.bic)
     }));
@@ -211,12 +297,19 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
         steps,
         |step| format!("{} of {}", step.starts_agree, step.starts),
     ));
+    let held_out = if split {
+        format!(" {}", findings::HELD_OUT_PARTS)
+    } else {
+        String::new()
+    };
     table(
         "Parameters after each step",
         &format!("<tr><th scope=\"col\">Parameter</th><th scope=\"col\">Unit</th>{heads}</tr>"),
         &rows,
-        "The last model first. Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
-         A minimum that one start alone has reached may not be the best one.",
+        &format!(
+            "The last model first. Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
+             A minimum that one start alone has reached may not be the best one.{held_out}"
+        ),
     )
 }
 

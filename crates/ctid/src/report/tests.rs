@@ -113,6 +113,30 @@ fn the_headline_counts_and_says_what_remains() {
 }
 
 #[test]
+fn a_partial_answer_shows_its_test_its_places_and_its_limit() {
+    let page = html(&sample::partial());
+    for part in [
+        "<h1>Mostly overflow: 85 % of the squared error above the noise floor (86 % on held-out data); what remains: ",
+        "<h3>Acceptance test of overflow</h3>",
+        "<td class=\"number\">85 %</td><td>90 % where more than noise remains; 50 % for a partial answer</td>",
+        "<td class=\"number\">86 %</td><td>not used for the verdict</td>",
+        "<td class=\"number\">512</td><td>more than 6</td>",
+        "<li>The residual is not noise: it still depends on the command (p &lt; 0.001).</li>",
+        "where it acts, with relative likelihood: upper tank 1.00, lower tank 0.31: cannot be told</li>",
+        "<h3>Two rankings</h3>",
+        "<th scope=\"row\">Its offset</th>",
+        "<p>Left out by the time limit of 20 s: swap steps between pairs of effects.</p>",
+        "<p>For a longer search: <code>--effort thorough</code> (limit 10 min).</p>",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    let whole = html(&sample::two_tanks());
+    for part in ["Acceptance test", "Two rankings", "Its offset", "Left out"] {
+        assert!(!whole.contains(part), "{part}");
+    }
+}
+
+#[test]
 fn the_last_model_stands_first_in_the_table() {
     let page = html(&sample::two_tanks());
     let (_, table) = page
@@ -169,6 +193,17 @@ fn names_are_escaped_wherever_they_stand() {
         step.parameters[0].name = hostile.to_owned();
         step.parameters[0].unit = hostile.to_owned();
     }
+    let partial = sample::partial();
+    diagnosis.acceptance = partial.acceptance.map(|mut test| {
+        test.effects[0] = hostile.to_owned();
+        test.reasons.push(hostile.to_owned());
+        test
+    });
+    diagnosis.places = partial.places;
+    diagnosis.places[0][1].place = hostile.to_owned();
+    diagnosis.rankings = partial.rankings;
+    diagnosis.rankings.white[0] = hostile.to_owned();
+    diagnosis.effort.left_out.push(hostile.to_owned());
     diagnosis.scores[0].effect = hostile.to_owned();
     diagnosis.scores[0].place = Some(hostile.to_owned());
     if let Some(size) = &mut diagnosis.scores[0].size {
@@ -241,6 +276,7 @@ fn long_records_with_gaps_make_a_page_of_sensible_size() {
 fn write_the_samples() {
     for (name, diagnosis) in [
         ("ctid-report-sample.html", sample::two_tanks()),
+        ("ctid-report-partial.html", sample::partial()),
         ("ctid-report-comparison.html", sample::comparison()),
         ("ctid-report-awkward.html", sample::awkward()),
     ] {

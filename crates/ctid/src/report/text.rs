@@ -18,6 +18,20 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
+/// A sentence as HTML: what stands between back quotes is a command.
+pub(super) fn prose(text: &str) -> String {
+    let escaped = escape(text);
+    let parts: Vec<&str> = escaped.split('`').collect();
+    if parts.len().is_multiple_of(2) {
+        return escaped;
+    }
+    let part = |(k, part): (usize, &&str)| match k % 2 {
+        0 => (*part).to_owned(),
+        _ => format!("<code>{part}</code>"),
+    };
+    parts.iter().enumerate().map(part).collect()
+}
+
 /// An effect or a parameter as HTML; a long name may break after a word, not within one.
 pub(super) fn code(name: &str) -> String {
     let name = escape(name)
@@ -155,6 +169,15 @@ mod tests {
             escape("<b a=\"1\" c='2'>&"),
             "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;"
         );
+    }
+
+    #[test]
+    fn commands_in_a_sentence_look_like_it() {
+        assert_eq!(
+            prose("run `ctid add X`, or `<b>`"),
+            "run <code>ctid add X</code>, or <code>&lt;b&gt;</code>"
+        );
+        assert_eq!(prose("a ` alone"), "a ` alone");
     }
 
     #[test]

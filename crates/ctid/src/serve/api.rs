@@ -23,6 +23,7 @@ use super::settings::Form;
 use super::upload::Upload;
 use super::{App, downloads, state};
 use crate::edit;
+use crate::effort::EffortLevel;
 use crate::term_file::TermFile;
 
 /// Requests in JSON are no larger \[bytes\].
@@ -44,6 +45,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/api/loop", post(treat_loop))
         .route("/api/run", post(run))
         .route("/api/cancel", post(cancel))
+        .route("/api/finish", post(finish))
         .route("/api/forget", post(forget))
         .merge(downloads::routes())
         .layer(DefaultBodyLimit::max(LARGEST_REQUEST))
@@ -302,6 +304,8 @@ enum Run {
     },
     Diagnose {
         max_effects: Option<NonZeroU8>,
+        #[serde(default)]
+        effort: EffortLevel,
     },
     Design {
         group: usize,
@@ -317,7 +321,13 @@ async fn run(State(app): State<Arc<App>>, Query(tab): Query<Tab>, Json(run): Jso
     let task = match run {
         Run::Compare => Task::Compare,
         Run::Chain { effects } => Task::Chain(effects),
-        Run::Diagnose { max_effects } => Task::Diagnose { max_effects },
+        Run::Diagnose {
+            max_effects,
+            effort,
+        } => Task::Diagnose {
+            max_effects,
+            effort,
+        },
         Run::Design {
             group,
             between,
@@ -345,6 +355,14 @@ async fn run(State(app): State<Arc<App>>, Query(tab): Query<Tab>, Json(run): Jso
 async fn cancel(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Answer {
     with(&app, &tab.session, |session| {
         session.stop();
+        Ok(())
+    })
+    .await
+}
+
+async fn finish(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Answer {
+    with(&app, &tab.session, |session| {
+        session.finish();
         Ok(())
     })
     .await

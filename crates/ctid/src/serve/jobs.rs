@@ -18,6 +18,7 @@ use super::session::{Fitted, Found, Job, Kind, Session, lock};
 use super::sessions::Shared;
 use super::words;
 use crate::design::candidacy;
+use crate::effort::EffortLevel;
 use crate::input::{self, Files};
 use crate::model_file::{self, ModelFile};
 use crate::{Error, edit};
@@ -30,7 +31,10 @@ pub(super) enum Task {
     /// Fits the model with these effects in place of its own; the model stays.
     Chain(Vec<(String, Option<String>)>),
     /// Searches what is missing; at most so many effects, where that is said.
-    Diagnose { max_effects: Option<NonZeroU8> },
+    Diagnose {
+        max_effects: Option<NonZeroU8>,
+        effort: EffortLevel,
+    },
     /// The experiment within these limits that tells apart two effects of a group of the diagnosis.
     Design {
         group: usize,
@@ -105,10 +109,11 @@ impl Work {
         })
     }
 
-    fn options<'a>(&self, stop: &'a AtomicBool) -> Options<'a> {
+    fn options<'a>(&self, stop: &'a AtomicBool, interrupt: &'a AtomicBool) -> Options<'a> {
         Options {
             simulate_loop: !self.measured,
             stop: Some(stop),
+            interrupt: Some(interrupt),
             ..Options::default()
         }
     }
@@ -129,6 +134,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     let work = Work::new(&mut session, text)?;
     let number = session.number();
     let stop = Arc::new(AtomicBool::new(false));
+    let interrupt = Arc::new(AtomicBool::new(false));
     let progress = Arc::new(Mutex::new(None));
     session.job = Some(Job {
         number,
@@ -140,7 +146,12 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
         },
         model: work.model.clone(),
         begun: Instant::now(),
+        limit: match task {
+            Task::Diagnose { effort, .. } => Some(effort.limit()),
+            _ => None,
+        },
         stop: stop.clone(),
+        interrupt: interrupt.clone(),
         progress: progress.clone(),
     });
     session.failure = None;
@@ -156,7 +167,8 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 *shown = Some(now);
             }
         };
-        let outcome = catch_unwind(AssertUnwindSafe(|| compute(&work, &task, &stop, &show)));
+        let options = work.options(&stop, &interrupt);
+        let outcome = catch_unwind(AssertUnwindSafe(|| compute(&work, &task, options, &show)));
         // The tab may be gone, and so is whoever waits.
         let Some(shared) = place.upgrade() else {
             return;
@@ -188,13 +200,17 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
 fn compute(
     work: &Work,
     task: &Task,
-    stop: &AtomicBool,
+    mut options: Options,
     show: &(dyn Fn(Progress) + Sync),
 ) -> Result<Outcome, Error> {
-    let (problem, mut options) = (&work.problem, work.options(stop));
+    let problem = &work.problem;
     let outcome = match task {
         Task::Compare | Task::Chain(_) => compare(problem, &options).map(Outcome::Fitted),
-        Task::Diagnose { max_effects } => {
+        Task::Diagnose {
+            max_effects,
+            effort,
+        } => {
+            options.time_limit = Some(effort.limit());
             if let Some(most) = max_effects {
                 options.max_effects = usize::from(most.get());
             }

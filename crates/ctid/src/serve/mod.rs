@@ -31,15 +31,16 @@
 //! | `POST /api/text?session=` | `{text}`, a whole model file, and `from`: the text that it replaces | the state; 409 where another stands there |
 //! | `POST /api/effect?session=` | `{do: "add" or "remove", effect, place}`; `{do: "keep", effect}` adds what the diagnosis left unexplained under that name | the state |
 //! | `POST /api/loop?session=` | `{measured}`: whether models run on the measured command where the loop could be simulated | the state |
-//! | `POST /api/run?session=` | `{what: "compare"}`, `{what: "diagnose", max_effects}`, `{what: "chain", effects: [[effect, place], ...]}`, `{what: "design", group, between: [a, b], range: [low, high], slew, duration}`, of which the last three may be missing | the state |
-//! | `POST /api/cancel?session=` | | the state |
+//! | `POST /api/run?session=` | `{what: "compare"}`, `{what: "diagnose", max_effects, effort}`, effort `quick`, `normal` or `thorough`, `{what: "chain", effects: [[effect, place], ...]}`, `{what: "design", group, between: [a, b], range: [low, high], slew, duration}`, of which the last three may be missing | the state |
+//! | `POST /api/cancel?session=` | | the state; what was computed is dropped |
+//! | `POST /api/finish?session=` | | the state; a search ends soon with the best that it has found |
 //! | `GET /api/data?session=` | | the records' curves, as the report draws them |
 //! | `GET /api/model?session=&id=` | the number of a fit or of the diagnosis | its curves, parameters and sentences |
 //! | `GET /api/file?session=&of=` | `model`, `report` or `experiment` | the file |
 //!
-//! The state is `{version, file, text, model_error, settings, effects, waiting, records, headings, guessed, current, trail, models,
+//! The state is `{version, file, text, model_error, settings, effects, waiting, records, warnings, headings, guessed, current, trail, models,
 //! chains, loop, diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits of its first
-//! effects, `job` `{what, phase, done, total, seconds}` while something is computed. A fit stops where the model becomes another.
+//! effects, `job` `{what, phase, done, total, seconds, limit, ending}` while something is computed. A fit stops where the model becomes another.
 //!
 //! # What is bounded
 //! Eight tabs, and 64 connections whose requests begin within ten seconds. 64 MB of files and 20 records in a tab, 500 columns in a file,

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use ct_signals::{Columns, Hold};
@@ -75,7 +75,11 @@ pub(super) struct Job {
     /// What it computes with.
     pub model: ModelFile,
     pub begun: Instant,
+    /// Limit on the time of a search.
+    pub limit: Option<Duration>,
     pub stop: Arc<AtomicBool>,
+    /// When set, the search ends soon with the best that it has found.
+    pub interrupt: Arc<AtomicBool>,
     pub progress: Arc<Mutex<Option<Progress>>>,
 }
 
@@ -392,6 +396,13 @@ impl Session {
             self.fail(format!(
                 "{what} was stopped, because this page had not asked after it for three minutes, as one that sleeps does not; {button} starts it again"
             ));
+        }
+    }
+
+    /// Ends the search that runs with the best that it has found.
+    pub(super) fn finish(&mut self) {
+        if let Some(job) = &self.job {
+            job.interrupt.store(true, Ordering::Relaxed);
         }
     }
 

@@ -178,6 +178,8 @@ mod tests {
             kind,
             model: model_file::parse("m.toml", "plant = \"single-tank\"").unwrap(),
             begun: Instant::now(),
+            limit: None,
+            interrupt: Arc::default(),
             stop: Arc::default(),
             progress: Arc::default(),
         }

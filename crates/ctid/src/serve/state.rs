@@ -1,6 +1,7 @@
 //! What the page is told of its session, whenever something has changed.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use ct_signals::{Columns, Record};
 use missing_effect::numbers;
@@ -9,7 +10,9 @@ use serde_json::{Value, json};
 
 use super::session::{Fitted, Found, Kind, Session, lock, same};
 use super::settings::Settings;
+use super::upload::Upload;
 use super::words;
+use crate::input::excitation;
 use crate::model_file::ModelFile;
 
 /// How far the computation is, if there is one.
@@ -28,6 +31,8 @@ pub(super) fn job(session: &Session) -> Value {
         "done": progress.map(|p| p.done),
         "total": progress.map(|p| p.total),
         "seconds": job.begun.elapsed().as_secs_f64(),
+        "limit": job.limit.map(|limit| limit.as_secs()),
+        "ending": job.interrupt.load(Ordering::Relaxed),
     })
 }
 
@@ -47,6 +52,10 @@ pub(super) fn state(session: &mut Session) -> Value {
             })
         })
         .collect();
+    let fitted = session.records.iter().filter(|upload| !upload.held_out);
+    let fitted: Vec<&Record> = fitted.filter_map(Upload::as_read).collect();
+    let warnings = excitation::of_records(fitted.into_iter());
+    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     // The form offers the columns of the first file; all have to have the same.
     let headings = session
         .records
@@ -84,6 +93,7 @@ pub(super) fn state(session: &mut Session) -> Value {
         "effects": words::effects(session),
         "waiting": model.as_ref().map_or(Vec::new(), words::waiting),
         "records": records,
+        "warnings": warnings,
         "headings": headings,
         "guessed": guessed,
         "current": current.map(|fitted| fitted.id),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::body::Bytes;
-use ct_signals::{Columns, Heading, Hold, Record, csv_header, parse_csv};
+use ct_signals::{Columns, Heading, Hold, Record, csv_header, parse_csv_any_input};
 
 use super::guard::Refusal;
 use super::held::of_record;
@@ -57,12 +57,19 @@ impl Upload {
         self.content.len() + read.map_or(0, |record| of_record(record))
     }
 
+    /// The record as it was read last.
+    pub(super) fn as_read(&self) -> Option<&Record> {
+        let (_, _, read) = self.read.as_ref()?;
+        read.as_ref().ok().map(AsRef::as_ref)
+    }
+
     /// The record, read again only where the columns have changed.
     pub(super) fn record(&mut self, columns: &Columns, hold: Hold) -> Result<Arc<Record>, String> {
         match &self.read {
             Some((c, h, record)) if c == columns && *h == hold => record.clone(),
             _ => {
-                let record = parse_csv(&self.name, &self.content, columns, hold);
+                // Whether a fitted record has to move depends on the others.
+                let record = parse_csv_any_input(&self.name, &self.content, columns, hold);
                 let record = record.map(Arc::new).map_err(|error| error.to_string());
                 self.read = Some((columns.clone(), hold, record.clone()));
                 record

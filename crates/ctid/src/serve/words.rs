@@ -6,7 +6,7 @@ use plants::EffectInfo;
 use serde_json::{Value, json, value::RawValue};
 
 use super::session::{Found, Session};
-use crate::findings;
+use crate::findings::{self, Reader};
 use crate::model_file::ModelFile;
 use crate::report;
 
@@ -24,10 +24,14 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
         parameters: Vec<Value>,
         starts: usize,
         starts_agree: usize,
-        sentences: &'a [String],
+        /// What the error on held-out data is made of.
+        held_out_error: Option<String>,
+        sentences: Vec<&'a str>,
         noise: String,
         seconds: f64,
     }
+    let effort = findings::effort(diagnosis, Reader::Page);
+    let sentences = diagnosis.sentences.iter().chain(&effort);
     let body = Body {
         id,
         drawing,
@@ -36,7 +40,8 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
         }),
         starts: step.map_or(0, |step| step.starts),
         starts_agree: step.map_or(0, |step| step.starts_agree),
-        sentences: &diagnosis.sentences,
+        held_out_error: step.and_then(|step| held_out_error(diagnosis, step)),
+        sentences: sentences.map(String::as_str).collect(),
         noise: with_unit(
             &numbers::significant(diagnosis.noise_floor, 2),
             &diagnosis.output_unit,
@@ -45,6 +50,13 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
     };
     // Writing plain structs to memory cannot fail.
     serde_json::to_string(&body).unwrap_or_else(|_| "{}".to_owned())
+}
+
+/// `held-out error 1.9 degC: offset 1.9, gain 0.1, shape 0.3 degC`.
+fn held_out_error(diagnosis: &Diagnosis, step: &Step) -> Option<String> {
+    let error = step.held_out_error.as_ref()?;
+    let parts = findings::held_out_error(error, &diagnosis.output_unit);
+    Some(format!("held-out error {parts}"))
 }
 
 fn with_unit(number: &str, unit: &str) -> String {
@@ -80,10 +92,22 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
             "rmse": error_after(diagnosis, k, unit),
             "sentence": diagnosis.sentences.get(k),
             "in_doubt": diagnosis.in_doubt.get(k),
+            "places": diagnosis.places.get(k).filter(|places| places.len() > 1).map(|places| findings::place_scores(places)),
             "others": group.iter().filter(|other| *other != effect).collect::<Vec<_>>(),
         })
     });
     let (headline, tone) = headline(diagnosis);
+    let acceptance = diagnosis.acceptance.as_ref().map(|test| {
+        json!({
+            "title": findings::acceptance_title(diagnosis, test),
+            "rows": findings::acceptance_rows(test, unit),
+            "reasons": test.reasons,
+        })
+    });
+    let rankings = findings::rankings(diagnosis);
+    let rankings = (!rankings.is_empty()).then(|| {
+        json!({ "why": findings::RANKINGS_DISAGREE, "heads": findings::RANKINGS_HEADS, "rows": rankings })
+    });
     json!({
         "id": found.id,
         "headline": headline,
@@ -93,6 +117,10 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "sentences": diagnosis.sentences.get(diagnosis.groups.len()..).unwrap_or_default(),
         "before": with_unit(&numbers::significant(diagnosis.steps.first().map_or(f64::NAN, |s| s.rmse), 3), unit),
         "noise": with_unit(&numbers::significant(diagnosis.noise_floor, 2), unit),
+        "acceptance": acceptance,
+        "rankings": rankings,
+        "held_out_error": diagnosis.steps.last().and_then(|step| held_out_error(diagnosis, step)),
+        "effort": findings::effort(diagnosis, Reader::Page),
         "ranking": ranked.collect::<Vec<_>>(),
         // What the shape depends on, where nothing explains it.
         "unknown": diagnosis.unknown.as_ref().map(|unknown| unknown.variable),
@@ -132,13 +160,7 @@ fn headline(diagnosis: &Diagnosis) -> (String, &'static str) {
             "Something is missing, and more than one effect fits these data".to_owned(),
             "open",
         ),
-        Verdict::Partial => (
-            format!(
-                "Mostly: {}; something else remains",
-                diagnosis.effects.join(", ")
-            ),
-            "open",
-        ),
+        Verdict::Partial => (findings::partial_headline(diagnosis), "open"),
         Verdict::Unexplained => (
             "What is left is not noise, and no effect of the catalogue explains it".to_owned(),
             "open",
@@ -244,4 +266,57 @@ pub(super) fn effects(session: &Session) -> Vec<Value> {
         |own| json!({ "effect": own.term.name, "place": null, "physics": "a term of your own" }),
     );
     placed.chain(terms).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::report::sample;
+
+    fn found(found: Diagnosis) -> Value {
+        let text = "plant = \"cascaded-tanks\"";
+        diagnosis(&Found {
+            id: 1,
+            model: crate::model_file::parse("tanks.toml", text).unwrap(),
+            text: text.to_string(),
+            data: 1,
+            measured: false,
+            found,
+        })
+    }
+
+    #[test]
+    fn a_partial_answer_has_all_that_the_page_shows_of_it() {
+        let told = found(sample::partial());
+        assert!(
+            told["headline"]
+                .as_str()
+                .unwrap()
+                .starts_with("Mostly overflow: 85 % of the squared error")
+        );
+        assert_eq!(told["tone"], "open");
+        assert_eq!(told["groups"][0]["effect"], "overflow");
+        assert_eq!(
+            told["groups"][0]["places"],
+            "upper tank 1.00, lower tank 0.31: cannot be told"
+        );
+        assert_eq!(told["acceptance"]["rows"][0][1], "85 %");
+        assert_eq!(
+            told["rankings"]["rows"][0],
+            json!(["1", "overflow", "sensor_saturation"])
+        );
+        assert!(told["held_out_error"].as_str().unwrap().contains("offset"));
+        assert!(told["effort"][1].as_str().unwrap().contains("thorough"));
+    }
+
+    #[test]
+    fn what_is_not_known_is_null() {
+        let told = found(sample::two_tanks());
+        for key in ["acceptance", "rankings", "held_out_error"] {
+            assert!(told[key].is_null(), "{key}");
+        }
+        assert_eq!(told["effort"], json!([]));
+    }
 }

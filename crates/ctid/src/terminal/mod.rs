@@ -7,6 +7,7 @@ use missing_effect::{Diagnosis, ResidualTests, Shown, Step, Verdict};
 
 pub(crate) use self::curves::{overlay, residuals};
 pub(crate) use self::ranking::ranking;
+use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot;
@@ -46,6 +47,9 @@ pub fn diagnosis(diagnosis: &Diagnosis, look: Look) -> String {
         };
         text += &residuals(diagnosis, &shown, look);
         text += &parameters(diagnosis, last, look);
+        if diagnosis.verdict == Verdict::Partial && last.added.is_some() {
+            text += &failures(diagnosis, last, look);
+        }
     }
     text + &groups(diagnosis, look) + &findings(diagnosis, look)
 }
@@ -198,7 +202,26 @@ pub(crate) fn trail(diagnosis: &Diagnosis, look: Look) -> String {
         text += &look.faint(look.paragraph("  ", &source).trim_end());
         text.push('\n');
     }
+    text += &held_out_errors(diagnosis, look);
     text.push('\n');
+    text
+}
+
+/// What the error on held-out data is made of, of the first and the last model.
+fn held_out_errors(diagnosis: &Diagnosis, look: Look) -> String {
+    let last = diagnosis.steps.len().saturating_sub(1);
+    let mut text = String::new();
+    for (index, step) in diagnosis.steps.iter().enumerate() {
+        if let (Some(error), true) = (&step.held_out_error, index == 0 || index == last) {
+            let of = if last > 0 {
+                format!("{}, ", model_name(diagnosis, step))
+            } else {
+                String::new()
+            };
+            let error = findings::held_out_error(error, &diagnosis.output_unit);
+            text += &look.paragraph("  ", &format!("{of}held-out error {error}"));
+        }
+    }
     text
 }
 
@@ -317,13 +340,39 @@ pub(crate) fn groups(diagnosis: &Diagnosis, look: Look) -> String {
             );
         }
     }
-    if lines.is_empty() {
-        return lines;
+    let mut text = String::new();
+    if !lines.is_empty() {
+        let heading = look.heading("What these data cannot tell apart");
+        text += &format!("{heading}\n{lines}\n");
     }
-    format!(
-        "{}\n{lines}\n",
-        look.heading("What these data cannot tell apart")
-    )
+    let places = findings::places(diagnosis);
+    if !places.is_empty() {
+        let heading = look.heading("Where it acts, with relative likelihood");
+        text += &format!("{heading}\n");
+        for place in places {
+            text += &look.paragraph("  - ", &place);
+        }
+        text.push('\n');
+    }
+    text + &rankings(diagnosis, look)
+}
+
+/// The two rankings side by side where they disagree.
+fn rankings(diagnosis: &Diagnosis, look: Look) -> String {
+    let ranked = findings::rankings(diagnosis);
+    if ranked.is_empty() {
+        return String::new();
+    }
+    let [white, prewhitened] = findings::RANKINGS_HEADS.map(|head| look.faint(head));
+    let mut rows = vec![vec![String::new(), white, prewhitened]];
+    rows.extend(ranked.into_iter().map(|(rank, a, b)| vec![rank, a, b]));
+    let mut text = format!("{}\n", look.heading("Two rankings"));
+    text += &look.paragraph("  ", findings::RANKINGS_DISAGREE);
+    for line in table(&[Side::Right, Side::Left, Side::Left], &rows) {
+        text += &format!("  {line}\n");
+    }
+    text.push('\n');
+    text
 }
 
 /// Nothing was scored: a comparison.
@@ -346,10 +395,7 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
             look.warning("Something is missing, and more than one effect fits these data")
         }
         Verdict::Partial => {
-            let part = format!(
-                "Mostly: {}; something else remains",
-                diagnosis.effects.join(", ")
-            );
+            let part = findings::partial_headline(diagnosis);
             look.warning(look.paragraph("", &part).trim_end())
         }
         Verdict::Unexplained => {
@@ -360,5 +406,44 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
     for sentence in &diagnosis.sentences {
         text += &look.paragraph("  ", sentence);
     }
+    for sentence in findings::effort(diagnosis, Reader::Commands) {
+        text += &look.paragraph("  ", &sentence);
+    }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn a_partial_answer_is_told_with_all_that_belongs_to_it() {
+        let told = diagnosis(&sample::partial(), Look::plain());
+        let flat = told.split_whitespace().collect::<Vec<_>>().join(" ");
+        for part in [
+            "Mostly overflow: 85 % of the squared error above the noise floor (86 % on held-out data); what remains: 0.26 V rms",
+            "cascaded-tanks + sqrt_outflow, held-out error 0.55 V: offset 0.33, gain 0.26, shape 0.35 V",
+            "+ overflow (upper), held-out error 0.22 V: offset 0.13, gain 0.10, shape 0.14 V",
+            "Where + overflow (upper) fails",
+            "- overflow: upper tank 1.00, lower tank 0.31: cannot be told",
+            "1 overflow sensor_saturation 2 sensor_saturation overflow",
+            "Left out by the time limit of 20 s: swap steps between pairs of effects.",
+            "`--effort thorough`",
+        ] {
+            assert!(flat.contains(part), "{part}: {told}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_is_not_told() {
+        for told in [
+            diagnosis(&sample::two_tanks(), Look::plain()),
+            comparison(&sample::comparison(), Look::plain()),
+        ] {
+            for part in ["held-out error", "Two rankings", "likelihood", "Left out"] {
+                assert!(!told.contains(part), "{part}: {told}");
+            }
+        }
+    }
 }

@@ -4,6 +4,7 @@
 mod bad_input;
 mod common;
 mod design;
+mod effort;
 mod identify;
 mod identify_loop;
 mod model_file;

@@ -15,7 +15,10 @@ pub use self::{
     simulation::{LoopRun, Simulated},
 };
 use crate::{
-    Error, LinearPlant, Replay, TimeLimit, feedback::Feedback, reading_step::reading_step,
+    Error, LinearPlant, Replay, TimeLimit,
+    clock::{Clock, span},
+    feedback::Feedback,
+    reading_step::reading_step,
 };
 
 /// A structure, the records, and which parameters are free.
@@ -47,6 +50,8 @@ pub struct Setup<'a> {
     parameters: usize,
     /// The controller, where the loop is simulated.
     feedback: Option<Feedback>,
+    /// When each record begins on the clock of drifts, steps and periods.
+    clock: Clock,
 }
 
 /// What an initial state costs in [`Setup::price`].
@@ -69,8 +74,7 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
         .iter()
         .map(Record::sample_interval)
         .fold(f64::INFINITY, f64::min);
-    let duration = records.iter().map(Record::duration).fold(0.0, f64::max);
-    let mut scales = Scales::from_ranges(input, output, sample, duration);
+    let mut scales = Scales::from_ranges(input, output, sample, span(records));
     scales.input_2 = input_2;
     if let Some((low, high)) = input_2 {
         scales.input_range = scales.input_range.max(low.abs()).max(high.abs());
@@ -183,6 +187,7 @@ impl<'a> Setup<'a> {
             free,
             parameters,
             feedback,
+            clock: Clock::of(records),
         })
     }
 
@@ -214,6 +219,7 @@ impl<'a> Setup<'a> {
     fn rebuilt(&self, structure: Structure, feedback: Option<Feedback>) -> Result<Self, Error> {
         let mut setup = Self::build(structure, self.records, self.fixed.clone(), feedback)?;
         setup.limited_as(self);
+        setup.clock = self.clock.clone();
         Ok(setup)
     }
 
@@ -298,7 +304,8 @@ impl<'a> Setup<'a> {
         self.time_limit.clone_from(&other.time_limit);
     }
 
-    /// The same structure against other records, in the same scales, run on the measured command.
+    /// The same structure against other records, in the same scales, run on the measured command. Those that begin after the
+    /// records of this setup have ended continue its clock.
     ///
     /// # Errors
     /// As [`Setup::new`].
@@ -308,6 +315,7 @@ impl<'a> Setup<'a> {
     {
         let mut setup: Setup<'b> = Setup::new(self.structure.clone(), records, self.fixed.clone())?;
         setup.limited_as(self);
+        setup.clock = self.clock.with_records(records);
         Ok(setup)
     }
 

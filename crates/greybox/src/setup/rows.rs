@@ -184,9 +184,15 @@ impl Setup<'_> {
                 };
                 let theta: Vec<_> = (0..count).map(dual).collect();
                 let levels: Vec<_> = plant.clone().map(dual).collect();
-                let mut simulator =
-                    Simulator::with_inputs(&self.structure, &theta, &levels, at_rest(record))
-                        .ok()?;
+                let begin = self.clock.begins[r];
+                let mut simulator = Simulator::starting_at(
+                    begin,
+                    &self.structure,
+                    &theta,
+                    &levels,
+                    at_rest(record),
+                )
+                .ok()?;
                 simulator.set_substeps(self.substeps);
                 let regulator = self.feedback.as_ref().map(|feedback| {
                     let states: Vec<_> = (plant.end..own.end).map(dual).collect();

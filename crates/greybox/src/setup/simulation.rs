@@ -61,7 +61,8 @@ impl Setup<'_> {
             mean_level: [0.0; MAX_VESSELS],
         };
         for (r, record) in self.records.iter().enumerate() {
-            let mut simulator = Simulator::with_inputs(
+            let mut simulator = Simulator::starting_at(
+                self.clock.begins[r],
                 &self.structure,
                 &x[..self.parameter_count()],
                 &x[self.plant_states_of(r)],
@@ -102,7 +103,9 @@ impl Setup<'_> {
             let states = self.plant_states_of(r);
             let theta = &x[..self.parameter_count()];
             let (levels, at_rest) = (&x[states.clone()], at_rest(record));
-            let mut simulator = Simulator::with_inputs(&self.structure, theta, levels, at_rest)?;
+            let begin = self.clock.begins[r];
+            let mut simulator =
+                Simulator::starting_at(begin, &self.structure, theta, levels, at_rest)?;
             simulator.set_substeps(self.substeps);
             let mut regulator = feedback
                 .controller

@@ -28,7 +28,10 @@ function job(now) {
   $("phase").textContent = now.phase || WORK[now.what];
   const bar = $("progress");
   if (now.total) { bar.max = now.total; bar.value = now.done; } else { bar.removeAttribute("value"); }
-  $("clock").textContent = `${now.seconds.toFixed(0)} s`;
+  const limit = now.limit ? ` of at most ${now.limit < 120 ? `${now.limit} s` : `${now.limit / 60} min`}` : "";
+  $("clock").textContent = `${now.seconds.toFixed(0)} s${now.ending ? ", ending" : limit}`;
+  $("finish").hidden = now.what !== "diagnose";
+  $("finish").disabled = now.ending;
 }
 
 /** Reads out what has come of it; the same is not said twice. */
@@ -105,6 +108,7 @@ function show(state, trouble) {
   }
   model.show(state, fail);
   data.show(state, fail, model.pumps(), model.drafting());
+  model.askForPlant();
   findings.show(state, fail);
   experiment.show(state);
   fall(state);
@@ -122,6 +126,7 @@ try {
   chains.start(fail);
   experiment.start(fail);
   $("cancel").addEventListener("click", cancel);
+  $("finish").addEventListener("click", () => server.send("/api/finish").catch((e) => fail(e.message)));
   $("fit").addEventListener("click", compare);
   show(opened.state);
   plots.start(() => { fit.draw(); unknown.draw(); chains.draw(); experiment.draw(); });

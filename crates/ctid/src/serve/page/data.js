@@ -124,6 +124,7 @@ export function columnFields(state, pumps) {
 /** `pumps` are those of the plant in the form; a draft keeps what was chosen. */
 export function show(state, fail, pumps, draft) {
   fill($("records"), state.records.map((one) => record(one, fail)));
+  fill($("record-warnings"), state.warnings.map((warning) => make("p", { className: "warning" }, warning)));
   $("after-record").hidden = !state.records.length;
   const fitted = state.records.some((one) => !one.held_out);
   $("drop-fitted").classList.toggle("small", fitted);

@@ -1,5 +1,5 @@
 // What a diagnosis found: the effects that are missing, each with what cannot be told from it, and the ranking.
-import { $, button, fill, make, named, units } from "./dom.js";
+import { $, button, fill, make, named, table, units } from "./dom.js";
 import * as experiment from "./experiment.js";
 import * as server from "./server.js";
 
@@ -11,7 +11,7 @@ export function start(fail) {
       return;
     }
     asked = true;
-    server.run("diagnose", { max_effects: most ? Number(most) : null }).catch((e) => fail(e.message));
+    server.run("diagnose", { max_effects: most ? Number(most) : null, effort: $("effort").value }).catch((e) => fail(e.message));
   });
 }
 
@@ -52,6 +52,7 @@ function group(state, one, k, fail) {
     make("div", { className: "head" }, make("code", { className: "name" }, named(one)), choice(one.effect, one.place, `add-found-${k}`)),
     make("p", { className: "figures" }, one.size ? make("span", {}, units(one.size)) : null, one.rmse ? make("span", {}, "error then ", make("b", {}, units(one.rmse))) : null),
     one.sentence ? make("p", {}, units(one.sentence)) : null,
+    one.places ? make("p", {}, `Where it acts, with relative likelihood: ${one.places}.`) : null,
     others.length ? [make("p", { className: "caption" }, "These data cannot tell it from:"), make("ul", { className: "others" }, others)] : null);
 }
 
@@ -90,6 +91,24 @@ function keep(state, found, fail) {
     make("p", { className: "line" }, box, button("Keep the shape", { id: "keep" }, press))];
 }
 
+/** A table that scrolls inside its own box. */
+function scrolled(name, heads, rows) {
+  const element = make("table");
+  table(element, heads, rows);
+  return make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": name }, element);
+}
+
+/** The acceptance test in numbers, behind its title. */
+function acceptance(test) {
+  return make("details", { id: "acceptance" }, make("summary", {}, test.title),
+    scrolled(test.title, [["Measure"], ["Found", true], ["Required"]], test.rows.map((row) => row.map((cell) => make("span", {}, units(cell))))),
+    test.reasons.length ? make("ul", {}, test.reasons.map((reason) => make("li", {}, units(reason)))) : null);
+}
+
+/** The two rankings side by side. */
+const rankings = (two) => [make("h3", {}, "Two rankings"), make("p", { className: "caption" }, two.why),
+  scrolled("Two rankings", [["#", true], ...two.heads.map((head) => [head])], two.rows.map(([rank, ...effects]) => [rank, ...effects.map((effect) => make("code", {}, effect))]))];
+
 let all = false;
 let shown = null;
 // What stands there: what was unfolded stays so while that does.
@@ -117,6 +136,10 @@ export function show(state, fail) {
     make("p", { className: "caption" }, `Diagnosed of ${found.of}: error ${found.before}, noise floor ${found.noise}, ${found.seconds.toFixed(1)} s.`),
     found.groups.length ? make("ul", { className: "groups" }, found.groups.map((one, k) => group(state, one, k, fail))) : null,
     found.sentences.map((sentence) => make("p", {}, units(sentence))),
+    found.effort.map((sentence) => make("p", { className: "caption" }, units(sentence))),
+    found.held_out_error ? make("p", { className: "caption" }, "With what was found: ", units(found.held_out_error), ".") : null,
+    found.acceptance ? acceptance(found.acceptance) : null,
+    found.rankings ? rankings(found.rankings) : null,
     found.unknown ? keep(state, found, fail) : null,
     make("h3", {}, "One effect at a time, refitted"),
     make("p", { className: "caption" }, "The larger the evidence (fall of BIC), the better; below 6 is none, and effects within 6 of each other are not told apart."),

@@ -101,6 +101,8 @@ function chosenWords() {
   document.querySelectorAll("#trail .step").forEach((one, k) => one.setAttribute("aria-pressed", String(k === view.chosen)));
   fill($("fails"), step.failures.sentences.map((sentence) => make("li", {}, units(sentence))));
   fill($("fit-sentences"), fit.sentences.map((sentence) => make("p", {}, units(sentence))));
+  $("held-out-parts").hidden = !fit.held_out_error;
+  fill($("held-out-parts"), units(fit.held_out_error));
   table($("parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
     fit.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? "–", units(one.unit)]));
   $("parameters-caption").textContent = `${fit.starts_agree === 0 ? `None of ${fit.starts} starts around it came as low` : `${fit.starts_agree} of ${fit.starts} starts ended in this minimum`}. –: the data do not determine it, or it sits at a bound.`;

@@ -120,11 +120,22 @@ function knownFields(known, state) {
   fill($("known-fields"), measured, known.known.flatMap((key) => input(`known-${key}`, label(key, known), values[key], units[key] ?? square)));
 }
 
+/** Asks for the plant where it alone is missing: without it no choice of columns has any effect. */
+export function askForPlant() {
+  const { headings } = server.current();
+  const said = headings ? data.columns() : {};
+  const missing = !$("plant").value && ["time", "input", "output"].every((role) => said[role]);
+  $("plant-missing").hidden = !missing;
+  $("plant").setAttribute("aria-invalid", String(missing));
+  return missing;
+}
+
 /** Another plant: one of which more has to be said waits for that. */
 function chosen() {
   const known = plant($("plant").value);
   const state = server.current();
   trouble(null);
+  askForPlant();
   if (!known) {
     draft = null;
     form(state);
@@ -146,7 +157,10 @@ function chosen() {
 
 /** Sends the form. Columns are said to the model only where they differ from what is guessed, or stand there already. */
 export async function changed() {
-  if (!$("plant").value) return;
+  if (!$("plant").value) {
+    if (askForPlant()) $("plant-missing").scrollIntoView({ block: "nearest" });
+    return;
+  }
   unanswered += 1;
   let refused = null;
   try {

@@ -139,13 +139,43 @@ fn an_empty_cell() {
 
 #[test]
 fn a_constant_input() {
-    record_refused(
-        Rows::new().each(1, |_| 4.2).text(),
+    let place = place();
+    place.write("bad.csv", Rows::new().each(1, |_| 4.2).text());
+    both_refuse(
+        &place,
+        "bad.csv --model tour.toml --test tour-test.csv",
         &[
             "bad.csv, column \"u [V]\"",
             "the input is 4.2 in all 900 rows",
             "record an experiment in which it moves",
         ],
+    );
+}
+
+/// Beside a record that moves, and held out, it is as good as any: it is simulated and scored.
+#[test]
+fn a_constant_input_beside_another_record() {
+    let place = crate::common::Place::new();
+    let mut still = String::from("t [s],u [V],y [cm]\n");
+    for k in 0..60 {
+        still += &format!("{},4,{}\n", 2 * k, 12.0 + 0.05 * f64::from(k * 7 % 5));
+    }
+    place.write("still.csv", &still);
+    place.write("other.csv", &still);
+    for records in [
+        "tour.csv --test still.csv",
+        "tour.csv still.csv",
+        "still.csv tour.csv --test other.csv",
+    ] {
+        let json = place.result(&format!("compare {records} --model tour.toml"));
+        let rmse = json["steps"][0]["rmse"].as_f64();
+        assert!(rmse.is_some_and(|rmse| rmse > 0.0), "{records}: {json}");
+        let held_out = json["steps"][0]["rmse_test"].as_f64();
+        assert_eq!(held_out.is_some(), records.contains("--test"), "{json}");
+    }
+    place.refuses(
+        "compare still.csv other.csv --model tour.toml",
+        &["still.csv", "\"u [V]\"", "4 in all 60 rows"],
     );
 }
 

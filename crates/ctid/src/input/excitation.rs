@@ -1,0 +1,362 @@
+//! Whether the records can tell anything of the process, seen without a fit.
+//!
+//! Three findings, each made so that a record that a fit can use raises none of them:
+//!
+//! - a record whose command never moves, beside one whose command does;
+//! - a command that makes a single step in all fitted records together;
+//! - an output that does not answer: its range is that of its own noise, and neither a lag of the prewhitened command nor the command
+//!   behind a first-order lag of any length is correlated with it.
+
+use std::fmt;
+
+use ct_signals::{Record, Signal, residual_tests::prewhitened_input_test};
+use missing_effect::Problem;
+
+use crate::numbers;
+
+/// A command has moved where it is this part of its whole range away from where it stood.
+const MOVE: f64 = 0.1;
+
+/// The range of white noise of up to 100 000 samples is below this many medians of its first differences.
+const NOISE_RANGE: f64 = 10.0;
+
+/// An output answers where chance alone gives such a correlation with the command less often than this.
+const CHANCE: f64 = 0.01;
+
+/// Standard errors of a correlation beyond which it is none of chance.
+const STANDARD_ERRORS: f64 = 4.0;
+
+/// What a record cannot tell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ExcitationWarning {
+    /// The command of a record never moves.
+    Still {
+        /// The record.
+        record: String,
+    },
+    /// All fitted records together hold one step of the command.
+    SingleStep {
+        /// The record that holds it.
+        record: String,
+        /// Commands before and after it.
+        levels: (f64, f64),
+        /// Unit of the command.
+        unit: String,
+    },
+    /// The output of a record shows no trace of its command.
+    NoAnswer {
+        /// The record.
+        record: String,
+        /// Range of the output.
+        range: f64,
+        /// Median of the absolute first differences of the output.
+        difference: f64,
+        /// Unit of the output.
+        unit: String,
+    },
+}
+
+impl fmt::Display for ExcitationWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Still { record } => write!(
+                f,
+                "{record}: the command never moves, so this record says nothing of how the process answers; the other fitted records have to"
+            ),
+            Self::SingleStep {
+                record,
+                levels: (before, after),
+                unit,
+            } => write!(
+                f,
+                "{record}: the command makes a single step, from {} to {}: a gain and a time constant can be fitted to it, but not how they \
+                 change with the level or the command, and many effects cannot be told apart; record several steps of different sizes",
+                numbers::significant(*before, 3),
+                with_unit(*after, unit),
+            ),
+            Self::NoAnswer {
+                record,
+                range,
+                difference,
+                unit,
+            } => write!(
+                f,
+                "{record}: the output shows no trace of the command: its range of {} is that of noise (median change from row to row {}); \
+                 check the columns, or record an experiment with larger steps",
+                with_unit(*range, unit),
+                with_unit(*difference, unit),
+            ),
+        }
+    }
+}
+
+fn with_unit(value: f64, unit: &str) -> String {
+    let number = numbers::significant(value, 3);
+    format!("{number} {unit}").trim_end().to_string()
+}
+
+/// What the fitted records of a problem cannot tell.
+#[must_use]
+pub fn of_problem(problem: &Problem) -> Vec<ExcitationWarning> {
+    of_records(problem.records.iter())
+}
+
+/// The same of fitted records that are not in a problem yet.
+pub(crate) fn of_records<'a>(
+    records: impl Iterator<Item = &'a Record> + Clone,
+) -> Vec<ExcitationWarning> {
+    let still = |record: &Record| record.require_moving_input().is_err();
+    let mut warnings = Vec::new();
+    let others = records.clone().any(|record| !still(record));
+    for record in records.clone() {
+        if still(record) {
+            if others {
+                warnings.push(ExcitationWarning::Still {
+                    record: record.name.clone(),
+                });
+            }
+        } else if let Some((range, difference)) = no_answer(record) {
+            warnings.push(ExcitationWarning::NoAnswer {
+                record: record.name.clone(),
+                range,
+                difference,
+                unit: record.output.unit.clone(),
+            });
+        }
+    }
+    warnings.extend(single_step(records));
+    warnings
+}
+
+/// The one step of the command, where all records hold no more; a second command that moves is more.
+fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<ExcitationWarning> {
+    let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    let (low, high) = records.clone().map(Record::input_range).reduce(wider)?;
+    let least = MOVE * (high - low);
+    let second = |record: &Record| {
+        record
+            .input_2
+            .as_ref()
+            .is_some_and(|u| u.range().0 < u.range().1)
+    };
+    let mut found = None;
+    for record in records {
+        if second(record) {
+            return None;
+        }
+        for levels in moves(&record.input, least) {
+            if found.is_some() {
+                return None;
+            }
+            found = Some(ExcitationWarning::SingleStep {
+                record: record.name.clone(),
+                levels,
+                unit: record.input.unit.clone(),
+            });
+        }
+    }
+    found
+}
+
+/// The moves of a signal by more than `least`: from where it stood, to where it went.
+fn moves(signal: &Signal, least: f64) -> Vec<(f64, f64)> {
+    let mut moves = Vec::new();
+    let mut values = signal.values.iter().copied();
+    let Some(mut stood) = values.next() else {
+        return moves;
+    };
+    for value in values {
+        if (value - stood).abs() > least {
+            moves.push((stood, value));
+            stood = value;
+        }
+    }
+    moves
+}
+
+/// Range of the output and median of its first differences, where it does not answer to the command.
+fn no_answer(record: &Record) -> Option<(f64, f64)> {
+    let (input, output) = (&record.input.values, &record.output.values);
+    let (low, high) = record.output_range();
+    let mut differences: Vec<f64> = output.windows(2).map(|y| (y[1] - y[0]).abs()).collect();
+    let middle = differences.len() / 2;
+    if differences.is_empty() {
+        return None;
+    }
+    let (_, &mut difference, _) = differences.select_nth_unstable_by(middle, f64::total_cmp);
+    let range = high - low;
+    let silent = record.input_2.is_none()
+        && range < NOISE_RANGE * difference
+        && uncorrelated(input, output)
+        && uncorrelated_behind_lags(input, output);
+    silent.then_some((range, difference))
+}
+
+/// No lag of the prewhitened input is correlated with the output. Where that cannot be tested it is not said.
+fn uncorrelated(input: &[f64], output: &[f64]) -> bool {
+    let lags = (input.len() / 10).clamp(2, 60);
+    prewhitened_input_test(input, output, lags).is_ok_and(|(_, p)| p > CHANCE)
+}
+
+/// The input, as it is and behind first-order lags of one sample to a third of the record, is not correlated with the output.
+fn uncorrelated_behind_lags(input: &[f64], output: &[f64]) -> bool {
+    let bound = STANDARD_ERRORS / (input.len() as f64).sqrt();
+    let mut lag = 1.0;
+    let mut filtered = input.to_vec();
+    loop {
+        if correlation(&filtered, output).abs() > bound {
+            return false;
+        }
+        if lag > input.len() as f64 / 3.0 {
+            return true;
+        }
+        let keep = (-1.0_f64 / lag).exp();
+        let mut state = input[0];
+        for (to, u) in filtered.iter_mut().zip(input) {
+            *to = state;
+            state = keep * state + (1.0 - keep) * u;
+        }
+        lag *= 2.0;
+    }
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (mean_a, mean_b) = (mean(a), mean(b));
+    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        let (a, b) = (a - mean_a, b - mean_b);
+        (aa, bb, ab) = (aa + a * a, bb + b * b, ab + a * b);
+    }
+    ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use ct_signals::{Hold, noise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// A lag of `gain` and `tau` samples, in white noise of one, with this command.
+    fn record(name: &str, gain: f64, tau: f64, seed: u64, command: &[f64]) -> Record {
+        let n = command.len();
+        let white = noise::white(n, 1.0, &mut ChaCha8Rng::seed_from_u64(seed));
+        let keep = (-1.0 / tau).exp();
+        let mut state = gain * command[0];
+        let output = command
+            .iter()
+            .zip(white)
+            .map(|(u, e)| {
+                let reading = 20.0 + state + e;
+                state = keep * state + (1.0 - keep) * gain * u;
+                reading
+            })
+            .collect();
+        Record {
+            name: name.to_string(),
+            time: (0..n).map(|k| k as f64).collect(),
+            input: Signal::new("u", "V", command.to_vec()),
+            output: Signal::new("y", "cm", output),
+            input_2: None,
+            reference: None,
+            hold: Hold::Zero,
+        }
+    }
+
+    /// Steps between random levels, each held for so long.
+    fn steps(n: usize, held: usize, seed: u64) -> Vec<f64> {
+        let levels = noise::white(n.div_ceil(held), 1.0, &mut ChaCha8Rng::seed_from_u64(seed));
+        (0..n).map(|k| levels[k / held]).collect()
+    }
+
+    fn warnings(records: &[Record]) -> Vec<ExcitationWarning> {
+        of_records(records.iter())
+    }
+
+    #[test]
+    fn an_output_of_noise_alone_does_not_answer() {
+        let mut raised = 0;
+        for seed in 0..20 {
+            let record = record("a.csv", 0.0, 10.0, seed, &steps(1000, 20, seed + 100));
+            match warnings(&[record]).as_slice() {
+                [] => {}
+                [ExcitationWarning::NoAnswer { range, .. }] => {
+                    assert!((5.0..10.0).contains(range), "{range}");
+                    raised += 1;
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        // Each of the tests finds something by chance in one record of a hundred.
+        assert!(raised >= 18, "{raised} of 20");
+    }
+
+    #[test]
+    fn an_output_that_answers_in_noise_does() {
+        // Slow and fast beside the sampling and the steps, as large as the noise or half of it; and without noise to speak of.
+        for (gain, tau, held) in [
+            (1.0, 10.0, 20),
+            (0.7, 200.0, 1000),
+            (1.0, 0.05, 1),
+            (1.0, 0.05, 30),
+            (300.0, 0.05, 1),
+            (300.0, 50.0, 100),
+        ] {
+            for seed in 0..10 {
+                let command = steps(4000, held, seed + 100);
+                let record = record("a.csv", gain, tau, seed, &command);
+                assert_eq!(warnings(&[record]), [], "{gain} {tau} {held} {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_single_step_is_said_and_two_are_not() {
+        let single: Vec<f64> = (0..400).map(|k| if k < 100 { 2.0 } else { 3.0 }).collect();
+        let expected = ExcitationWarning::SingleStep {
+            record: "a.csv".to_string(),
+            levels: (2.0, 3.0),
+            unit: "V".to_string(),
+        };
+        let once = record("a.csv", 30.0, 20.0, 1, &single);
+        assert_eq!(warnings(std::slice::from_ref(&once)), [expected]);
+        // A measured command has noise of its own.
+        let measured: Vec<f64> = single
+            .iter()
+            .zip(noise::white(400, 0.005, &mut ChaCha8Rng::seed_from_u64(7)))
+            .map(|(u, e)| u + e)
+            .collect();
+        let noisy = record("a.csv", 30.0, 20.0, 1, &measured);
+        assert!(matches!(
+            warnings(&[noisy]).as_slice(),
+            [ExcitationWarning::SingleStep { .. }]
+        ));
+        // A second record with a step, a step back, and a ramp are more.
+        let again = record("b.csv", 30.0, 20.0, 2, &single);
+        assert_eq!(warnings(&[once, again]), []);
+        let back: Vec<f64> = (0..400)
+            .map(|k| if (100..250).contains(&k) { 3.0 } else { 2.0 })
+            .collect();
+        assert_eq!(warnings(&[record("a.csv", 30.0, 20.0, 1, &back)]), []);
+        let ramp: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
+        assert_eq!(warnings(&[record("a.csv", 30.0, 20.0, 1, &ramp)]), []);
+    }
+
+    #[test]
+    fn a_record_at_rest_is_said_beside_one_that_moves() {
+        let still = record("still.csv", 30.0, 20.0, 1, &[2.0; 100]);
+        let moves = record("a.csv", 30.0, 20.0, 1, &steps(400, 20, 1));
+        let said = warnings(&[still, moves]);
+        let expected = ExcitationWarning::Still {
+            record: "still.csv".to_string(),
+        };
+        assert_eq!(said, [expected]);
+        assert!(
+            said[0]
+                .to_string()
+                .starts_with("still.csv: the command never moves")
+        );
+    }
+}

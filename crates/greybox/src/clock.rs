@@ -1,0 +1,146 @@
+//! The clock that drifts, steps and periods follow, where there are several records.
+//!
+//! Records whose time stamps continue (each begins after the one before it has ended) are parts of one experiment: the clock
+//! runs through them, from the beginning of the first. Records that each begin at a zero of their own have nothing in common, and
+//! the clock starts again in each of them. A held-out record that begins after the fitted ones have ended continues their clock.
+
+use ct_signals::Record;
+
+/// Where records stand on their clock.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Clock {
+    /// Time stamp at which it begins \[s\].
+    origin: f64,
+    /// Time stamp at which the fitted records end \[s\]; infinite where they share no clock.
+    end: f64,
+    /// When each record begins \[s\].
+    pub begins: Vec<f64>,
+}
+
+/// When each record begins on the clock that they share \[s\], the first at zero; `None` where they share none, and of one record.
+#[must_use]
+pub fn common_clock(records: &[Record]) -> Option<Vec<f64>> {
+    let continues = |pair: &[Record]| match (pair[0].time.last(), pair[1].time.first()) {
+        (Some(end), Some(begin)) => begin > end,
+        _ => false,
+    };
+    let origin = *records.first()?.time.first()?;
+    let shared = records.len() > 1 && records.windows(2).all(continues);
+    shared.then(|| {
+        records
+            .iter()
+            .map(|record| begin(record) - origin)
+            .collect()
+    })
+}
+
+/// What the clock shows in all records together \[s\]: their whole span, or the longest of them.
+pub(crate) fn span(records: &[Record]) -> f64 {
+    match (common_clock(records), records.last()) {
+        (Some(begins), Some(last)) => begins.last().unwrap_or(&0.0) + last.duration(),
+        _ => records.iter().map(Record::duration).fold(0.0, f64::max),
+    }
+}
+
+fn begin(record: &Record) -> f64 {
+    record.time.first().copied().unwrap_or(0.0)
+}
+
+impl Clock {
+    /// The clock of fitted records.
+    pub fn of(records: &[Record]) -> Self {
+        let shared = common_clock(records);
+        let last = records.last().and_then(|record| record.time.last());
+        let end = match last {
+            Some(end) if shared.is_some() || records.len() == 1 => *end,
+            _ => f64::INFINITY,
+        };
+        Self {
+            origin: records.first().map_or(0.0, begin),
+            end,
+            begins: shared.unwrap_or_else(|| vec![0.0; records.len()]),
+        }
+    }
+
+    /// The same clock for other records: those that begin after its end continue it.
+    pub fn with_records(&self, records: &[Record]) -> Self {
+        let own = Self::of(records).begins;
+        let begins = records.iter().zip(own).map(|(record, own)| {
+            let begin = begin(record);
+            if begin > self.end {
+                begin - self.origin
+            } else {
+                own
+            }
+        });
+        Self {
+            begins: begins.collect(),
+            ..*self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ct_signals::{Hold, Signal};
+
+    use super::*;
+
+    fn record(from: f64, to: f64) -> Record {
+        let signal = || Signal::new("", "", vec![0.0; 2]);
+        Record {
+            name: String::new(),
+            time: vec![from, to],
+            input: signal(),
+            input_2: None,
+            output: signal(),
+            reference: None,
+            hold: Hold::Zero,
+        }
+    }
+
+    #[test]
+    fn records_whose_stamps_continue_share_a_clock() {
+        let parts = [
+            record(100.0, 200.0),
+            record(210.0, 300.0),
+            record(500.0, 600.0),
+        ];
+        assert_eq!(common_clock(&parts), Some(vec![0.0, 110.0, 400.0]));
+        assert_eq!(span(&parts), 500.0);
+        let clock = Clock::of(&parts);
+        // A held-out record later, one in between, one from its own zero.
+        let test = [
+            record(700.0, 800.0),
+            record(400.0, 450.0),
+            record(0.0, 90.0),
+        ];
+        assert_eq!(clock.with_records(&test).begins, [600.0, 0.0, 0.0]);
+        assert_eq!(clock.with_records(&parts), clock);
+        // A single record has a clock of its own, which a later one continues.
+        let alone = Clock::of(&parts[..1]);
+        assert_eq!(alone.begins, [0.0]);
+        assert_eq!(alone.with_records(&parts[1..2]).begins, [110.0]);
+    }
+
+    #[test]
+    fn records_from_their_own_zero_share_none() {
+        for records in [
+            vec![record(0.0, 100.0), record(0.0, 300.0)],
+            // Out of order, overlapping, and begun at the instant at which the other ends.
+            vec![record(200.0, 300.0), record(0.0, 100.0)],
+            vec![record(0.0, 100.0), record(50.0, 350.0)],
+            vec![record(0.0, 100.0), record(100.0, 300.0)],
+            vec![record(0.0, 100.0), record(200.0, 300.0), record(0.0, 100.0)],
+        ] {
+            assert_eq!(common_clock(&records), None);
+            let clock = Clock::of(&records);
+            assert!(clock.begins.iter().all(|begin| *begin == 0.0));
+            let later = clock.with_records(&[record(900.0, 950.0)]);
+            assert_eq!(later.begins, [0.0]);
+            let longest = records.iter().map(Record::duration).fold(0.0, f64::max);
+            assert_eq!(span(&records), longest);
+        }
+        assert_eq!(common_clock(&[]), None);
+    }
+}

@@ -7,6 +7,7 @@ mod fit;
 mod levenberg_marquardt;
 mod marginal;
 mod noise_factor;
+mod reading_grid;
 mod reading_step;
 mod sandwich;
 mod setup;
@@ -19,6 +20,7 @@ pub use fit::{
     Fit, FitOptions, Start, coloured, fit, fit_from, fit_initial_levels, fit_onward, noise_of,
 };
 pub use levenberg_marquardt::{Stop, Stopping};
+pub use reading_grid::{ReadingGrid, reading_grid};
 pub use sandwich::{Robust, robust};
 pub use setup::{LoopRun, Rows, Setup, Simulated, at_rest, commands};
 pub use starts::{random_starts, starts_around};

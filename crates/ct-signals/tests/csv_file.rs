@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use approx::assert_relative_eq;
-use ct_signals::{ColumnFault, Columns, Error, Hold, Record, read_csv};
+use ct_signals::{ColumnFault, Columns, Error, Hold, Record, parse_csv_any_input, read_csv};
 
 /// 40 rows of a plausible experiment: time step 2, input and output moving.
 fn rows() -> Vec<[f64; 3]> {
@@ -550,6 +550,16 @@ fn constant_signals() {
     let error = read(&text(HEADER, &still)).unwrap_err();
     assert!(matches!(error, Error::ConstantInput { rows: 40, .. }));
     says(&error, &["tank.csv", "\"u [V]\"", "4.5", "input"]);
+    // Where it may be constant the record says so itself, in the same words.
+    let still = parse_csv_any_input(
+        "tank.csv",
+        text(HEADER, &still).as_bytes(),
+        &Columns::default(),
+        Hold::Zero,
+    )
+    .unwrap();
+    let of_record = still.require_moving_input().unwrap_err();
+    assert!(error.to_string().ends_with(&of_record.to_string()));
 
     let mut still = rows();
     still.iter_mut().for_each(|row| row[2] = 0.0);

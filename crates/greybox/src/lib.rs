@@ -6,8 +6,10 @@ mod error;
 mod feedback;
 mod fit;
 mod levenberg_marquardt;
+mod many_starts;
 mod marginal;
 mod noise_factor;
+mod reading_grid;
 mod reading_step;
 mod sandwich;
 mod setup;
@@ -23,6 +25,8 @@ pub use fit::{
     prewhitened,
 };
 pub use levenberg_marquardt::{Stop, Stopping};
+pub use many_starts::{keep_best_simulated, with_other_time_constants};
+pub use reading_grid::{ReadingGrid, reading_grid};
 pub use sandwich::{Robust, robust};
 pub use setup::{LoopRun, Rows, Setup, Simulated, at_rest, commands};
 pub use starts::{random_starts, starts_around};

@@ -1,6 +1,9 @@
-//! Whether the readings of records are whole multiples of one number, and of which.
+//! Whether the readings of records are whole multiples of one number, and of which: exactly, as a converter leaves them, or with
+//! noise of their own on them.
 
 use ct_signals::Record;
+
+use crate::reading_grid;
 
 /// How well readings must lie on the multiples: the mean of `cos(2 pi y/D)`, one where all of them do. With white noise of
 /// a tenth of the step, 0.82.
@@ -15,6 +18,12 @@ const FIRST_LOOK: usize = 400;
 /// The largest `D` that nearly all readings are multiples of \[output unit\], if there is one that is coarse enough to be
 /// more than the last digit.
 pub(crate) fn reading_step(records: &[Record]) -> Option<f64> {
+    let exact = reading_grid(records).filter(|grid| grid.is_coarse() && grid.has_zero());
+    exact.map(|grid| grid.step).or_else(|| noisy_step(records))
+}
+
+/// The same where noise comes behind the steps.
+fn noisy_step(records: &[Record]) -> Option<f64> {
     let all = || records.iter().flat_map(|record| &record.output.values);
     let count = all().count();
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {

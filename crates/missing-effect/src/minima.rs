@@ -1,7 +1,7 @@
 //! Whether a minimum is the lowest: it is held against those that other starts reach.
 
 use ct_signals::ArModel;
-use greybox::{Fit, Start, fit_onward, starts_around};
+use greybox::{Fit, Start, fit_onward, keep_best_simulated, starts_around};
 use plants::Placed;
 use rayon::prelude::*;
 
@@ -47,7 +47,11 @@ pub(crate) fn begun_again(
     noise: &ArModel,
 ) -> Result<(), Error> {
     let starts = effects.iter();
-    let starts = starts.flat_map(|placed| grid(node, &node.setup, *placed));
+    let starts = starts.flat_map(|placed| {
+        let mut starts = grid(node, &node.setup, *placed);
+        keep_best_simulated(&node.setup, *placed, &mut starts, noise);
+        starts
+    });
     let starts = starts.collect();
     descend(node, starts, noise)
 }

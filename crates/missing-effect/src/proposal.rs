@@ -3,7 +3,9 @@
 use std::{f64::consts::TAU, sync::OnceLock};
 
 use ct_signals::{ArModel, Record};
-use greybox::{Setup, Start, Stopping, Triangle, fit_onward};
+use greybox::{
+    Setup, Start, Stopping, Triangle, fit_onward, keep_best_simulated, with_other_time_constants,
+};
 use plants::{Place, Placed, Plant};
 use rayon::prelude::*;
 
@@ -49,6 +51,7 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
     }
 
     begun.extend(with_less_throughput(&begun[0], child, placed));
+    begun.extend(with_other_time_constants(child, placed, &begun[0]));
 
     let parameters = child.structure.effect_parameters(placed);
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
@@ -198,6 +201,7 @@ pub(crate) fn promising(
 ) -> Option<(f64, Vec<Start>)> {
     let mut starts = grid(from, setup, placed);
     keep_shown_periods(setup, placed, &mut starts, noise);
+    keep_best_simulated(setup, placed, &mut starts, noise);
     let mut ranked: Vec<(f64, Start)> = starts
         .into_par_iter()
         .filter_map(|x| {

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     intake::Sample,
-    learn::{Learned, record},
+    learn::{BEGIN as BEGIN_IN_BAND, Learned, record},
     sensitivity::command,
 };
 
@@ -294,6 +294,8 @@ impl Search<'_> {
         if placed.effect.id == "valve_step" {
             fixed.insert(name("time"), 0.0);
         }
+        // It followed the command until then.
+        fixed.insert(BEGIN_IN_BAND.into(), 0.0);
         if let Some(held) = own.iter().find(|parameter| Some(parameter.name) == held) {
             fixed.insert(name(held.name), held.upper);
         }

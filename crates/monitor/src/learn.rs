@@ -150,11 +150,16 @@ pub(crate) fn record<'a>(rows: impl Iterator<Item = &'a Sample>, hold: Hold) -> 
     record
 }
 
+/// Where in its band a valve that sticks stands when a record begins.
+pub(crate) const BEGIN: &str = "stiction_backlash.begin";
+
 /// The fit, and the levels at the first row; in words why there is none.
 pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f64>), String> {
     let options = FitOptions::default();
     let said = |error: &dyn std::fmt::Display| error.to_string();
-    let fixed = model.fixed();
+    let mut fixed = model.fixed();
+    // The simulation goes on from where the last one stood, and does not begin within the band anew.
+    fixed.insert(BEGIN.into(), 0.0);
     let bare = Setup::from_records(
         model.plant,
         model.known.clone(),

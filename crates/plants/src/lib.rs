@@ -34,6 +34,7 @@ mod damped;
 pub mod effects;
 mod error;
 mod inflow;
+mod lag_response;
 mod law;
 mod linear;
 mod moments;

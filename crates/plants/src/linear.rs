@@ -1,22 +1,41 @@
-//! Exact propagation of linear vessels under a polynomial inflow, by the matrix exponential.
+//! Exact propagation of linear vessels under a polynomial inflow, in closed form.
+//!
+//! `S_i dz_i/dt = q_i - z_i`, `z_i = x_i - offset_i`, `q_2 = z_1`, under `q_1 = a + b s + c s^2`, `s` from 0 to 1 over a step of length `h`.
+//! With `r_i = h/S_i` ([`crate::lag_response`] has `w_k`, `C` and `W_k`):
+//! ```text
+//! x_1 <- exp(-r_1) x_1 + w_0(r_1) a + w_1(r_1) b + w_2(r_1) c + w_0(r_1) offset_1
+//! x_2 <- C x_1 + exp(-r_2) x_2 + W_0 a + W_1 b + W_2 c + w_0(r_2) offset_2 - C offset_1
+//! ```
 
-use crate::{Scalar, inflow::Inflow, structure::SERIES};
+use crate::{
+    Scalar,
+    inflow::Inflow,
+    lag_response::{one_lag, two_lags},
+    structure::SERIES,
+};
 
-/// Vessels, and the inflow's three coefficients and the constant one beside them.
-const SIZE: usize = SERIES + 4;
-
-type Matrix<T> = [[T; SIZE]; SIZE];
+/// Coefficients of one vessel's level after a step.
+#[derive(Clone, Copy)]
+struct Row<T> {
+    /// Of the levels before.
+    levels: [T; SERIES],
+    /// Of the inflow's three coefficients.
+    inflow: [T; 3],
+    constant: T,
+}
 
 /// Propagates `S_i dx_i/dt = q_i - (x_i - offset_i)`, `q_(i+1) = x_i - offset_i`.
 pub(crate) struct Propagators<T> {
     /// Time constant and offset of each vessel.
     vessels: Vec<(T, T)>,
-    /// Exponentials made so far, by step length; a delay needs a few, an even sampling one.
-    known: Vec<(T, Vec<[T; SIZE]>)>,
+    /// Rows made so far, by step length; a delay needs a few, an even sampling one.
+    known: Vec<(T, [Row<T>; SERIES])>,
+    /// Which of them is replaced next.
+    oldest: usize,
 }
 
-/// Exponentials that are kept.
-const KEPT: usize = 12;
+/// Step lengths whose rows are kept.
+const KEPT: usize = 6;
 
 /// Whether what was computed for a step of length `known` holds for one of length `h`: they differ by less than times that
 /// are read from text do, and have the same derivatives.
@@ -30,6 +49,7 @@ impl<T: Scalar> Propagators<T> {
         Self {
             vessels,
             known: Vec::with_capacity(KEPT),
+            oldest: 0,
         }
     }
 
@@ -55,10 +75,11 @@ impl<T: Scalar> Propagators<T> {
         let rows = self.rows(h);
         let [a, b, c] = q.coefficients();
         let mut next = *levels;
-        for (row, to) in rows.iter().zip(next.iter_mut()) {
-            let mut sum = row[n] * a + row[n + 1] * b + row[n + 2] * c + row[n + 3];
-            for j in 0..n {
-                sum = sum + row[j] * levels[j];
+        for (row, to) in rows.iter().zip(next.iter_mut()).take(n) {
+            let [by_a, by_b, by_c] = row.inflow;
+            let mut sum = by_a * a + by_b * b + by_c * c + row.constant;
+            for (own, level) in row.levels.iter().zip(levels).take(n) {
+                sum = sum + *own * *level;
             }
             *to = sum;
         }
@@ -68,109 +89,232 @@ impl<T: Scalar> Propagators<T> {
     /// What the second vessel gets over a step of length `h`: from the first one's level, and from its inflow's three
     /// coefficients.
     pub(crate) fn second_from(&mut self, h: T) -> (T, [T; 3]) {
-        let n = self.vessels.len();
         let row = &self.rows(h)[1];
-        (row[0], [row[n], row[n + 1], row[n + 2]])
+        (row.levels[0], row.inflow)
     }
 
-    /// The exponential's rows for a step of length `h`, which is not zero.
-    fn rows(&mut self, h: T) -> &[[T; SIZE]] {
+    /// The rows for a step of length `h`, which is not zero.
+    fn rows(&mut self, h: T) -> &[Row<T>; SERIES] {
         let found = self
             .known
             .iter()
             .position(|&(known, _)| same_step(known, h));
         let at = found.unwrap_or_else(|| {
-            if self.known.len() == KEPT {
-                self.known.remove(0);
+            let made = (h, self.rows_of(h));
+            if self.known.len() < KEPT {
+                self.known.push(made);
+                return self.known.len() - 1;
             }
-            let rows = self.exponential(h);
-            self.known.push((h, rows));
-            self.known.len() - 1
+            let at = self.oldest;
+            self.known[at] = made;
+            self.oldest = (at + 1) % KEPT;
+            at
         });
         &self.known[at].1
     }
 
-    /// The first rows of `exp(M)`, where `M` drives the vessels over the unit interval by
-    /// `a + b s + c s^2` and by the offsets: the columns after the vessels' belong to `a`, `b`, `c` and one.
-    fn exponential(&self, h: T) -> Vec<[T; SIZE]> {
+    /// The closed form.
+    fn rows_of(&self, h: T) -> [Row<T>; SERIES] {
         let zero = T::constant(0.0);
-        let n = self.vessels.len();
-        // Generator of (levels, p0, p1, p2, 1) with p0 = a + b s + c s^2, p1 = b + 2 c s, p2 = 2 c:
-        // p0' = p1, p1' = p2.
-        let mut m: Matrix<T> = [[zero; SIZE]; SIZE];
-        for (i, &(tau, offset)) in self.vessels.iter().enumerate() {
-            let rate = h / tau;
-            m[i][i] = -rate;
-            m[i][n + 3] = rate * offset;
-            if i == 0 {
-                m[i][n] = rate;
-            } else {
-                m[i][i - 1] = rate;
-                m[i][n + 3] = m[i][n + 3] - rate * self.vessels[i - 1].1;
+        let mut rows = [Row {
+            levels: [zero; SERIES],
+            inflow: [zero; 3],
+            constant: zero,
+        }; SERIES];
+        let mut before: Option<(T, T)> = None;
+        for (i, (&(tau, offset), row)) in self.vessels.iter().zip(&mut rows).enumerate() {
+            let r = h / tau;
+            let own = one_lag(r.value());
+            let of_one = |partial: [f64; 2]| T::with_slopes(partial[0], [(r, partial[1])]);
+            row.levels[i] = of_one(own.decay);
+            let filled = of_one(own.inflow[0]);
+            row.constant = filled * offset;
+            match before {
+                None => {
+                    row.inflow = [filled, of_one(own.inflow[1]), of_one(own.inflow[2])];
+                }
+                Some((first, offset_above)) => {
+                    let [level, inflow @ ..] = two_lags(first.value(), r.value()).map(|partial| {
+                        T::with_slopes(partial.value, [(first, partial.by[0]), (r, partial.by[1])])
+                    });
+                    row.levels[i - 1] = level;
+                    row.inflow = inflow;
+                    row.constant = row.constant - row.levels[i - 1] * offset_above;
+                }
             }
+            before = Some((r, offset));
         }
-        m[n][n + 1] = T::constant(1.0);
-        m[n + 1][n + 2] = T::constant(1.0);
-        let size = n + 4;
-        // Scaling and squaring with the Taylor series: at a norm of at most 1/2 sixteen terms reach rounding.
-        let norm = (0..size)
-            .map(|i| (0..size).map(|j| m[i][j].value().abs()).sum::<f64>())
-            .fold(0.0, f64::max);
-        let mut squarings = 0;
-        while norm * 0.5_f64.powi(squarings) > 0.5 && squarings < 200 {
-            squarings += 1;
-        }
-        let scale = 0.5_f64.powi(squarings);
-        for row in &mut m {
-            for entry in row.iter_mut() {
-                *entry = *entry * scale;
+        rows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Dual;
+
+    /// Vessels, and the inflow's three coefficients and the constant one beside them.
+    const SIZE: usize = SERIES + 4;
+
+    type Matrix<T> = [[T; SIZE]; SIZE];
+
+    /// The matrix exponential by scaling and squaring, which the closed form is held against.
+    struct Reference<T> {
+        vessels: Vec<(T, T)>,
+    }
+
+    impl<T: Scalar> Reference<T> {
+        /// The first rows of `exp(M)`, where `M` drives the vessels over the unit interval by
+        /// `a + b s + c s^2` and by the offsets: the columns after the vessels' belong to `a`, `b`, `c` and one.
+        fn exponential(&self, h: T) -> Vec<[T; SIZE]> {
+            let zero = T::constant(0.0);
+            let n = self.vessels.len();
+            // Generator of (levels, p0, p1, p2, 1) with p0 = a + b s + c s^2, p1 = b + 2 c s, p2 = 2 c:
+            // p0' = p1, p1' = p2.
+            let mut m: Matrix<T> = [[zero; SIZE]; SIZE];
+            for (i, &(tau, offset)) in self.vessels.iter().enumerate() {
+                let rate = h / tau;
+                m[i][i] = -rate;
+                m[i][n + 3] = rate * offset;
+                if i == 0 {
+                    m[i][n] = rate;
+                } else {
+                    m[i][i - 1] = rate;
+                    m[i][n + 3] = m[i][n + 3] - rate * self.vessels[i - 1].1;
+                }
             }
-        }
-        let mut sum = identity();
-        for k in (1..=16).rev() {
-            // Horner: I + M/k (I + M/(k+1) (...)).
-            sum = product(&m, &sum, size);
-            for (i, row) in sum.iter_mut().enumerate().take(size) {
-                for (j, entry) in row.iter_mut().enumerate().take(size) {
-                    *entry = *entry * (1.0 / f64::from(k));
-                    if i == j {
-                        *entry = *entry + 1.0;
+            m[n][n + 1] = T::constant(1.0);
+            m[n + 1][n + 2] = T::constant(1.0);
+            let size = n + 4;
+            // Scaling and squaring with the Taylor series: at a norm of at most 1/2 sixteen terms reach rounding.
+            let norm = (0..size)
+                .map(|i| (0..size).map(|j| m[i][j].value().abs()).sum::<f64>())
+                .fold(0.0, f64::max);
+            let mut squarings = 0;
+            while norm * 0.5_f64.powi(squarings) > 0.5 && squarings < 200 {
+                squarings += 1;
+            }
+            let scale = 0.5_f64.powi(squarings);
+            for row in &mut m {
+                for entry in row.iter_mut() {
+                    *entry = *entry * scale;
+                }
+            }
+            let mut sum = identity();
+            for k in (1..=16).rev() {
+                // Horner: I + M/k (I + M/(k+1) (...)).
+                sum = product(&m, &sum, size);
+                for (i, row) in sum.iter_mut().enumerate().take(size) {
+                    for (j, entry) in row.iter_mut().enumerate().take(size) {
+                        *entry = *entry * (1.0 / f64::from(k));
+                        if i == j {
+                            *entry = *entry + 1.0;
+                        }
                     }
                 }
             }
+            for _ in 0..squarings {
+                sum = product(&sum, &sum, size);
+            }
+            // From (p0, p1, p2) at the beginning to (a, b, c): p0 = a, p1 = b, p2 = 2 c.
+            sum.iter()
+                .take(n)
+                .map(|row| {
+                    let mut row = *row;
+                    row[n + 2] = row[n + 2] * 2.0;
+                    row
+                })
+                .collect()
         }
-        for _ in 0..squarings {
-            sum = product(&sum, &sum, size);
+    }
+
+    fn identity<T: Scalar>() -> Matrix<T> {
+        let mut unit = [[T::constant(0.0); SIZE]; SIZE];
+        for (i, row) in unit.iter_mut().enumerate() {
+            row[i] = T::constant(1.0);
         }
-        // From (p0, p1, p2) at the beginning to (a, b, c): p0 = a, p1 = b, p2 = 2 c.
-        sum.iter()
-            .take(n)
-            .map(|row| {
-                let mut row = *row;
-                row[n + 2] = row[n + 2] * 2.0;
-                row
-            })
+        unit
+    }
+
+    fn product<T: Scalar>(a: &Matrix<T>, b: &Matrix<T>, size: usize) -> Matrix<T> {
+        let mut c = [[T::constant(0.0); SIZE]; SIZE];
+        for i in 0..size {
+            for k in 0..size {
+                let factor = a[i][k];
+                for j in 0..size {
+                    c[i][j] = c[i][j] + factor * b[k][j];
+                }
+            }
+        }
+        c
+    }
+
+    fn rates() -> Vec<f64> {
+        (-8..=3)
+            .flat_map(|power| [1.0, 2.3, 6.1].map(|m| m * 10.0_f64.powi(power)))
+            .filter(|r| *r <= 1e3)
             .collect()
     }
-}
 
-fn identity<T: Scalar>() -> Matrix<T> {
-    let mut unit = [[T::constant(0.0); SIZE]; SIZE];
-    for (i, row) in unit.iter_mut().enumerate() {
-        row[i] = T::constant(1.0);
+    /// Largest error of value and derivatives of the rows, as a share of the largest entry of its kind.
+    fn error(vessels: Vec<(Dual<5>, Dual<5>)>, h: Dual<5>) -> f64 {
+        let n = vessels.len();
+        let reference = Reference {
+            vessels: vessels.clone(),
+        }
+        .exponential(h);
+        let rows = Propagators::new(vessels).rows_of(h);
+        let mut worst = 0.0_f64;
+        for (row, reference) in rows.iter().zip(&reference) {
+            let own = row.levels[..n]
+                .iter()
+                .chain(&row.inflow)
+                .chain([&row.constant]);
+            for (entry, wanted) in own.zip(&reference[..n + 4]) {
+                worst = worst.max((entry.re - wanted.re).abs());
+                for (a, b) in entry.eps.iter().zip(&wanted.eps) {
+                    worst = worst.max((a - b).abs());
+                }
+            }
+        }
+        worst
     }
-    unit
-}
 
-fn product<T: Scalar>(a: &Matrix<T>, b: &Matrix<T>, size: usize) -> Matrix<T> {
-    let mut c = [[T::constant(0.0); SIZE]; SIZE];
-    for i in 0..size {
-        for k in 0..size {
-            let factor = a[i][k];
-            for j in 0..size {
-                c[i][j] = c[i][j] + factor * b[k][j];
+    /// Time constants for rates over a step of length one, in lanes of which the derivatives are relative ones.
+    fn lags(rates: &[f64]) -> Vec<(Dual<5>, Dual<5>)> {
+        let lag = |(i, r): (usize, &f64)| {
+            let mut tau = Dual::variable(1.0 / r, i);
+            tau.eps[i] = 1.0 / r;
+            (tau, Dual::variable(0.7 - i as f64, 2 + i))
+        };
+        rates.iter().enumerate().map(lag).collect()
+    }
+
+    #[test]
+    fn the_closed_form_is_the_matrix_exponential() {
+        let h = Dual::variable(1.0, 4);
+        for a in rates() {
+            let one = error(lags(&[a]), h);
+            assert!(one < 1e-12, "{a}: {one:e}");
+            let near = [
+                1.0,
+                1.0 + 1e-12,
+                1.0 + 1e-7,
+                1.001,
+                0.97,
+                1.1,
+                1.39,
+                1.41,
+                0.69,
+                0.6,
+            ]
+            .map(|f| f * a);
+            for b in rates().into_iter().chain(near) {
+                let both = error(lags(&[a, b]), h);
+                // Squaring doubles the rounding of the reference each time.
+                let rounding = 4e-15 * a.max(b).max(1.0) + 2e-14;
+                assert!(both < rounding, "{a} {b}: {both:e}");
             }
         }
     }
-    c
 }

@@ -36,24 +36,30 @@ impl<T: Scalar> KeptMoments<T> {
 
 /// `exp(-1/e)` and the moments `M_0, M_1, M_2` for `e = time_constant/h`, both non-negative, not both zero.
 pub(crate) fn exponential_moments<T: Scalar>(time_constant: T, h: T) -> (T, [T; 3]) {
-    let zero = T::constant(0.0);
     if time_constant.value() > 2.0 * h.value() {
-        // Small z = h/T: the series, since the recursion below cancels.
-        let z = h / time_constant;
-        let mut term = T::constant(1.0);
-        let mut moments = [zero; 3];
+        // Small z = h/T: the recursion below cancels. Upwards it does not: M_(j-1) = (z M_j + exp(-z))/j, from the series of M_3;
+        // and the derivative of M_j by z is -M_(j+1).
+        let rate = h / time_constant;
+        let z = rate.value();
+        let (mut term, mut m3) = (1.0, 0.0);
         for n in 0..18 {
-            for (j, moment) in moments.iter_mut().enumerate() {
-                *moment = *moment + term * (1.0 / (n + 1 + j) as f64);
+            m3 += term / f64::from(n + 4);
+            term *= -z / f64::from(n + 1);
+            if term.abs() < 1e-18 {
+                break;
             }
-            term = term * z * (-1.0 / (n + 1) as f64);
         }
-        return ((-z).exp(), moments);
+        let decay = (-z).exp();
+        let m2 = (z * m3 + decay) / 3.0;
+        let m1 = (z * m2 + decay) / 2.0;
+        let m0 = z * m1 + decay;
+        let of = |value, slope| T::with_slopes(value, [(rate, slope)]);
+        return (of(decay, -decay), [of(m0, -m1), of(m1, -m2), of(m2, -m3)]);
     }
     let e = time_constant / h;
     // Below 1/700 the exponential is zero in double precision, with all its derivatives.
     let decay = if e.value() < 1.0 / 700.0 {
-        zero
+        T::constant(0.0)
     } else {
         (-(h / time_constant)).exp()
     };

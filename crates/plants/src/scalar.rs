@@ -30,6 +30,8 @@ pub trait Scalar:
     fn sin_cos(self) -> (Self, Self);
     /// Whether both have the same derivatives.
     fn same_derivatives(self, other: Self) -> bool;
+    /// A number of that value which hangs on others, given its partial derivatives by them.
+    fn with_slopes<const K: usize>(value: f64, of: [(Self, f64); K]) -> Self;
 
     /// The smaller of two by value; the first where they are equal.
     fn min(self, other: Self) -> Self {
@@ -73,6 +75,10 @@ impl Scalar for f64 {
     #[inline]
     fn same_derivatives(self, _other: Self) -> bool {
         true
+    }
+    #[inline]
+    fn with_slopes<const K: usize>(value: f64, _of: [(Self, f64); K]) -> Self {
+        value
     }
 }
 
@@ -136,6 +142,14 @@ impl<const N: usize> Scalar for Dual<N> {
     #[inline]
     fn same_derivatives(self, other: Self) -> bool {
         self.eps == other.eps
+    }
+    #[inline]
+    fn with_slopes<const K: usize>(value: f64, of: [(Self, f64); K]) -> Self {
+        let slope = |i: usize| of.iter().map(|(by, slope)| by.eps[i] * slope).sum();
+        Self {
+            re: value,
+            eps: std::array::from_fn(slope),
+        }
     }
 }
 

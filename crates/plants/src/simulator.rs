@@ -35,11 +35,11 @@ impl Command {
 
 /// A simulation in progress. Read first, then advance: `y[k]` is read before `u[k]` acts.
 ///
-/// Linear plants without effects in their vessels are propagated exactly (matrix exponential); others by
+/// Linear plants without effects in their vessels are propagated exactly, in closed form; others by
 /// Runge-Kutta of order four in [`Simulator::set_substeps`] equal parts of the sampling interval, cut where the
 /// input jumps behind a dead time, where a level meets its rim and where a law jumps. Parts that are longer than a vessel's
 /// time constant are exponential Runge-Kutta steps (see the [front page](crate#steps-that-are-longer-than-a-time-constant)). Nothing is allocated per step,
-/// but for the first step of a new length of a linear plant, and the queue behind a dead time while it fills.
+/// but for the queue behind a dead time while it fills.
 pub struct Simulator<T: Scalar> {
     actuator: Actuator<T>,
     layout: Layout<T>,

@@ -17,6 +17,39 @@ fn the_limit_is_chosen_and_written() {
     );
 }
 
+/// What the records cannot tell, and what their time stamps say, stands first.
+#[test]
+fn what_is_known_of_the_records_beforehand_is_said() {
+    let place = Place::new();
+    let said = |words: &str| {
+        let text = place.succeeds(&format!("compare {words} --model tour.toml"));
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let text = place.read("tour.csv");
+    let (header, rows) = text.split_once('\n').unwrap();
+    let rows: Vec<&str> = rows.lines().collect();
+    for (name, rows) in [("a.csv", &rows[..450]), ("b.csv", &rows[450..])] {
+        place.write(name, format!("{header}\n{}\n", rows.join("\n")));
+    }
+    let continued = "note: a.csv, b.csv: the time stamps continue from file to file";
+    assert!(said("a.csv b.csv").starts_with(continued));
+    for other in ["tour.csv", "b.csv a.csv"] {
+        let said = said(other);
+        assert!(
+            !said.contains("note:") && !said.contains("warning:"),
+            "{said}"
+        );
+    }
+    let mut step = String::from("t [s],u [V],y [cm]\n");
+    for k in 0..400 {
+        let (u, y) = if k < 50 { (4, 12.0) } else { (5, 15.0) };
+        step += &format!("{},{u},{}\n", 2 * k, y + 0.05 * f64::from(k * 7 % 5));
+    }
+    place.write("step.csv", step);
+    let warning = "warning: step.csv: the command makes a single step, from 4.00 to 5.00 V";
+    assert!(said("step.csv").starts_with(warning));
+}
+
 /// The first interrupt asks for the best so far, the second ends the program at once.
 #[test]
 #[cfg(unix)]

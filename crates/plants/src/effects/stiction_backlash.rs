@@ -8,7 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Actuator,
     by_clock: false,
     physics: "What the command moves has play, or sticks until the command has moved on far enough and then slips.",
-    equation: "pos stays while |u - pos| <= w (1 + j)/2, else pos = u - sign(u - pos) w (1 - j)/2; j = 0: backlash of width w, j = 1: stiction, it moves only when |u - pos| > w",
+    equation: "pos stays while |u - pos| <= w (1 + j)/2, else pos = u - sign(u - pos) w (1 - j)/2; j = 0: backlash of width w, j = 1: stiction, it moves only when |u - pos| > w; the record begins with pos = u + b w (1 + j)/2",
     applies: any_plant,
     parameters,
     confused_with: &[],
@@ -16,13 +16,19 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "Q. P. He, J. Wang, M. Pottmann, S. J. Qin, A curve fitting method for detecting valve stiction in oscillating control loops, Ind. Eng. Chem. Res. 46, 2007.",
 };
 
-/// Widths that are tried, as shares of the range of the command: the least, how many, and the factor from one to the next. Where
-/// it sticks the error is in plain sight only within a tenth of the true width, so the grid has to be this fine.
-const WIDTHS: (f64, i32, f64) = (0.03, 15, 1.2);
+/// Widths that are tried, as shares of the range of the command, in two parts: the least, how many, and the factor from one to the
+/// next. Where it sticks the error is in plain sight only within a tenth of the true width, so the grid has to be this fine; where the
+/// width is near the range of the command it moves at the extremes alone, and the grid has to be finer. The largest is nearly twice the
+/// range: so wide a band is left only if the valve begins near an end of it.
+const WIDTHS: [(f64, i32, f64); 2] = [(0.03, 14, 1.2), (0.38, 18, 1.1)];
+/// The largest width, as a share of the range of the command. Beyond, a valve that sticks moves only where it begins at an end of
+/// its band, and the width cannot be told from where it begins.
+const WIDEST: f64 = 2.2;
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.input();
     let span = (high - low).max(f64::MIN_POSITIVE);
+    let shares = WIDTHS.iter().flat_map(|&(least, count, factor)| (0..count).map(move |i| least * factor.powi(i)));
     vec![
         ParameterInfo {
             name: "width",
@@ -30,8 +36,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             meaning: "play, or how far the command must move before anything does",
             absent: 0.0,
             lower: 0.0,
-            upper: 0.6 * span,
-            starts: (0..WIDTHS.1).map(|i| WIDTHS.0 * WIDTHS.2.powi(i) * span).collect(),
+            upper: WIDEST * span,
+            starts: shares.map(|share| share * span).collect(),
         },
         ParameterInfo {
             name: "jump",
@@ -40,12 +46,21 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             absent: f64::NAN,
             lower: 0.0,
             upper: 1.0,
-            starts: vec![0.0, 1.0],
+            starts: vec![0.0, 0.5, 1.0],
+        },
+        ParameterInfo {
+            name: "begin",
+            unit: Unit::ONE,
+            meaning: "position within the band when the record begins; 0: at the command, -1 and 1: at an end of the band",
+            absent: f64::NAN,
+            lower: -1.0,
+            upper: 1.0,
+            starts: vec![-0.95, -0.5, 0.0, 0.5, 0.95],
         },
     ]
 }
 
-/// How far a width is varied for its slope.
+/// How far a width is varied for its slope, as a share of it, and by how much `begin` is.
 const VARIED: f64 = 0.05;
 
 /// One element that sticks.
@@ -53,41 +68,79 @@ const VARIED: f64 = 0.05;
 struct Element<T> {
     width: f64,
     jump: f64,
+    begin: f64,
     position: T,
 }
 
 impl<T: Scalar> Element<T> {
+    /// Half the band in which it stays.
+    fn half_band(&self) -> f64 {
+        0.5 * self.width * (1.0 + self.jump)
+    }
+
+    fn begin_at(&mut self, u: T) {
+        self.position = u + self.begin * self.half_band();
+    }
+
     fn follow(&mut self, u: T) {
         let gap = u.value() - self.position.value();
-        if gap.abs() > 0.5 * self.width * (1.0 + self.jump) {
+        if gap.abs() > self.half_band() {
             self.position = u - gap.signum() * 0.5 * self.width * (1.0 - self.jump);
         }
     }
 }
 
-/// The slope of a position by its width is zero almost everywhere for an element that slips: the position changes where a slip is
+/// An element varied to either side in one of its parameters.
+#[derive(Clone, Copy)]
+struct Varied<T> {
+    below: Element<T>,
+    above: Element<T>,
+    /// One over the difference of the parameter between the two.
+    inverse: f64,
+}
+
+impl<T: Scalar> Varied<T> {
+    fn chord(&self) -> f64 {
+        (self.above.position.value() - self.below.position.value()) * self.inverse
+    }
+}
+
+/// The slope of a position by the width is zero almost everywhere for an element that slips: the position changes where a slip is
 /// won or lost. The slope is therefore that of a chord: an element a little narrower and one a little wider follow the same
-/// command beside it. Which of the two it is, backlash or stiction, is a choice, made by the starts; it has no slope, and
-/// a fit does not move it.
+/// command beside it. So it is with where it begins. Which of the two it is, backlash or stiction, is a choice, made by the starts; it
+/// has no slope, and a fit does not move it.
 struct StictionBacklash<T> {
     width: T,
+    begin: T,
     element: Element<T>,
-    narrower: Element<T>,
-    wider: Element<T>,
+    by_width: Varied<T>,
+    by_begin: Varied<T>,
     begun: bool,
 }
 
 pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
-    let (width, jump) = (parameters[0].value(), parameters[1].value());
+    let [width, jump, begin] = [0, 1, 2].map(|i: usize| parameters[i].value());
     let (low, high) = site.input();
+    let element = Element { width, jump, begin, position: T::constant(0.0) };
     // At no width at all the chord is short and lies on the one side that there is.
     let reach = (VARIED * width).max(1e-6 * (high - low).abs());
-    let at = |width: f64| Element { width: width.max(0.0), jump, position: T::constant(0.0) };
+    let (narrower, wider) = ((width - reach).max(0.0), width + reach);
+    // At an end of the band the chord lies on the one side that there is.
+    let (lower, upper) = ((begin - VARIED).max(-1.0), (begin + VARIED).min(1.0));
     StictionBacklash {
         width: parameters[0],
-        element: at(width),
-        narrower: at(width - reach),
-        wider: at(width + reach),
+        begin: parameters[2],
+        element,
+        by_width: Varied {
+            below: Element { width: narrower, ..element },
+            above: Element { width: wider, ..element },
+            inverse: 1.0 / (wider - narrower),
+        },
+        by_begin: Varied {
+            below: Element { begin: lower, ..element },
+            above: Element { begin: upper, ..element },
+            inverse: 1.0 / (upper - lower),
+        },
         begun: false,
     }
 }
@@ -95,15 +148,19 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
 impl<T: Scalar> Law<T> for StictionBacklash<T> {
     fn position(&mut self, u: T) -> Option<T> {
         let begun = std::mem::replace(&mut self.begun, true);
-        for element in [&mut self.element, &mut self.narrower, &mut self.wider] {
+        let Varied { below: narrower, above: wider, .. } = &mut self.by_width;
+        let Varied { below: lower, above: upper, .. } = &mut self.by_begin;
+        for element in [&mut self.element, narrower, wider, lower, upper] {
             if begun {
                 element.follow(u);
             } else {
-                element.position = u;
+                element.begin_at(u);
             }
         }
-        let apart = self.wider.position.value() - self.narrower.position.value();
-        let chord = apart / (self.wider.width - self.narrower.width);
-        Some((self.width - self.width.value()) * chord + self.element.position)
+        Some(
+            (self.width - self.width.value()) * self.by_width.chord()
+                + (self.begin - self.begin.value()) * self.by_begin.chord()
+                + self.element.position,
+        )
     }
 }

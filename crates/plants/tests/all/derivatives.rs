@@ -193,29 +193,42 @@ fn what_sticks_has_the_slope_of_a_chord_of_a_twentieth() {
             effect: effect("stiction_backlash"),
             vessel: 0,
         };
-        let mut largest = 0.0_f64;
+        let mut largest = [0.0_f64; 2];
         for (seed, drive) in DRIVES.into_iter().enumerate() {
             let input = input(drive, 200, base.h, 300 + seed as u64);
-            for (width, jump) in [(0.61, 0.43), (0.3, 0.9), (0.3, 1.0), (0.8, 0.0)] {
+            for (width, jump, begin) in [
+                (0.61, 0.43, -0.57),
+                (0.3, 0.9, 0.98),
+                (0.3, 1.0, 0.0),
+                (0.8, 0.0, -1.0),
+                // It never moves.
+                (9.0, 1.0, 0.3),
+            ] {
                 let mut case = base.with_interior(&[placed]);
-                (case.theta[own], case.theta[own + 1]) = (width, jump);
+                case.theta[own..own + 3].copy_from_slice(&[width, jump, begin]);
                 let exact = case.run_dual(&input, 1);
-                let at = |width: f64| {
+                let at = |parameter: usize, value: f64| {
                     let mut moved = case.clone();
-                    moved.theta[own] = width;
+                    moved.theta[own + parameter] = value;
                     moved.run(&input, 1)
                 };
                 // A linear plant passes the chord of the position on as it is; what jumps is a choice and has no slope.
-                let (narrow, wide) = (at(0.95 * width), at(1.05 * width));
-                for (k, y) in exact.iter().enumerate() {
-                    let chord = (wide[k] - narrow[k]) / (0.1 * width);
-                    largest = largest.max(chord.abs());
-                    assert!((chord - y.eps[own]).abs() < 1e-9, "{drive:?} {k}");
-                    assert_eq!(y.eps[own + 1], 0.0);
+                let (lower, upper) = ((begin - 0.05_f64).max(-1.0), (begin + 0.05_f64).min(1.0));
+                let chords = [(0, 0.95 * width, 1.05 * width), (2, lower, upper)];
+                for (parameter, below, above) in chords {
+                    let (from, to) = (at(parameter, below), at(parameter, above));
+                    for (k, y) in exact.iter().enumerate() {
+                        let chord = (to[k] - from[k]) / (above - below);
+                        let largest = &mut largest[parameter / 2];
+                        *largest = largest.max(chord.abs());
+                        let error = (chord - y.eps[own + parameter]).abs();
+                        assert!(error < 1e-9, "{drive:?} {parameter} {k}: {error}");
+                        assert_eq!(y.eps[own + 1], 0.0);
+                    }
                 }
             }
         }
-        assert!(largest > 0.1, "it shows");
+        assert!(largest.iter().all(|chord| *chord > 0.1), "it shows");
     }
 }
 

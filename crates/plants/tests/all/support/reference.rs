@@ -14,8 +14,8 @@ struct Pump {
     gain: f64,
     /// Change and time constant.
     warm_up: (f64, f64),
-    /// Width and jump.
-    sticks: (f64, f64),
+    /// Width, jump and where in its band it begins.
+    sticks: (f64, f64, f64),
     delay: f64,
     threshold: f64,
     limit: f64,
@@ -29,7 +29,7 @@ impl Default for Pump {
         Self {
             gain: 0.0,
             warm_up: (0.0, 1.0),
-            sticks: (0.0, 0.0),
+            sticks: (0.0, 0.0, 0.0),
             delay: 0.0,
             threshold: 0.0,
             limit: f64::INFINITY,
@@ -156,7 +156,8 @@ impl Equations {
                 ("sensor_hysteresis", _) => e.hysteresis.as_mut().expect("step first")[2] = value,
                 ("sensor_saturation", _) => e.largest_reading = value,
                 ("stiction_backlash", "width") => e.pumps[v].sticks.0 = value,
-                ("stiction_backlash", _) => e.pumps[v].sticks.1 = value,
+                ("stiction_backlash", "jump") => e.pumps[v].sticks.1 = value,
+                ("stiction_backlash", _) => e.pumps[v].sticks.2 = value,
                 ("pump_gain_drift", "change") => e.pumps[v].warm_up.0 = value,
                 ("pump_gain_drift", _) => e.pumps[v].warm_up.1 = value,
                 ("pipe_height", _) => e.pipe[v] = value,
@@ -233,9 +234,9 @@ impl Equations {
 
     /// The commands that act behind what sticks.
     fn moved(&self, pump: usize, input: &[(Command, f64)]) -> Vec<(Command, f64)> {
-        let (width, jump) = self.pumps[pump].sticks;
+        let (width, jump, begin) = self.pumps[pump].sticks;
         let (breaks, left) = (0.5 * width * (1.0 + jump), 0.5 * width * (1.0 - jump));
-        let mut position = self.pumps[pump].at_rest;
+        let mut position = self.pumps[pump].at_rest + begin * breaks;
         let mut follow = |u: f64| {
             if u > position + breaks {
                 position = u - left;

@@ -1,0 +1,304 @@
+//! Effects at the actuator with many starts: a plain simulation of each, and a regression, say which are worth linearising.
+//!
+//! The reading is linear in the pump's gain `K`, `y = K f(p) + ...`, `p` the command behind the effect. What the effect changes in a
+//! simulation with the gain `K0` is `D = K0 f(p) - K0 f(u)`, so the column of the gain at a start is `df/dK + D/K0`, with `df/dK` that of
+//! the model without the effect: a start costs one simulation in plain numbers and a regression on this one column. Of plants that are not
+//! linear this holds to first order.
+
+use ct_signals::ArModel;
+use plants::{Outlet, Place, Placed};
+use rayon::prelude::*;
+
+use crate::{Setup, levenberg_marquardt::within};
+
+/// What sticks in front of the plant.
+const STICKS: &str = "stiction_backlash";
+/// Time constants, in samples, from which its fits begin beside the one that the model without it has.
+const TIME_CONSTANTS: [f64; 3] = [1.0, 12.0, 150.0];
+
+/// Plants with other time constants in front of which something sticks.
+///
+/// A model without it answers to commands that move nothing. It imitates what the plant does then by another time constant, a much
+/// longer one or none at all.
+#[must_use]
+pub fn with_other_time_constants(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f64>> {
+    let plant = setup.structure.plant;
+    if placed.effect.id != STICKS || plant.outlet() != Outlet::Linear {
+        return Vec::new();
+    }
+    let lags = time_constants(setup);
+    if lags.is_empty() {
+        return Vec::new();
+    }
+    let with = |samples: f64| {
+        let mut x = x.to_vec();
+        for &lag in &lags {
+            x[lag] = samples * setup.structure.scales.sample_interval;
+        }
+        x
+    };
+    TIME_CONSTANTS.map(with).to_vec()
+}
+
+/// Where the fitted time constants of a plant stand in the vector.
+fn time_constants(setup: &Setup) -> Vec<usize> {
+    let lags = ["tau", "tau1", "tau2"];
+    let free = setup.free().iter().copied();
+    free.filter(|&at| lags.contains(&setup.names()[at].as_str()))
+        .collect()
+}
+
+/// Damping of the step by the other parameters, against what the data do not determine.
+const DAMPING: f64 = 1e-9;
+/// With more starts than this an effect at the actuator is simulated from all of them, without derivatives, before it is linearised ...
+const MANY: usize = 48;
+/// ... at so many, the best.
+const LINEARISED: usize = 12;
+
+/// Of many starts of an effect at the actuator keeps those whose simulations fit best, once the gain of the pump and, to first order,
+/// the other parameters but time constants are fitted to each; they begin with that gain. Few starts stay as they are.
+pub fn keep_best_simulated(
+    setup: &Setup,
+    placed: Placed,
+    starts: &mut Vec<Vec<f64>>,
+    noise: &ArModel,
+) {
+    if starts.len() <= MANY || placed.effect.place != Place::Actuator {
+        return;
+    }
+    let Some(scores) = scores_of_simulations(setup, placed, starts, noise) else {
+        return;
+    };
+    let mut ranked: Vec<(Simulated, Vec<f64>)> = scores.into_iter().zip(starts.drain(..)).collect();
+    ranked.sort_by(|a, b| a.0.left.total_cmp(&b.0.left));
+    ranked.truncate(LINEARISED);
+    let apart = apart(setup, placed);
+    let linear: Vec<usize> = (0..setup.free().len())
+        .filter(|&j| !apart.contains(&setup.free()[j]))
+        .collect();
+    let best = ranked.into_par_iter().map(|(simulated, mut start)| {
+        // With a gain of the wrong sign the slopes by time constants would have the wrong sign too.
+        if let Some(gain) = simulated.gain {
+            start[placed.vessel] = within(gain, setup.bounds()[placed.vessel]);
+        }
+        settled(setup, start, &linear, noise)
+    });
+    starts.par_extend(best);
+}
+
+/// A start with the other parameters fitted to it in one step, by those of the free ones that are named, where that is a better one.
+fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &ArModel) -> Vec<f64> {
+    let Some(triangle) = setup.linearise(&start, noise) else {
+        return start;
+    };
+    let scale: Vec<f64> = (0..setup.free().len())
+        .map(|j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
+        .collect();
+    let step = triangle.solve(linear, &scale, DAMPING);
+    let mut moved = start.clone();
+    for (d, &i) in step.iter().zip(setup.free()) {
+        moved[i] = within(moved[i] + d, setup.bounds()[i]);
+    }
+    if setup.costs_more(&moved, noise, triangle.cost()) {
+        start
+    } else {
+        moved
+    }
+}
+
+/// Where the effect's own parameters stand in the vector, and those of time constants, which are not fitted at a start.
+fn apart(setup: &Setup, placed: Placed) -> Vec<usize> {
+    let own = format!("{}.", placed.effect.id);
+    let named = setup.names()[..setup.parameter_count()].iter().enumerate();
+    let mut apart: Vec<usize> = named
+        .filter(|(_, name)| name.starts_with(&own))
+        .map(|(at, _)| at)
+        .collect();
+    apart.extend(time_constants(setup));
+    apart
+}
+
+/// What a simulation says of a start.
+#[derive(Clone, Copy)]
+struct Simulated {
+    /// What is left of the sum of squares.
+    left: f64,
+    /// The pump's gain, where it is fitted.
+    gain: Option<f64>,
+}
+
+/// What the simulation of each start says.
+fn scores_of_simulations(
+    setup: &Setup,
+    placed: Placed,
+    starts: &[Vec<f64>],
+    noise: &ArModel,
+) -> Option<Vec<Simulated>> {
+    let parameters = setup.structure.effect_parameters(placed);
+    let own: Vec<(usize, f64)> = parameters
+        .iter()
+        .filter_map(|info| {
+            let name = format!("{}.{}", placed.effect.id, info.name);
+            let at = setup.names().iter().position(|known| *known == name)?;
+            Some((at, info.absent))
+        })
+        .collect();
+    // Starts that differ in more than the effect have their own model without it.
+    let without = |start: &Vec<f64>| {
+        let mut without = start.clone();
+        for &(at, absent) in &own {
+            without[at] = if absent.is_finite() { absent } else { 0.0 };
+        }
+        without
+    };
+    let mut models: Vec<Vec<f64>> = Vec::new();
+    for start in starts {
+        let without = without(start);
+        if !models.contains(&without) {
+            models.push(without);
+        }
+    }
+    // Neither the effect's own columns nor those of time constants, which the start has its own of, take part.
+    let apart = apart(setup, placed);
+    let models: Vec<WithoutEffect> = models
+        .into_par_iter()
+        .filter_map(|x| WithoutEffect::at(x, &apart, placed.vessel, setup, noise))
+        .collect();
+    let scores = starts.par_iter().map(|start| {
+        let without = without(start);
+        let model = models.iter().find(|model| model.x == without)?;
+        let simulated = model.with(whitened(setup, start, noise)?);
+        Some(simulated).filter(|simulated| simulated.left.is_finite())
+    });
+    let none = Simulated {
+        left: f64::INFINITY,
+        gain: None,
+    };
+    Some(scores.map(|score| score.unwrap_or(none)).collect())
+}
+
+/// What a model leaves of the records, whitened.
+fn whitened(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<Vec<f64>> {
+    let residuals = setup.disturbance(x).ok()?;
+    let series = residuals.iter();
+    Some(series.flat_map(|residual| noise.whiten(residual)).collect())
+}
+
+/// The model without an effect at the actuator, whitened.
+struct WithoutEffect {
+    x: Vec<f64>,
+    /// The pump's gain.
+    gain: f64,
+    residual: Vec<f64>,
+    /// The column of the pump's gain, times the gain; where the gain is known only the simulation itself counts.
+    by_gain: Option<Vec<f64>>,
+    /// The residual and that column together, without what the other parameters explain of them.
+    wanted: Vec<f64>,
+    /// The other parameters' columns, orthonormal.
+    basis: Vec<Vec<f64>>,
+}
+
+impl WithoutEffect {
+    /// `apart`: places of parameters that do not take part; `gain`: of the pump's gain.
+    fn at(
+        x: Vec<f64>,
+        apart: &[usize],
+        gain: usize,
+        setup: &Setup,
+        noise: &ArModel,
+    ) -> Option<Self> {
+        let rows = setup.rows(&x)?;
+        let mut whitener = noise.whitener(rows.columns);
+        let mut columns = vec![Vec::with_capacity(setup.samples()); rows.columns];
+        let mut row = vec![0.0; rows.columns];
+        for record in rows.records() {
+            whitener.reset();
+            for values in record.chunks_exact(rows.columns) {
+                row.copy_from_slice(values);
+                whitener.push(&mut row);
+                for (column, value) in columns.iter_mut().zip(&row) {
+                    column.push(*value);
+                }
+            }
+        }
+        let residual = columns.pop()?;
+        let mut by_gain = None;
+        let mut basis: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
+        for (mut column, &at) in columns.into_iter().zip(setup.free()) {
+            if at == gain {
+                column.iter_mut().for_each(|value| *value *= x[gain]);
+                by_gain = Some(column);
+            } else if !apart.contains(&at) && orthogonalise(&mut column, &basis).is_some() {
+                basis.push(column);
+            }
+        }
+        let mut wanted = residual.clone();
+        for (wanted, own) in wanted.iter_mut().zip(by_gain.iter().flatten()) {
+            *wanted += own;
+        }
+        project(&mut wanted, &basis);
+        Some(Self {
+            gain: x[gain],
+            x,
+            residual,
+            by_gain,
+            wanted,
+            basis,
+        })
+    }
+
+    /// The model with the effect, of which the simulation leaves `left`, once gain and other parameters are fitted.
+    fn with(&self, mut left: Vec<f64>) -> Simulated {
+        let Some(by_gain) = &self.by_gain else {
+            project(&mut left, &self.basis);
+            return Simulated {
+                left: dot(&left, &left),
+                gain: None,
+            };
+        };
+        // The column of the gain there, times the gain.
+        let before = self.residual.iter().zip(by_gain);
+        for (left, (residual, by_gain)) in left.iter_mut().zip(before) {
+            *left = by_gain + residual - *left;
+        }
+        let mut simulated = Simulated {
+            left: dot(&self.wanted, &self.wanted),
+            gain: None,
+        };
+        if let Some(length) = orthogonalise(&mut left, &self.basis) {
+            let along = dot(&left, &self.wanted);
+            simulated.left -= along.powi(2);
+            simulated.gain = Some(self.gain * along / length);
+        }
+        simulated
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Takes out of a column what lies along an orthonormal basis.
+fn project(column: &mut [f64], basis: &[Vec<f64>]) {
+    for unit in basis {
+        let along = dot(column, unit);
+        for (value, unit) in column.iter_mut().zip(unit) {
+            *value -= along * unit;
+        }
+    }
+}
+
+/// Makes a column one of length one that is orthogonal to a basis, and says how long it was then; `None` where it lies in the basis, but
+/// for rounding.
+fn orthogonalise(column: &mut [f64], basis: &[Vec<f64>]) -> Option<f64> {
+    const ROUNDING: f64 = 1e-7;
+    let before = dot(column, column).sqrt();
+    project(column, basis);
+    project(column, basis);
+    let left = dot(column, column).sqrt();
+    if left.is_nan() || left <= ROUNDING * before {
+        return None;
+    }
+    column.iter_mut().for_each(|value| *value /= left);
+    Some(left)
+}

@@ -1,0 +1,247 @@
+//! What one lag, and two in series, make of a polynomial over one step, with derivatives by the rates.
+//!
+//! With `r` the length of the step over the time constant, the drive `s^k`, `s` from 0 to 1 over the step, leaves at its end
+//! ```text
+//! w_k(r) = int_0^1 r exp(-r (1 - s)) s^k ds
+//! ```
+//! behind one lag. Behind a second one of rate `r2`, of what stood behind the first at the beginning and of the drive there arrive
+//! ```text
+//! C = -r2 E[r1, r2],  E(r) = exp(-r)
+//! W_k = w_k(r1) - r1 w_k[r1, r2] = -r1 r2 v_k[r1, r2],  v_k(r) = w_k(r)/r
+//! ```
+//! `f[a, b] = (f(b) - f(a))/(b - a)` is the divided difference, the mean of `f'` between the two: for rates that are near each
+//! other it is taken as that, by quadrature, or as a power series, so that equal time constants are nothing special.
+//!
+//! All of it hangs on one or two numbers. So derivatives are written out for these in plain numbers, and chained into whatever else the
+//! rates hang on: a dual with many lanes is multiplied a few times only.
+
+/// Below this rate power series are summed: what they replace divides by the rate.
+const SLOW: f64 = 1.0;
+/// Terms of a power series reach rounding for any rate below [`SLOW`].
+const TERMS: usize = 22;
+
+/// A value and its derivatives by the two rates.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Partial {
+    pub value: f64,
+    pub by: [f64; 2],
+}
+
+/// One lag: what is left of a level, and what comes of the inflow's three coefficients; each with its derivative by the rate.
+pub(crate) struct OneLag {
+    pub decay: [f64; 2],
+    pub inflow: [[f64; 2]; 3],
+}
+
+/// A function of the rate with its first two derivatives.
+type Jet = [f64; 3];
+
+/// Behind one lag of rate `r`.
+pub(crate) fn one_lag(r: f64) -> OneLag {
+    let decay = (-r).exp();
+    OneLag {
+        decay: [decay, -decay],
+        inflow: jets(r, decay).map(|[value, slope, _]| [value, slope]),
+    }
+}
+
+/// `w_0, w_1, w_2` with two derivatives each; `decay = exp(-r)`.
+fn jets(r: f64, decay: f64) -> [Jet; 3] {
+    if r < SLOW {
+        // w_k = r sum_n (-r)^n k!/(n + k + 1)!
+        let mut jets = [[0.0; 3]; 3];
+        // (-1)^n r^(n+1)/(n+1)! and its derivatives.
+        let mut power = [r, 1.0, 0.0];
+        for n in 0..TERMS {
+            let n = n as f64;
+            // k!/((n + 2) ... (n + k + 1))
+            let shares = [1.0, 1.0 / (n + 2.0), 2.0 / ((n + 2.0) * (n + 3.0))];
+            for (jet, share) in jets.iter_mut().zip(shares) {
+                for (sum, term) in jet.iter_mut().zip(power) {
+                    *sum += term * share;
+                }
+            }
+            if power[2].abs() < 1e-18 && n > 1.0 {
+                break;
+            }
+            // Each is the integral of the next.
+            power = [-power[0] * r / (n + 2.0), -power[0], -power[1]];
+        }
+        return jets;
+    }
+    let i = 1.0 / r;
+    let w0 = [-(-r).exp_m1(), decay, -decay];
+    // w_(k+1) = 1 - (k + 1) w_k/r
+    let next = |w: Jet, k: f64| {
+        let quotient = w[0] * i;
+        let slope = (w[1] - quotient) * i;
+        let bend = (w[2] - 2.0 * slope) * i;
+        [1.0 - k * quotient, -k * slope, -k * bend]
+    };
+    let w1 = next(w0, 1.0);
+    [w0, w1, next(w1, 2.0)]
+}
+
+/// `v_0, v_1, v_2` with two derivatives each; `decay = exp(-r)`.
+fn quotient_jets(r: f64, decay: f64) -> [Jet; 3] {
+    if r >= SLOW {
+        let i = 1.0 / r;
+        return jets(r, decay).map(|[value, slope, bend]| {
+            let quotient = value * i;
+            let its_slope = (slope - quotient) * i;
+            [quotient, its_slope, (bend - 2.0 * its_slope) * i]
+        });
+    }
+    // v_k = sum_n (-r)^n k!/(n + k + 1)!
+    let mut jets = [[0.0; 3]; 3];
+    // (-r)^n/(n + 1)! and its derivatives.
+    let mut power = [1.0, 0.0, 0.0];
+    for n in 0..TERMS {
+        let n = n as f64;
+        let second = 1.0 / (n + 2.0);
+        let shares = [1.0, second, 2.0 * second / (n + 3.0)];
+        for (jet, share) in jets.iter_mut().zip(shares) {
+            for (sum, term) in jet.iter_mut().zip(power) {
+                *sum += term * share;
+            }
+        }
+        if power[2].abs() < 1e-18 && n > 2.0 {
+            break;
+        }
+        let [value, slope, bend] = power;
+        power = [
+            -value * r * second,
+            -(slope * r + value) * second,
+            -(bend * r + 2.0 * slope) * second,
+        ];
+    }
+    jets
+}
+
+/// Behind two lags of rates `a` and `b`: what comes of the first one's level, `C`, and of its inflow's three coefficients, `W_k`.
+pub(crate) fn two_lags(a: f64, b: f64) -> [Partial; 4] {
+    if a.max(b) < SLOW {
+        return slow_lags(a, b);
+    }
+    // Where one is slow W_k is small, and v_k gives it without a difference of large terms; where both are fast w_k does.
+    let one_slow = a.min(b) < SLOW;
+    let gap = b - a;
+    let near = gap.abs() < f64::max(1.0, 0.4 * a.min(b));
+    // Divided differences of E and of w_0, w_1, w_2 or v_0, v_1, v_2, each with its derivatives by a and b.
+    let mut differences = [Partial::default(); 4];
+    let at = |r: f64| {
+        let decay = (-r).exp();
+        let [f0, f1, f2] = if one_slow {
+            quotient_jets(r, decay)
+        } else {
+            jets(r, decay)
+        };
+        [[decay, -decay, decay], f0, f1, f2]
+    };
+    let first = at(a);
+    if near {
+        for (node, weight) in NODES {
+            for (node, weight) in [(node, weight), (1.0 - node, weight)] {
+                for (difference, [_, slope, bend]) in differences.iter_mut().zip(at(a + node * gap))
+                {
+                    difference.value += weight * slope;
+                    difference.by[0] += weight * (1.0 - node) * bend;
+                    difference.by[1] += weight * node * bend;
+                }
+            }
+        }
+    } else {
+        let last = at(b);
+        let i = 1.0 / gap;
+        for (difference, (from, to)) in differences.iter_mut().zip(first.iter().zip(last)) {
+            let value = (to[0] - from[0]) * i;
+            *difference = Partial {
+                value,
+                by: [(value - from[1]) * i, (to[1] - value) * i],
+            };
+        }
+    }
+    let [e, f @ ..] = differences;
+    let of = |k: usize| {
+        let (own, difference) = (first[k + 1], f[k]);
+        if one_slow {
+            return Partial {
+                value: -a * b * difference.value,
+                by: [
+                    -b * (difference.value + a * difference.by[0]),
+                    -a * (difference.value + b * difference.by[1]),
+                ],
+            };
+        }
+        Partial {
+            value: own[0] - a * difference.value,
+            by: [
+                own[1] - difference.value - a * difference.by[0],
+                -a * difference.by[1],
+            ],
+        }
+    };
+    let level = Partial {
+        value: -b * e.value,
+        by: [-b * e.by[0], -e.value - b * e.by[1]],
+    };
+    [level, of(0), of(1), of(2)]
+}
+
+/// The same for rates below [`SLOW`]: the divided difference of `r^m` is the sum of `a^i b^j` over `i + j = m - 1`.
+fn slow_lags(a: f64, b: f64) -> [Partial; 4] {
+    // That sum for m = n + 1, times (-1)^n/(n + 1)!, with its derivatives by a and b, and so b^n with its derivative.
+    let mut sum = Partial {
+        value: 1.0,
+        by: [0.0; 2],
+    };
+    let mut power = [1.0, 0.0];
+    // -E[a, b], and -v_k[a, b].
+    let mut sums = [Partial::default(); 4];
+    for n in 0..TERMS {
+        let n = n as f64;
+        // -E has 1/(n + 1)!, -v_k has k!/(n + k + 2)!.
+        let second = 1.0 / (n + 2.0);
+        let third = second / (n + 3.0);
+        let shares = [1.0, second, third, 2.0 * third / (n + 4.0)];
+        for (to, share) in sums.iter_mut().zip(shares) {
+            to.value += sum.value * share;
+            to.by[0] += sum.by[0] * share;
+            to.by[1] += sum.by[1] * share;
+        }
+        if sum.by[0].abs() + sum.by[1].abs() < 1e-18 && n > 1.0 {
+            break;
+        }
+        let factor = -second;
+        power = [power[0] * b * factor, (power[0] + power[1] * b) * factor];
+        sum = Partial {
+            value: sum.value * a * factor + power[0],
+            by: [
+                (sum.value + sum.by[0] * a) * factor,
+                sum.by[1] * a * factor + power[1],
+            ],
+        };
+    }
+    let [e, v @ ..] = sums;
+    let level = Partial {
+        value: b * e.value,
+        by: [b * e.by[0], e.value + b * e.by[1]],
+    };
+    let [w0, w1, w2] = v.map(|v| Partial {
+        value: a * b * v.value,
+        by: [b * (v.value + a * v.by[0]), a * (v.value + b * v.by[1])],
+    });
+    [level, w0, w1, w2]
+}
+
+/// Gauss-Legendre with sixteen nodes on the unit interval: the nodes below one half, and the weights.
+const NODES: [(f64, f64); 8] = [
+    (0.4524937450811813, 0.09472530522753432),
+    (0.35919822461037054, 0.09130170752246182),
+    (0.2709916111713863, 0.08457825969750132),
+    (0.19106187779867811, 0.07479799440828835),
+    (0.1222977958224985, 0.062314485627767036),
+    (0.06718439880608412, 0.0475792558412463),
+    (0.0277124884633837, 0.031126761969323728),
+    (0.005299532504175031, 0.013576229705877088),
+];

@@ -31,6 +31,11 @@ pub(crate) fn beyond_chance(gained: &Node, lacking: &Node) -> bool {
     let freedom = freedom.max(gained.fit.parameters.saturating_sub(lacking.fit.parameters));
     let fall = lacking.fit.deviance - gained.fit.deviance;
     let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
+    chance_of(gained, lacking, chance)
+}
+
+/// Whether a probability is small enough, corrected for all that the search looked at, to claim what one set has beyond another.
+pub(crate) fn chance_of(gained: &Node, lacking: &Node, chance: f64) -> bool {
     let candidates = lacking.setup.structure.candidates().len() as f64;
     let looks: f64 = gained
         .added

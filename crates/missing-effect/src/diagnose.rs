@@ -8,11 +8,11 @@ use plants::Placed;
 use crate::{
     Acceptance, ControlLoop, Diagnosis, Effort, Error, GROUP_MARGIN, NoiseFloor, Options, Problem,
     Progress, Rankings, Score, Shown, Step, Verdict,
-    confirm::BIC_MARGIN,
+    confirm::{BIC_MARGIN, confirm},
     doubt::doubt,
     find::{Found, find, shortened},
     judge::{Course, Grade, Judge, PART, WHOLE},
-    node::Node,
+    node::{Node, without},
     partial::largest_part,
     problem::base,
     remains::remains,
@@ -53,6 +53,10 @@ pub fn diagnose(
     let (doubted, single) = rayon::join(|| doubt(&base, &found), || grown.singles(metric));
     let doubted = doubted?;
     let mut confirmed = doubted.confirmed;
+    let widen = ControlLoop::widens(control_loop.as_ref());
+    if let Some(position) = confirmed.narrow_stiction().filter(|_| widen) {
+        confirmed = confirm(without(&confirmed, position, &found.noise)?, &found.noise)?;
+    }
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;
     if stopped {
@@ -99,7 +103,7 @@ pub fn diagnose(
     let unexplained = course.left.is_some() || found.limited;
     if judged.grade != Grade::Whole || (course.last().added.is_empty() && unexplained) {
         let by_error = found.grown.promising_singles();
-        let tested = largest_part(&base, &found, &by_error, found.noise.sigma())?;
+        let tested = largest_part(&base, &found, &by_error, found.noise.sigma(), widen)?;
         if let Some(tested) = &tested {
             acceptance.effects = ids(&tested.node.added);
             acceptance.share = Some(tested.share);
@@ -151,7 +155,6 @@ pub fn diagnose(
 
     tell("telling apart", 2, 3);
     allow(&base, 1.0);
-    let widen = ControlLoop::widens(control_loop.as_ref());
     let steps = course.steps(&floor, problem, widen)?;
     let Course { left, .. } = course;
     let last = course.last();

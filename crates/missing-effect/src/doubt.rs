@@ -11,6 +11,7 @@ use crate::{
     node::{Node, without_clock},
     noise_floor::NOISE_ORDER,
     problem::STOPPING,
+    random_walk::beyond_random_walk,
     remains::remains,
 };
 
@@ -50,13 +51,15 @@ pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a
     if jumped.is_some() {
         confirmed = found.base.clone();
     }
-    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, and where the other
+    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
+    // explain as much, and where the other
     // effects of the set are called for without them. What is there to mend an imitation is not.
     if confirmed.added.iter().any(|placed| placed.effect.by_clock) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();
+        let by_walk = !beyond_random_walk(&confirmed, &others)?;
         let others = confirm(others, noise)?;
-        if others.added.len() < count || remains(&confirmed, &own_last)?.is_some() {
+        if by_walk || others.added.len() < count || remains(&confirmed, &own_last)?.is_some() {
             confirmed = others;
         }
     }

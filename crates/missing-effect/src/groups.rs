@@ -9,6 +9,9 @@ use crate::{Error, PlaceScore, exchange::exchanges, node::Node, step::place_name
 /// What stands in for another lies within this of its criterion.
 pub const GROUP_MARGIN: f64 = 6.0;
 
+/// The mean square that a stand-in of an effect that follows time alone may leave, over what that leaves.
+const NEARLY: f64 = 1.05;
+
 /// An effect, what cannot be told apart from it, and where it may act.
 pub(crate) struct Group {
     /// Identifiers: the effect itself, then what fits as well in its place, best first.
@@ -57,7 +60,15 @@ pub(crate) fn groups<'a>(
                     !node.at_the_edge(*placed)
                         || last.added.contains(placed) && last.at_the_edge(*placed)
                 });
-                if plausible && behind < GROUP_MARGIN && !group.iter().any(|g| g == stand_in) {
+                // An effect at an instant or with a course that the fit has chosen follows any disturbance: what hangs on the
+                // plant's own signals and explains nearly as much cannot be told from it.
+                let nearly = own.effect.by_clock
+                    && node.added.iter().all(|placed| !placed.effect.by_clock)
+                    && node.fit.cost < NEARLY * last.fit.cost;
+                if plausible
+                    && (behind < GROUP_MARGIN || nearly)
+                    && !group.iter().any(|g| g == stand_in)
+                {
                     group.push(stand_in.to_string());
                 }
             }

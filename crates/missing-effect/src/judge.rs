@@ -26,7 +26,7 @@ use crate::{
 /// remains explains nineteen twentieths and more.
 pub(crate) const WHOLE: f64 = 0.9;
 /// They are a partial answer if they explain this share.
-pub(crate) const PART: f64 = 0.35;
+pub(crate) const PART: f64 = 0.38;
 
 /// How much of an answer a set of effects is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -30,6 +30,7 @@ mod pairs;
 mod partial;
 mod problem;
 mod proposal;
+mod random_walk;
 mod remains;
 mod scores;
 mod search;
@@ -38,6 +39,7 @@ mod sentences;
 mod simulated;
 mod spectral_line;
 mod step;
+mod sticking;
 mod trail;
 mod unknown;
 

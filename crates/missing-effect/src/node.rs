@@ -26,6 +26,15 @@ const HIGHEST: f64 = 100.0;
 /// ... and one this many times that height where it is: an area that is a little wrong shifts levels that nobody measures.
 const ABOVE_RIM: f64 = 1.5;
 
+/// A sensor at the end of its range: its reading is said to rise beyond from this correlation with the level on, over so many samples.
+const LIMIT: &str = "sensor_saturation";
+const RISES: f64 = 0.5;
+const BEYOND: usize = 50;
+
+/// What a valve does that sticks, and the width of its band, as a part of what the command moves over, below which a loop imitates it.
+pub(crate) const STICTION: &str = "stiction_backlash";
+const NARROW: f64 = 0.25;
+
 /// A structure with its fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Node<'a> {
@@ -44,7 +53,34 @@ impl Node<'_> {
     /// The size of every added effect lies inside its plausible range, neither absent nor at the far end, and no level is beyond
     /// what is physical.
     pub fn plausible(&self) -> bool {
-        !self.added.iter().any(|placed| self.at_the_edge(*placed)) && self.physical()
+        !self.added.iter().any(|placed| self.at_the_edge(*placed))
+            && self.physical()
+            && !self.reads_beyond_limit()
+    }
+
+    /// The reading still rises with the level where the model has it at the sensor's limit: then the limit is not the sensor's.
+    fn reads_beyond_limit(&self) -> bool {
+        let structure = &self.setup.structure;
+        let Some(placed) = self.added.iter().find(|placed| placed.effect.id == LIMIT) else {
+            return false;
+        };
+        let unlimited = || {
+            let setup = self
+                .setup
+                .with_structure(structure.without(placed.effect))
+                .ok()?;
+            let level = setup.simulate(&transfer(self, &setup)).ok()?.output;
+            let residual = self.setup.residuals(&self.fit.x).ok()?;
+            let limit = self.fit.x[self.size_of(*placed)?.1];
+            let beyond: Vec<(f64, f64)> = level
+                .concat()
+                .into_iter()
+                .zip(residual.concat())
+                .filter(|(level, _)| *level > limit)
+                .collect();
+            (beyond.len() >= BEYOND).then(|| correlation(&beyond))
+        };
+        unlimited().is_some_and(|correlation| correlation > RISES)
     }
 
     /// No level lies above the tank's rim where that is known, or so far above the readings that the model has lost its way.
@@ -77,6 +113,21 @@ impl Node<'_> {
         let leading = parameters.into_iter().next()?;
         let at = position_of(&self.setup, placed, leading.name)?;
         Some((leading, at))
+    }
+
+    /// The added stiction, where its band is narrower than [`NARROW`] of what the command moves over.
+    ///
+    /// In a loop that is not simulated, a disturbance comes back through the command with a delay, as if the valve had play: the model
+    /// that runs on that command takes such a phase for a narrow band. A band that holds the valve over a wide part of the command's
+    /// moves is no such thing.
+    pub fn narrow_stiction(&self) -> Option<usize> {
+        let position = self
+            .added
+            .iter()
+            .position(|placed| placed.effect.id == STICTION)?;
+        let (_, at) = self.size_of(self.added[position])?;
+        let (low, high) = self.setup.structure.site(self.added[position]).input();
+        (self.fit.x[at] < NARROW * (high - low)).then_some(position)
     }
 
     /// The size of an added effect is absent or at the far end of its plausible range.
@@ -166,4 +217,18 @@ pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node
 pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
+}
+
+fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let n = pairs.len() as f64;
+    let (a, b) = pairs
+        .iter()
+        .fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
+    for (x, y) in pairs {
+        xx += (x - a) * (x - a);
+        yy += (y - b) * (y - b);
+        xy += (x - a) * (y - b);
+    }
+    xy / (xx * yy).sqrt().max(f64::MIN_POSITIVE)
 }

@@ -21,9 +21,11 @@ use crate::{
     find::Found,
     judge::{PART, WHOLE, explained},
     jump::jump,
-    node::{FINE, Node, ROUGH, refine},
+    node::{FINE, Node, ROUGH, STICTION, refine, without_clock},
     noise_floor::in_own_noise,
+    random_walk::beyond_random_walk,
     step::held_out_rmse,
+    sticking::sticks,
 };
 
 /// Sets of one size that are refitted, those with the least simulation error.
@@ -36,6 +38,15 @@ const LEFT: f64 = 0.5;
 /// What noise may explain as well has to explain this part of the error on a half of the record that was not fitted.
 const CARRIED_OVER: f64 = 0.2;
 
+/// By how much the logarithm of the mean square with a jump has to lie below that of a set.
+const JUMP_CLEARLY: f64 = 0.1;
+
+/// Stiction that the shape of the record shows is a partial answer from this share on.
+const PART_BY_SHAPE: f64 = 0.15;
+
+/// Why a narrow band of stiction is refused.
+const NARROW_BAND: &str = "in a loop that is not simulated a disturbance that comes back through the command looks like a narrow band";
+
 /// A set that was tested, and with what result.
 pub(crate) struct Tested<'a> {
     /// The set, fitted to the simulation error.
@@ -44,22 +55,26 @@ pub(crate) struct Tested<'a> {
     pub share: f64,
     /// Fall of the criterion, each model under its own noise model.
     pub bic_fall: f64,
+    /// The record has the shape of a valve that sticks, and the set is that.
+    pub shape: bool,
     /// Why it is refused; empty where it is accepted.
     pub reasons: Vec<String>,
 }
 
 /// The set that explains the largest part of the excess error, accepted or, where none is, the best that was refused.
 ///
-/// `floor`: standard deviation of the noise \[output unit\].
+/// `floor`: standard deviation of the noise \[output unit\]; `in_loop`: the records come from a loop that is not simulated.
 pub(crate) fn largest_part<'a>(
     base: &Node<'a>,
     found: &Found<'a>,
     singles: &[Node<'a>],
     floor: f64,
+    in_loop: bool,
 ) -> Result<Option<Tested<'a>>, Error> {
     let white = ArModel::white(1.0);
     let own_base = in_own_noise(base)?;
     let jump = jump(base, &white)?.map_or(f64::INFINITY, |jump| jump.bic);
+    let sticks = in_loop && sticks(base.setup.records);
     let mut best: Option<Tested<'a>> = None;
     for size in 1..=MOST {
         if size > 1 && base.setup.out_of_time() {
@@ -78,13 +93,33 @@ pub(crate) fn largest_part<'a>(
         let mut sets = of_size(found.grown.sizes.get(size).map_or(&[], Vec::as_slice));
         if size == 1 {
             sets.extend(of_size(singles));
+            let sticking = |node: &&Node| {
+                sticks && node.added.iter().any(|placed| placed.effect.id == STICTION)
+            };
+            sets.extend(singles.iter().filter(sticking).cloned());
         }
         sets.extend(of_size(std::slice::from_ref(&found.confirmed)));
         sets.extend(of_size(std::slice::from_ref(&found.richest)));
         let tested = sets
             .into_par_iter()
             .filter_map(|set| refine(&set, &white, &[]).ok())
-            .map(|node| test(base, &own_base, node, floor, jump))
+            .map(|node| {
+                let mut tested = test(base, &own_base, node, floor, jump)?;
+                if in_loop && tested.node.narrow_stiction().is_some() {
+                    tested.reasons.push(NARROW_BAND.to_string());
+                }
+                // The shape says more than an error that cannot fall far.
+                let alone = tested
+                    .node
+                    .added
+                    .iter()
+                    .all(|placed| placed.effect.id == STICTION);
+                tested.shape = sticks && alone && tested.share >= PART_BY_SHAPE;
+                if tested.shape {
+                    tested.reasons.clear();
+                }
+                Ok::<_, Error>(tested)
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let accepted = tested.into_iter().max_by(|a, b| {
             key(a)
@@ -94,8 +129,9 @@ pub(crate) fn largest_part<'a>(
         best = match (best, accepted) {
             (None, found) => found,
             (Some(best), Some(larger))
-                if key(&larger).0 > key(&best).0
+                if (key(&larger).0, key(&larger).1) > (key(&best).0, key(&best).1)
                     || (larger.reasons.is_empty()
+                        && !best.shape
                         && 1.0 - larger.share <= LEFT * (1.0 - best.share)) =>
             {
                 Some(larger)
@@ -137,9 +173,9 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
     Ok(1.0 - of_both(node)? / of_both(base)?)
 }
 
-/// Accepted sets before refused ones, then by what they explain.
-fn key(tested: &Tested) -> (bool, f64) {
-    (tested.reasons.is_empty(), tested.share)
+/// Accepted sets before refused ones, those that the shape of the record shows before others, then by what they explain.
+fn key(tested: &Tested) -> (bool, bool, f64) {
+    (tested.reasons.is_empty(), tested.shape, tested.share)
 }
 
 fn test<'a>(
@@ -179,16 +215,23 @@ fn test<'a>(
             );
         }
     }
+    let timeless = without_clock(&node, &ArModel::white(1.0))?;
+    if required > PART && !beyond_random_walk(&node, &timeless)? {
+        reasons.push("a random walk explains as much".to_string());
+    }
     if !node.plausible() {
         reasons.push("a size stands at a bound, or a state is not physical".to_string());
     }
-    if jump < node.fit.bic() {
+    // A jump at a free instant imitates much where set points step: it has to explain clearly more.
+    let clearly = JUMP_CLEARLY * node.setup.samples() as f64;
+    if jump + clearly < node.fit.bic() {
         reasons.push("a single jump of the reading explains more".to_string());
     }
     Ok(Tested {
         node,
         share,
         bic_fall,
+        shape: false,
         reasons,
     })
 }

@@ -1,0 +1,124 @@
+//! Whether effects that follow time alone explain more than a random walk beside white noise does.
+//!
+//! **Model of the residual** (local level model): `e[k] = l[k] + v[k]`, `l[k+1] = l[k] + w[k]`, `v` and `w` white with variances
+//! `s^2` and `q s^2`, `l[0] = 0`. No autoregressive model of low order describes it, and every drift, step or slow period looks
+//! significant beside one that does not. The likelihood follows from the Kalman filter; `s^2` is at its best in closed form, `q` by a
+//! search over its logarithm.
+//!
+//! **Cost**: `O(N)` for a value of `q`.
+//!
+//! **Reference**: A. C. Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, Cambridge 1989, ch. 4.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::{
+    Error,
+    confirm::{BIC_MARGIN, chance_of},
+    node::Node,
+};
+
+/// Decades of `q` that are searched, and values in each.
+const DECADES: std::ops::Range<i32> = -9..2;
+const EACH: i32 = 6;
+
+/// Minus twice the logarithm of the likelihood of residuals, a series for each record, under white noise and a random walk.
+fn deviance(residuals: &[Vec<f64>]) -> f64 {
+    let at = |q: f64| {
+        let (mut squares, mut log_det, mut count) = (0.0, 0.0, 0.0);
+        for residual in residuals {
+            let (mut level, mut variance) = (0.0, 0.0);
+            for e in residual {
+                let innovation = e - level;
+                let whole = variance + 1.0;
+                squares += innovation * innovation / whole;
+                log_det += f64::ln(whole);
+                count += 1.0;
+                let gain = variance / whole;
+                level += gain * innovation;
+                variance = variance * (1.0 - gain) + q;
+            }
+        }
+        count * f64::ln((squares / count).max(f64::MIN_POSITIVE)) + log_det
+    };
+    (DECADES.start * EACH..DECADES.end * EACH)
+        .map(|step| 10_f64.powf(f64::from(step) / f64::from(EACH)))
+        .map(at)
+        .fold(at(0.0), f64::min)
+}
+
+/// Whether a set lowers the deviance beyond chance against one that lacks some of its effects, where either residual may hold a random
+/// walk. What the smaller set's own parameters would gain in that noise model is allowed for: one for each.
+pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node) -> Result<bool, Error> {
+    let of = |node: &Node| Ok::<_, Error>(deviance(&node.setup.disturbance(&node.fit.x)?));
+    let free = |node: &Node| node.setup.free().len();
+    let fall = of(lacking)? - of(gained)? - free(lacking) as f64;
+    let freedom = free(gained).saturating_sub(free(lacking)).max(1);
+    let penalty = gained.setup.price(0) - lacking.setup.price(0);
+    let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
+    Ok(fall > penalty + BIC_MARGIN && chance_of(gained, lacking, chance))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+
+    const N: usize = 600;
+
+    /// White noise, a random walk of this standard deviation at the end, and a line that rises by so much.
+    fn series(walk: f64, rise: f64, seed: u64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut level = 0.0;
+        (0..N)
+            .map(|k| {
+                let [white, step]: [f64; 2] = std::array::from_fn(|_| rng.sample(StandardNormal));
+                level += walk * step / (N as f64).sqrt();
+                white + level + rise * k as f64 / N as f64
+            })
+            .collect()
+    }
+
+    fn without_line(series: &[f64]) -> Vec<f64> {
+        let t = |k: usize| k as f64 / N as f64 - 0.5;
+        let mean = series.iter().sum::<f64>() / N as f64;
+        let power: f64 = (0..N).map(|k| t(k) * t(k)).sum();
+        let slope = series
+            .iter()
+            .enumerate()
+            .map(|(k, e)| e * t(k))
+            .sum::<f64>()
+            / power;
+        let line = |(k, e): (usize, &f64)| e - mean - slope * t(k);
+        series.iter().enumerate().map(line).collect()
+    }
+
+    #[test]
+    fn a_random_walk_is_no_drift_and_a_drift_is_no_random_walk() {
+        let fall = |walk: f64, rise: f64, seed: u64| {
+            let series = series(walk, rise, seed);
+            let mean = series.iter().sum::<f64>() / N as f64;
+            let centred: Vec<f64> = series.iter().map(|e| e - mean).collect();
+            deviance(&[centred]) - deviance(&[without_line(&series)])
+        };
+        // Beyond a penalty of ln(600) = 6.4 and a margin of 6.
+        let named = |walk: f64, rise: f64| {
+            (0..100)
+                .filter(|&seed| fall(walk, rise, seed) > 15.0)
+                .count()
+        };
+        assert!(named(0.5, 0.0) <= 1 && named(3.0, 0.0) <= 1);
+        // A drift whose rms is as large as the noise.
+        assert!(named(0.0, 3.5) >= 97);
+    }
+
+    #[test]
+    fn white_noise_has_no_random_walk() {
+        let white = series(0.0, 0.0, 3);
+        let squares: f64 = white.iter().map(|e| e * e).sum();
+        let plain = N as f64 * (squares / N as f64).ln();
+        assert!((deviance(&[white]) - plain).abs() < 3.0);
+    }
+}

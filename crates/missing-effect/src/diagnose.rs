@@ -70,6 +70,7 @@ pub fn diagnose(
         base: &base,
         noise: &found.noise,
         wandering: found.wandering,
+        in_loop: widen,
         by_simulation: found.by_simulation,
         stopped,
         jumped,

@@ -20,12 +20,13 @@ pub(crate) struct Group {
     pub places: Vec<PlaceScore>,
 }
 
-/// For every added effect, itself and all that fit as well in its place.
+/// For every added effect, itself and all that fit as well in its place; `in_loop`: the records come from a loop that is not simulated.
 pub(crate) fn groups<'a>(
     last: &Node<'a>,
     metric: &ArModel,
     per_sample: f64,
     singles: Option<&[Node<'a>]>,
+    in_loop: bool,
 ) -> Result<Vec<Group>, Error> {
     (0..last.added.len())
         .into_par_iter()
@@ -60,6 +61,9 @@ pub(crate) fn groups<'a>(
                     !node.at_the_edge(*placed)
                         || last.added.contains(placed) && last.at_the_edge(*placed)
                 });
+                if in_loop && node.narrow_stiction().is_some() {
+                    continue;
+                }
                 // An effect at an instant or with a course that the fit has chosen follows any disturbance: what hangs on the
                 // plant's own signals and explains nearly as much cannot be told from it.
                 let nearly = own.effect.by_clock

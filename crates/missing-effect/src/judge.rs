@@ -44,6 +44,8 @@ pub(crate) struct Judge<'s, 'a> {
     pub base: &'s Node<'a>,
     pub noise: &'s ArModel,
     pub wandering: bool,
+    /// The records come from a loop that is not simulated.
+    pub in_loop: bool,
     /// Models are compared and shown by their simulation error.
     pub by_simulation: bool,
     /// The set was cut to as many effects as may be added.
@@ -150,7 +152,13 @@ impl<'a> Judge<'_, 'a> {
         };
         let same_metric = self.by_simulation || !self.stopped || self.noise.order() == 0;
         let singles = same_metric.then_some(self.singles);
-        groups(&refine(last, metric, &[])?, metric, per_sample, singles)
+        groups(
+            &refine(last, metric, &[])?,
+            metric,
+            per_sample,
+            singles,
+            self.in_loop,
+        )
     }
 
     /// The models on the way to a set.
@@ -276,6 +284,7 @@ mod tests {
             base: &base,
             noise: &colour(&set).unwrap(),
             wandering: true,
+            in_loop: false,
             by_simulation: true,
             stopped: false,
             jumped: None,

@@ -21,6 +21,9 @@ use crate::{
 const DECADES: std::ops::Range<i32> = -9..2;
 const EACH: i32 = 6;
 
+/// The fall beyond the penalty: twice the usual one, since the smaller set's parameters are not fitted in this noise model.
+const MARGIN: f64 = 2.0 * BIC_MARGIN;
+
 /// Minus twice the logarithm of the likelihood of residuals, a series for each record, under white noise and a random walk.
 fn deviance(residuals: &[Vec<f64>]) -> f64 {
     let at = |q: f64| {
@@ -55,7 +58,7 @@ pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node) -> Result<bool, 
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);
     let penalty = gained.setup.price(0) - lacking.setup.price(0);
     let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
-    Ok(fall > penalty + BIC_MARGIN && chance_of(gained, lacking, chance))
+    Ok(fall > penalty + MARGIN && chance_of(gained, lacking, chance))
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ pub use fit::{
     prewhitened,
 };
 pub use levenberg_marquardt::{Stop, Stopping};
-pub use many_starts::{keep_best_simulated, with_other_time_constants};
+pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use reading_grid::{ReadingGrid, reading_grid};
 pub use sandwich::{Robust, robust};
 pub use setup::{LoopRun, Rows, Setup, Simulated, at_rest, commands};

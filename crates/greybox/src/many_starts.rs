@@ -11,33 +11,52 @@ use rayon::prelude::*;
 
 use crate::{Setup, levenberg_marquardt::within};
 
-/// What sticks in front of the plant.
+/// What hides much of the command from the plant, and so how quick the plant is.
 const STICKS: &str = "stiction_backlash";
-/// Time constants, in samples, from which its fits begin beside the one that the model without it has.
+const SATURATES: &str = "pump_saturation";
+/// Time constants of linear plants, in samples, from which their fits begin beside the one that the model without them has, ...
 const TIME_CONSTANTS: [f64; 3] = [1.0, 12.0, 150.0];
+/// ... and one in lengths of the record: a plant that integrates.
+const INTEGRATES: f64 = 10.0;
+/// Tanks: by how much quicker than the model without them has it.
+const QUICKER: [f64; 3] = [0.3, 3.0, 9.0];
 
-/// Plants with other time constants in front of which something sticks.
+/// Plants that are quicker or slower than one, in front of which something sticks or saturates; none for other effects.
 ///
-/// A model without it answers to commands that move nothing. It imitates what the plant does then by another time constant, a much
-/// longer one or none at all.
+/// A model without it answers to commands that move nothing. It imitates what the plant does then by a small gain and another time
+/// constant, a much longer one or none at all. Of tanks the gain and the outflows are taken more or less together: the levels stay.
 #[must_use]
-pub fn with_other_time_constants(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f64>> {
+pub fn with_other_speeds(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f64>> {
     let plant = setup.structure.plant;
-    if placed.effect.id != STICKS || plant.outlet() != Outlet::Linear {
+    let effect = placed.effect.id;
+    if plant.outlet() == Outlet::Linear && (effect == STICKS || effect == SATURATES) {
+        let lags = time_constants(setup);
+        let scales = &setup.structure.scales;
+        let sampled = TIME_CONSTANTS.map(|samples| samples * scales.sample_interval);
+        let with = |time_constant: f64| {
+            let mut x = x.to_vec();
+            for &lag in &lags {
+                x[lag] = time_constant;
+            }
+            x
+        };
+        let all = sampled.into_iter().chain([INTEGRATES * scales.duration]);
+        return all.filter(|_| !lags.is_empty()).map(with).collect();
+    }
+    // Where a valve sticks there are too many starts already.
+    let own = plant.parameters(&setup.structure.scales).len();
+    let all_free = (0..own).all(|at| setup.free().contains(&at));
+    if plant.joined() || effect != SATURATES || !all_free {
         return Vec::new();
     }
-    let lags = time_constants(setup);
-    if lags.is_empty() {
-        return Vec::new();
-    }
-    let with = |samples: f64| {
+    let with = |factor: f64| {
         let mut x = x.to_vec();
-        for &lag in &lags {
-            x[lag] = samples * setup.structure.scales.sample_interval;
+        for (value, &bounds) in x.iter_mut().zip(setup.bounds()).take(own) {
+            *value = within(factor * *value, bounds);
         }
         x
     };
-    TIME_CONSTANTS.map(with).to_vec()
+    QUICKER.map(with).to_vec()
 }
 
 /// Where the fitted time constants of a plant stand in the vector.
@@ -51,7 +70,7 @@ fn time_constants(setup: &Setup) -> Vec<usize> {
 /// Damping of the step by the other parameters, against what the data do not determine.
 const DAMPING: f64 = 1e-9;
 /// With more starts than this an effect at the actuator is simulated from all of them, without derivatives, before it is linearised ...
-const MANY: usize = 48;
+const MANY: usize = 20;
 /// ... at so many, the best.
 const LINEARISED: usize = 12;
 
@@ -158,11 +177,27 @@ fn scores_of_simulations(
             models.push(without);
         }
     }
-    // Neither the effect's own columns nor those of time constants, which the start has its own of, take part.
+    // The effect's own columns take no part; those of time constants only where the model fits best without the effect, since elsewhere
+    // they are not near what they will be.
+    let squares =
+        |x: &Vec<f64>| whitened(setup, x, noise).map_or(f64::INFINITY, |left| dot(&left, &left));
+    let best = models
+        .par_iter()
+        .map(|x| (squares(x), x))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, x)| x.clone());
+    let own: Vec<usize> = own.iter().map(|(at, _)| *at).collect();
     let apart = apart(setup, placed);
     let models: Vec<WithoutEffect> = models
         .into_par_iter()
-        .filter_map(|x| WithoutEffect::at(x, &apart, placed.vessel, setup, noise))
+        .filter_map(|x| {
+            let apart = if Some(&x) == best.as_ref() {
+                &own
+            } else {
+                &apart
+            };
+            WithoutEffect::at(x, apart, placed.vessel, setup, noise)
+        })
         .collect();
     let scores = starts.par_iter().map(|start| {
         let without = without(start);

@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, sync::OnceLock};
 
 use ct_signals::{ArModel, Record};
 use greybox::{
-    Setup, Start, Stopping, Triangle, fit_onward, keep_best_simulated, with_other_time_constants,
+    Setup, Start, Stopping, Triangle, fit_onward, keep_best_simulated, with_other_speeds,
 };
 use plants::{Place, Placed, Plant};
 use rayon::prelude::*;
@@ -51,7 +51,7 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
     }
 
     begun.extend(with_less_throughput(&begun[0], child, placed));
-    begun.extend(with_other_time_constants(child, placed, &begun[0]));
+    begun.extend(with_other_speeds(child, placed, &begun[0]));
 
     let parameters = child.structure.effect_parameters(placed);
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];

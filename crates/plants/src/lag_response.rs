@@ -38,37 +38,51 @@ type Jet = [f64; 3];
 
 /// Behind one lag of rate `r`.
 pub(crate) fn one_lag(r: f64) -> OneLag {
-    let decay = (-r).exp();
+    if r >= SLOW {
+        let decay = (-r).exp();
+        return OneLag {
+            decay: [decay, -decay],
+            inflow: jets(r, decay).map(|[value, slope, _]| [value, slope]),
+        };
+    }
+    // v_(k-1) = (1 - r v_k)/k and v_k' = v_(k+1) - v_k.
+    let v3 = series(r).iter().rev().fold(0.0, |sum, c| sum * r + c);
+    let v2 = (1.0 - r * v3) / 3.0;
+    let v1 = (1.0 - r * v2) / 2.0;
+    let v0 = 1.0 - r * v1;
+    let decay = 1.0 - r * v0;
+    let of = |v: f64, next: f64| [r * v, v + r * (next - v)];
     OneLag {
         decay: [decay, -decay],
-        inflow: jets(r, decay).map(|[value, slope, _]| [value, slope]),
+        inflow: [of(v0, v1), of(v1, v2), of(v2, v3)],
     }
 }
 
-/// `w_0, w_1, w_2` with two derivatives each; `decay = exp(-r)`.
-fn jets(r: f64, decay: f64) -> [Jet; 3] {
-    if r < SLOW {
-        // w_k = r sum_n (-r)^n k!/(n + k + 1)!
-        let mut jets = [[0.0; 3]; 3];
-        // (-1)^n r^(n+1)/(n+1)! and its derivatives.
-        let mut power = [r, 1.0, 0.0];
-        for n in 0..TERMS {
-            let n = n as f64;
-            // k!/((n + 2) ... (n + k + 1))
-            let shares = [1.0, 1.0 / (n + 2.0), 2.0 / ((n + 2.0) * (n + 3.0))];
-            for (jet, share) in jets.iter_mut().zip(shares) {
-                for (sum, term) in jet.iter_mut().zip(power) {
-                    *sum += term * share;
-                }
-            }
-            if power[2].abs() < 1e-18 && n > 1.0 {
-                break;
-            }
-            // Each is the integral of the next.
-            power = [-power[0] * r / (n + 2.0), -power[0], -power[1]];
-        }
-        return jets;
+/// As many terms of `v_3(r) = sum_n (-r)^n 3!/(n + 4)!` as reach rounding in its slope.
+fn series(r: f64) -> &'static [f64] {
+    let terms = if r < 0.04 {
+        8
+    } else if r < 0.3 {
+        12
+    } else {
+        SERIES.len()
+    };
+    &SERIES[..terms]
+}
+
+/// `(-1)^n 3!/(n + 4)!`
+const SERIES: [f64; 18] = {
+    let mut terms = [0.25; 18];
+    let mut n = 1;
+    while n < terms.len() {
+        terms[n] = -terms[n - 1] / (n + 4) as f64;
+        n += 1;
     }
+    terms
+};
+
+/// `w_0, w_1, w_2` with two derivatives each, for rates that are not slow; `decay = exp(-r)`.
+fn jets(r: f64, decay: f64) -> [Jet; 3] {
     let i = 1.0 / r;
     let w0 = [-(-r).exp_m1(), decay, -decay];
     // w_(k+1) = 1 - (k + 1) w_k/r
@@ -188,48 +202,55 @@ pub(crate) fn two_lags(a: f64, b: f64) -> [Partial; 4] {
     [level, of(0), of(1), of(2)]
 }
 
-/// The same for rates below [`SLOW`]: the divided difference of `r^m` is the sum of `a^i b^j` over `i + j = m - 1`.
+/// The same for rates below [`SLOW`], by Horner's scheme for `v_3` at `b` and its divided difference, and then as `v_k` follow from each other:
+/// `(r v)[a, b] = v(b) + a v[a, b]`.
 fn slow_lags(a: f64, b: f64) -> [Partial; 4] {
-    // That sum for m = n + 1, times (-1)^n/(n + 1)!, with its derivatives by a and b, and so b^n with its derivative.
-    let mut sum = Partial {
-        value: 1.0,
-        by: [0.0; 2],
-    };
-    let mut power = [1.0, 0.0];
-    // -E[a, b], and -v_k[a, b].
-    let mut sums = [Partial::default(); 4];
-    for n in 0..TERMS {
-        let n = n as f64;
-        // -E has 1/(n + 1)!, -v_k has k!/(n + k + 2)!.
-        let second = 1.0 / (n + 2.0);
-        let third = second / (n + 3.0);
-        let shares = [1.0, second, third, 2.0 * third / (n + 4.0)];
-        for (to, share) in sums.iter_mut().zip(shares) {
-            to.value += sum.value * share;
-            to.by[0] += sum.by[0] * share;
-            to.by[1] += sum.by[1] * share;
-        }
-        if sum.by[0].abs() + sum.by[1].abs() < 1e-18 && n > 1.0 {
-            break;
-        }
-        let factor = -second;
-        power = [power[0] * b * factor, (power[0] + power[1] * b) * factor];
-        sum = Partial {
-            value: sum.value * a * factor + power[0],
+    let mut at_b = [0.0; 2];
+    let mut between = Partial::default();
+    for c in series(a.max(b)).iter().rev() {
+        between = Partial {
+            value: between.value * a + at_b[0],
             by: [
-                (sum.value + sum.by[0] * a) * factor,
-                sum.by[1] * a * factor + power[1],
+                between.by[0] * a + between.value,
+                between.by[1] * a + at_b[1],
             ],
         };
+        at_b = [at_b[0] * b + c, at_b[1] * b + at_b[0]];
     }
-    let [e, v @ ..] = sums;
-    let level = Partial {
-        value: b * e.value,
-        by: [b * e.by[0], e.value + b * e.by[1]],
+    // Of r v: value and slope at b, and the divided difference.
+    let times_rate = |at_b: [f64; 2], between: Partial| {
+        let at = [b * at_b[0], at_b[0] + b * at_b[1]];
+        let divided = Partial {
+            value: at_b[0] + a * between.value,
+            by: [
+                between.value + a * between.by[0],
+                at_b[1] + a * between.by[1],
+            ],
+        };
+        (at, divided)
     };
-    let [w0, w1, w2] = v.map(|v| Partial {
-        value: a * b * v.value,
-        by: [b * (v.value + a * v.by[0]), a * (v.value + b * v.by[1])],
+    // v_(k-1) = (1 - r v_k)/k
+    let before = |k: f64, at_b: [f64; 2], between: Partial| {
+        let (at, divided) = times_rate(at_b, between);
+        let i = -1.0 / k;
+        let divided = Partial {
+            value: divided.value * i,
+            by: divided.by.map(|slope| slope * i),
+        };
+        ([(1.0 - at[0]) / k, at[1] * i], divided)
+    };
+    let (at_2, v2) = before(3.0, at_b, between);
+    let (at_1, v1) = before(2.0, at_2, v2);
+    let (at_0, v0) = before(1.0, at_1, v1);
+    // E = 1 - r v_0
+    let (_, minus_e) = times_rate(at_0, v0);
+    let level = Partial {
+        value: b * minus_e.value,
+        by: [b * minus_e.by[0], minus_e.value + b * minus_e.by[1]],
+    };
+    let [w0, w1, w2] = [v0, v1, v2].map(|v| Partial {
+        value: -a * b * v.value,
+        by: [-b * (v.value + a * v.by[0]), -a * (v.value + b * v.by[1])],
     });
     [level, w0, w1, w2]
 }

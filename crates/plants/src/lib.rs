@@ -53,6 +53,8 @@ pub use law::{Balance, Law, Rim, Side};
 pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scalar::{Dual, Scalar};
 pub use simulator::{Command, Simulator};
-pub use structure::{Known, MAX_VESSELS, Picked, Placed, Scales, Site, Structure, WIDENED};
+pub use structure::{
+    Deciles, Known, MAX_VESSELS, Picked, Placed, Scales, Site, Structure, WIDENED, deciles,
+};
 pub use term::{Fitted, MOST_KNOTS, Term, Variable};
 pub use unit::Unit;

@@ -34,6 +34,18 @@ impl<T: Scalar> KeptMoments<T> {
     }
 }
 
+/// `(-1)^n/(n! (n + 4))`, the terms of `M_3` by powers of `z`.
+const SERIES: [f64; 16] = {
+    let mut terms = [0.0; 16];
+    let (mut n, mut factor) = (0, 1.0);
+    while n < terms.len() {
+        terms[n] = factor / (n + 4) as f64;
+        factor = -factor / (n + 1) as f64;
+        n += 1;
+    }
+    terms
+};
+
 /// `exp(-1/e)` and the moments `M_0, M_1, M_2` for `e = time_constant/h`, both non-negative, not both zero.
 pub(crate) fn exponential_moments<T: Scalar>(time_constant: T, h: T) -> (T, [T; 3]) {
     if time_constant.value() > 2.0 * h.value() {
@@ -41,14 +53,8 @@ pub(crate) fn exponential_moments<T: Scalar>(time_constant: T, h: T) -> (T, [T; 
         // and the derivative of M_j by z is -M_(j+1).
         let rate = h / time_constant;
         let z = rate.value();
-        let (mut term, mut m3) = (1.0, 0.0);
-        for n in 0..18 {
-            m3 += term / f64::from(n + 4);
-            term *= -z / f64::from(n + 1);
-            if term.abs() < 1e-18 {
-                break;
-            }
-        }
+        // At z <= 1/2 the first term that is left out is 2e-19 of the sum.
+        let m3 = SERIES.iter().rev().fold(0.0, |sum, c| sum * z + c);
         let decay = (-z).exp();
         let m2 = (z * m3 + decay) / 3.0;
         let m1 = (z * m2 + decay) / 2.0;

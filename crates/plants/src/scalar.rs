@@ -145,11 +145,13 @@ impl<const N: usize> Scalar for Dual<N> {
     }
     #[inline]
     fn with_slopes<const K: usize>(value: f64, of: [(Self, f64); K]) -> Self {
-        let slope = |i: usize| of.iter().map(|(by, slope)| by.eps[i] * slope).sum();
-        Self {
-            re: value,
-            eps: std::array::from_fn(slope),
+        let mut eps = [0.0; N];
+        for (by, slope) in &of {
+            for (eps, by) in eps.iter_mut().zip(&by.eps) {
+                *eps += by * slope;
+            }
         }
+        Self { re: value, eps }
     }
 }
 

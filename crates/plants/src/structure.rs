@@ -32,12 +32,21 @@ pub struct Scales {
     pub input: (f64, f64),
     /// Smallest and largest command to the second pump; `None`: no second pump runs \[input unit\].
     pub input_2: Option<(f64, f64)>,
+    /// Deciles of the commands, where they are known \[input unit\].
+    #[serde(default)]
+    pub input_deciles: [Option<Deciles>; 2],
     /// Range over which the actuator works: the known one, or zero to the largest command \[input unit\].
     pub input_range: f64,
     /// How many vessels there are, as [`Structure::new`] knows it.
     pub vessels: usize,
     /// Smallest and largest level that each vessel visits, as far as it is known \[level unit\].
     pub level: [(f64, f64); MAX_VESSELS],
+    /// Deciles of these levels, where they are known \[level unit\].
+    #[serde(default)]
+    pub level_deciles: [Option<Deciles>; MAX_VESSELS],
+    /// Height of the tanks, where it is known, as [`Structure::new`] knows it \[level unit\].
+    #[serde(default)]
+    pub tank_height: Option<f64>,
     /// Mean level of each vessel \[level unit\].
     pub operating_level: [f64; MAX_VESSELS],
     /// Area of each vessel, one where it is not known.
@@ -59,6 +68,34 @@ pub struct Scales {
     pub sample_interval: f64,
     /// Length of the longest record \[s\].
     pub duration: f64,
+}
+
+/// The 10 %, 20 %, ... 90 % quantiles of what was visited.
+pub type Deciles = [f64; 9];
+
+/// The quantile of a share, between two ends and straight between the deciles; of an even spread where these are not known.
+fn quantile(share: f64, (low, high): (f64, f64), deciles: Option<&Deciles>) -> f64 {
+    let Some(deciles) = deciles else {
+        return low + share * (high - low);
+    };
+    let at = |i: usize| match i {
+        0 => low,
+        10 => high,
+        _ => deciles[i - 1],
+    };
+    let place = 10.0 * share.clamp(0.0, 1.0);
+    let below = (place as usize).min(9);
+    at(below) + (place - below as f64) * (at(below + 1) - at(below))
+}
+
+/// The deciles of values; `None` of nothing.
+#[must_use]
+pub fn deciles(mut values: Vec<f64>) -> Option<Deciles> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some(std::array::from_fn(|i| {
+        values[((i + 1) as f64 * last as f64 / 10.0).round() as usize]
+    }))
 }
 
 impl Scales {
@@ -166,6 +203,40 @@ impl Site<'_> {
     pub fn duration(&self) -> f64 {
         self.scales.duration.max(f64::MIN_POSITIVE)
     }
+    /// The command to the pump below which it stays for a share of the time.
+    #[must_use]
+    pub fn input_quantile(&self, share: f64) -> f64 {
+        let second = self.vessel == 1 && self.scales.input_2.is_some();
+        let deciles = &self.scales.input_deciles[usize::from(second)];
+        quantile(share, self.input(), deciles.as_ref())
+    }
+    /// The level below which the vessel stays for a share of the time.
+    #[must_use]
+    pub fn level_quantile(&self, share: f64) -> f64 {
+        let deciles = &self.scales.level_deciles[self.vessel];
+        quantile(share, self.level(), deciles.as_ref())
+    }
+    /// The same of the measured vessel.
+    #[must_use]
+    pub fn measured_quantile(&self, share: f64) -> f64 {
+        let deciles = &self.scales.level_deciles[self.scales.measured];
+        quantile(share, self.measured_level(), deciles.as_ref())
+    }
+    /// The highest place for a rim or a hole: the height of the tank, where it is known and the level is counted from its bottom; else so far
+    /// above the largest level that nothing there would show. A level that is not measured is known from the believed model alone,
+    /// which may have it far too low.
+    #[must_use]
+    pub fn highest_place(&self) -> f64 {
+        let (low, high) = self.level();
+        let beyond = if self.is_measured() { 0.5 } else { 3.0 };
+        let beyond = high + beyond * (high - low);
+        let absolute = self.is_measured() || self.plant.outlet() == Outlet::Torricelli;
+        match self.scales.tank_height.filter(|_| absolute) {
+            // What a wrong model has run over still has room for a rim.
+            Some(height) => height.max(low + 0.1 * (high - low)),
+            None => beyond,
+        }
+    }
     /// Smallest and largest level of the measured vessel.
     #[must_use]
     pub fn measured_level(&self) -> (f64, f64) {
@@ -205,6 +276,7 @@ impl Structure {
         let scales = &mut structure.scales;
         scales.measured = structure.known.measured.unwrap_or(plant.vessels() - 1);
         scales.orifice = structure.known.orifice;
+        scales.tank_height = structure.known.tank_height;
         scales.vessels = plant.vessels();
         if !plant.joined() {
             scales.input_2 = None;
@@ -454,8 +526,11 @@ impl Scales {
         Self {
             input,
             input_2: None,
+            input_deciles: [None; 2],
             input_range: input.0.abs().max(input.1.abs()),
             level: [output; MAX_VESSELS],
+            level_deciles: [None; MAX_VESSELS],
+            tank_height: None,
             operating_level: [middle; MAX_VESSELS],
             area: [1.0; MAX_VESSELS],
             vessels: 1,
@@ -468,5 +543,56 @@ impl Scales {
             sample_interval,
             duration,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_lie_on_what_was_visited() {
+        // Nine tenths of the time near the lower end.
+        let values: Vec<f64> = (0..=1000)
+            .map(|k| f64::from(k) / 1000.0)
+            .map(|x| if x < 0.9 { x } else { 0.9 + 91.0 * (x - 0.9) })
+            .collect();
+        let known = deciles(values).unwrap();
+        let at = |share| quantile(share, (0.0, 10.0), Some(&known));
+        for (share, value) in [
+            (0.0, 0.0),
+            (0.25, 0.25),
+            (0.9, 0.9),
+            (0.95, 5.45),
+            (1.0, 10.0),
+        ] {
+            assert!((at(share) - value).abs() < 1e-9, "{share}: {}", at(share));
+        }
+        assert_eq!(quantile(0.25, (2.0, 10.0), None), 4.0);
+        assert_eq!(deciles(Vec::new()), None);
+        assert_eq!(deciles(vec![3.0]), Some([3.0; 9]));
+    }
+
+    #[test]
+    fn rims_and_holes_lie_within_the_tank() {
+        let scales = Scales::from_ranges((3.0, 7.0), (5.0, 25.0), 1.0, 100.0);
+        let at = |tank_height, vessel| {
+            let known = Known {
+                tank_height,
+                ..Known::default()
+            };
+            let structure = Structure::new(Plant::CascadedTanks, known, scales.clone());
+            ["overflow", "leak_at_height"].map(|id| {
+                let effect = EffectInfo::find(id).unwrap();
+                let parameters = structure.effect_parameters(Placed { effect, vessel });
+                let named = |p: &&ParameterInfo| p.name == "rim" || p.name == "height";
+                parameters.iter().find(named).unwrap().upper
+            })
+        };
+        assert_eq!(at(None, 1), [35.0; 2]);
+        // The level of the upper tank is known from the believed model alone.
+        assert_eq!(at(None, 0), [85.0; 2]);
+        assert_eq!(at(Some(28.0), 0), [28.0; 2]);
+        assert_eq!(at(Some(28.0), 1), [28.0; 2]);
     }
 }

@@ -7,8 +7,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use ct_signals::{Hold, Record};
-use plants::{Command, Place, Placed, Scales, Structure, controller::Controller};
+use ct_signals::{Hold, Record, Signal};
+use plants::{
+    Command, MAX_VESSELS, Place, Placed, Scales, Structure, controller::Controller, deciles,
+};
 
 pub use self::{
     rows::Rows,
@@ -76,6 +78,16 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
         .fold(f64::INFINITY, f64::min);
     let mut scales = Scales::from_ranges(input, output, sample, span(records));
     scales.input_2 = input_2;
+    let commands = |signal: fn(&Record) -> Option<&Signal>| {
+        let signals = records.iter().filter_map(signal);
+        deciles(signals.flat_map(|signal| &signal.values).copied().collect())
+    };
+    scales.input_deciles = [
+        commands(|record| Some(&record.input)),
+        commands(|record| record.input_2.as_ref()),
+    ];
+    let readings = records.iter().flat_map(|record| &record.output.values);
+    scales.level_deciles = [deciles(readings.copied().collect()); MAX_VESSELS];
     if let Some((low, high)) = input_2 {
         scales.input_range = scales.input_range.max(low.abs()).max(high.abs());
     }

@@ -1,7 +1,7 @@
 //! What a setup shows at a vector: simulations on the measured command or in the loop, and what is left of the records.
 
 use ct_signals::{Record, Signal};
-use plants::{MAX_VESSELS, Scalar, Scales, Simulator};
+use plants::{MAX_VESSELS, Scalar, Scales, Simulator, deciles};
 
 use super::{Setup, at_rest, commands, reference, second_command};
 use crate::{Error, feedback::step};
@@ -52,6 +52,15 @@ impl Setup<'_> {
     /// # Errors
     /// Where the vector has the wrong length, or nobody waits any more.
     pub fn simulate(&self, x: &[f64]) -> Result<Simulated, Error> {
+        self.simulate_seeing(x, |_| ())
+    }
+
+    /// The same; `see` is shown the levels at every sample.
+    fn simulate_seeing(
+        &self,
+        x: &[f64],
+        mut see: impl FnMut([f64; MAX_VESSELS]),
+    ) -> Result<Simulated, Error> {
         if self.stopped() {
             return Err(Error::Stopped);
         }
@@ -71,6 +80,7 @@ impl Setup<'_> {
             let mut output = Vec::with_capacity(record.len());
             self.run(record, &mut simulator, |_, y, simulator| {
                 output.push(y);
+                see(simulator.levels());
                 for (i, level) in simulator.levels().into_iter().enumerate() {
                     simulated.level[i].0 = simulated.level[i].0.min(level);
                     simulated.level[i].1 = simulated.level[i].1.max(level);
@@ -229,10 +239,15 @@ impl Setup<'_> {
     /// # Errors
     /// As [`Setup::simulate`].
     pub fn scales_at(&self, x: &[f64]) -> Result<Scales, Error> {
-        let simulated = self.simulate(x)?;
+        let mut levels: [Vec<f64>; MAX_VESSELS] = Default::default();
+        let simulated = self.simulate_seeing(x, |visited| {
+            for (all, level) in levels.iter_mut().zip(visited) {
+                all.push(level);
+            }
+        })?;
         let plant = self.structure.plant;
         let mut scales = self.structure.scales.clone();
-        for vessel in 0..plant.vessels() {
+        for (vessel, visited) in levels.into_iter().enumerate().take(plant.vessels()) {
             let (low, high) = simulated.level[vessel];
             if low.is_finite() && high.is_finite() && high > low {
                 let measured = vessel == scales.measured;
@@ -242,6 +257,7 @@ impl Setup<'_> {
                     (low.min(0.0), high.max(0.0))
                 };
                 scales.operating_level[vessel] = simulated.mean_level[vessel];
+                scales.level_deciles[vessel] = deciles(visited);
             }
         }
         let mean = |signal: fn(&Record) -> Option<&Signal>| {

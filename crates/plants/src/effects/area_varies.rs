@@ -22,8 +22,8 @@ fn parameters(_: &Site) -> Vec<ParameterInfo> {
         unit: Unit::ONE,
         meaning: "relative widening for a relative rise of the level",
         absent: 0.0,
-        lower: -0.6,
-        upper: 1.5,
+        lower: -0.9,
+        upper: 3.0,
         starts: vec![0.1],
     }]
 }

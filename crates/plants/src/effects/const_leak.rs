@@ -24,8 +24,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         meaning: "flow that leaves unseen",
         absent: 0.0,
         lower: 0.0,
-        // More than this does not leak away unseen.
-        upper: 0.2 * flow,
+        // More than this does not leak away unseen; out of a tank whose level nobody sees all of it may.
+        upper: if site.is_measured() { 0.6 } else { 1.0 } * flow,
         starts: vec![0.05 * flow],
     }]
 }

@@ -38,7 +38,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     }
     let (sample, duration) = (site.scales.sample_interval, site.duration());
     vec![
-        coupling("share", "surface of the side tank over that of the tank", 3.0, 0.1),
+        coupling("share", "surface of the side tank over that of the tank", 10.0, 0.1),
         ParameterInfo {
             name: "time_constant",
             unit: Unit::TIME,

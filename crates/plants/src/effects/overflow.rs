@@ -1,6 +1,6 @@
 //! `overflow`: the level cannot rise above the rim; what spills is lost, or reaches the next tank in part.
 
-use super::{EffectInfo, Place, any_plant, spread};
+use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Rim, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
@@ -25,8 +25,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         meaning: "height of the rim",
         absent: f64::INFINITY,
         lower: low - 0.5 * span,
-        upper: high + 0.5 * span,
-        starts: spread(low + 0.4 * span, high, 4),
+        upper: site.highest_place(),
+        starts: [0.45, 0.65, 0.82, 0.95].map(|share| site.level_quantile(share)).to_vec(),
     }];
     if site.is_above_another() {
         parameters.push(ParameterInfo {

@@ -28,8 +28,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         unit: Unit::FLOW,
         meaning,
         absent: 0.0,
-        lower: -0.3 * flow,
-        upper: 0.3 * flow,
+        lower: -flow,
+        upper: flow,
         starts: vec![start * flow],
     };
     let (fewest, most, step) = PERIODS;

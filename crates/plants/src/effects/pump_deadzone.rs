@@ -18,8 +18,12 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.input();
+    let mut starts = if low >= 0.0 {
+        [0.1, 0.3, 0.5].map(|share| site.input_quantile(share)).to_vec()
+    } else {
+        spread(0.0, 0.6 * high.max(-low), 3)
+    };
     let (low, high) = (low.abs().min(high.abs()), low.abs().max(high.abs()));
-    let mut starts = spread(low, low + 0.6 * (high - low), 3);
     starts.insert(0, 0.5 * low);
     vec![ParameterInfo {
         name: "threshold",

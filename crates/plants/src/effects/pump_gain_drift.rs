@@ -27,8 +27,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             unit: Unit::ONE,
             meaning: "relative change of the gain over the record",
             absent: 0.0,
-            lower: -0.5,
-            upper: 0.5,
+            lower: -0.9,
+            upper: 2.0,
             starts: vec![0.01],
         },
         ParameterInfo {

@@ -18,14 +18,17 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.input();
+    // Over all of the range, and on what was visited most.
+    let mut starts = spread(low, high, 4);
+    starts.extend([0.3, 0.7].map(|share| site.input_quantile(share)));
     vec![ParameterInfo {
         name: "limit",
         unit: Unit::INPUT,
         meaning: "command above which the inflow no longer rises",
         absent: f64::INFINITY,
-        lower: low + 0.2 * (high - low),
+        lower: low + 0.02 * (high - low),
         upper: high,
-        starts: spread(low + 0.35 * (high - low), high, 4),
+        starts,
     }]
 }
 

@@ -18,8 +18,8 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
-    // A tenth of what it reads is more than a sensor drifts unseen.
-    let most = 0.1 * low.abs().max(high.abs());
+    // More than this no sensor drifts unseen.
+    let most = (0.3 * low.abs().max(high.abs())).max(high - low);
     vec![ParameterInfo {
         name: "change",
         unit: Unit::LEVEL,
@@ -27,7 +27,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         absent: 0.0,
         lower: -most,
         upper: most,
-        starts: vec![0.1 * most],
+        starts: vec![0.03 * most],
     }]
 }
 

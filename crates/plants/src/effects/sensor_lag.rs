@@ -24,7 +24,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         meaning: "time constant of the sensor",
         absent: 0.0,
         lower: 0.0,
-        upper: 0.2 * duration,
+        upper: 0.5 * duration,
         starts: vec![sample, 8.0 * sample],
     }]
 }

@@ -22,8 +22,9 @@ fn parameters(_: &Site) -> Vec<ParameterInfo> {
         unit: Unit::ONE,
         meaning: "curvature: above zero the reading bends upwards",
         absent: 0.0,
-        lower: -0.5,
-        upper: 0.5,
+        // Beyond one the reading would turn back.
+        lower: -0.95,
+        upper: 0.95,
         starts: vec![0.02],
     }]
 }

@@ -1,6 +1,6 @@
 //! `sensor_saturation`: above a limit the reading does not rise.
 
-use super::{EffectInfo, Place, any_plant, spread};
+use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
@@ -19,14 +19,14 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
     let span = high - low;
-    let mut starts = spread(low + 0.6 * span, high, 2);
+    let mut starts = [0.5, 0.8].map(|share| site.measured_quantile(share)).to_vec();
     starts.push(high);
     vec![ParameterInfo {
         name: "limit",
         unit: Unit::LEVEL,
         meaning: "largest reading",
         absent: f64::INFINITY,
-        lower: low + 0.3 * span,
+        lower: low + 0.02 * span,
         upper: high + 0.05 * span,
         starts,
     }]

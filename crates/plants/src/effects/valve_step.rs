@@ -29,8 +29,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             unit: Unit::ONE,
             meaning: "relative change of the outflow",
             absent: 0.0,
-            lower: fully_shut(site, -0.5),
-            upper: 0.5,
+            lower: fully_shut(site, -0.9),
+            upper: 2.0,
             starts: changes,
         },
         ParameterInfo {

@@ -11,7 +11,7 @@ use std::{error::Error, fs, path::PathBuf};
 
 use clap::Parser;
 use ctid_tests::{Drive, Rig, three_tanks};
-use missing_effect::{Options, Problem, compare, diagnose};
+use missing_effect::{Options, Problem, TIME_LIMIT, compare, diagnose};
 use plants::Plant;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -60,6 +60,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut cells = in_loop();
     cells.extend(slow());
     cells.retain(|cell| cell.name.contains(&arguments.filter));
+    let limited = Options {
+        time_limit: Some(TIME_LIMIT),
+        ..Options::default()
+    };
     println!(
         "{:<56} {:>7} {:>7} {:>4} {:>7} {:>7}  found",
         "cell", "compare", "cpu", "most", "wall", "cpu"
@@ -67,12 +71,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut all: Vec<Value> = Vec::new();
     for Cell { name, problem } in cells {
         let before = processor();
-        let compared = compare(&problem, &Options::default())?;
+        let compared = compare(&problem, &limited)?;
         let compare_cpu = processor() - before;
         for &max_effects in &most {
             let options = Options {
                 max_effects,
-                ..Options::default()
+                ..limited
             };
             let before = processor();
             let found = diagnose(&problem, &options, &|_| {})?;

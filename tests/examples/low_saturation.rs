@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, error::Error, fs, path::PathBuf};
 use clap::Parser;
 use ctid_tests::Rig;
 use greybox::Setup;
-use missing_effect::{Diagnosis, Options, Problem, Step, compare, diagnose};
+use missing_effect::{Diagnosis, Options, Problem, Step, TIME_LIMIT, compare, diagnose};
 use plants::{EffectInfo, Known, Placed};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -40,14 +40,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..Rig::cascaded_tanks()
     };
     let mut all = Vec::new();
+    let options = Options {
+        time_limit: Some(TIME_LIMIT),
+        ..Options::default()
+    };
     for seed in 0..arguments.records {
         let record = rig.run(&mut ChaCha8Rng::seed_from_u64(seed));
         let mut problem = rig.problem(record);
         if seed % 2 == 1 {
             problem.known = Known::default();
         }
-        let compared = compare(&problem, &Options::default())?;
-        let found = diagnose(&problem, &Options::default(), &|_| {})?;
+        let compared = compare(&problem, &options)?;
+        let found = diagnose(&problem, &options, &|_| {})?;
         let first = found
             .effects
             .first()

@@ -5,7 +5,7 @@ use std::{error::Error, fs, path::PathBuf};
 
 use clap::Parser;
 use ctid_tests::measured::{Case, Mark, Source, cases, claims_feedback, folder};
-use missing_effect::{Diagnosis, Options, Step, diagnose};
+use missing_effect::{Diagnosis, Options, Step, TIME_LIMIT, diagnose};
 use serde_json::{Value, json};
 
 /// Diagnoses measured records of which it is known what a simple model lacks.
@@ -42,6 +42,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         "{:<46} {:<7} {:<12} {:>6} {:>17} {:>17}  groups",
         "record", "", "verdict", "s", "error", "held out"
     );
+    let options = Options {
+        time_limit: Some(TIME_LIMIT),
+        ..Options::default()
+    };
     for (name, case) in cases(&arguments.filter) {
         let case = match case {
             Ok(case) => case,
@@ -54,7 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let row = rows.iter_mut().find(|(source, _)| *source == case.source);
         let Some((_, row)) = row else { continue };
         row.tried += 1;
-        match diagnose(&case.problem, &Options::default(), &|_| {}) {
+        match diagnose(&case.problem, &options, &|_| {}) {
             Err(why) => {
                 println!("{name:<46} refused: {why}");
                 all.push(json!({ "record": name, "refused": why.to_string() }));

@@ -114,6 +114,7 @@ impl Work {
             simulate_loop: !self.measured,
             stop: Some(stop),
             interrupt: Some(interrupt),
+            time_limit: Some(missing_effect::TIME_LIMIT),
             ..Options::default()
         }
     }

@@ -60,7 +60,7 @@ fn feedback_is_found_where_it_is_and_only_there() {
                 let feedback = known(&found);
                 assert!(!feedback.simulated && feedback.feedback_p.unwrap() < 1e-4);
                 let said = found.sentences.join(" ");
-                assert!(said.contains("there is feedback") && said.contains("[controller]"));
+                assert!(said.contains("Feedback detected") && said.contains("[controller]"));
             }
         }
     }

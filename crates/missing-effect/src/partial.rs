@@ -4,8 +4,7 @@
 //! that nothing was found: a set is a partial answer where
 //! - it explains [`PART`](crate::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one with an
 //!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::judge::WHOLE) of it;
-//! - the criterion falls beyond chance, each model under the noise model of its own residual, whose memory is limited, or what is
-//!   fitted to one half of the record helps on the other;
+//! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
 //! - sizes are inside their bounds, and states are physical;
 //! - a single jump of the reading does not explain more.
 //!
@@ -17,7 +16,6 @@ use rayon::prelude::*;
 
 use crate::{
     Error,
-    confirm::{BIC_MARGIN, beyond_chance},
     find::Found,
     judge::{PART, WHOLE, explained},
     jump::jump,
@@ -35,7 +33,7 @@ const MOST: usize = 3;
 /// A larger set leaves at most this part of what the smaller one leaves of the excess error.
 const LEFT: f64 = 0.5;
 
-/// What noise may explain as well has to explain this part of the error on a half of the record that was not fitted.
+/// A set explains this part of the mean squared error at least on a half of the record that was not fitted.
 const CARRIED_OVER: f64 = 0.2;
 
 /// By how much the logarithm of the mean square with a jump has to lie below that of a set.
@@ -207,15 +205,18 @@ fn test<'a>(
     } else {
         let own = in_own_noise(&node)?;
         bic_fall = own.gain_over(own_base);
-        let beyond_noise = bic_fall > BIC_MARGIN && beyond_chance(&own, own_base);
-        if !beyond_noise && carried_over(base, &node)? < CARRIED_OVER {
+        if carried_over(base, &node)? < CARRIED_OVER {
             reasons.push(
-                "coloured noise explains as much, and one half of the record does not predict it in the other"
-                    .to_string(),
+                "what is fitted to one half of the record does not predict the other".to_string(),
             );
         }
     }
     let timeless = without_clock(&node, &ArModel::white(1.0))?;
+    if required > PART && node.added.len() > 1 {
+        reasons.push(
+            "with an effect that follows time alone a set bends to any disturbance".to_string(),
+        );
+    }
     if required > PART && !beyond_random_walk(&node, &timeless)? {
         reasons.push("a random walk explains as much".to_string());
     }

@@ -132,6 +132,7 @@ fn every_error_is_a_simulation_error_on_data_that_are_named() {
             "simulation error",
             "standard error",
             "squared error",
+            "held-out error",
             "error after",
         ]
         .iter()

@@ -397,7 +397,9 @@ fn a_held_out_record_changes_no_fit_and_no_choice() {
         for step in with["steps"].as_array_mut().unwrap() {
             assert!(number(&step["rmse_test"]) > 0.0);
             step["rmse_test"] = Value::Null;
+            step["held_out_error"] = Value::Null;
         }
+        with["acceptance"]["share_test"] = Value::Null;
         // The findings in words tell of the held-out error.
         with["sentences"] = without["sentences"].clone();
         assert_eq!(with, without);

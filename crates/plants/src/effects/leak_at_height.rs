@@ -36,9 +36,9 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             meaning: "outflow through the hole at one unit of level above it",
             absent: 0.0,
             lower: 0.0,
-            // A wide opening lets out all that comes, as a rim does: nothing bounds its width.
-            upper: 100.0 * whole,
-            starts: vec![0.05 * whole, 2.0 * whole],
+            // A wider opening lets out all that comes: that is a rim.
+            upper: 2.0 * whole,
+            starts: vec![0.05 * whole],
         },
         ParameterInfo {
             name: "height",

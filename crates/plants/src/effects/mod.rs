@@ -68,6 +68,8 @@ impl EffectInfo {
             "stiction_backlash",
             "coupled_tank",
             "overflow",
+            "leak_at_height",
+            "sensor_offset",
             "sensor_saturation",
             "coarse_quantisation",
         ];

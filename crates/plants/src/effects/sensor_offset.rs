@@ -18,9 +18,8 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
-    // A live zero (4 to 20 mA, 2 to 10 V) reads a fifth of the range for an empty tank, of a reading in the lower half of the range more
-    // than a half.
-    let most = (0.6 * low.abs().max(high.abs())).max(high - low);
+    // A live zero (4 to 20 mA, 2 to 10 V) reads a fifth of the range for an empty tank; more would have been seen.
+    let most = 0.25 * low.abs().max(high.abs());
     vec![ParameterInfo {
         name: "offset",
         unit: Unit::LEVEL,
@@ -28,7 +27,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         absent: 0.0,
         lower: -most,
         upper: most,
-        starts: vec![0.05 * most],
+        starts: vec![0.1 * most],
     }]
 }
 

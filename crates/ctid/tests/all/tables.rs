@@ -261,9 +261,10 @@ fn the_emulated_rig_misses_its_dead_zone() {
     assert!(before > 0.5 && after < 0.1, "{before} {after}");
     // One effect alone would be a backlash, which imitates the dead zone and the sensor's filter at once.
     let (effects, before, after) = missing("tank.toml", "");
+    // A constant leak is the same as long as the command stays above the dead zone.
     assert_eq!(
         effects,
-        serde_json::json!([["pump_deadzone"], ["pump_lag", "sensor_lag"]])
+        serde_json::json!([["pump_deadzone", "const_leak"], ["pump_lag", "sensor_lag"]])
     );
     assert!(before > 0.2 && after < 0.02, "{before} {after}");
 }

@@ -37,7 +37,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             absent: 0.0,
             lower: 0.0,
             // A wider opening lets out all that comes: that is a rim.
-            upper: 2.0 * whole,
+            upper: 0.5 * whole,
             starts: vec![0.05 * whole],
         },
         ParameterInfo {

@@ -1,6 +1,6 @@
 //! `leak_at_height`: a hole in the wall, through which water leaves once the level is above it.
 
-use super::{EffectInfo, Place, any_plant};
+use super::{EffectInfo, Place, any_plant, spread};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
@@ -19,10 +19,12 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.level();
     let span = (high - low).max(f64::MIN_POSITIVE);
-    // The throughput through a hole that is halfway up what the level visits: a level that a controller holds visits little, and a hole far
-    // below it lets out twice as much.
+    // Half the throughput through a hole that is halfway up would have been seen.
     let whole = site.scales.flow.abs() / (0.5 * span).sqrt();
-    let mut starts = [0.1, 0.3, 0.5, 0.7, 0.9].map(|share| site.level_quantile(share)).to_vec();
+    // A level that is not measured is known from the believed model alone, which has its water leave by another way and may have
+    // it far too low.
+    let beyond = if site.is_measured() { 0.5 } else { 3.0 } * span;
+    let mut starts = spread(low, high, 5);
     let mut lowest = low - 0.5 * span;
     if site.is_joined_to_next() {
         // Of joined tanks any may leak at its bottom; that of a tank with an outlet of its own is the outlet's.
@@ -36,7 +38,6 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             meaning: "outflow through the hole at one unit of level above it",
             absent: 0.0,
             lower: 0.0,
-            // A wider opening lets out all that comes: that is a rim.
             upper: 0.5 * whole,
             starts: vec![0.05 * whole],
         },
@@ -46,7 +47,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             meaning: "level from which on it leaks",
             absent: f64::NAN,
             lower: lowest,
-            upper: site.highest_place(),
+            upper: high + beyond,
             starts,
         },
     ]

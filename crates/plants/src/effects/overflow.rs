@@ -1,6 +1,6 @@
 //! `overflow`: the level cannot rise above the rim; what spills is lost, or reaches the next tank in part.
 
-use super::{EffectInfo, Place, any_plant};
+use super::{EffectInfo, Place, any_plant, spread};
 use crate::{Law, ParameterInfo, Rim, Scalar, Site, Unit};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
@@ -26,7 +26,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         absent: f64::INFINITY,
         lower: low - 0.5 * span,
         upper: site.highest_place(),
-        starts: [0.45, 0.65, 0.82, 0.95].map(|share| site.level_quantile(share)).to_vec(),
+        starts: spread(low + 0.4 * span, high, 4),
     }];
     if site.is_above_another() {
         parameters.push(ParameterInfo {

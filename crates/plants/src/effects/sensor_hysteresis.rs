@@ -29,14 +29,14 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         starts,
     };
     vec![
-        info("step", "by how much the reading is too high", 0.0, 0.0, 0.3 * span, vec![0.03 * span]),
+        info("step", "by how much the reading is too high", 0.0, 0.0, 0.1 * span, vec![0.03 * span]),
         info(
             "drop",
             "level at which a falling reading drops back",
             f64::NAN,
             low + 0.02 * span,
-            low + 0.98 * span,
-            (0..12).map(|i| site.measured_quantile(0.04 + 0.08 * f64::from(i))).collect(),
+            low + 0.9 * span,
+            (0..12).map(|i| low + span * (0.06 + 0.07 * f64::from(i))).collect(),
         ),
         info("rise", "how far above `drop` the reading sticks in full", f64::NAN, 0.02 * span, span, vec![0.25 * span]),
     ]

@@ -3,7 +3,8 @@
 //! Measured records often hold several causes, and noise that is nearly integrated. That no set of effects leaves noise does not mean
 //! that nothing was found: a set is a partial answer where
 //! - it explains [`PART`](crate::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one with an
-//!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::judge::WHOLE) of it;
+//!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::judge::WHOLE) of it,
+//!   alone and beyond what a random walk explains;
 //! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
 //! - sizes are inside their bounds, and states are physical;
 //! - a single jump of the reading does not explain more.

@@ -16,8 +16,11 @@ use crate::{
     sentences, step,
 };
 
-/// Share of a diagnosis' time limit that a comparison has.
+/// Share of a diagnosis' time limit that a comparison has, and of that the shares after which its phases end: further starts, single
+/// effects.
 const SHARE: f64 = 0.2;
+const FITTED: f64 = 0.6;
+const TRIED: f64 = 0.8;
 
 /// Fits the believed model and says where it fails: a diagnosis of one step without a search of sets.
 ///
@@ -30,8 +33,8 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
         time_limit: options.time_limit.map(|limit| limit.mul_f64(SHARE)),
         ..*options
     };
-    let (base, control_loop) = base(problem, options)?;
-    allow(&base, 0.7);
+    let (base, control_loop) = base(problem, options, FITTED)?;
+    allow(&base, TRIED);
     let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
     // The model lacks something where its residual is not noise, or where some effect would lower the error by more than
     // chance does: the one needs no catalogue, the other sees what is small.

@@ -21,7 +21,9 @@ use crate::{
     unknown::unknown,
 };
 
-/// Shares of the time limit after which the phases end: the search of sets, then all that follows but the report.
+/// Shares of the time limit after which the phases end: further starts of the believed model, the search of sets, then all that follows
+/// but the report.
+pub(crate) const FITTED: f64 = 0.2;
 const SEARCHED: f64 = 0.65;
 const CONFIRMED: f64 = 0.9;
 
@@ -37,7 +39,7 @@ pub fn diagnose(
     let begun = Instant::now();
     let tell = |phase, done, total| progress(Progress { phase, done, total });
     tell("fitting the model", 0, 1);
-    let (base, control_loop) = base(problem, options)?;
+    let (base, control_loop) = base(problem, options, FITTED)?;
     allow(&base, SEARCHED);
     let found = find(&base, options.max_effects, &tell)?;
     allow(&base, CONFIRMED);

@@ -14,6 +14,9 @@ use crate::{
 pub(crate) const NEAR: f64 = 25.0;
 /// Stand-ins that are refitted for each effect: so many that a promise favours, and so many that a few steps favour.
 const EXCHANGED: usize = 12;
+/// In a set of more than so many effects half as many, and a few steps for so many: a fit costs several times as much.
+const LARGE: usize = 2;
+const QUICKLY: usize = 16;
 /// What is behind by more than this part of an effect's own gain after a few steps does not catch up.
 const OUT_OF_REACH: f64 = 0.5;
 
@@ -110,6 +113,12 @@ fn begin_exchanges<'a>(
         })
         .collect();
     proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    let refitted = if lacking.added.len() < LARGE {
+        EXCHANGED
+    } else {
+        proposals.truncate(QUICKLY);
+        EXCHANGED / 2
+    };
     // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
     // worth. A few steps are too few where parameters nearly imitate each other, and there the promise holds.
     let mut begun: Vec<(usize, Node)> = proposals
@@ -121,7 +130,7 @@ fn begin_exchanges<'a>(
     begun
         .into_iter()
         .enumerate()
-        .filter(|(quick, (promised, _))| *quick < EXCHANGED || *promised < EXCHANGED)
+        .filter(|(quick, (promised, _))| *quick < refitted || *promised < refitted)
         .map(|(_, (_, begun))| begun)
         .collect()
 }

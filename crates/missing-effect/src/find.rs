@@ -1,11 +1,13 @@
 //! The search: a set of effects, and the noise in whose metric it is confirmed.
 
 use ct_signals::ArModel;
+use rayon::prelude::*;
 
 use crate::{
     Error,
     confirm::{BIC_MARGIN, confirm, improve, least_useful},
     exhausted::exhausted,
+    floating::follow,
     minima::begun_again,
     node::{Node, refine},
     noise_floor::{bic_in_colour, colour, longest_memory, wanders},
@@ -15,7 +17,9 @@ use crate::{
 /// Sets grown side by side, and refits of a size.
 const BEAM: usize = 3;
 const REFITS: usize = 12;
-/// Sets are grown to so many effects where they pay.
+/// Sets are grown side by side up to so many effects, ...
+const SIDE_BY_SIDE: usize = 3;
+/// ... and one by one to so many where they pay.
 const RICHEST: usize = 6;
 
 /// In the metric of a noise that wanders they are grown to so many.
@@ -54,22 +58,37 @@ pub(crate) fn find<'a>(
         // What may be added does not bound what is tried: only the richest model shows what is noise.
         most: most.max(RICHEST),
     };
-    let pays = |before: &Node, after: &Node| after.gain_over(before) > BIC_MARGIN;
+    let pays = |before: &Node, after: &[Node]| {
+        let best = after.first();
+        best.is_some_and(|best| best.gain_over(before) > BIC_MARGIN)
+    };
     // While the colour is not known, a coloured noise would pay for one effect after the other: what counts is what remains of
-    // the gain where each model has the colour of its own residual.
-    let pays_in_colour = |before: &Node, after: &Node| {
-        let fall = || Ok::<_, Error>(bic_in_colour(before)? - bic_in_colour(after)?);
+    // the gain where each model has the colour of its own residual. Any set of a size may show it: the one with the least
+    // simulation error may be rough from sample to sample.
+    let pays_in_colour = |before: &Node, after: &[Node]| {
+        let least = || {
+            let all = after.par_iter().map(bic_in_colour);
+            let all = all.collect::<Result<Vec<f64>, Error>>()?;
+            Ok::<_, Error>(all.into_iter().fold(f64::INFINITY, f64::min))
+        };
+        let fall = || Ok::<_, Error>(bic_in_colour(before)? - least()?);
         pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
     };
     let white = ArModel::white(1.0);
-    let grown = grow(
+    let mut grown = grow(
         base,
         &white,
-        breadth,
+        Breadth {
+            most: SIDE_BY_SIDE,
+            ..breadth
+        },
         pays_in_colour,
         exhausted,
         &|done, total| tell("searching sets of effects", done, total),
     )?;
+    if grown.goes_on(SIDE_BY_SIDE) {
+        follow(base, &mut grown, &white, breadth.most)?;
+    }
     let mut richest = refine(&chosen(&grown.sizes, base), &white, &[])?;
     if richest.added.len() > 1 {
         let effects = richest.added.clone();

@@ -129,7 +129,7 @@ mod tests {
         {
             let step = part * NOISE;
             let problem = problem(step, colour, seed as u64);
-            let (node, _) = base(&problem, &Options::default()).unwrap();
+            let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
             let found = hidden_step(&node).unwrap().unwrap();
             // Over the range of the readings, of 8 at most, it counts right to less than one. What is below that range is not
             // seen: at half the noise the whole count may be one off.
@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn the_steps_that_were_looked_at_are_paid_for() {
         let problem = simulated::tank(|u| u, |_, level| level, 0.0, 7);
-        let (node, _) = base(&problem, &Options::default()).unwrap();
+        let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
         let found = hidden_step(&node).unwrap().unwrap();
         // From two to as many as the noise leaves room for, over the range of the readings.
         assert!(found.of > 100.0);

@@ -269,7 +269,7 @@ mod tests {
     fn judged(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
         let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
         let problem = simulated::tank(|u| u.min(4.2), read, 0.0, 1);
-        let (base, _) = base(&problem, &Options::default()).unwrap();
+        let (base, _) = base(&problem, &Options::default(), 1.0).unwrap();
         let white = ArModel::white(1.0);
         let mut set = base.clone();
         for id in ["pump_saturation", "sensor_drift"] {

@@ -131,7 +131,7 @@ mod tests {
         let noise = ArModel::white(1.0);
         for by in [0.3, -0.3, 3.0] {
             let problem = problem(by, 1, 1);
-            let (node, _) = base(&problem, &Options::default()).unwrap();
+            let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
             let found = jump(&node, &noise).unwrap().unwrap();
             assert!(found.bic < node.fit.bic() - 100.0);
             let left = found.left(&problem.records[0]);
@@ -143,7 +143,7 @@ mod tests {
         // Where the reading does not jump, the best of several is less than its two parameters cost.
         let worth = (1..=10).filter(|seed| {
             let problem = problem(0.0, 1, *seed);
-            let (node, _) = base(&problem, &Options::default()).unwrap();
+            let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
             let found = jump(&node, &noise).unwrap().unwrap();
             found.bic < node.fit.bic()
         });
@@ -154,7 +154,7 @@ mod tests {
     fn of_several_records_none_is_sought() {
         let noise = ArModel::white(1.0);
         let several = problem(0.3, 2, 1);
-        let (node, _) = base(&several, &Options::default()).unwrap();
+        let (node, _) = base(&several, &Options::default(), 1.0).unwrap();
         assert!(jump(&node, &noise).unwrap().is_none());
     }
 }

@@ -17,6 +17,7 @@ mod exchange;
 mod exhausted;
 mod feedback_test;
 mod find;
+mod floating;
 mod groups;
 mod hidden_step;
 mod judge;

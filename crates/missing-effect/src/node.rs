@@ -35,6 +35,9 @@ const BEYOND: usize = 50;
 pub(crate) const STICTION: &str = "stiction_backlash";
 const NARROW: f64 = 0.25;
 
+/// What is nearer to a bound than this part of a range is at it.
+const EDGE: f64 = 1e-6;
+
 /// A structure with its fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Node<'a> {
@@ -56,6 +59,17 @@ impl Node<'_> {
         !self.added.iter().any(|placed| self.at_the_edge(*placed))
             && self.physical()
             && !self.reads_beyond_limit()
+    }
+
+    /// No added effect is absent, and no level is beyond what is physical. While much is missing, a size may be driven to its far bound
+    /// by what it stands in for beside itself.
+    pub fn possible(&self) -> bool {
+        let absent = |placed: &Placed| {
+            self.size_of(*placed).is_some_and(|(size, at)| {
+                (self.fit.x[at] - size.absent).abs() <= EDGE * (size.upper - size.lower)
+            })
+        };
+        !self.added.iter().any(absent) && self.physical() && !self.reads_beyond_limit()
     }
 
     /// The reading still rises with the level where the model has it at the sensor's limit: then the limit is not the sensor's.
@@ -135,7 +149,7 @@ impl Node<'_> {
         let Some((leading, at)) = self.size_of(placed) else {
             return false;
         };
-        let room = 1e-6 * (leading.upper - leading.lower);
+        let room = EDGE * (leading.upper - leading.lower);
         let size = self.fit.x[at];
         size <= leading.lower + room || size >= leading.upper - room
     }
@@ -194,11 +208,29 @@ pub(crate) fn without<'a>(
     position: usize,
     noise: &ArModel,
 ) -> Result<Node<'a>, Error> {
+    lacking(node, position, noise, FINE)
+}
+
+/// The same, to be extended.
+pub(crate) fn roughly_without<'a>(
+    node: &Node<'a>,
+    position: usize,
+    noise: &ArModel,
+) -> Result<Node<'a>, Error> {
+    lacking(node, position, noise, ROUGH)
+}
+
+fn lacking<'a>(
+    node: &Node<'a>,
+    position: usize,
+    noise: &ArModel,
+    stopping: Stopping,
+) -> Result<Node<'a>, Error> {
     let setup = node
         .setup
         .with_structure(node.setup.structure.without(node.added[position].effect))?;
     let start = transfer(node, &setup);
-    let fit = fit_from(&setup, &[start], noise, FINE)?;
+    let fit = fit_from(&setup, &[start], noise, stopping)?;
     let mut added = node.added.clone();
     added.remove(position);
     Ok(Node { setup, fit, added })

@@ -5,6 +5,7 @@
 //! - it explains [`PART`](crate::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one with an
 //!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::judge::WHOLE) of it,
 //!   alone and beyond what a random walk explains;
+//! - it foretells the next sample as well as the model without it does, each beside a noise model of its own;
 //! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
 //! - sizes are inside their bounds, and states are physical;
 //! - a single jump of the reading does not explain more.
@@ -29,13 +30,17 @@ use crate::{
 
 /// Sets of one size that are refitted, those with the least simulation error.
 const REFITTED: usize = 6;
-/// Largest set.
+/// Largest set, but for the confirmed one.
 const MOST: usize = 3;
 /// A larger set leaves at most this part of what the smaller one leaves of the excess error.
 const LEFT: f64 = 0.5;
 
 /// A set explains this part of the mean squared error at least on a half of the record that was not fitted.
 const CARRIED_OVER: f64 = 0.2;
+
+/// The innovations beside a set are at most so many times as large as those beside the base: what imitates a slow course by moves of its
+/// own is rougher than the record.
+const ROUGHER: f64 = 1.05;
 
 /// By how much the logarithm of the mean square with a jump has to lie below that of a set.
 const JUMP_CLEARLY: f64 = 0.1;
@@ -75,7 +80,7 @@ pub(crate) fn largest_part<'a>(
     let jump = jump(base, &white)?.map_or(f64::INFINITY, |jump| jump.bic);
     let sticks = in_loop && sticks(base.setup.records);
     let mut best: Option<Tested<'a>> = None;
-    for size in 1..=MOST {
+    for size in 1..=MOST.max(found.confirmed.added.len()) {
         if size > 1 && base.setup.out_of_time() {
             break;
         }
@@ -89,7 +94,8 @@ pub(crate) fn largest_part<'a>(
             nodes.truncate(REFITTED);
             nodes
         };
-        let mut sets = of_size(found.grown.sizes.get(size).map_or(&[], Vec::as_slice));
+        let grown = found.grown.sizes.get(size).filter(|_| size <= MOST);
+        let mut sets = of_size(grown.map_or(&[], Vec::as_slice));
         if size == 1 {
             sets.extend(of_size(singles));
             let sticking = |node: &&Node| {
@@ -98,7 +104,9 @@ pub(crate) fn largest_part<'a>(
             sets.extend(singles.iter().filter(sticking).cloned());
         }
         sets.extend(of_size(std::slice::from_ref(&found.confirmed)));
-        sets.extend(of_size(std::slice::from_ref(&found.richest)));
+        if size <= MOST {
+            sets.extend(of_size(std::slice::from_ref(&found.richest)));
+        }
         let tested = sets
             .into_par_iter()
             .filter_map(|set| refine(&set, &white, &[]).ok())
@@ -206,6 +214,9 @@ fn test<'a>(
     } else {
         let own = in_own_noise(&node)?;
         bic_fall = own.gain_over(own_base);
+        if own.fit.noise.sigma() > ROUGHER * own_base.fit.noise.sigma() {
+            reasons.push("from sample to sample the record does not go as this has it".to_string());
+        }
         if carried_over(base, &node)? < CARRIED_OVER {
             reasons.push(
                 "what is fitted to one half of the record does not predict the other".to_string(),

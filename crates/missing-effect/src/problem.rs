@@ -8,7 +8,15 @@ use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, TimeLimit, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 
-use crate::{ControlLoop, Error, closed_loop::enclose, minima::begun_again, node::Node};
+use rayon::prelude::*;
+
+use crate::{
+    ControlLoop, Error,
+    closed_loop::enclose,
+    minima::begun_again,
+    node::{Node, ROUGH},
+    proposal::{Parent, propose, realise},
+};
 
 /// What the fit of a believed model is taken to.
 pub(crate) const STOPPING: Stopping = Stopping {
@@ -16,8 +24,10 @@ pub(crate) const STOPPING: Stopping = Stopping {
     cost: 1e-9,
 };
 
-/// Share of the time limit after which the believed model has no further starts.
-const BASE_SHARE: f64 = 0.2;
+/// Share of the time limit in which the best fit follows changed ranges.
+const FOLLOW: f64 = 0.1;
+/// Random starts of the plant alone, before its effects are put on.
+const BARE_STARTS: usize = 12;
 
 /// What is to be diagnosed.
 #[derive(Debug, Clone)]
@@ -92,10 +102,11 @@ pub struct Progress {
 }
 
 /// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried. In a
-/// loop that is known it is then fitted there.
+/// loop that is known it is then fitted there. After this share of the time limit it has no further starts.
 pub(crate) fn base<'a>(
     problem: &'a Problem,
     options: &Options<'a>,
+    share: f64,
 ) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
     let fixed: BTreeMap<String, f64> = problem
         .fixed
@@ -119,13 +130,14 @@ pub(crate) fn base<'a>(
     setup.stop = options.stop;
     setup.interrupt = options.interrupt;
     let limit = Arc::new(TimeLimit::new(options.time_limit));
-    limit.allow(BASE_SHARE);
+    limit.allow(share);
     setup.time_limit = Some(limit);
     for record in &problem.records {
         record.require_rows(setup.free().len())?;
     }
     let white = ArModel::white(1.0);
     let mut starts = options.starts.max(10);
+    let one_by_one = one_by_one(&setup, options.seed)?;
     let fit = loop {
         let mut all = random_starts(&setup, starts, options.seed);
         if !problem.start.is_empty() {
@@ -134,6 +146,11 @@ pub(crate) fn base<'a>(
                 *value = problem.start.get(name).copied().unwrap_or(*value);
             }
             all.push(guessed);
+        }
+        // First: out of time no other is followed.
+        all.extend(one_by_one.clone());
+        if one_by_one.is_some() {
+            all.rotate_right(1);
         }
         let fit = fit_from(&setup, &all, &white, STOPPING)?;
         if fit.agree >= 2
@@ -145,7 +162,11 @@ pub(crate) fn base<'a>(
         starts *= 2;
     };
     setup.choose_substeps(&fit.x)?;
-    // Levels that are not measured are known now: ranges and operating levels follow them.
+    // Levels that are not measured are known now: ranges and operating levels follow them, and the parameters that are relative to
+    // these have to follow, whatever the time.
+    if let Some(limit) = &setup.time_limit {
+        limit.allow(share + FOLLOW);
+    }
     setup.structure.scales = setup.scales_at(&fit.x)?;
     let setup = setup.with_structure(setup.structure.clone())?;
     let fit = fit_from(&setup, std::slice::from_ref(&fit.x), &white, STOPPING)?.continuing(&fit);
@@ -160,4 +181,53 @@ pub(crate) fn base<'a>(
         begun_again(&mut node, &problem.effects, &white)?;
     }
     enclose(problem, options, node)
+}
+
+/// A start of a plant with effects: the plant is fitted without them, and one after the other is put on, first what lowers the error most.
+///
+/// From random starts of all at once hardly any fit of several effects finds its way. `None`: the plant has no effects.
+fn one_by_one(setup: &Setup, seed: u64) -> Result<Option<Vec<f64>>, Error> {
+    let mut remaining = setup.structure.effects().to_vec();
+    if remaining.is_empty() {
+        return Ok(None);
+    }
+    let white = ArModel::white(1.0);
+    let structure = setup.structure.clone();
+    let structure = remaining.iter().fold(structure, |structure, placed| {
+        structure.without(placed.effect)
+    });
+    let bare = setup.with_structure(structure)?;
+    let fit = fit_from(
+        &bare,
+        &random_starts(&bare, BARE_STARTS, seed),
+        &white,
+        ROUGH,
+    )?;
+    let mut node = Node {
+        setup: bare,
+        fit,
+        added: Vec::new(),
+    };
+    while !remaining.is_empty() {
+        let parent = Parent::new(&node);
+        let placed: Vec<Node> = remaining
+            .par_iter()
+            .filter_map(|placed| realise(propose(&parent, *placed, &white)?, &white, ROUGH))
+            .collect();
+        let least = |a: &Node, b: &Node| a.fit.rmse.total_cmp(&b.fit.rmse);
+        let Some(first) = placed.into_iter().min_by(least) else {
+            break;
+        };
+        remaining.retain(|placed| Some(placed) != first.added.last());
+        node = first;
+    }
+    // What was not put on for want of time is as any start has it.
+    let mut x = random_starts(setup, 1, seed).swap_remove(0);
+    let own = node.setup.names();
+    for (name, value) in setup.names().iter().zip(&mut x) {
+        if let Some(at) = own.iter().position(|known| known == name) {
+            *value = node.fit.x[at];
+        }
+    }
+    Ok(Some(x))
 }

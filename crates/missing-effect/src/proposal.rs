@@ -20,6 +20,9 @@ const PROMISE_DAMPING: f64 = 1e-6;
 /// Starts of a new effect that are followed down, the most promising of its grid.
 const FOLLOWED: usize = 2;
 
+/// Starts of an effect beside two others or more.
+const COARSE: usize = 10;
+
 /// The parameter that has as many minima as a spectrum has lines, and how many of its starts are looked at.
 const PERIOD: &str = "periodic_disturbance.period";
 const PERIODS_SHOWN: usize = 6;
@@ -200,6 +203,10 @@ pub(crate) fn promising(
     noise: &ArModel,
 ) -> Option<(f64, Vec<Start>)> {
     let mut starts = grid(from, setup, placed);
+    if from.added.len() > 1 {
+        // Beside a pair, what is the third is looked for on a coarser grid.
+        starts = every_so_many(starts, COARSE);
+    }
     keep_shown_periods(setup, placed, &mut starts, noise);
     keep_best_simulated(setup, placed, &mut starts, noise);
     let mut ranked: Vec<(f64, Start)> = starts
@@ -216,6 +223,12 @@ pub(crate) fn promising(
     let starts = ranked.into_iter().take(FOLLOWED);
     let starts = starts.map(|(_, start)| start).collect();
     Some((promise, starts))
+}
+
+/// At most so many of a list, evenly over it.
+fn every_so_many(starts: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
+    let step = starts.len().div_ceil(most);
+    starts.into_iter().step_by(step.max(1)).collect()
 }
 
 /// Of starts with many periods keeps those whose periods show most in what is not explained without the effect: a plant answers a

@@ -27,6 +27,9 @@ pub(crate) struct Breadth {
     pub most: usize,
 }
 
+/// Up to so many effects a set may hold one that follows time alone and be extended.
+pub(crate) const PAIR: usize = 2;
+
 /// Pairs that are refitted for their joint score, beside those that grow from the best single effects.
 const JOINT_PAIRS: usize = 12;
 
@@ -85,6 +88,8 @@ pub(crate) struct Grown<'a> {
     unpromising: Vec<Proposal<'a>>,
     /// The set that was exhausted, where the growth ended so.
     exhausted: Option<Vec<Placed>>,
+    /// The last size was worth it.
+    paid: bool,
 }
 
 impl<'a> Grown<'a> {
@@ -92,6 +97,21 @@ impl<'a> Grown<'a> {
     pub fn exhausted_by(&self, node: &Node) -> bool {
         let same = |set: &Vec<Placed>| key(set) == key(&node.added);
         self.exhausted.as_ref().is_some_and(same)
+    }
+
+    /// Whether sets of so many effects were grown, and still paid.
+    pub fn goes_on(&self, size: usize) -> bool {
+        self.sizes.len() > size && self.exhausted.is_none() && self.paid
+    }
+
+    /// Takes in a set that was found otherwise.
+    pub fn take_in(&mut self, node: Node<'a>) {
+        let size = node.added.len();
+        while self.sizes.len() <= size {
+            self.sizes.push(Vec::new());
+        }
+        self.sizes[size].push(node);
+        self.sizes[size].sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     }
 
     /// What [`singles`](crate::proposal::singles) gives for the base in the metric in which it was grown.
@@ -109,12 +129,12 @@ impl<'a> Grown<'a> {
 
 /// Grows sets of effects from a base.
 ///
-/// The growth ends after two sizes that are not `worth` it, and at once where the best set is `exhausted`.
+/// The growth ends after two sizes that are not `worth` it beside the best set so far, and at once where the best set is `exhausted`.
 pub(crate) fn grow<'a>(
     base: &Node<'a>,
     noise: &ArModel,
     breadth: Breadth,
-    worth: impl Fn(&Node, &Node) -> bool,
+    worth: impl Fn(&Node, &[Node]) -> bool,
     exhausted: impl Fn(&Node) -> Result<bool, Error>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Grown<'a>, Error> {
@@ -123,6 +143,7 @@ pub(crate) fn grow<'a>(
         refitted: Vec::new(),
         unpromising: Vec::new(),
         exhausted: None,
+        paid: false,
     };
     let mut idle = 0;
     for size in 1..=breadth.most {
@@ -174,17 +195,23 @@ pub(crate) fn grow<'a>(
         }
         nodes.retain(Node::plausible);
         let mut nodes = best_first(nodes);
-        nodes.truncate(4 * breadth.beam);
-        let Some(best) = nodes.first() else {
+        let mut kept = [0; 2];
+        nodes.retain(|node| {
+            let kept = &mut kept[usize::from(by_clock(node))];
+            *kept += 1;
+            *kept <= 4 * breadth.beam
+        });
+        if nodes.is_empty() {
             break;
-        };
+        }
         // A pair is looked at even where no single effect pays; after two sizes that do not pay there is no more.
-        idle = if worth(best_before, best) {
+        idle = if worth(best_before, &nodes) {
             0
         } else {
             idle + 1
         };
         sizes.push(nodes);
+        grown.paid = idle == 0;
         if idle == 2 {
             break;
         }
@@ -193,14 +220,22 @@ pub(crate) fn grow<'a>(
     Ok(grown)
 }
 
+/// Whether a set has an effect that follows time alone.
+pub(crate) fn by_clock(node: &Node) -> bool {
+    node.added.iter().any(|placed| placed.effect.by_clock)
+}
+
 /// The sets of one size extended by one effect, each set once, the most promising first.
-fn extensions<'a>(
+pub(crate) fn extensions<'a>(
     base: &Node<'a>,
     parents: &[Node<'a>],
     width: usize,
     noise: &ArModel,
 ) -> Result<Vec<Proposal<'a>>, Error> {
-    let parents: Vec<Parent> = distinct(base, parents, width)?
+    // What follows time alone bends to whatever is missing: it is added last.
+    let timeless = |node: &&Node| node.added.len() < PAIR || !by_clock(node);
+    let parents: Vec<Node<'a>> = parents.iter().filter(timeless).cloned().collect();
+    let parents: Vec<Parent> = distinct(base, &parents, width)?
         .into_iter()
         .map(Parent::new)
         .collect();

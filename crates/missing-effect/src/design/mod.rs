@@ -29,6 +29,7 @@ pub use sequences::Kind;
 use crate::{
     Error, Options, Problem, Progress,
     control_loop::slowest_time_constant,
+    diagnose::FITTED,
     groups::GROUP_MARGIN,
     node::{FINE, Node, refine},
     noise_floor::colour,
@@ -166,7 +167,7 @@ fn fitted<'a>(
     between: [Candidacy; 2],
     options: &Options<'a>,
 ) -> Result<Fitted<'a>, Error> {
-    let (base, _) = base(problem, options)?;
+    let (base, _) = base(problem, options, FITTED)?;
     for Candidacy { effect, vessel } in between {
         let vessel = vessel.unwrap_or_else(|| effect.usual_site(problem.plant));
         base.setup.structure.with(Placed { effect, vessel })?;

@@ -25,7 +25,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         absent: 0.0,
         lower: 0.0,
         // More than this does not leak away unseen; out of a tank whose level nobody sees all of it may.
-        upper: if site.is_measured() { 0.6 } else { 1.0 } * flow,
+        upper: if site.is_measured() { 0.3 } else { 1.0 } * flow,
         starts: vec![0.05 * flow],
     }]
 }

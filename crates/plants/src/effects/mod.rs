@@ -59,7 +59,7 @@ impl EffectInfo {
     }
 
     /// The bound of its size is one of physics, not of what is plausible: a limit or a rim beyond all that was visited does nothing, a
-    /// share is at most one.
+    /// share is at most one, and a sensor that is further off would not be called one.
     #[must_use]
     pub fn bound_is_physical(&self) -> bool {
         let physical = [
@@ -70,6 +70,8 @@ impl EffectInfo {
             "overflow",
             "leak_at_height",
             "sensor_offset",
+            "sensor_hysteresis",
+            "sensor_nonlinearity",
             "sensor_saturation",
             "coarse_quantisation",
         ];

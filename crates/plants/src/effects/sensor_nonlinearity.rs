@@ -22,9 +22,9 @@ fn parameters(_: &Site) -> Vec<ParameterInfo> {
         unit: Unit::ONE,
         meaning: "curvature: above zero the reading bends upwards",
         absent: 0.0,
-        // Beyond one the reading would turn back.
-        lower: -0.95,
-        upper: 0.95,
+        // An eighth of the range at its middle: what bends more is no sensor of levels.
+        lower: -0.5,
+        upper: 0.5,
         starts: vec![0.02],
     }]
 }

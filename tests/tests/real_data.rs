@@ -38,8 +38,8 @@ fn every_record_is_read() {
     assert_eq!(Source::ALL.map(of), [16, 17, 1, 12, 1]);
 }
 
-/// From the plain square-root model, with nothing told, the tool finds a chain of effects on the estimation record that
-/// halves the error on the test record, overflow and the pump's dead zone among them.
+/// From the plain square-root model, with nothing told, the tool finds effects on the estimation record that cut the error on the test
+/// record to a third: among them the overflow, the end of the sensor's range, and the reading that drops back, which one sees in the data.
 #[test]
 #[cfg_attr(
     not(measured_records),
@@ -49,7 +49,7 @@ fn the_cascaded_tanks_give_up_their_effects() {
     let case = case("cascaded_tanks").unwrap();
     let found = diagnosed(&case.problem).unwrap();
     assert!(named(&found));
-    for effect in ["overflow", "pump_deadzone"] {
+    for effect in ["overflow", "sensor_saturation", "sensor_hysteresis"] {
         assert!(
             found.effects.iter().any(|name| name == effect),
             "{effect} is not in {:?}",
@@ -63,7 +63,7 @@ fn the_cascaded_tanks_give_up_their_effects() {
         .collect();
     // The plain square root scores 0.67 V; a neural state space model 0.33 V.
     assert!((held_out[0] - 0.67).abs() < 0.01, "{held_out:?}");
-    assert!(*held_out.last().unwrap() <= 0.33, "{held_out:?}");
+    assert!(*held_out.last().unwrap() <= 0.23, "{held_out:?}");
 
     // The test record decides nothing: without it the same effects are found.
     let alone = diagnosed(&Problem {

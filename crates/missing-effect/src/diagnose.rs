@@ -18,6 +18,7 @@ use crate::{
     remains::remains,
     scores::{price_of_colour, scores},
     sentences,
+    sticking::sticks,
     unknown::unknown,
 };
 
@@ -102,8 +103,10 @@ pub fn diagnose(
         reasons: Vec::new(),
     };
     let mut partial = false;
-    // Noise whose memory had to be limited may hold slow physics.
-    let unexplained = course.left.is_some() || found.limited;
+    // Noise whose memory had to be limited may hold slow physics; a valve that sticks in a loop makes a limit cycle, which noise with a
+    // memory describes.
+    let sticking = widen && sticks(&problem.records);
+    let unexplained = course.left.is_some() || found.limited || sticking;
     if judged.grade != Grade::Whole || (course.last().added.is_empty() && unexplained) {
         let by_error = found.grown.promising_singles();
         let tested = largest_part(&base, &found, &by_error, found.noise.sigma(), widen)?;

@@ -1,7 +1,7 @@
 //! `leak_at_height`: a hole in the wall, through which water leaves once the level is above it.
 
 use super::{EffectInfo, Place, any_plant, spread};
-use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
+use crate::{Balance, Law, Outlet, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "leak_at_height",
@@ -19,8 +19,13 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.level();
     let span = (high - low).max(f64::MIN_POSITIVE);
-    // Half the throughput through a hole that is halfway up would have been seen.
+    // Half the throughput through a hole that is halfway up of a tank would have been seen. A linear balance describes stores of any
+    // kind: above a threshold another drain may let out as much as comes in.
     let whole = site.scales.flow.abs() / (0.5 * span).sqrt();
+    let (most, coefficients) = match site.plant.outlet() {
+        Outlet::Torricelli => (0.5, vec![0.05 * whole]),
+        Outlet::Linear => (100.0, vec![0.05 * whole, 3.0 * whole]),
+    };
     // A level that is not measured is known from the believed model alone, which has its water leave by another way and may have
     // it far too low.
     let beyond = if site.is_measured() { 0.5 } else { 3.0 } * span;
@@ -38,8 +43,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             meaning: "outflow through the hole at one unit of level above it",
             absent: 0.0,
             lower: 0.0,
-            upper: 0.5 * whole,
-            starts: vec![0.05 * whole],
+            upper: most * whole,
+            starts: coefficients,
         },
         ParameterInfo {
             name: "height",

@@ -29,6 +29,7 @@ mod noise_floor;
 pub mod numbers;
 mod pairs;
 mod partial;
+mod plausible;
 mod problem;
 mod proposal;
 mod random_walk;

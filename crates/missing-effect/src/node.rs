@@ -2,7 +2,7 @@
 
 use ct_signals::ArModel;
 use greybox::{Fit, Setup, Start, Stopping, fit_from, fit_onward};
-use plants::{Outlet, ParameterInfo, Placed};
+use plants::{ParameterInfo, Placed};
 
 use crate::Error;
 
@@ -21,22 +21,9 @@ pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
-/// A level this many times the largest reading is not physical where the height of the tanks is not known, ...
-const HIGHEST: f64 = 100.0;
-/// ... and one this many times that height where it is: an area that is a little wrong shifts levels that nobody measures.
-const ABOVE_RIM: f64 = 1.5;
-
-/// A sensor at the end of its range: its reading is said to rise beyond from this correlation with the level on, over so many samples.
-const LIMIT: &str = "sensor_saturation";
-const RISES: f64 = 0.5;
-const BEYOND: usize = 50;
-
 /// What a valve does that sticks, and the width of its band, as a part of what the command moves over, below which a loop imitates it.
 pub(crate) const STICTION: &str = "stiction_backlash";
 const NARROW: f64 = 0.25;
-
-/// What is nearer to a bound than this part of a range is at it.
-const EDGE: f64 = 1e-6;
 
 /// A structure with its fit.
 #[derive(Debug, Clone)]
@@ -51,74 +38,6 @@ impl Node<'_> {
     /// Fall of the criterion against another node in the same metric.
     pub fn gain_over(&self, other: &Node) -> f64 {
         other.fit.bic() - self.fit.bic()
-    }
-
-    /// The size of every added effect lies inside its plausible range, neither absent nor at the far end, and no level is beyond
-    /// what is physical.
-    pub fn plausible(&self) -> bool {
-        !self.added.iter().any(|placed| self.at_the_edge(*placed))
-            && self.physical()
-            && !self.reads_beyond_limit()
-    }
-
-    /// No added effect is absent, and no level is beyond what is physical. While much is missing, a size may be driven to its far bound
-    /// by what it stands in for beside itself.
-    pub fn possible(&self) -> bool {
-        let absent = |placed: &Placed| {
-            self.size_of(*placed).is_some_and(|(size, at)| {
-                (self.fit.x[at] - size.absent).abs() <= EDGE * (size.upper - size.lower)
-            })
-        };
-        !self.added.iter().any(absent) && self.physical() && !self.reads_beyond_limit()
-    }
-
-    /// The reading still rises with the level where the model has it at the sensor's limit: then the limit is not the sensor's.
-    fn reads_beyond_limit(&self) -> bool {
-        let structure = &self.setup.structure;
-        let Some(placed) = self.added.iter().find(|placed| placed.effect.id == LIMIT) else {
-            return false;
-        };
-        let unlimited = || {
-            let setup = self
-                .setup
-                .with_structure(structure.without(placed.effect))
-                .ok()?;
-            let level = setup.simulate(&transfer(self, &setup)).ok()?.output;
-            let residual = self.setup.residuals(&self.fit.x).ok()?;
-            let limit = self.fit.x[self.size_of(*placed)?.1];
-            let beyond: Vec<(f64, f64)> = level
-                .concat()
-                .into_iter()
-                .zip(residual.concat())
-                .filter(|(level, _)| *level > limit)
-                .collect();
-            (beyond.len() >= BEYOND).then(|| correlation(&beyond))
-        };
-        unlimited().is_some_and(|correlation| correlation > RISES)
-    }
-
-    /// No level lies above the tank's rim where that is known, or so far above the readings that the model has lost its way.
-    fn physical(&self) -> bool {
-        let structure = &self.setup.structure;
-        if structure.plant.outlet() != Outlet::Torricelli {
-            return true;
-        }
-        let readings = self
-            .setup
-            .records
-            .iter()
-            .map(|record| record.output_range());
-        let highest = readings.fold(0.0, |most: f64, (low, high)| {
-            most.max(low.abs()).max(high.abs())
-        });
-        let most = structure
-            .known
-            .tank_height
-            .map_or(HIGHEST * highest, |height| ABOVE_RIM * height.max(highest));
-        self.setup.simulate(&self.fit.x).is_ok_and(|simulated| {
-            let levels = &simulated.level[..structure.plant.vessels()];
-            levels.iter().all(|(_, high)| *high <= most)
-        })
     }
 
     /// The leading parameter of an added effect, its size, and where that stands in the vector.
@@ -142,16 +61,6 @@ impl Node<'_> {
         let (_, at) = self.size_of(self.added[position])?;
         let (low, high) = self.setup.structure.site(self.added[position]).input();
         (self.fit.x[at] < NARROW * (high - low)).then_some(position)
-    }
-
-    /// The size of an added effect is absent or at the far end of its plausible range.
-    pub fn at_the_edge(&self, placed: Placed) -> bool {
-        let Some((leading, at)) = self.size_of(placed) else {
-            return false;
-        };
-        let room = EDGE * (leading.upper - leading.lower);
-        let size = self.fit.x[at];
-        size <= leading.lower + room || size >= leading.upper - room
     }
 }
 
@@ -249,18 +158,4 @@ pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node
 pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
-}
-
-fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let n = pairs.len() as f64;
-    let (a, b) = pairs
-        .iter()
-        .fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
-    for (x, y) in pairs {
-        xx += (x - a) * (x - a);
-        yy += (y - b) * (y - b);
-        xy += (x - a) * (y - b);
-    }
-    xy / (xx * yy).sqrt().max(f64::MIN_POSITIVE)
 }

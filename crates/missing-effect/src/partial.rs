@@ -5,6 +5,7 @@
 //! - it explains [`PART`](crate::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one with an
 //!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::judge::WHOLE) of it,
 //!   alone and beyond what a random walk explains;
+//! - of several effects: they are called for where each model has a noise model of its own, of limited memory;
 //! - it foretells the next sample as well as the model without it does, each beside a noise model of its own;
 //! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
 //! - sizes are inside their bounds, and states are physical;
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 
 use crate::{
     Error,
+    confirm::BIC_MARGIN,
     find::Found,
     judge::{PART, WHOLE, explained},
     jump::jump,
@@ -214,6 +216,12 @@ fn test<'a>(
     } else {
         let own = in_own_noise(&node)?;
         bic_fall = own.gain_over(own_base);
+        if node.added.len() > 1 && bic_fall <= BIC_MARGIN {
+            reasons.push(
+                "several effects bend to much, and each with a noise model of its own the model without them is as probable"
+                    .to_string(),
+            );
+        }
         if own.fit.noise.sigma() > ROUGHER * own_base.fit.noise.sigma() {
             reasons.push("from sample to sample the record does not go as this has it".to_string());
         }

@@ -11,10 +11,11 @@
 //! - sizes are inside their bounds, and states are physical;
 //! - a single jump of the reading does not explain more.
 //!
-//! A larger set is taken where it explains half of what the smaller one leaves.
+//! A larger set is taken where it explains half of what each smaller one of its effects leaves.
 
 use ct_signals::ArModel;
 use greybox::{fit_from, fit_initial_levels};
+use plants::Placed;
 use rayon::prelude::*;
 
 use crate::{
@@ -38,7 +39,7 @@ const MOST: usize = 3;
 const LEFT: f64 = 0.5;
 
 /// A set explains this part of the mean squared error at least on a half of the record that was not fitted.
-const CARRIED_OVER: f64 = 0.2;
+const CARRIED_OVER: f64 = 0.3;
 
 /// The innovations beside a set are at most so many times as large as those beside the base: what imitates a slow course by moves of its
 /// own is rougher than the record.
@@ -82,6 +83,7 @@ pub(crate) fn largest_part<'a>(
     let jump = jump(base, &white)?.map_or(f64::INFINITY, |jump| jump.bic);
     let sticks = in_loop && sticks(base.setup.records);
     let mut best: Option<Tested<'a>> = None;
+    let mut smaller: Vec<(Vec<Placed>, f64)> = Vec::new();
     for size in 1..=MOST.max(found.confirmed.added.len()) {
         if size > 1 && base.setup.out_of_time() {
             break;
@@ -130,7 +132,12 @@ pub(crate) fn largest_part<'a>(
                 Ok::<_, Error>(tested)
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let accepted = tested.into_iter().max_by(|a, b| {
+        let more: Vec<Tested> = tested
+            .into_iter()
+            .filter(|one| says_more(one, &smaller))
+            .collect();
+        smaller.extend(more.iter().map(|one| (one.node.added.clone(), one.share)));
+        let accepted = more.into_iter().max_by(|a, b| {
             key(a)
                 .partial_cmp(&key(b))
                 .unwrap_or(std::cmp::Ordering::Equal)
@@ -180,6 +187,16 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
     };
     let of_both = |node: &Node| Ok::<f64, Error>(error(node, 0)? + error(node, 1)?);
     Ok(1.0 - of_both(node)? / of_both(base)?)
+}
+
+/// Whether a set leaves at most [`LEFT`] of what each smaller one of its effects leaves, accepted or refused.
+fn says_more(one: &Tested, smaller: &[(Vec<Placed>, f64)]) -> bool {
+    let added = &one.node.added;
+    smaller.iter().all(|(subset, share)| {
+        let within =
+            subset.len() < added.len() && subset.iter().all(|placed| added.contains(placed));
+        !within || 1.0 - one.share <= LEFT * (1.0 - share)
+    })
 }
 
 /// Accepted sets before refused ones, those that the shape of the record shows before others, then by what they explain.

@@ -106,10 +106,10 @@ mod tests {
             let centred: Vec<f64> = series.iter().map(|e| e - mean).collect();
             deviance(&[centred]) - deviance(&[without_line(&series)])
         };
-        // Beyond a penalty of ln(600) = 6.4 and a margin of 6.
+        // Beyond the penalty of a parameter and the margin.
         let named = |walk: f64, rise: f64| {
             (0..100)
-                .filter(|&seed| fall(walk, rise, seed) > 15.0)
+                .filter(|&seed| fall(walk, rise, seed) > (N as f64).ln() + MARGIN)
                 .count()
         };
         assert!(named(0.5, 0.0) <= 1 && named(3.0, 0.0) <= 1);

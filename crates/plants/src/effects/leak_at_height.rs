@@ -26,9 +26,6 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         Outlet::Torricelli => (0.5, vec![0.05 * whole]),
         Outlet::Linear => (100.0, vec![0.05 * whole, 3.0 * whole]),
     };
-    // A level that is not measured is known from the believed model alone, which has its water leave by another way and may have
-    // it far too low.
-    let beyond = if site.is_measured() { 0.5 } else { 3.0 } * span;
     let mut starts = spread(low, high, 5);
     let mut lowest = low - 0.5 * span;
     if site.is_joined_to_next() {
@@ -52,7 +49,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             meaning: "level from which on it leaks",
             absent: f64::NAN,
             lower: lowest,
-            upper: high + beyond,
+            upper: site.highest_place(),
             starts,
         },
     ]

@@ -6,7 +6,7 @@ use ct_signals::{ArModel, Record};
 use greybox::{
     Setup, Start, Stopping, Triangle, fit_onward, keep_best_simulated, with_other_speeds,
 };
-use plants::{Place, Placed, Plant};
+use plants::{Place, Placed, Plant, Unit};
 use rayon::prelude::*;
 
 use crate::{
@@ -27,8 +27,10 @@ const COARSE: usize = 10;
 const PERIOD: &str = "periodic_disturbance.period";
 const PERIODS_SHOWN: usize = 6;
 
-/// Two tanks that push on each other.
+/// Effects that the believed model of two tanks imitates by too large a throughput: tanks that push on each other, and what water
+/// leaves the upper tank by beside its outlet.
 const COUPLED: &str = "coupled_tank";
+const LEAVES: [&str; 2] = ["overflow", "leak_at_height"];
 
 /// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
 /// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
@@ -40,6 +42,7 @@ const BY_CLOCK: usize = 1;
 /// them apart, and from the wrong order no fit comes to the right one.
 pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let mut begun = vec![transfer(from, child)];
+    let less = with_less_throughput(&begun[0], child, placed);
     let pair = child.structure.plant.interchangeable();
     if let Some(pair) = pair.filter(|_| placed.effect.place == Place::Vessel) {
         let free = |name| {
@@ -53,8 +56,8 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
         }
     }
 
-    begun.extend(with_less_throughput(&begun[0], child, placed));
     begun.extend(with_other_speeds(child, placed, &begun[0]));
+    let begun: Vec<(Vec<f64>, f64)> = begun.into_iter().map(|x| (x, 1.0)).chain(less).collect();
 
     let parameters = child.structure.effect_parameters(placed);
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
@@ -73,10 +76,11 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
     combinations
         .into_iter()
         .flat_map(|values| begun.iter().map(move |x| (x.clone(), values.clone())))
-        .map(|(mut x, values)| {
+        .map(|((mut x, levels), values)| {
             for (parameter, value) in parameters.iter().zip(values) {
                 if let Some(at) = position_of(child, placed, parameter.name) {
-                    x[at] = value;
+                    let level = parameter.unit == Unit::LEVEL;
+                    x[at] = if level { levels * value } else { value };
                 }
             }
             x
@@ -87,18 +91,21 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
 /// Parts of the throughput, where a fit may have taken it several times too high.
 const LESS_THROUGHPUT: [f64; 2] = [0.4, 0.2];
 
-/// Two tanks with a part of their throughput: the lower level stays, the upper tank is as much lower.
+/// Two tanks with a part of their throughput, and what the upper tank's levels are multiplied by: the lower level stays, the upper tank is
+/// as much lower.
 ///
-/// Two tanks that push on each other have time constants far apart. The model without the push imitates that by a high upper tank above a
-/// quick lower one, with several times the throughput, and from there a fit of the push ends at another minimum.
-fn with_less_throughput(x: &[f64], child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
+/// Two tanks that push on each other have time constants far apart, and a tank that runs over passes on less the fuller it is. The model
+/// without these imitates that by a high upper tank above a quick lower one, with several times the throughput, and from there a fit ends
+/// at another minimum.
+fn with_less_throughput(x: &[f64], child: &Setup, placed: Placed) -> Vec<(Vec<f64>, f64)> {
     let plant = child.structure.plant;
-    let pushes = placed.effect.id == COUPLED && plant == Plant::CascadedTanks;
+    let upper = placed.vessel == 0 && LEAVES.contains(&placed.effect.id);
+    let imitated = plant == Plant::CascadedTanks && (placed.effect.id == COUPLED || upper);
     let at = |name| child.names().iter().position(|known| known == name);
     let (Some(gain), Some(lower)) = (at("pump_gain"), at("alpha_lower")) else {
         return Vec::new();
     };
-    if !pushes || [gain, lower].iter().any(|at| !child.free().contains(at)) {
+    if !imitated || [gain, lower].iter().any(|at| !child.free().contains(at)) {
         return Vec::new();
     }
     let less = |part: f64| {
@@ -108,7 +115,7 @@ fn with_less_throughput(x: &[f64], child: &Setup, placed: Placed) -> Vec<Vec<f64
         for record in 0..child.records.len() {
             x[child.plant_states_of(record).start] *= part.powi(2);
         }
-        x
+        (x, part.powi(2))
     };
     LESS_THROUGHPUT.map(less).to_vec()
 }

@@ -204,24 +204,27 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
     // The minimum from which the next size's is sought; at the end others are looked for.
     let mut near: Option<Vec<f64>> = None;
     for _ in 0..2 {
+        // A rig that leaves its levels has too much of the effect.
         let mut at = |size: f64| {
             let with = path.at(&rig, size);
-            let fit = misfit(&with, seed, near.as_deref(), 0)?;
-            let reached = fit.rmse / rig.noise;
-            near = Some(fit.x);
-            Some((with, reached))
+            let fit = misfit(&with, seed, near.as_deref(), 0);
+            let reached = fit
+                .as_ref()
+                .map_or(f64::INFINITY, |fit| fit.rmse / rig.noise);
+            near = fit.map(|fit| fit.x).or_else(|| near.take());
+            (with, reached)
         };
         // Outwards until the ratio lies between two sizes, then along the line through their logarithms.
         let mut below: Option<(f64, f64)> = None;
         let mut size = 1.0 / 1024.0;
-        let mut found = at(size)?;
+        let mut found = at(size);
         while found.1 < ratio {
             if size >= 1.0 {
                 return None;
             }
             below = Some((size, found.1));
             size = (2.0 * size).min(1.0);
-            found = at(size)?;
+            found = at(size);
         }
         let mut above = (size, found.1);
         for step in 0..20 {
@@ -237,7 +240,7 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
                 Some(below) => (below.0 * above.0).sqrt(),
                 None => 0.25 * above.0,
             };
-            found = at(size)?;
+            found = at(size);
             if found.1 < ratio {
                 below = Some((size, found.1));
             } else {
@@ -320,7 +323,10 @@ impl Path {
                 };
                 (p.absent, p.absent + part * (end - p.absent))
             } else {
-                (p.upper, p.lower)
+                // A threshold, from a little beyond all that the believed model visits.
+                let first = p.starts.iter().copied().fold(p.lower, f64::max);
+                let beyond = first + 0.2 * (first - p.lower);
+                (beyond.min(p.upper), p.lower)
             }
         });
         Some(Self {

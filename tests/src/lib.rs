@@ -221,7 +221,7 @@ impl Rig {
     pub fn missing(&self) -> Vec<(&'static str, usize, Vec<f64>)> {
         let mut all = self.hidden.clone();
         if self.converter > 0.0 {
-            all.push(("coarse_quantisation", 0, vec![self.converter]));
+            all.push(("coarse_quantisation", 0, vec![self.converter, self.noise]));
         }
         all
     }

@@ -79,7 +79,7 @@ fn cases() -> Vec<Case> {
         add(plant, "stiction_backlash", 0, vec![0.4, 1.0, 0.0]);
         add(plant, "sensor_drift", 0, vec![0.5]);
         add(plant, "sensor_nonlinearity", 0, vec![0.1]);
-        add(plant, "coarse_quantisation", 0, vec![0.6]);
+        add(plant, "coarse_quantisation", 0, vec![0.6, 0.0]);
     }
     cases
 }

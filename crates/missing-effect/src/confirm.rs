@@ -7,7 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::{
     Error,
     exchange::{NEAR, exchanges},
-    node::{Node, best_first, without},
+    node::{FINE, Node, best_first, without},
 };
 
 /// An effect is accepted where its criterion falls by more than this ...
@@ -118,7 +118,7 @@ pub(crate) fn least_useful<'a>(
 fn each_lacking<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Vec<Node<'a>>, Error> {
     (0..node.added.len())
         .into_par_iter()
-        .map(|position| without(node, position, noise))
+        .map(|position| without(node, position, noise, FINE))
         .collect()
 }
 

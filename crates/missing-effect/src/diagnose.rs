@@ -12,10 +12,11 @@ use crate::{
     doubt::doubt,
     find::{Found, find, shortened},
     judge::{Course, Grade, Judge, PART, WHOLE},
-    node::{Node, without},
+    node::{FINE, Node, without},
     partial::largest_part,
     problem::base,
     remains::remains,
+    rounding::rounded,
     scores::{price_of_colour, scores},
     sentences,
     sticking::sticks,
@@ -58,7 +59,10 @@ pub fn diagnose(
     let mut confirmed = doubted.confirmed;
     let widen = ControlLoop::widens(control_loop.as_ref());
     if let Some(position) = confirmed.narrow_stiction().filter(|_| widen) {
-        confirmed = confirm(without(&confirmed, position, &found.noise)?, &found.noise)?;
+        confirmed = confirm(
+            without(&confirmed, position, &found.noise, FINE)?,
+            &found.noise,
+        )?;
     }
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;
@@ -146,6 +150,20 @@ pub fn diagnose(
             None => {}
         }
     }
+    let mut rounding = None;
+    if course.last().added.len() < options.max_effects
+        && let Some(rounded) = rounded(course.last())?
+    {
+        rounding = Some(sentences::of_rounding(
+            rounded.step,
+            rounded.share,
+            &problem.records[0].output.unit,
+        ));
+        course = judge.longer(course, rounded.node)?;
+        groups.push(rounded.group);
+        acceptance.effects = ids(&course.last().added);
+        remark = remark.filter(|_| course.left.is_some());
+    }
     let mut floor = floor(
         &found.noise,
         if course.last().added.len() == found.richest.added.len() && !stopped {
@@ -206,7 +224,9 @@ pub fn diagnose(
     let stop = stopped.then(|| sentences::of_a_stop(options.max_effects, needed));
     let colour = price.and_then(sentences::of_the_colour);
     let disagree = sentences::of_rankings(&diagnosis.rankings);
-    let more = [remark, held_out, minimum, stop, terms, colour, disagree];
+    let more = [
+        rounding, remark, held_out, minimum, stop, terms, colour, disagree,
+    ];
     diagnosis.sentences.extend(more.into_iter().flatten());
     diagnosis.speak_of_the_loop(control_loop);
     diagnosis.effort = effort(&base, options);

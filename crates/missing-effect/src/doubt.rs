@@ -52,14 +52,18 @@ pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a
         confirmed = found.base.clone();
     }
     // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
-    // explain as much, and where the other
-    // effects of the set are called for without them. What is there to mend an imitation is not.
+    // explain as much, and where the other effects of the set are called for without them: what is there to mend an imitation is not.
+    // An imitation does not leave white noise.
     if confirmed.added.iter().any(|placed| placed.effect.by_clock) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();
         let by_walk = !beyond_random_walk(&confirmed, &others)?;
+        let white = own_last.noise.order() == 0;
         let others = confirm(others, noise)?;
-        if by_walk || others.added.len() < count || remains(&confirmed, &own_last)?.is_some() {
+        if by_walk
+            || (others.added.len() < count && !white)
+            || remains(&confirmed, &own_last)?.is_some()
+        {
             confirmed = others;
         }
     }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::{
     Error,
-    node::{Node, QUICK, ROUGH, best_first, fitted, refine, transfer, without},
+    node::{FINE, Node, QUICK, ROUGH, best_first, fitted, refine, transfer, without},
     proposal::{Parent, Proposal, candidates, promising, propose, realise},
 };
 
@@ -32,7 +32,7 @@ pub(crate) fn exchanges<'a>(
     if node.setup.leaves_out("the exchange of confirmed effects") {
         return Ok(Vec::new());
     }
-    let lacking = without(node, position, noise)?;
+    let lacking = without(node, position, noise, FINE)?;
     let own = node.added[position];
     let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());
     let begun = match singles {

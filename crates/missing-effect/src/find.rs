@@ -20,10 +20,9 @@ const REFITS: usize = 12;
 /// Sets are grown side by side up to so many effects, ...
 const SIDE_BY_SIDE: usize = 3;
 /// ... and one by one to so many where they pay.
-const RICHEST: usize = 6;
-
+const RICHEST: usize = 7;
 /// In the metric of a noise that wanders they are grown to so many.
-const PAIR: usize = 2;
+const WANDERING: usize = 2;
 
 /// What the search found.
 pub(crate) struct Found<'a> {
@@ -118,7 +117,11 @@ pub(crate) fn find<'a>(
         // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many
         // effects it tells little.
         let breadth = Breadth {
-            most: if by_simulation { PAIR } else { breadth.most },
+            most: if by_simulation {
+                WANDERING
+            } else {
+                breadth.most
+            },
             ..breadth
         };
         let coloured = grow(

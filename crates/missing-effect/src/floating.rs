@@ -4,12 +4,13 @@
 //! 1119-1125.
 
 use ct_signals::ArModel;
+use plants::Placed;
 use rayon::prelude::*;
 
 use crate::{
     Error,
     confirm::BIC_MARGIN,
-    node::{Node, ROUGH, best_first, refine, roughly_without, without},
+    node::{FINE, Node, ROUGH, best_first, refine, without},
     proposal::realise_all,
     search::{Grown, PAIR, by_clock, extensions},
 };
@@ -23,7 +24,8 @@ const FOLLOWED: usize = 10;
 ///
 /// Of small sets that take nearly the same out of a residual, the one that is right is not the best as long as much is missing: each is
 /// followed for itself. On the measured Cascaded Tanks data a leak of the lower tank stands for the pump's dead zone, until the end of
-/// the sensor's range is in the set.
+/// the sensor's range is in the set. As long as much is missing a size may also be driven to a bound: what is left of a set without such
+/// effects is extended and exchanged again, within all bounds.
 pub(crate) fn follow<'a>(
     base: &Node<'a>,
     grown: &mut Grown<'a>,
@@ -36,80 +38,100 @@ pub(crate) fn follow<'a>(
             timeless.take(SEEDS).cloned()
         })
         .collect();
-    let ends = seeds
+    let loose = Floating {
+        base,
+        noise,
+        most,
+        accepted: |node| node.possible(),
+    };
+    let strict = Floating {
+        accepted: |node| node.plausible(),
+        ..loose
+    };
+    let mut ends = seeds
         .into_par_iter()
-        .map(|seed| one_at_a_time(base, seed, noise, most))
+        .map(|seed| loose.one_at_a_time(seed))
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(end) = best_first(ends.clone()).into_iter().next() {
+        ends.push(loose.exchanged(end)?);
+    }
+    let ends = ends
+        .into_par_iter()
+        .map(|end| within_bounds(&end, noise))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(end) = best_first(ends).into_iter().next() {
-        grown.take_in(within_bounds(exchanged(base, end, noise, most)?, noise)?);
+        let end = strict.exchanged(strict.one_at_a_time(end)?)?;
+        grown.take_in(within_bounds(&end, noise)?);
     }
     Ok(())
 }
 
 /// A set, fitted to the end, without the effects whose sizes end at a bound.
-fn within_bounds<'a>(node: Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
-    let mut node = refine(&node, noise, &[])?;
+fn within_bounds<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+    let mut node = refine(node, noise, &[])?;
     let at_the_edge = |node: &Node| node.added.iter().position(|on| node.at_the_edge(*on));
     while let Some(position) = at_the_edge(&node) {
-        node = without(&node, position, noise)?;
+        node = without(&node, position, noise, FINE)?;
     }
     Ok(node)
 }
 
-/// A set with one effect more, and one more, as long as that pays.
-fn one_at_a_time<'a>(
-    base: &Node<'a>,
-    mut node: Node<'a>,
-    noise: &ArModel,
+/// What sets are grown from, and which are accepted.
+#[derive(Clone, Copy)]
+struct Floating<'n, 'a> {
+    base: &'n Node<'a>,
+    noise: &'n ArModel,
+    /// Largest number of effects.
     most: usize,
-) -> Result<Node<'a>, Error> {
-    while node.added.len() < most && !node.setup.leaves_out("larger sets of effects") {
-        let mut proposals = extensions(base, std::slice::from_ref(&node), 1, noise)?;
-        proposals.retain(|proposal| proposal.added.iter().all(|placed| !placed.effect.by_clock));
+    accepted: fn(&Node<'a>) -> bool,
+}
+
+impl<'a> Floating<'_, 'a> {
+    /// A set with one effect more, and one more, as long as the criterion falls.
+    fn one_at_a_time(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
+        while node.added.len() < self.most && !node.setup.leaves_out("larger sets of effects") {
+            match better_than(&node, self.extended(&node, None)?) {
+                Some(best) => node = best,
+                None => break,
+            }
+        }
+        Ok(node)
+    }
+
+    /// Exchanges an effect of a set for another, and goes on one at a time, as long as the criterion falls.
+    fn exchanged(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
+        while !node.setup.leaves_out("exchanges within sets of effects") {
+            let others = (0..node.added.len())
+                .into_par_iter()
+                .map(|position| {
+                    let lacking = without(&node, position, self.noise, ROUGH)?;
+                    self.extended(&lacking, Some(node.added[position]))
+                })
+                .collect::<Result<Vec<_>, Error>>()?;
+            match better_than(&node, others.concat()) {
+                Some(best) => node = self.one_at_a_time(best)?,
+                None => break,
+            }
+        }
+        Ok(node)
+    }
+
+    /// A set with one effect more, each of the most promising that does not follow time alone, but not the one that was taken out.
+    fn extended(&self, node: &Node<'a>, taken_out: Option<Placed>) -> Result<Vec<Node<'a>>, Error> {
+        let mut proposals = extensions(self.base, std::slice::from_ref(node), 1, self.noise)?;
+        proposals.retain(|proposal| {
+            let added = proposal.added.last();
+            added.is_some_and(|placed| Some(*placed) != taken_out && !placed.effect.by_clock)
+        });
         proposals.truncate(FOLLOWED);
-        let mut larger = best_first(realise_all(proposals, noise, ROUGH));
-        larger.retain(Node::possible);
-        match larger.into_iter().next() {
-            Some(best) if best.gain_over(&node) > BIC_MARGIN => node = best,
-            _ => break,
-        }
+        let mut found = realise_all(proposals, self.noise, ROUGH);
+        found.retain(self.accepted);
+        Ok(found)
     }
-    Ok(node)
 }
 
-/// Exchanges an effect of a set for another, or adds one, as long as that pays.
-fn exchanged<'a>(
-    base: &Node<'a>,
-    mut node: Node<'a>,
-    noise: &ArModel,
-    most: usize,
-) -> Result<Node<'a>, Error> {
-    loop {
-        if node.setup.leaves_out("exchanges within sets of effects") {
-            return Ok(node);
-        }
-        let others: Vec<Node<'a>> = (0..node.added.len())
-            .into_par_iter()
-            .map(|position| {
-                let own = node.added[position];
-                let lacking = roughly_without(&node, position, noise)?;
-                let mut proposals = extensions(base, std::slice::from_ref(&lacking), 1, noise)?;
-                proposals.retain(|proposal| {
-                    let added = proposal.added.last();
-                    added.is_some_and(|placed| *placed != own && !placed.effect.by_clock)
-                });
-                proposals.truncate(FOLLOWED);
-                Ok(realise_all(proposals, noise, ROUGH))
-            })
-            .collect::<Result<Vec<_>, Error>>()?
-            .concat();
-        let mut others = best_first(others);
-        others.retain(Node::possible);
-        let best = others.into_iter().next();
-        let best = best.filter(|best| best.gain_over(&node) > BIC_MARGIN);
-        let Some(best) = best else {
-            return Ok(node);
-        };
-        node = one_at_a_time(base, best, noise, most)?;
-    }
+/// The best of the sets, where its criterion lies clearly below a node's.
+fn better_than<'a>(node: &Node, sets: Vec<Node<'a>>) -> Option<Node<'a>> {
+    let best = best_first(sets).into_iter().next();
+    best.filter(|best| best.gain_over(node) > BIC_MARGIN)
 }

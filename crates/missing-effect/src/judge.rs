@@ -9,7 +9,7 @@ use crate::{
     Error, NoiseFloor, Problem, Step,
     confirm::confirm,
     groups::{Group, groups},
-    node::{Node, refine, without},
+    node::{FINE, Node, refine, without},
     noise_floor::{NOISE_ORDER, longest_memory, residual_colour, slowness},
     problem::STOPPING,
     remains::{Left, Remains, remains},
@@ -84,7 +84,7 @@ impl<'a> Judge<'_, 'a> {
             }
             for course in &courses {
                 if let Some(position) = set.added.iter().position(|on| on == course) {
-                    set = without(&set, position, self.noise)?;
+                    set = without(&set, position, self.noise, FINE)?;
                 }
             }
             set = confirm(set, self.noise)?;
@@ -164,7 +164,7 @@ impl<'a> Judge<'_, 'a> {
     /// The models on the way to a set.
     pub fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
         let mut nodes = trail(self.base, set, &ArModel::white(1.0))?;
-        let mut last = nodes.pop().unwrap_or_else(|| self.base.clone());
+        let last = nodes.pop().unwrap_or_else(|| self.base.clone());
         let in_noise = if self.by_simulation || self.stopped {
             last.clone()
         } else {
@@ -173,7 +173,23 @@ impl<'a> Judge<'_, 'a> {
             let ends: Vec<_> = whole.then(|| last.fit.x.clone()).into_iter().collect();
             refine(set, self.noise, &ends)?
         };
-        let own = coloured(&in_noise.setup, in_noise.fit, NOISE_ORDER, STOPPING)?;
+        self.ending(nodes, last, in_noise.fit)
+    }
+
+    /// A course with one model more, which is fitted.
+    pub fn longer(&self, course: Course<'a>, last: Node<'a>) -> Result<Course<'a>, Error> {
+        let fit = last.fit.clone();
+        self.ending(course.nodes, last, fit)
+    }
+
+    /// `in_noise`: the last model's fit in the metric of the noise.
+    fn ending(
+        &self,
+        mut nodes: Vec<Node<'a>>,
+        mut last: Node<'a>,
+        in_noise: Fit,
+    ) -> Result<Course<'a>, Error> {
+        let own = coloured(&last.setup, in_noise, NOISE_ORDER, STOPPING)?;
         // That the residual wanders says less than that it jumps.
         let left = match remains(&last, &own)? {
             Some(left) if !matches!(left.what, Remains::Slow(..)) => Some(left),

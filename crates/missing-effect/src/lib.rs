@@ -34,6 +34,7 @@ mod problem;
 mod proposal;
 mod random_walk;
 mod remains;
+mod rounding;
 mod scores;
 mod search;
 mod sentences;

@@ -116,23 +116,6 @@ pub(crate) fn without<'a>(
     node: &Node<'a>,
     position: usize,
     noise: &ArModel,
-) -> Result<Node<'a>, Error> {
-    lacking(node, position, noise, FINE)
-}
-
-/// The same, to be extended.
-pub(crate) fn roughly_without<'a>(
-    node: &Node<'a>,
-    position: usize,
-    noise: &ArModel,
-) -> Result<Node<'a>, Error> {
-    lacking(node, position, noise, ROUGH)
-}
-
-fn lacking<'a>(
-    node: &Node<'a>,
-    position: usize,
-    noise: &ArModel,
     stopping: Stopping,
 ) -> Result<Node<'a>, Error> {
     let setup = node
@@ -149,7 +132,7 @@ fn lacking<'a>(
 pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
     let mut node = node.clone();
     while let Some(position) = node.added.iter().position(|placed| placed.effect.by_clock) {
-        node = without(&node, position, noise)?;
+        node = without(&node, position, noise, FINE)?;
     }
     Ok(node)
 }

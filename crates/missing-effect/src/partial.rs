@@ -131,6 +131,13 @@ pub(crate) fn largest_part<'a>(
                 }
                 Ok::<_, Error>(tested)
             })
+            // A set that cannot be simulated on a half of the record, or is fitted to nothing, is no answer.
+            .filter(|tested| {
+                !matches!(
+                    tested,
+                    Err(Error::Fit(greybox::Error::NoFiniteStart { .. }))
+                )
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let more: Vec<Tested> = tested
             .into_iter()

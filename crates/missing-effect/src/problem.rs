@@ -7,7 +7,6 @@ use std::time::Duration;
 use ct_signals::{ArModel, Record};
 use greybox::{Setup, Stopping, TimeLimit, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Term, controller::Controller};
-
 use rayon::prelude::*;
 
 use crate::{
@@ -139,18 +138,15 @@ pub(crate) fn base<'a>(
     let mut starts = options.starts.max(10);
     let one_by_one = one_by_one(&setup, options.seed)?;
     let fit = loop {
-        let mut all = random_starts(&setup, starts, options.seed);
+        // The start of one effect after the other comes first: out of time no other is followed.
+        let mut all: Vec<Vec<f64>> = one_by_one.iter().cloned().collect();
+        all.extend(random_starts(&setup, starts, options.seed));
         if !problem.start.is_empty() {
             let mut guessed = all[0].clone();
             for (name, value) in setup.names().iter().zip(&mut guessed) {
                 *value = problem.start.get(name).copied().unwrap_or(*value);
             }
             all.push(guessed);
-        }
-        // First: out of time no other is followed.
-        all.extend(one_by_one.clone());
-        if one_by_one.is_some() {
-            all.rotate_right(1);
         }
         let fit = fit_from(&setup, &all, &white, STOPPING)?;
         if fit.agree >= 2

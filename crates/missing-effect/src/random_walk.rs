@@ -1,9 +1,12 @@
-//! Whether effects that follow time alone explain more than a random walk beside white noise does.
+//! Whether effects that follow time alone explain more than a random walk beside the noise does.
 //!
 //! **Model of the residual** (local level model): `e[k] = l[k] + v[k]`, `l[k+1] = l[k] + w[k]`, `v` and `w` white with variances
 //! `s^2` and `q s^2`, `l[0]` unknown. No autoregressive model of low order describes it, and every drift, step or slow period looks
 //! significant beside one that does not. The likelihood follows from the Kalman filter; `s^2` is at its best in closed form, `q` by a
 //! search over its logarithm.
+//!
+//! Both residuals are whitened first by the noise model of the set with the effects: beside coloured noise a random walk would
+//! otherwise describe the noise, and the effects with it. Whitened, a walk is a walk still, smaller by the sum of the filter.
 //!
 //! **Cost**: `O(N)` for a value of `q`.
 //!
@@ -15,6 +18,7 @@ use crate::{
     Error,
     confirm::{BIC_MARGIN, chance_of},
     node::Node,
+    noise_floor::colour,
 };
 
 /// Decades of `q` that are searched, and values in each.
@@ -53,7 +57,12 @@ fn deviance(residuals: &[Vec<f64>]) -> f64 {
 /// Whether a set lowers the deviance beyond chance against one that lacks some of its effects, where either residual may hold a random
 /// walk. What the smaller set's own parameters would gain in that noise model is allowed for: one for each.
 pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node) -> Result<bool, Error> {
-    let of = |node: &Node| Ok::<_, Error>(deviance(&node.setup.disturbance(&node.fit.x)?));
+    let noise = colour(gained)?;
+    let of = |node: &Node| {
+        let residuals = node.setup.disturbance(&node.fit.x)?;
+        let white: Vec<Vec<f64>> = residuals.iter().map(|e| noise.whiten(e)).collect();
+        Ok::<_, Error>(deviance(&white))
+    };
     let free = |node: &Node| node.setup.free().len();
     let fall = of(lacking)? - of(gained)? - free(lacking) as f64;
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);

@@ -1,4 +1,9 @@
 //! `coarse_quantisation`: the reading moves in steps.
+//!
+//! A converter rounds what the sensor says with its noise. Where the noise is a good part of a step it blurs the stairs, and from one
+//! step on nothing is left of them in the mean reading.
+
+use std::f64::consts::{PI, SQRT_2};
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
@@ -8,7 +13,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Sensor,
     by_clock: false,
     physics: "The reading moves in steps: a coarse converter, a float switch with many contacts, digits that were cut off.",
-    equation: "y = D round(H/D)",
+    equation: "y = E[D round((H + v)/D)], v ~ N(0, s^2)",
     applies: any_plant,
     parameters,
     confused_with: &[],
@@ -21,38 +26,81 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let span = (high - low).max(f64::MIN_POSITIVE);
     let seen = site.scales.reading_step;
     let hidden = site.scales.hidden_step.map(|step| step.value);
-    vec![ParameterInfo {
-        name: "step",
-        unit: Unit::LEVEL,
-        meaning: "from one reading to the next",
-        absent: 0.0,
-        lower: 0.0,
-        upper: 0.5 * span,
-        // Readings in steps show the step themselves, and to more digits than any grid of starts has. Under noise that
-        // comes behind the steps what is not explained shows it.
-        starts: vec![if seen > 0.0 {
-            seen
-        } else {
-            hidden.unwrap_or(0.02 * span)
-        }],
-    }]
+    // Readings in steps show the step themselves, and to more digits than any grid of starts has. Under noise that comes behind the
+    // steps what is not explained shows it.
+    let step = if seen > 0.0 {
+        seen
+    } else {
+        hidden.unwrap_or(0.02 * span)
+    };
+    vec![
+        ParameterInfo {
+            name: "step",
+            unit: Unit::LEVEL,
+            meaning: "from one reading to the next",
+            absent: 0.0,
+            lower: 0.0,
+            upper: 0.5 * span,
+            starts: vec![step],
+        },
+        ParameterInfo {
+            name: "noise",
+            unit: Unit::LEVEL,
+            meaning: "standard deviation of the noise that is rounded with the level",
+            absent: f64::NAN,
+            lower: 0.0,
+            upper: 0.5 * span,
+            starts: vec![0.0, 0.3 * step],
+        },
+    ]
 }
 
-struct CoarseQuantisation<T>(T);
+/// So many standard deviations from a threshold the reading is as if there were no noise.
+const REACH: f64 = 7.0;
+/// From so much noise on, over the step, nothing is left of the stairs to 1e-8 of a step.
+const BLURRED: f64 = 1.0;
+/// Below so little the stairs are sharp to any reading.
+const SHARP: f64 = 1e-6;
+
+struct CoarseQuantisation<T> {
+    step: T,
+    noise: T,
+}
 
 pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
-    CoarseQuantisation(parameters[0])
+    CoarseQuantisation { step: parameters[0], noise: parameters[1] }
 }
 
 impl<T: Scalar> Law<T> for CoarseQuantisation<T> {
     fn reading(&mut self, y: T, _t: f64) -> T {
-        let step = self.0.value();
-        if step <= 0.0 {
+        let (step, noise) = (self.step.value(), self.noise.value());
+        if step <= 0.0 || noise >= BLURRED * step {
             return y;
         }
-        let count = (y.value() / step).round();
-        // The value is the step's. The slope by the level is that over a whole step, which is one: the slope at a point is
-        // zero and would stop every fit.
-        y - y.value() + step * count + (self.0 - step) * count
+        let level = y.value() / step;
+        if noise <= SHARP * step {
+            let count = level.round();
+            // The value is the step's. The slope by the level is that over a whole step, which is one: the slope at a point is
+            // zero and would stop every fit.
+            return T::with_slopes(step * count, [(y, 1.0), (self.step, count)]);
+        }
+        // Every threshold half a step below a whole number is passed with the probability that the noise lets it; those out of reach
+        // below are passed, and those above are not.
+        let spread = noise / step;
+        let first = (level - REACH * spread - 0.5).floor();
+        let last = (level + REACH * spread - 0.5).ceil();
+        let (mut count, mut by_level, mut by_spread) = (first, 0.0, 0.0);
+        let mut threshold = first;
+        while threshold <= last {
+            let z = (level - threshold - 0.5) / spread;
+            let density = (-0.5 * z * z).exp() / (2.0 * PI).sqrt();
+            count += 0.5 * libm::erfc(-z / SQRT_2);
+            by_level += density / spread;
+            by_spread -= z * density / spread;
+            threshold += 1.0;
+        }
+        let by_step = count - level * by_level - spread * by_spread;
+        let slopes = [(y, by_level), (self.step, by_step), (self.noise, by_spread)];
+        T::with_slopes(step * count, slopes)
     }
 }

@@ -161,7 +161,8 @@ pub fn interior(case: &Case, placed: Placed, info: &ParameterInfo) -> f64 {
         ("periodic_disturbance", _) => 37.3 * h,
         ("sensor_drift", _) => 1.3,
         ("sensor_nonlinearity", _) => 0.21,
-        ("coarse_quantisation", _) => 0.83,
+        ("coarse_quantisation", "step") => 0.83,
+        ("coarse_quantisation", _) => 0.24,
         _ => info.starts[0],
     }
 }

@@ -82,6 +82,7 @@ struct Equations {
     sensor_bend: f64,
     sensor_range: f64,
     quantum: f64,
+    rounded_noise: f64,
     hysteresis: Option<[f64; 4]>,
     largest_reading: f64,
 }
@@ -174,7 +175,8 @@ impl Equations {
                 ("periodic_disturbance", _) => e.swing[v][2] = value,
                 ("sensor_drift", _) => e.sensor_drift = value,
                 ("sensor_nonlinearity", _) => e.sensor_bend = value,
-                ("coarse_quantisation", _) => e.quantum = value,
+                ("coarse_quantisation", "step") => e.quantum = value,
+                ("coarse_quantisation", _) => e.rounded_noise = value,
                 _ => panic!("`{name}` has no reference: write its equation here"),
             }
         }
@@ -478,7 +480,9 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
                 y += step * stuck;
             }
             let limited = y.min(e.largest_reading);
-            readings.push(if e.quantum > 0.0 {
+            readings.push(if e.quantum > 0.0 && e.rounded_noise > 0.0 {
+                mean_reading(limited, e.quantum, e.rounded_noise)
+            } else if e.quantum > 0.0 {
                 e.quantum * (limited / e.quantum).round()
             } else {
                 limited
@@ -583,4 +587,16 @@ fn bisected(e: &Equations, stretch: &Stretch, mut x: [f64; 7], from: f64, to: f6
         t = until;
     }
     x
+}
+
+/// Mean of what is rounded with noise: the Fourier series of the sawtooth, each term less by the noise's characteristic function.
+fn mean_reading(level: f64, step: f64, noise: f64) -> f64 {
+    let angle = 2.0 * std::f64::consts::PI;
+    let term = |n: i32| {
+        let n = f64::from(n);
+        let less = (-0.5 * (angle * n * noise / step).powi(2)).exp();
+        let sign = if n % 2.0 == 0.0 { 1.0 } else { -1.0 };
+        sign * 2.0 / (angle * n) * less * (angle * n * level / step).sin()
+    };
+    level + step * (1..200).map(term).sum::<f64>()
 }

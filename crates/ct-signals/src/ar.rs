@@ -35,6 +35,8 @@ use crate::record::check_finite;
 /// Partial correlations stay this far inside -1..1, so that even a constant or a sine leaves a
 /// stable predictor.
 const MARGIN: f64 = 1e-9;
+/// Squares that sum to less are those of nothing: products of them underflow.
+const NOTHING: f64 = 1e-200;
 
 /// Orders that leave fewer samples than this for each coefficient are not tried.
 const SAMPLES_PER_COEFFICIENT: usize = 5;
@@ -104,7 +106,7 @@ impl ArModel {
     /// Fits a process to one or several independent stretches of a signal, of order 0 to
     /// `max_order`; orders with fewer than 5 samples for each coefficient are left out.
     ///
-    /// The mean is not removed. A signal that is 0 throughout gives white noise of sigma 0.
+    /// The mean is not removed. A signal that is 0 throughout, or whose squares underflow, gives white noise of sigma 0.
     ///
     /// # Errors
     /// [`Error::ValueNotFinite`], and [`Error::TooFewSamples`] when there are no samples at all.
@@ -129,7 +131,7 @@ impl ArModel {
                 .flat_map(|segment| model.whiten(segment))
                 .map(|w| w * w)
                 .sum();
-            if sum == 0.0 {
+            if sum < NOTHING {
                 return Ok(ArModel::white(0.0));
             }
             let log_det: f64 = segments.iter().map(|s| model.log_det(s.len())).sum();

@@ -20,7 +20,7 @@ const REFITS: usize = 12;
 /// Sets are grown side by side up to so many effects, ...
 const SIDE_BY_SIDE: usize = 3;
 /// ... and one by one to so many where they pay.
-const RICHEST: usize = 7;
+const RICHEST: usize = 6;
 /// In the metric of a noise that wanders they are grown to so many.
 const WANDERING: usize = 2;
 

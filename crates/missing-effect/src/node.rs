@@ -1,7 +1,7 @@
 //! A set of effects with its fit, and the fits of what it is changed to.
 
 use ct_signals::ArModel;
-use greybox::{Fit, Setup, Start, Stopping, fit_from, fit_onward};
+use greybox::{Fit, Setup, Start, Stopping, fit_from, fit_onward, random_starts};
 use plants::{ParameterInfo, Placed};
 
 use crate::Error;
@@ -21,6 +21,8 @@ pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
+/// Random starts of a set without one of its effects, where it cannot be simulated with the parameters that it had.
+const OTHER_STARTS: usize = 12;
 /// What a valve does that sticks, and the width of its band, as a part of what the command moves over, below which a loop imitates it.
 pub(crate) const STICTION: &str = "stiction_backlash";
 const NARROW: f64 = 0.25;
@@ -122,7 +124,14 @@ pub(crate) fn without<'a>(
         .setup
         .with_structure(node.setup.structure.without(node.added[position].effect))?;
     let start = transfer(node, &setup);
-    let fit = fit_from(&setup, &[start], noise, stopping)?;
+    let fit = match fit_from(&setup, &[start], noise, stopping) {
+        // Some parameters hold beside the effect alone.
+        Err(greybox::Error::NoFiniteStart { .. }) => {
+            let others = random_starts(&setup, OTHER_STARTS, 1);
+            fit_from(&setup, &others, noise, stopping)?
+        }
+        fit => fit?,
+    };
     let mut added = node.added.clone();
     added.remove(position);
     Ok(Node { setup, fit, added })

@@ -87,11 +87,9 @@ impl<T: Scalar> Law<T> for CoarseQuantisation<T> {
         // Every threshold half a step below a whole number is passed with the probability that the noise lets it; those out of reach
         // below are passed, and those above are not.
         let spread = noise / step;
-        let first = (level - REACH * spread - 0.5).floor();
-        let last = (level + REACH * spread - 0.5).ceil();
-        let (mut count, mut by_level, mut by_spread) = (first, 0.0, 0.0);
-        let mut threshold = first;
-        while threshold <= last {
+        let mut threshold = (level - REACH * spread - 0.5).ceil();
+        let (mut count, mut by_level, mut by_spread) = (threshold, 0.0, 0.0);
+        while threshold <= level + REACH * spread - 0.5 {
             let z = (level - threshold - 0.5) / spread;
             let density = (-0.5 * z * z).exp() / (2.0 * PI).sqrt();
             count += 0.5 * libm::erfc(-z / SQRT_2);

@@ -3,7 +3,7 @@
 
 use ct_signals::noise;
 use ctid_tests::{
-    Rig,
+    Drive, Rig,
     outside::{BY_CLOCK, OUTSIDE, Outside},
 };
 use missing_effect::{Diagnosis, Options, Problem, Verdict, compare, diagnose};
@@ -324,5 +324,59 @@ fn an_overflow_of_a_tank_that_is_not_measured_is_named() {
             rim.value
         );
         assert!(last.rmse < 1.05 * rig.noise);
+    }
+}
+
+/// What a converter rounds is seen from its readings: the noise that it rounds with the level leaves no stairs for a fit.
+#[test]
+fn a_converter_is_named_from_its_readings() {
+    for drive in [Drive::Open, Drive::Closed] {
+        let noise = Rig::single_tank().noise;
+        let rig = |converter: f64| Rig {
+            converter,
+            drive,
+            ..Rig::single_tank()
+        };
+        let found = diagnosed(&rig(4.0 * noise), 1, &Options::default());
+        assert_eq!(found.effects, ["coarse_quantisation"], "{drive:?}");
+        let last = found.steps.last().unwrap();
+        assert!(last.rmse <= found.steps[0].rmse);
+        let of = |name: &str| last.parameters.iter().find(|p| p.name == name).unwrap();
+        let (step, rounded) = (
+            of("coarse_quantisation.step"),
+            of("coarse_quantisation.noise"),
+        );
+        assert!(
+            (step.value - 4.0 * noise).abs() < 1e-3 * noise,
+            "{}",
+            step.value
+        );
+        assert!(
+            (rounded.value - noise).abs() < 0.5 * noise,
+            "{}",
+            rounded.value
+        );
+        // A sixth of the noise's variance is no finding.
+        let found = diagnosed(&rig(1.4 * noise), 1, &Options::default());
+        assert_eq!(found.verdict, Verdict::Adequate, "{drive:?}");
+    }
+}
+
+/// Beside coloured noise a random walk describes the noise, and would take a drift with it.
+#[test]
+fn a_drift_is_named_in_coloured_noise() {
+    for seed in 1..=3 {
+        let rig = Rig {
+            hidden: vec![("valve_drift", 0, vec![0.15])],
+            colour: 0.8,
+            ..Rig::single_tank()
+        };
+        let found = diagnosed(&rig, seed, &Options::default());
+        assert!(
+            found.groups.concat().contains(&"valve_drift".to_string()),
+            "seed {seed}: {:?} {:?}",
+            found.verdict,
+            found.groups
+        );
     }
 }

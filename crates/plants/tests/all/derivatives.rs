@@ -295,3 +295,34 @@ fn an_instant_on_a_sample_has_the_derivative_of_its_neighbours() {
         }
     }
 }
+
+#[test]
+fn little_noise_before_the_rounding_leaves_no_trace_between_thresholds() {
+    let base = base(Plant::SingleTank);
+    let own = base.theta.len();
+    let placed = Placed {
+        effect: effect("coarse_quantisation"),
+        vessel: 0,
+    };
+    let mut case = base.with_interior(&[placed]);
+    let step = case.theta[own];
+    case.theta[own + 1] = 1e-3 * step;
+    let input = input(DRIVES[1], 150, base.h, 400);
+    let levels = base.run_dual(&input, 1);
+    let far = |level: f64| ((level / step - 0.5).round() - (level / step - 0.5)).abs() > 0.01;
+    let between: Vec<usize> = (0..150).filter(|&k| far(levels[k].re)).collect();
+    assert!(between.len() > 100);
+    for (k, y) in case.run_dual(&input, 1).iter().enumerate() {
+        if between.contains(&k) {
+            let count = (levels[k].re / step).round();
+            assert_eq!(y.re, step * count);
+            // Numbers whose squares underflow would stop every fit.
+            assert!(
+                y.eps
+                    .iter()
+                    .enumerate()
+                    .all(|(i, slope)| *slope == 0.0 || i == own)
+            );
+        }
+    }
+}

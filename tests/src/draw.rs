@@ -93,8 +93,8 @@ pub fn rig(plant: Plant, drive: Drive, colour: f64, samples: usize, rng: &mut Ch
 ///
 /// The plant is drawn from those in which the effect may act, and the vessel from those of the plant. What is beside the size
 /// (a height, a time, a time constant, a phase) is drawn from the range that the catalogue's starts cover. The
-/// size goes from absent to the end of its plausible range until the ratio is met. Where it is not met, or the
-/// level leaves 0.1 to 3 times the level at rest, another rig is drawn; `None` where none of twelve would do.
+/// size goes from absent to the end of its plausible range until the ratio is met. One with which the level leaves 0.1 to 3 times the
+/// level at rest is too large. Where the ratio is not met, another rig is drawn; `None` where none of twelve would do.
 ///
 /// Coarse quantisation is a converter behind the noise, as real ones are: its structural error is that of rounding, the step over
 /// the square root of 12.

@@ -150,20 +150,6 @@ pub fn diagnose(
             None => {}
         }
     }
-    let mut rounding = None;
-    if course.last().added.len() < options.max_effects
-        && let Some(rounded) = rounded(course.last())?
-    {
-        rounding = Some(sentences::of_rounding(
-            rounded.step,
-            rounded.share,
-            &problem.records[0].output.unit,
-        ));
-        course = judge.longer(course, rounded.node)?;
-        groups.push(rounded.group);
-        acceptance.effects = ids(&course.last().added);
-        remark = remark.filter(|_| course.left.is_some());
-    }
     let mut floor = floor(
         &found.noise,
         if course.last().added.len() == found.richest.added.len() && !stopped {
@@ -172,6 +158,27 @@ pub fn diagnose(
             "the residual of the richest model that was tried"
         },
     );
+    let mut rounding = None;
+    if !partial
+        && course.last().added.len() < options.max_effects
+        && let Some(rounded) = rounded(course.last())?
+    {
+        rounding = Some(sentences::of_rounding(
+            rounded.step,
+            rounded.share,
+            &problem.records[0].output.unit,
+        ));
+        let longer = judge.longer(course.nodes.clone(), rounded.node)?;
+        // What nothing explains stays unexplained where rounding leaves something that is not noise.
+        if longer.left.is_none() || !course.last().added.is_empty() {
+            course = longer;
+            groups.push(rounded.group);
+            acceptance.effects = ids(&course.last().added);
+            (acceptance.share, acceptance.bic_fall) = (None, None);
+            acceptance.reasons.clear();
+            remark = remark.filter(|_| course.left.is_some());
+        }
+    }
     if (course.left.is_some() || partial) && !stopped {
         floor = floor.of_what_is_new();
     }
@@ -266,8 +273,9 @@ fn share_on_held_out(steps: &[Step], floor: f64) -> Option<f64> {
         return None;
     };
     let (before, after) = (first.rmse_test?.powi(2), last.rmse_test?.powi(2));
-    let floor = after.min(floor * floor);
-    Some((before - after) / (before - floor).max(f64::MIN_POSITIVE))
+    let noise = floor * floor;
+    // An error that is noise has no share to explain.
+    (before > noise).then(|| (before - after) / (before - after.min(noise)))
 }
 
 /// The single effects under both weightings, those that were promising enough for a refit.

@@ -53,7 +53,7 @@ pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a
     }
     // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
     // explain as much, and where the other effects of the set are called for without them: what is there to mend an imitation is not.
-    // An imitation does not leave white noise.
+    // An imitation hardly ever leaves white noise.
     if confirmed.added.iter().any(|placed| placed.effect.by_clock) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();

@@ -176,10 +176,10 @@ impl<'a> Judge<'_, 'a> {
         self.ending(nodes, last, in_noise.fit)
     }
 
-    /// A course with one model more, which is fitted.
-    pub fn longer(&self, course: Course<'a>, last: Node<'a>) -> Result<Course<'a>, Error> {
+    /// The course of these models and one more, which is fitted.
+    pub fn longer(&self, nodes: Vec<Node<'a>>, last: Node<'a>) -> Result<Course<'a>, Error> {
         let fit = last.fit.clone();
-        self.ending(course.nodes, last, fit)
+        self.ending(nodes, last, fit)
     }
 
     /// `in_noise`: the last model's fit in the metric of the noise.

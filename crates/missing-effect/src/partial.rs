@@ -131,7 +131,7 @@ pub(crate) fn largest_part<'a>(
                 }
                 Ok::<_, Error>(tested)
             })
-            // A set that cannot be simulated on a half of the record, or is fitted to nothing, is no answer.
+            // A set that cannot be fitted beside a noise model of its own, or to a half of the record, is no answer.
             .filter(|tested| {
                 !matches!(
                     tested,

@@ -138,7 +138,8 @@ pub(crate) fn base<'a>(
     let mut starts = options.starts.max(10);
     let one_by_one = one_by_one(&setup, options.seed)?;
     let fit = loop {
-        // The start of one effect after the other comes first: out of time no other is followed.
+        // The start of one effect after the other comes first: out of time no other is followed. What the user guesses of some
+        // parameters goes with it.
         let mut all: Vec<Vec<f64>> = one_by_one.iter().cloned().collect();
         all.extend(random_starts(&setup, starts, options.seed));
         if !problem.start.is_empty() {

@@ -12,6 +12,7 @@
 //!
 //! **Reference**: A. C. Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, Cambridge 1989, ch. 4.
 
+use ct_signals::ArModel;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
@@ -54,17 +55,26 @@ fn deviance(residuals: &[Vec<f64>]) -> f64 {
         .fold(at(0.0), f64::min)
 }
 
+/// Residuals behind the filter that makes the noise white. The first samples, which the filter takes otherwise, are left out: a level
+/// other than zero would look like a jump there.
+fn whitened(residuals: &[Vec<f64>], noise: &ArModel) -> Vec<Vec<f64>> {
+    let settled = |residual: &Vec<f64>| {
+        let white = noise.whiten(residual);
+        white.into_iter().skip(noise.order()).collect()
+    };
+    residuals.iter().map(settled).collect()
+}
+
 /// Whether a set lowers the deviance beyond chance against one that lacks some of its effects, where either residual may hold a random
-/// walk. What the smaller set's own parameters would gain in that noise model is allowed for: one for each.
+/// walk.
 pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node) -> Result<bool, Error> {
     let noise = colour(gained)?;
     let of = |node: &Node| {
         let residuals = node.setup.disturbance(&node.fit.x)?;
-        let white: Vec<Vec<f64>> = residuals.iter().map(|e| noise.whiten(e)).collect();
-        Ok::<_, Error>(deviance(&white))
+        Ok::<_, Error>(deviance(&whitened(&residuals, &noise)))
     };
     let free = |node: &Node| node.setup.free().len();
-    let fall = of(lacking)? - of(gained)? - free(lacking) as f64;
+    let fall = of(lacking)? - of(gained)?;
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);
     let penalty = gained.setup.price(0) - lacking.setup.price(0);
     let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
@@ -73,23 +83,27 @@ pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node) -> Result<bool, 
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
     use super::*;
+    use crate::noise_floor::NOISE_ORDER;
 
     const N: usize = 600;
 
-    /// White noise, a random walk of this standard deviation at the end, and a line that rises by so much.
-    fn series(walk: f64, rise: f64, seed: u64) -> Vec<f64> {
+    /// Noise of this correlation from sample to sample, a random walk of this standard deviation at the end, and a line that rises by so
+    /// much.
+    fn series(correlation: f64, walk: f64, rise: f64, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut level = 0.0;
+        let (mut level, mut noise): (f64, f64) = (0.0, rng.sample(StandardNormal));
         (0..N)
             .map(|k| {
                 let [white, step]: [f64; 2] = std::array::from_fn(|_| rng.sample(StandardNormal));
                 level += walk * step / (N as f64).sqrt();
-                white + level + rise * k as f64 / N as f64
+                noise = correlation * noise + (1.0 - correlation.powi(2)).sqrt() * white;
+                noise + level + rise * k as f64 / N as f64
             })
             .collect()
     }
@@ -110,28 +124,33 @@ mod tests {
 
     #[test]
     fn a_random_walk_is_no_drift_and_a_drift_is_no_random_walk() {
-        let fall = |walk: f64, rise: f64, seed: u64| {
-            let series = series(walk, rise, seed);
+        let fall = |correlation: f64, walk: f64, rise: f64, seed: u64| {
+            let series = series(correlation, walk, rise, seed);
             let mean = series.iter().sum::<f64>() / N as f64;
             let centred: Vec<f64> = series.iter().map(|e| e - mean).collect();
-            deviance(&[centred]) - deviance(&[without_line(&series)])
+            let gained = without_line(&series);
+            let noise = ArModel::fit(&[&gained], NOISE_ORDER).unwrap();
+            let of = |residual: Vec<f64>| deviance(&whitened(&[residual], &noise));
+            of(centred) - of(gained)
         };
         // Beyond the penalty of a parameter and the margin.
-        let named = |walk: f64, rise: f64| {
+        let named = |correlation: f64, walk: f64, rise: f64| {
             (0..100)
-                .filter(|&seed| fall(walk, rise, seed) > (N as f64).ln() + BIC_MARGIN)
+                .filter(|&seed| fall(correlation, walk, rise, seed) > (N as f64).ln() + BIC_MARGIN)
                 .count()
         };
-        let (small, large) = (named(0.5, 0.0), named(3.0, 0.0));
-        assert!(small <= 1 && large <= 1, "{small}, {large}");
-        // A drift whose rms is as large as the noise.
-        let drifts = named(0.0, 3.5);
-        assert!(drifts >= 97, "{drifts}");
+        for correlation in [0.0, 0.8] {
+            let walks = [0.5, 3.0].map(|walk| named(correlation, walk, 0.0));
+            assert!(walks.iter().all(|count| *count <= 1), "{walks:?}");
+        }
+        // A drift whose rms is as large as the noise; three times as large beside coloured noise.
+        let drifts = (named(0.0, 0.0, 3.5), named(0.8, 0.0, 10.0));
+        assert!(drifts.0 >= 95 && drifts.1 >= 90, "{drifts:?}");
     }
 
     #[test]
     fn white_noise_has_no_random_walk() {
-        let white = series(0.0, 0.0, 3);
+        let white = series(0.0, 0.0, 0.0, 3);
         let squares: f64 = white.iter().map(|e| e * e).sum();
         // An unknown mean costs the logarithm of the samples.
         let plain = N as f64 * (squares / N as f64).ln() + (N as f64).ln();

@@ -58,12 +58,10 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
     let setup = setup.with_structure(setup.structure.clone())?;
     let begun = transfer(node, &setup);
     let noise = (error - rounding).max(0.0).sqrt();
-    let starts = [0.0, noise.min(step), 0.5 * step].map(|noise| {
+    let starts = [0.0, noise, 0.5 * step].map(|noise| {
         let mut start = begun.clone();
-        for (name, value) in [("step", step), ("noise", noise)] {
-            if let Some(at) = position_of(&setup, placed, name) {
-                start[at] = value;
-            }
+        if let Some(at) = position_of(&setup, placed, "noise") {
+            start[at] = noise;
         }
         start
     });

@@ -132,10 +132,10 @@ pub(crate) fn of_a_part(last: &Node, unit: &str) -> String {
 /// What readings say of a converter: `share` is that of rounding in the mean squared error.
 pub(crate) fn of_rounding(step: f64, share: f64, unit: &str) -> String {
     format!(
-        "The readings are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error; no model of the plant makes that part less.",
+        "Nearly all readings are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error of the model without it.",
         significant(step, 3),
         significant(step / 12.0_f64.sqrt(), 2),
-        100.0 * share
+        100.0 * share.min(1.0)
     )
 }
 

@@ -59,6 +59,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
 const REACH: f64 = 7.0;
 /// From so much noise on, over the step, nothing is left of the stairs to 1e-8 of a step.
 const BLURRED: f64 = 1.0;
+/// Most steps from zero to the level.
+const COUNTABLE: f64 = 1e12;
 /// Below so little the stairs are sharp to any reading.
 const SHARP: f64 = 1e-6;
 
@@ -74,10 +76,11 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 impl<T: Scalar> Law<T> for CoarseQuantisation<T> {
     fn reading(&mut self, y: T, _t: f64) -> T {
         let (step, noise) = (self.step.value(), self.noise.value());
-        if step <= 0.0 || noise >= BLURRED * step {
+        let level = y.value() / step;
+        // Steps that are fine against the level's own digits, or a level that is not finite, cannot be counted.
+        if step <= 0.0 || noise >= BLURRED * step || !(level.abs() < COUNTABLE) {
             return y;
         }
-        let level = y.value() / step;
         if noise <= SHARP * step {
             let count = level.round();
             // The value is the step's. The slope by the level is that over a whole step, which is one: the slope at a point is

@@ -78,7 +78,8 @@ impl<T: Scalar> Law<T> for CoarseQuantisation<T> {
         let (step, noise) = (self.step.value(), self.noise.value());
         let level = y.value() / step;
         // Steps that are fine against the level's own digits, or a level that is not finite, cannot be counted.
-        if step <= 0.0 || noise >= BLURRED * step || !(level.abs() < COUNTABLE) {
+        let countable = level.abs() < COUNTABLE;
+        if step <= 0.0 || noise >= BLURRED * step || !countable {
             return y;
         }
         if noise <= SHARP * step {

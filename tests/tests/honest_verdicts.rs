@@ -327,7 +327,7 @@ fn an_overflow_of_a_tank_that_is_not_measured_is_named() {
     }
 }
 
-/// What a converter rounds is seen from its readings: the noise that it rounds with the level leaves no stairs for a fit.
+/// Rounding by a converter is seen from the readings: with the noise that is rounded the mean reading is nearly linear in the level.
 #[test]
 fn a_converter_is_named_from_its_readings() {
     for drive in [Drive::Open, Drive::Closed] {

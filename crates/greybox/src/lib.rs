@@ -27,6 +27,7 @@ pub use fit::{
 pub use levenberg_marquardt::{Stop, Stopping};
 pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use reading_grid::{ReadingGrid, reading_grid};
+pub use reading_step::exact_reading_step;
 pub use sandwich::{Robust, robust};
 pub use setup::{LoopRun, Rows, Setup, Simulated, at_rest, commands};
 pub use starts::{random_starts, starts_around};

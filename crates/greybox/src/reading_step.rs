@@ -18,8 +18,14 @@ const FIRST_LOOK: usize = 400;
 /// The largest `D` that nearly all readings are multiples of \[output unit\], if there is one that is coarse enough to be
 /// more than the last digit.
 pub(crate) fn reading_step(records: &[Record]) -> Option<f64> {
-    let exact = reading_grid(records).filter(|grid| grid.is_coarse() && grid.has_zero());
-    exact.map(|grid| grid.step).or_else(|| noisy_step(records))
+    exact_reading_step(records).or_else(|| noisy_step(records))
+}
+
+/// The same where the readings themselves are multiples, as a converter leaves them.
+#[must_use]
+pub fn exact_reading_step(records: &[Record]) -> Option<f64> {
+    let grid = reading_grid(records).filter(|grid| grid.is_coarse() && grid.has_zero());
+    grid.map(|grid| grid.step)
 }
 
 /// The same where noise comes behind the steps.

@@ -52,8 +52,8 @@ pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a
         confirmed = found.base.clone();
     }
     // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
-    // explain as much, and where the other effects of the set are called for without them: what is there to mend an imitation is not.
-    // An imitation hardly ever leaves white noise.
+    // explain as much, and where the other effects of the set are called for without them: what only corrects an imitation is not. Where
+    // white noise is left this is not asked, since an imitation hardly ever leaves white noise.
     if confirmed.added.iter().any(|placed| placed.effect.by_clock) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();

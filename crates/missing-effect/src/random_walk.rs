@@ -55,8 +55,8 @@ fn deviance(residuals: &[Vec<f64>]) -> f64 {
         .fold(at(0.0), f64::min)
 }
 
-/// Residuals behind the filter that makes the noise white. The first samples, which the filter takes otherwise, are left out: a level
-/// other than zero would look like a jump there.
+/// Residuals whitened by a noise model, without the first samples: they have no complete past, and are scaled otherwise, so that a level
+/// other than zero would look like a jump.
 fn whitened(residuals: &[Vec<f64>], noise: &ArModel) -> Vec<Vec<f64>> {
     let settled = |residual: &Vec<f64>| {
         let white = noise.whiten(residual);
@@ -97,7 +97,7 @@ mod tests {
     /// much.
     fn series(correlation: f64, walk: f64, rise: f64, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let (mut level, mut noise): (f64, f64) = (0.0, rng.sample(StandardNormal));
+        let (mut level, mut noise): (f64, f64) = (0.0, 0.0);
         (0..N)
             .map(|k| {
                 let [white, step]: [f64; 2] = std::array::from_fn(|_| rng.sample(StandardNormal));
@@ -145,7 +145,7 @@ mod tests {
         }
         // A drift whose rms is as large as the noise; three times as large beside coloured noise.
         let drifts = (named(0.0, 0.0, 3.5), named(0.8, 0.0, 10.0));
-        assert!(drifts.0 >= 95 && drifts.1 >= 90, "{drifts:?}");
+        assert!(drifts.0 >= 97 && drifts.1 >= 90, "{drifts:?}");
     }
 
     #[test]

@@ -1,13 +1,15 @@
 //! Readings that a converter has rounded with their noise.
 //!
-//! The readings themselves are the evidence: nearly all are multiples of one number `D`, which needs no fit and no criterion. By the
-//! criterion rounding is hardly to be seen: the noise that is rounded with the level blurs the stairs (dither), and rounding is a further
-//! noise of variance `D^2/12`.
+//! The readings themselves are the evidence: nearly all are multiples of one number `D`, which needs no fit and no criterion. The criterion
+//! hardly falls: the noise that is rounded with the level (dither) makes the mean reading nearly linear in the level, and rounding acts as a
+//! further noise of variance `D^2/12`.
 //!
 //! **Reference**: B. Widrow, I. Kollar, Quantization Noise, Cambridge 2008, ch. 4 and 19.
 
+use std::ops::RangeInclusive;
+
 use ct_signals::ArModel;
-use greybox::{fit_from, reading_grid};
+use greybox::{exact_reading_step, fit_from};
 use plants::{EffectInfo, Placed};
 
 use crate::{
@@ -17,12 +19,11 @@ use crate::{
     node::{FINE, Node, position_of, transfer},
 };
 
-/// Rounding is named where it makes this part of the mean squared error that is left, and not more than all of it, nearly: where the
-/// error is less, the level rests or the record is no rounded one.
-const SHARE: f64 = 1.0 / 3.0;
-const WHOLE: f64 = 1.1;
+/// Rounding is named where its variance is this part of the mean squared error that is left. Where it is clearly more than that error, the
+/// level rests, or the grid is not that of a converter.
+const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
 
-/// What rounding is, and how much of the error.
+/// A model with rounding, and what rounding makes of the error.
 pub(crate) struct Rounded<'a> {
     /// The model with rounding.
     pub node: Node<'a>,
@@ -30,7 +31,7 @@ pub(crate) struct Rounded<'a> {
     pub group: Group,
     /// The number that readings are multiples of \[output unit\].
     pub step: f64,
-    /// What rounding alone makes of the mean squared error that the model without it leaves.
+    /// Share of rounding alone in the mean squared error of the model without it.
     pub share: f64,
 }
 
@@ -41,21 +42,21 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
         return Ok(None);
     };
     let placed = Placed { effect, vessel: 0 };
-    let grid = reading_grid(node.setup.records).filter(|grid| grid.is_coarse() && grid.has_zero());
-    let Some(step) = grid.map(|grid| grid.step) else {
+    let Some(step) = exact_reading_step(node.setup.records) else {
         return Ok(None);
     };
     let structure = &node.setup.structure;
     let error = node.fit.rmse.powi(2);
     let known = structure.effects().iter().any(|on| on.effect.id == EFFECT);
     let rounding = step.powi(2) / 12.0;
-    if known || !(SHARE * error..=WHOLE * error).contains(&rounding) {
+    let share = rounding / error;
+    if known || !SHARE.contains(&share) {
         return Ok(None);
     }
-    let mut setup = node.setup.with_structure(structure.with(placed)?)?;
-    // The readings tell the step to all their digits, and the level tells nothing more.
+    // The readings give the step to all their digits; a fit adds nothing.
+    let mut setup = node.setup.clone();
     setup.fixed.insert(format!("{EFFECT}.step"), step);
-    let setup = setup.with_structure(setup.structure.clone())?;
+    let setup = setup.with_structure(structure.with(placed)?)?;
     let begun = transfer(node, &setup);
     let noise = (error - rounding).max(0.0).sqrt();
     let starts = [0.0, noise, 0.5 * step].map(|noise| {
@@ -76,6 +77,6 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
         node: Node { setup, fit, added },
         group,
         step,
-        share: rounding / error,
+        share,
     }))
 }

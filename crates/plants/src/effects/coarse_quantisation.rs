@@ -1,7 +1,7 @@
 //! `coarse_quantisation`: the reading moves in steps.
 //!
-//! A converter rounds what the sensor says with its noise. Where the noise is a good part of a step it blurs the stairs, and from one
-//! step on nothing is left of them in the mean reading.
+//! A converter rounds the sensor's signal with its noise. Such noise smooths the mean reading over the level: from a standard deviation of
+//! one step on, it is a straight line.
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -55,13 +55,13 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     ]
 }
 
-/// So many standard deviations from a threshold the reading is as if there were no noise.
+/// Beyond so many standard deviations from a threshold, noise does not change the reading.
 const REACH: f64 = 7.0;
-/// From so much noise on, over the step, nothing is left of the stairs to 1e-8 of a step.
-const BLURRED: f64 = 1.0;
+/// Noise over step from which on the mean reading is the level, to 1e-8 of a step.
+const SMOOTH: f64 = 1.0;
 /// Most steps from zero to the level.
 const COUNTABLE: f64 = 1e12;
-/// Below so little the stairs are sharp to any reading.
+/// Noise over step below which the reading is as without noise.
 const SHARP: f64 = 1e-6;
 
 struct CoarseQuantisation<T> {
@@ -79,7 +79,7 @@ impl<T: Scalar> Law<T> for CoarseQuantisation<T> {
         let level = y.value() / step;
         // Steps that are fine against the level's own digits, or a level that is not finite, cannot be counted.
         let countable = level.abs() < COUNTABLE;
-        if step <= 0.0 || noise >= BLURRED * step || !countable {
+        if step <= 0.0 || noise >= SMOOTH * step || !countable {
             return y;
         }
         if noise <= SHARP * step {
@@ -88,8 +88,7 @@ impl<T: Scalar> Law<T> for CoarseQuantisation<T> {
             // zero and would stop every fit.
             return T::with_slopes(step * count, [(y, 1.0), (self.step, count)]);
         }
-        // Every threshold half a step below a whole number is passed with the probability that the noise lets it; those out of reach
-        // below are passed, and those above are not.
+        // Each threshold, half-way between two readings, is passed with a probability; those out of reach below are passed surely.
         let spread = noise / step;
         let mut threshold = (level - REACH * spread - 0.5).ceil();
         let (mut count, mut by_level, mut by_spread) = (threshold, 0.0, 0.0);

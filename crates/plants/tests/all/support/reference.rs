@@ -589,7 +589,7 @@ fn bisected(e: &Equations, stretch: &Stretch, mut x: [f64; 7], from: f64, to: f6
     x
 }
 
-/// Mean of what is rounded with noise: the Fourier series of the sawtooth, each term less by the noise's characteristic function.
+/// Mean of a level that is rounded with noise: the Fourier series of the sawtooth, each term times the noise's characteristic function.
 fn mean_reading(level: f64, step: f64, noise: f64) -> f64 {
     let angle = 2.0 * std::f64::consts::PI;
     let term = |n: i32| {

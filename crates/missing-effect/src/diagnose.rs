@@ -54,10 +54,10 @@ pub fn diagnose(
         }
         _ => (&white, &base, &found.grown),
     };
-    let (doubted, single) = rayon::join(|| doubt(&base, &found), || grown.singles(metric));
+    let widen = ControlLoop::widens(control_loop.as_ref());
+    let (doubted, single) = rayon::join(|| doubt(&base, &found, widen), || grown.singles(metric));
     let doubted = doubted?;
     let mut confirmed = doubted.confirmed;
-    let widen = ControlLoop::widens(control_loop.as_ref());
     if let Some(position) = confirmed.narrow_stiction().filter(|_| widen) {
         confirmed = confirm(
             without(&confirmed, position, &found.noise, FINE)?,

@@ -7,12 +7,14 @@ use crate::{
     Error,
     confirm::{BIC_MARGIN, beyond_chance, confirm},
     find::Found,
+    groups::NEARLY,
     jump::{Jump, jump},
-    node::{Node, without_clock},
+    node::{Node, refine, without_clock},
     noise_floor::NOISE_ORDER,
     problem::STOPPING,
     random_walk::beyond_random_walk,
     remains::remains,
+    search::by_clock,
 };
 
 /// What a doubt leaves.
@@ -24,8 +26,12 @@ pub(crate) struct Doubted<'a> {
     pub jumped: Option<Jump>,
 }
 
-/// Takes from what is confirmed what something simpler explains as well.
-pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a>, Error> {
+/// Takes from what is confirmed what something simpler explains as well; `in_loop`: the records come from a loop that is not simulated.
+pub(crate) fn doubt<'a>(
+    base: &Node<'a>,
+    found: &Found<'a>,
+    in_loop: bool,
+) -> Result<Doubted<'a>, Error> {
     let noise = &found.noise;
     let mut confirmed = found.confirmed.clone();
     // Each model with the colour of its own residual: what a coloured noise explains needs no effect. The richest model has
@@ -54,7 +60,7 @@ pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a
     // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
     // explain as much, and where the other effects of the set are called for without them: what only corrects an imitation is not. Where
     // white noise is left this is not asked, since an imitation hardly ever leaves white noise.
-    if confirmed.added.iter().any(|placed| placed.effect.by_clock) {
+    if by_clock(&confirmed) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();
         let by_walk = !beyond_random_walk(&confirmed, &others)?;
@@ -67,9 +73,43 @@ pub(crate) fn doubt<'a>(base: &Node<'a>, found: &Found<'a>) -> Result<Doubted<'a
             confirmed = others;
         }
     }
+    if in_loop
+        && by_clock(&confirmed)
+        && let Some(simpler) = simpler(&confirmed, found)?
+    {
+        confirmed = simpler;
+    }
     Ok(Doubted {
         confirmed,
         own_base,
         jumped,
     })
+}
+
+/// The best smaller set without effects that follow time alone which leaves noise, and nearly as little of it; `None` where there is none.
+///
+/// In a loop the command answers to every disturbance, and the likelihood of a model that runs on the measured command is biased by as
+/// much as a few effects gain. A valve that sticks is then imitated by a pump that saturates and an outlet that changes at the instant of
+/// a slip: chosen instants and limits meet the noise better than what the valve is bound to do.
+fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Result<Option<Node<'a>>, Error> {
+    let grown = std::iter::once(&found.grown).chain(&found.prewhitened);
+    let mut smaller: Vec<Node> = grown
+        .flat_map(|grown| grown.sizes.iter().take(confirmed.added.len()))
+        .flatten()
+        .filter(|node| !node.added.is_empty() && !by_clock(node))
+        .filter_map(|node| refine(node, &found.noise, &[]).ok())
+        .filter(|node| {
+            node.fit.cost < NEARLY * confirmed.fit.cost
+                && node.plausible()
+                && node.narrow_stiction().is_none()
+        })
+        .collect();
+    smaller.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+    for node in smaller {
+        let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?;
+        if remains(&node, &own)?.is_none() {
+            return Ok(Some(node));
+        }
+    }
+    Ok(None)
 }

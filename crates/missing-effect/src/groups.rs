@@ -10,7 +10,7 @@ use crate::{Error, PlaceScore, exchange::exchanges, node::Node, step::place_name
 pub const GROUP_MARGIN: f64 = 6.0;
 
 /// The mean square that a stand-in of an effect that follows time alone may leave, over what that leaves.
-const NEARLY: f64 = 1.05;
+pub(crate) const NEARLY: f64 = 1.05;
 
 /// An effect, what cannot be told apart from it, and where it may act.
 pub(crate) struct Group {

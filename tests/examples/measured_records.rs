@@ -17,6 +17,9 @@ struct Arguments {
     /// Writes every record's outcome.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Searches without a limit on the time.
+    #[arg(long)]
+    no_limit: bool,
     /// Also prints what the diagnosis says in words.
     #[arg(long)]
     sentences: bool,
@@ -43,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "record", "", "verdict", "s", "error", "held out"
     );
     let options = Options {
-        time_limit: Some(TIME_LIMIT),
+        time_limit: (!arguments.no_limit).then_some(TIME_LIMIT),
         ..Options::default()
     };
     for (name, case) in cases(&arguments.filter) {

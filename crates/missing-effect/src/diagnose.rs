@@ -73,6 +73,7 @@ pub fn diagnose(
 
     tell("telling apart", 1, 3);
     let jumped = doubted.jumped.map(|jump| jump.left(&problem.records[0]));
+    let searched = found.sets();
     let judge = Judge {
         base: &base,
         noise: &found.noise,
@@ -82,6 +83,7 @@ pub fn diagnose(
         stopped,
         jumped,
         singles: &single,
+        searched: &searched,
     };
     let (judged, (scores, price)) = rayon::join(
         || judge.judge(confirmed),

@@ -92,12 +92,12 @@ pub(crate) fn doubt<'a>(
 /// much as a few effects gain. A valve that sticks is then imitated by a pump that saturates and an outlet that changes at the instant of
 /// a slip: chosen instants and limits meet the noise better than what the valve is bound to do.
 fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Result<Option<Node<'a>>, Error> {
-    let grown = std::iter::once(&found.grown).chain(&found.prewhitened);
-    let mut smaller: Vec<Node> = grown
-        .flat_map(|grown| grown.sizes.iter().take(confirmed.added.len()))
-        .flatten()
-        .filter(|node| !node.added.is_empty() && !by_clock(node))
-        .filter_map(|node| refine(node, &found.noise, &[]).ok())
+    let smaller = |node: &Node| (1..confirmed.added.len()).contains(&node.added.len());
+    let mut smaller: Vec<Node> = found
+        .sets()
+        .into_iter()
+        .filter(|node| smaller(node) && !by_clock(node))
+        .filter_map(|node| refine(&node, &found.noise, &[]).ok())
         .filter(|node| {
             node.fit.cost < NEARLY * confirmed.fit.cost
                 && node.plausible()

@@ -7,17 +7,28 @@ use crate::{
     proposal::any_promise, remains::remains,
 };
 
-/// What a set leaves is noise, and in the metric of that noise no effect more promises what it would cost.
+/// What is left to explain beside a set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rest {
+    /// More than noise, or an effect more promises what it would cost.
+    Structure,
+    /// What looks like coloured noise; a noise model may have taken up an effect.
+    Coloured,
+    /// White noise.
+    White,
+}
+
+/// What a set leaves: noise, where in the metric of that noise no effect more promises what it would cost.
 ///
 /// The colour is that of the set's own residual, so that a coloured noise does not keep the search going. A set beside this
 /// one, which leaves as little, is found where this one's effects are exchanged.
-pub(crate) fn exhausted(node: &Node) -> Result<bool, Error> {
+pub(crate) fn rest(node: &Node) -> Result<Rest, Error> {
     if node.setup.out_of_time() {
-        return Ok(false);
+        return Ok(Rest::Structure);
     }
     let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?;
     if remains(node, &own)?.is_some() {
-        return Ok(false);
+        return Ok(Rest::Structure);
     }
     let noise = own.noise.clone();
     let node = Node {
@@ -28,5 +39,11 @@ pub(crate) fn exhausted(node: &Node) -> Result<bool, Error> {
     let pays = |setup: &Setup, promise: f64| {
         n * (cost / promise).ln() - (setup.price(0) - node.setup.price(0)) > BIC_MARGIN
     };
-    Ok(!any_promise(&node, &noise, pays))
+    Ok(if any_promise(&node, &noise, pays) {
+        Rest::Structure
+    } else if noise.order() > 0 {
+        Rest::Coloured
+    } else {
+        Rest::White
+    })
 }

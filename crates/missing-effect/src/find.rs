@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::{
     Error,
     confirm::{BIC_MARGIN, confirm, improve, least_useful},
-    exhausted::exhausted,
+    exhausted::{Rest, rest},
     floating::follow,
     minima::begun_again,
     node::{Node, refine},
@@ -43,6 +43,18 @@ pub(crate) struct Found<'a> {
     pub wandering: bool,
     /// Whether it does and something is confirmed: then models are compared and shown by their simulation error.
     pub by_simulation: bool,
+}
+
+impl<'a> Found<'a> {
+    /// All sets that were grown, in either weighting.
+    pub fn sets(&self) -> Vec<Node<'a>> {
+        let grown = std::iter::once(&self.grown).chain(&self.prewhitened);
+        grown
+            .flat_map(|grown| &grown.sizes)
+            .flatten()
+            .cloned()
+            .collect()
+    }
 }
 
 /// Searches sets of effects of at most `most`, or more where the noise needs them.
@@ -82,7 +94,7 @@ pub(crate) fn find<'a>(
             ..breadth
         },
         pays_in_colour,
-        exhausted,
+        rest,
         &|done, total| tell("searching sets of effects", done, total),
     )?;
     if grown.goes_on(SIDE_BY_SIDE) {
@@ -130,7 +142,13 @@ pub(crate) fn find<'a>(
             breadth,
             pays,
             // It was exhausted in this colour, which is that of its own residual.
-            |node| Ok(grown.exhausted_by(node) || exhausted(node)?),
+            |node| {
+                if grown.exhausted_by(node) {
+                    Ok(Rest::White)
+                } else {
+                    rest(node)
+                }
+            },
             &|done, total| tell("searching in the noise's metric", done, total),
         )?;
         let best = chosen(&coloured.sizes, &base);

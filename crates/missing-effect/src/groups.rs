@@ -4,7 +4,12 @@ use ct_signals::ArModel;
 use plants::Placed;
 use rayon::prelude::*;
 
-use crate::{Error, PlaceScore, exchange::exchanges, node::Node, step::place_name};
+use crate::{
+    Error, PlaceScore,
+    exchange::exchanges,
+    node::{Node, best_first, refine},
+    step::place_name,
+};
 
 /// What stands in for another lies within this of its criterion.
 pub const GROUP_MARGIN: f64 = 6.0;
@@ -20,12 +25,16 @@ pub(crate) struct Group {
     pub places: Vec<PlaceScore>,
 }
 
-/// For every added effect, itself and all that fit as well in its place; `in_loop`: the records come from a loop that is not simulated.
+/// For every added effect, itself and all that fit as well in its place.
+///
+/// `searched`: sets that the search has fitted, among them stand-ins that a new start may miss; `in_loop`: the records come from a loop
+/// that is not simulated.
 pub(crate) fn groups<'a>(
     last: &Node<'a>,
     metric: &ArModel,
     per_sample: f64,
     singles: Option<&[Node<'a>]>,
+    searched: &[Node<'a>],
     in_loop: bool,
 ) -> Result<Vec<Group>, Error> {
     (0..last.added.len())
@@ -41,14 +50,32 @@ pub(crate) fn groups<'a>(
                 })
                 .into_iter()
                 .collect();
-            for node in exchanges(last, position, metric, singles)? {
-                let stand_in = node.added.last().map_or("", |placed| placed.effect.id);
-                // In the white metric a coloured residual counts each sample for less than one.
-                let behind = (node.fit.bic() - last.fit.bic()) / per_sample;
-                if let Some(other) = node.added.last().copied()
-                    && other.effect.id == own.effect.id
+            // In the white metric a coloured residual counts each sample for less than one.
+            let behind = |node: &Node| (node.fit.bic() - last.fit.bic()) / per_sample;
+            let mut nodes = exchanges(last, position, metric, singles)?;
+            let near = |set: &&Node| {
+                let other = stand_in(set, last, position);
+                other.is_some_and(|other| {
+                    let found = nodes.iter().filter(|node| node.added.contains(&other));
+                    found.map(behind).fold(f64::INFINITY, f64::min) >= GROUP_MARGIN
+                })
+            };
+            let more = searched.par_iter().filter(near);
+            let more: Vec<Node> = more
+                .filter_map(|set| refine(set, metric, &[]).ok())
+                .collect();
+            nodes.extend(more);
+            for node in best_first(nodes) {
+                let Some(other) = stand_in(&node, last, position) else {
+                    continue;
+                };
+                let id = other.effect.id;
+                if id == own.effect.id
                     && let Some(place) = place_of(other)
                 {
+                    if places.iter().any(|known| known.place == place) {
+                        continue;
+                    }
                     let deviance = (node.fit.deviance - last.fit.deviance) / per_sample;
                     places.push(PlaceScore {
                         place,
@@ -70,10 +97,10 @@ pub(crate) fn groups<'a>(
                     && node.added.iter().all(|placed| !placed.effect.by_clock)
                     && node.fit.cost < NEARLY * last.fit.cost;
                 if plausible
-                    && (behind < GROUP_MARGIN || nearly)
-                    && !group.iter().any(|g| g == stand_in)
+                    && (behind(&node) < GROUP_MARGIN || nearly)
+                    && !group.iter().any(|g| g == id)
                 {
-                    group.push(stand_in.to_string());
+                    group.push(id.to_string());
                 }
             }
             Ok(Group {
@@ -82,6 +109,17 @@ pub(crate) fn groups<'a>(
             })
         })
         .collect()
+}
+
+/// What a set has in the place of the effect at a position of another set, where they differ in that alone.
+fn stand_in(set: &Node, last: &Node, position: usize) -> Option<Placed> {
+    let kept = last.added.iter().enumerate();
+    let mut kept = kept.filter(|(k, _)| *k != position);
+    let differs = set.added.len() == last.added.len()
+        && !set.added.contains(&last.added[position])
+        && kept.all(|(_, placed)| set.added.contains(placed));
+    let new = |placed: &&Placed| !last.added.contains(placed);
+    set.added.iter().find(new).filter(|_| differs).copied()
 }
 
 /// The places relative to the best one, most likely first.

@@ -54,6 +54,8 @@ pub(crate) struct Judge<'s, 'a> {
     pub jumped: Option<Left>,
     /// The single effects, in the metric in which they were refitted last.
     pub singles: &'s [Node<'a>],
+    /// The sets that the search has fitted.
+    pub searched: &'s [Node<'a>],
 }
 
 /// What was found of a set.
@@ -157,6 +159,7 @@ impl<'a> Judge<'_, 'a> {
             metric,
             per_sample,
             singles,
+            self.searched,
             self.in_loop,
         )
     }
@@ -305,6 +308,7 @@ mod tests {
             stopped: false,
             jumped: None,
             singles: &singles(&base, &white),
+            searched: &[],
         }
         .judge(set)
         .unwrap();

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::{
     Error,
+    exhausted::Rest,
     node::{Node, ROUGH, best_first},
     pairs::joint_pairs,
     proposal::{Parent, Proposal, candidates, proposals, propose, realise_all},
@@ -129,13 +130,14 @@ impl<'a> Grown<'a> {
 
 /// Grows sets of effects from a base.
 ///
-/// The growth ends after two sizes that are not `worth` it beside the best set so far, and at once where the best set is `exhausted`.
+/// The growth ends after two sizes that are not `worth` it beside the best set so far, and at once where the best set leaves noise. Where
+/// an only effect leaves coloured noise, which may hold a second one, it goes on if some pair is worth it.
 pub(crate) fn grow<'a>(
     base: &Node<'a>,
     noise: &ArModel,
     breadth: Breadth,
     worth: impl Fn(&Node, &[Node]) -> bool,
-    exhausted: impl Fn(&Node) -> Result<bool, Error>,
+    rest: impl Fn(&Node) -> Result<Rest, Error>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Grown<'a>, Error> {
     let mut grown = Grown {
@@ -161,9 +163,14 @@ pub(crate) fn grow<'a>(
             .flatten()
             .min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
             .unwrap_or(base);
-        if !best_before.added.is_empty() && idle == 0 && exhausted(best_before)? {
-            grown.exhausted = Some(best_before.added.clone());
-            break;
+        let mut may_end = None;
+        if !best_before.added.is_empty() && idle == 0 {
+            let rest = rest(best_before)?;
+            may_end = (rest != Rest::Structure).then(|| best_before.added.clone());
+            if may_end.is_some() && (size > PAIR || rest == Rest::White) {
+                grown.exhausted = may_end;
+                break;
+            }
         }
         // The first sizes are searched wider: a pair may pay where neither of its effects does.
         let factor = if size <= 2 { 2 } else { 1 };
@@ -207,6 +214,9 @@ pub(crate) fn grow<'a>(
         // A pair is looked at even where no single effect pays; after two sizes that do not pay there is no more.
         idle = if worth(best_before, &nodes) {
             0
+        } else if may_end.is_some() {
+            grown.exhausted = may_end;
+            break;
         } else {
             idle + 1
         };

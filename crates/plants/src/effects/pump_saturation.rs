@@ -20,7 +20,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.input();
     // Over all of the range, and on what was visited most.
     let mut starts = spread(low, high, 4);
-    starts.extend([0.3, 0.7].map(|share| site.input_quantile(share)));
+    starts.extend([0.3, 0.7, 0.9, 0.97].map(|share| site.input_quantile(share)));
     vec![ParameterInfo {
         name: "limit",
         unit: Unit::INPUT,

@@ -215,7 +215,8 @@ impl Plant {
             let mut valve = alpha(name, meaning, scales.area[vessel]);
             if let Some(orifice) = scales.orifice {
                 valve.unit = Unit::ONE;
-                (valve.lower, valve.upper) = (valve.lower / orifice, valve.upper / orifice);
+                valve.lower /= orifice;
+                valve.upper = (valve.upper / orifice).min(MOST_OF_AN_ORIFICE);
             }
             valve
         };
@@ -280,6 +281,10 @@ impl Plant {
         }
     }
 }
+
+/// The largest flow coefficient of a valve whose orifice is known: an orifice lets through at most what Torricelli's law says, which is
+/// one, and its cross-section may be twice what is written down.
+const MOST_OF_AN_ORIFICE: f64 = 2.0;
 
 /// A size to divide by: one where there is none.
 fn positive(size: f64) -> f64 {

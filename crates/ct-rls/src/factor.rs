@@ -231,6 +231,19 @@ impl<const P: usize> UdFactor<P> {
         SMatrix::from_fn(|i, j| entry(self.u.as_flattened(), &self.d, i, j))
     }
 
+    /// `L = U D^(1/2)`, upper triangular, with `P = L L'`.
+    pub fn root(&self) -> SMatrix<f64, P, P> {
+        let mut root = SMatrix::zeros();
+        for j in 0..P {
+            let spread = libm::sqrt(self.d[j]);
+            for i in 0..j {
+                root[(i, j)] = self.u[j][i] * spread;
+            }
+            root[(j, j)] = spread;
+        }
+        root
+    }
+
     /// Sum of the diagonal of `U D U'`.
     pub fn trace(&self) -> f64 {
         trace(self.u.as_flattened(), &self.d)

@@ -34,6 +34,8 @@ pub(crate) mod sealed {
         fn smallest_pivot(&self) -> Result<f64, (usize, f64)>;
         /// `(P x, x'P x)`
         fn times(&self, x: &SVector<f64, P>) -> (SVector<f64, P>, f64);
+        /// `L` of `P = L L'`
+        fn root(&self) -> Result<SMatrix<f64, P, P>, Error>;
     }
 
     /// Why a step was not made; the state is as before.
@@ -108,6 +110,10 @@ impl<const P: usize> sealed::Covariance<P> for Plain<P> {
         let [entries] = &x.data.0;
         let k = nalgebra::SVector::from(Self::times(self, entries));
         (k, k.dot(x))
+    }
+
+    fn root(&self) -> Result<nalgebra::SMatrix<f64, P, P>, crate::Error> {
+        Ok(crate::UdFactor::new(&self.to_matrix())?.root())
     }
 
     fn smallest_pivot(&self) -> Result<f64, (usize, f64)> {

@@ -158,9 +158,12 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
         Some(epsilon)
     }
 
-    /// `(P x, x'P x)`.
-    pub fn times(&self, x: &SVector<f64, P>) -> (SVector<f64, P>, f64) {
-        self.state.times(x)
+    /// `L`, upper triangular, with `P = L L'`.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] where a rule other than [`ExactHold`] has lost it.
+    pub fn root(&self) -> Result<SMatrix<f64, P, P>, Error> {
+        self.state.root()
     }
 
     /// The same estimator with other guards against wind-up.

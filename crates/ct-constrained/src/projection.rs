@@ -9,7 +9,7 @@
 //!
 //! Assumption: some `theta` obeys all rows. Equations (the dual method of Goldfarb and Idnani) with `P = L L'`, so that
 //! `theta = theta^ + L x` and the nearest point has the shortest `x`; `g_i = L' f_i/sum |f_ij| sqrt(P_jj)`, with the sign of the bound
-//! that is violated. `G = Q R` are the active rows, equalities first, `g` is the row that comes next, `e` its violation in that unit:
+//! that is violated. `G = Q R` are the active rows, `g` is the row that is violated most, `e` its violation in that unit:
 //! ```text
 //! r = R^-1 Q' g,   z = g - Q Q' g,   t = min(e/z'z, min lambda_j/r_j over r_j > 0)
 //! lambda -= t r,   lambda_g += t,    e -= t z'z
@@ -163,6 +163,32 @@ struct Active {
     lambda: f64,
 }
 
+/// The row that is violated most for its size, its side and its excess; not finite where that is beyond the floating-point range.
+fn most_violated<const P: usize, const N: usize>(
+    rows: &[Interval<P>; N],
+    theta: &SVector<f64, P>,
+    entries: &SVector<f64, P>,
+    passed: impl Fn(usize) -> bool,
+) -> Option<(usize, f64, f64)> {
+    let mut most = OBEYED;
+    let mut found = None;
+    for (row, interval) in rows.iter().enumerate() {
+        let (sign, excess) = interval.excess(theta);
+        if excess <= 0.0 || passed(row) {
+            continue;
+        }
+        let share = excess / interval.size(sign, entries);
+        if share.is_nan() {
+            return Some((row, sign, share));
+        }
+        if share > most {
+            most = share;
+            found = Some((row, sign, excess));
+        }
+    }
+    found
+}
+
 struct Search<'a, const P: usize, const N: usize> {
     rows: &'a [Interval<P>; N],
     start: SVector<f64, P>,
@@ -188,7 +214,12 @@ struct Search<'a, const P: usize, const N: usize> {
 }
 
 impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
+    #[inline]
     fn new(rows: &'a [Interval<P>; N], start: SVector<f64, P>, root: SMatrix<f64, P, P>) -> Self {
+        let mut squares = SVector::zeros();
+        for column in root.column_iter() {
+            squares += column.component_mul(&column);
+        }
         let none = Active {
             row: 0,
             sign: 0.0,
@@ -202,7 +233,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
             entries: start.abs(),
             way: 0.0,
             root,
-            spread: root.component_mul(&root).column_sum().map(libm::sqrt),
+            spread: squares.map(libm::sqrt),
             active: [none; P],
             count: 0,
             q: [SVector::zeros(); P],
@@ -215,27 +246,10 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         &self.active[..self.count]
     }
 
-    /// The row to take next, its side and its excess: an equality, or what is violated most for its size.
     fn next(&self) -> Option<(usize, f64, f64)> {
-        let mut most = OBEYED;
-        let mut found = None;
-        for (row, interval) in self.rows.iter().enumerate() {
-            if self.implied[row] || self.active().iter().any(|a| a.row == row) {
-                continue;
-            }
-            let (sign, excess) = interval.excess(&self.theta);
-            if interval.equality() {
-                return Some((row, sign, excess));
-            }
-            if excess > 0.0 {
-                let size = interval.size(sign, &self.entries);
-                if excess > most * size {
-                    most = excess / size;
-                    found = Some((row, sign, excess));
-                }
-            }
-        }
-        found
+        most_violated(self.rows, &self.theta, &self.entries, |row| {
+            self.implied[row] || self.active().iter().any(|a| a.row == row)
+        })
     }
 
     /// `g`
@@ -308,6 +322,11 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
             y[j] = (left * active.sign * active.unit - known) / self.r[j][j];
             x += self.q[j] * y[j];
         }
+        self.go(&x);
+    }
+
+    /// `theta += L x`
+    fn go(&mut self, x: &SVector<f64, P>) {
         self.theta += self.root * x;
         self.way += x.norm();
         let ends = self.theta.abs().sup(&self.start.abs());
@@ -362,7 +381,11 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
             entering.lambda += t;
             let Some(j) = leaves else {
                 self.push(entering, h, z, slope);
-                self.move_onto_active();
+                if first {
+                    self.go(&(z * -t));
+                } else {
+                    self.move_onto_active();
+                }
                 return true;
             };
             if independent {
@@ -380,34 +403,29 @@ fn nearest<const P: usize, const N: usize, I: Integrator>(
     rows: &[Interval<P>; N],
 ) -> Result<bool, Error> {
     let start = *rls.theta();
-    let (mut obeyed, entries) = (true, start.abs());
-    for row in rows {
-        let (sign, excess) = row.excess(&start);
-        if excess.is_nan() || excess == f64::INFINITY {
-            let what = "the violation";
+    let Some(mut next) = most_violated(rows, &start, &start.abs(), |_| false) else {
+        return Ok(false);
+    };
+    let mut search = Search::new(rows, start, rls.root()?);
+    for _ in 0..STEPS * (N + P) {
+        let (row, sign, excess) = next;
+        if !excess.is_finite() {
             return Err(Error::NotFinite {
-                what,
+                what: "the violation",
                 value: excess,
             });
         }
-        obeyed &= excess <= 0.0 || excess <= OBEYED * row.size(sign, &entries);
-    }
-    if obeyed {
-        return Ok(false);
-    }
-    let mut search = Search::new(rows, start, rls.root()?);
-    let (mut row, mut violation) = (0, 0.0);
-    for _ in 0..STEPS * (N + P) {
-        let Some((next, sign, excess)) = search.next() else {
+        if !search.enter(row, sign, excess) {
+            break;
+        }
+        let Some(violated) = search.next() else {
             // for what rounding left
             search.move_onto_active();
             rls.set_theta(search.theta)?;
             return Ok(search.theta != start);
         };
-        (row, violation) = (next, excess);
-        if !search.enter(row, sign, excess) {
-            break;
-        }
+        next = violated;
     }
+    let (row, _, violation) = next;
     Err(Error::NoCommonPoint { row, violation })
 }

@@ -90,6 +90,7 @@ impl<const P: usize> Covariance<P> for UdFactor<P> {
         self.times(x)
     }
 
+    #[inline]
     fn root(&self) -> Result<SMatrix<f64, P, P>, Error> {
         Ok(self.root())
     }

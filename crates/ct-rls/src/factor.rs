@@ -232,6 +232,7 @@ impl<const P: usize> UdFactor<P> {
     }
 
     /// `L = U D^(1/2)`, upper triangular, with `P = L L'`.
+    #[inline]
     pub fn root(&self) -> SMatrix<f64, P, P> {
         let mut root = SMatrix::zeros();
         for j in 0..P {

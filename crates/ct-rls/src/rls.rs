@@ -162,6 +162,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] where a rule other than [`ExactHold`] has lost it.
+    #[inline]
     pub fn root(&self) -> Result<SMatrix<f64, P, P>, Error> {
         self.state.root()
     }

@@ -15,7 +15,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::Error;
-use crate::settings::{MAX_EPSILON, MAX_TRACE, Weights, gain};
+use crate::settings::{MAX_EPSILON, MAX_TRACE, MAX_WEIGHT, Weights, gain};
 
 /// Entries of `P(0)` that should be equal may differ by this, relative to the diagonal.
 const SYMMETRY: f64 = 1e-9;
@@ -93,6 +93,20 @@ pub(crate) fn information_norm(u: &[f64], d: &[f64], x: &mut [f64]) -> f64 {
     sum
 }
 
+/// `a' b`, in one order of summation whether the length is known when the program is built or not.
+#[inline(always)]
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((fours_a, rest_a), (fours_b, rest_b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in fours_a.iter().zip(fours_b) {
+        for i in 0..4 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
 /// `f = U' phi` and `s = phi' P phi`.
 #[inline(always)]
 pub(crate) fn project(u: &[f64], d: &[f64], phi: &[f64], f: &mut [f64]) -> f64 {
@@ -146,7 +160,8 @@ pub(crate) fn exact_step(
     let s = project(u, d, phi, f);
     let a = weights.gamma() * length;
     let denominator = 1.0 + a * s;
-    if !(denominator.is_finite() && epsilon.abs() <= MAX_EPSILON) {
+    let in_range = denominator.is_finite() && weights.c() * length <= MAX_WEIGHT;
+    if !(in_range && epsilon.abs() <= MAX_EPSILON) {
         return None;
     }
     absorb(u, d, f, a, growth, k);

@@ -136,6 +136,17 @@ impl<const P: usize> sealed::Covariance<P> for Plain<P> {
     }
 }
 
-pub(crate) fn dot<const P: usize>(a: &[f64; P], b: &[f64; P]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// Makes the step to `next` where all its numbers are finite.
+pub(crate) fn take<const P: usize>(
+    theta: &mut [f64; P],
+    state: &mut Plain<P>,
+    next_theta: [f64; P],
+    next_state: Plain<P>,
+) -> Result<(), sealed::Refusal> {
+    let mut numbers = next_theta.iter().chain(next_state.0.as_flattened());
+    if !numbers.all(|x| x.is_finite()) {
+        return Err(sealed::Refusal::NotFinite);
+    }
+    (*theta, *state) = (next_theta, next_state);
+    Ok(())
 }

@@ -107,7 +107,8 @@ pub struct Guards {
     /// there, forgetting is nearly off in all directions.
     pub trace_limit: f64,
     /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`.
-    /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's.
+    /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's. Above 1e30 it
+    /// is 1e30, the limit of a regressor.
     pub silent_below: f64,
 }
 
@@ -160,6 +161,8 @@ pub(crate) const MAX_PHI_SQUARED: f64 = MAX_REGRESSOR * MAX_REGRESSOR;
 pub(crate) const MAX_EPSILON: f64 = 1e100;
 /// As above, for the step, s.
 const MAX_DT: f64 = 1e30;
+/// As above, for `c (e^{eta h} - 1)/eta`, the weight of a sample over its step.
+pub(crate) const MAX_WEIGHT: f64 = 1e200;
 /// As above, for the trace of P; its pivots start above the inverse of it.
 pub(crate) const MAX_TRACE: f64 = 1e100;
 

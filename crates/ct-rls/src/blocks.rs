@@ -26,7 +26,7 @@ use nalgebra::SVector;
 
 use crate::estimator::{Innovation, Outcome};
 use crate::integrator::sealed::{BlockRule, Refusal, Rule};
-use crate::settings::{MAX_EPSILON, MAX_WEIGHT, Step, Weights};
+use crate::settings::{MAX_EPSILON, Step, Weights};
 use crate::{ContinuousRls, Euler, ExactHold, Integrator, UdFactor, factor};
 
 /// An integrator that can carry two blocks with one output error: [`ExactHold`] or [`Euler`].
@@ -131,11 +131,9 @@ impl BlockRule for ExactHold {
         let s2 = factor::project(state2.u.as_flattened(), &state2.d, phi2, &mut f2);
         let (a1, a2) = (w1.gamma() * step1.length, w2.gamma() * step2.length);
         let size = (w1.c() * step1.length + a1) * s1 + (w2.c() * step2.length + a2) * s2;
-        let weight = (w1.c() * step1.length).max(w2.c() * step2.length);
         // both weights times s, without the step, are what the integrals divide by
         let rates = 2.0 * (w1.c() * s1 + w2.c() * s2);
-        let in_range = size.is_finite() && rates.is_finite() && weight <= MAX_WEIGHT;
-        if !(in_range && epsilon.abs() <= MAX_EPSILON) {
+        if !(size.is_finite() && rates.is_finite() && epsilon.abs() <= MAX_EPSILON) {
             return Err(Refusal::NotFinite);
         }
         let [share1, share2] = if size < f64::EPSILON {

@@ -79,9 +79,8 @@ pub enum Outcome {
     Capped,
     /// The regressor is silent: nothing was forgotten.
     Silent,
-    /// A signal is not finite, or beyond any sense: a regressor above 1e30, an output error above 1e100, a weight
-    /// `c (e^{eta dt} - 1)/eta` of the sample above 1e200, or a step of [`Euler`](crate::Euler) or [`Rk4`](crate::Rk4) beyond the
-    /// floating-point range. Nothing was done.
+    /// A signal is not finite, or beyond any sense: a regressor above 1e30, an output error above 1e100; or a step of
+    /// [`Euler`](crate::Euler) or [`Rk4`](crate::Rk4) would lead beyond the floating-point range. Nothing was done.
     NotFinite,
     /// `dt` is not above 0 and at most 1e30 s, or `eta dt` is above 300: nothing was done.
     BadStep,
@@ -101,7 +100,7 @@ impl Outcome {
         match self {
             Self::Updated | Self::Capped | Self::Silent => "it was used",
             Self::NotFinite => {
-                "a signal is NaN, infinite or beyond any sense (a regressor above 1e30, an output error above 1e100, a weight c dt above 1e200); leave it out"
+                "a signal is NaN, infinite or beyond any sense (a regressor above 1e30, an output error above 1e100); leave it out"
             }
             Self::BadStep => {
                 "its step must be above 0 and at most 1e30 s, with eta dt at most 300; check the clock"

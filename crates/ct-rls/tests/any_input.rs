@@ -49,7 +49,12 @@ fn positive() -> impl Strategy<Value = f64> {
 
 fn weights() -> impl Strategy<Value = Weights> {
     let eta = prop_oneof![Just(0.0), 0.0..10.0, positive()];
-    (positive(), prop_oneof![Just(1.0), 0.0..1.999], eta)
+    let c = prop_oneof![
+        (-307.0..40.0).prop_map(|x: f64| 10_f64.powf(x)),
+        0.1..10.0,
+        prop::sample::select(vec![5e-324, 1e40]),
+    ];
+    (c, prop_oneof![Just(1.0), 0.0..1.999], eta)
         .prop_filter_map("c is so small that gamma is 2 c", |(c, ratio, eta)| {
             Weights::new(c, c * ratio, eta).ok()
         })

@@ -176,6 +176,10 @@ fn bad_settings_are_refused_with_their_numbers() {
         Weights::new(f64::INFINITY, 0.0, 0.0),
         Err(Error::Weight { .. })
     ));
+    assert!(matches!(
+        Weights::new(1.1e40, 0.0, 0.0),
+        Err(Error::Weight { .. })
+    ));
     for eta in [-1e-9, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             Weights::new(1.0, 1.0, eta),

@@ -274,7 +274,8 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
             }
             left = z.norm_squared();
             // once more where much has gone, so that rounding is no part of what is left
-            if !(left < 0.01 * before && left > DEPENDENT * DEPENDENT) {
+            let again = left < 0.01 * before && left > DEPENDENT * DEPENDENT;
+            if !again {
                 return (h, z, left);
             }
         }

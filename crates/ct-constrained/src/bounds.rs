@@ -93,7 +93,7 @@ impl<const P: usize> Bounds<P> {
     /// Brings the estimates back after a step of `dt` seconds; returns whether they moved.
     ///
     /// # Errors
-    /// As of [`project_box`]; a box has a point, so none in fact.
+    /// As of [`project_box`].
     #[inline]
     pub fn enforce<I: Integrator>(
         &self,

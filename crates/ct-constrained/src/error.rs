@@ -17,10 +17,10 @@ pub enum Error {
         /// Weight of the output error.
         c: f64,
     },
-    /// A coefficient or the right-hand side of a row is not finite.
+    /// A coefficient, the right-hand side or the violation of a row is not finite.
     #[error("{what} of the row is {value}, but must be finite")]
     NotFinite {
-        /// `a coefficient` or `chi`.
+        /// `a coefficient`, `chi` or `the violation`.
         what: &'static str,
         /// The value that was given.
         value: f64,
@@ -70,7 +70,7 @@ pub enum Error {
         "no estimate obeys all rows: row {row} is violated by {violation} where the others are obeyed; drop a row that contradicts the others, or one of two that are nearly parallel"
     )]
     NoCommonPoint {
-        /// The row, from 0; of a box, lower bounds come first.
+        /// The row, from 0; of a box, the parameter.
         row: usize,
         /// By how much, the unit of its chi.
         violation: f64,

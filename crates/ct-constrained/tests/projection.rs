@@ -99,3 +99,36 @@ fn equalities_and_bounds_together() {
         rls.theta()
     );
 }
+
+#[test]
+fn an_equality_that_rounding_moved_is_not_taken_for_a_contradiction() {
+    let mut rls = estimator(vector![-3.0, -7.0], matrix![890.0, 8.5; 8.5, 0.1]);
+    let rows = [
+        Row::equal([8.0, 8.0], 40.0, 0.0).unwrap(),
+        Row::at_most([4.0, 0.0], 5.0, 0.0).unwrap(),
+    ];
+    assert_eq!(project(&mut rls, &rows), Ok(true));
+    assert!(
+        (rls.theta() - vector![1.25, 3.75]).amax() < 1e-13,
+        "{}",
+        rls.theta()
+    );
+}
+
+#[test]
+fn a_box_may_have_a_fixed_entry() {
+    let mut rls = estimator(vector![0.0, -3.9], matrix![3.5, 1.34; 1.34, 3.24]);
+    let moved = project_box(&mut rls, &vector![0.0, 0.0], &vector![0.0, 2.0]);
+    assert_eq!(moved, Ok(true));
+    assert_eq!(*rls.theta(), vector![0.0, 0.0]);
+}
+
+#[test]
+fn a_violation_that_leaves_the_floating_point_range_is_an_error() {
+    let start = vector![1e300, 0.0];
+    let mut rls = estimator(start, SMatrix::identity());
+    let rows = [Row::at_most([1e20, 0.0], 1.0, 0.0).unwrap()];
+    let error = project(&mut rls, &rows).unwrap_err();
+    assert!(matches!(error, Error::NotFinite { .. }), "{error}");
+    assert_eq!(*rls.theta(), start);
+}

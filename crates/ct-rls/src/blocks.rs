@@ -131,10 +131,17 @@ impl BlockRule for ExactHold {
         let s2 = factor::project(state2.u.as_flattened(), &state2.d, phi2, &mut f2);
         let (a1, a2) = (w1.gamma() * step1.length, w2.gamma() * step2.length);
         let size = (w1.c() * step1.length + a1) * s1 + (w2.c() * step2.length + a2) * s2;
-        if !(size.is_finite() && epsilon.abs() <= MAX_EPSILON) {
+        // both weights times s, without the step, are what the integrals divide by
+        let rates = 2.0 * (w1.c() * s1 + w2.c() * s2);
+        if !(size.is_finite() && rates.is_finite() && epsilon.abs() <= MAX_EPSILON) {
             return Err(Refusal::NotFinite);
         }
-        let [share1, share2] = shares((w1, step1, s1), (w2, step2, s2));
+        let [share1, share2] = if size < f64::EPSILON {
+            // the error does not change over the step; below that, what the integrals divide by may be subnormal
+            [w1.c() * step1.length, w2.c() * step2.length]
+        } else {
+            shares((w1, step1, s1), (w2, step2, s2))
+        };
         let (u1, u2) = (state1.u.as_flattened_mut(), state2.u.as_flattened_mut());
         factor::absorb(u1, &mut state1.d, &f1, a1, step1.growth, &mut k1);
         factor::absorb(u2, &mut state2.d, &f2, a2, step2.growth, &mut k2);

@@ -114,8 +114,7 @@ impl DynamicRls {
         if phi.len() != self.theta.len() {
             return Innovation::unused(f64::NAN, self.guard.skip(Outcome::BadSize));
         }
-        let prediction: f64 = phi.iter().zip(&self.theta).map(|(a, b)| a * b).sum();
-        let epsilon = y - prediction;
+        let epsilon = y - factor::dot(phi, self.theta.as_slice());
         let (step, outcome) = match self.guard.begin(phi, dt, weights.eta()) {
             Ok(begun) => begun,
             Err(outcome) => return Innovation::unused(epsilon, outcome),

@@ -6,9 +6,9 @@ use crate::Outcome;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// `c` is no positive number.
+    /// `c` is no positive number, or above 1e40.
     #[error(
-        "c is {c}, but the weight of the output error must be above 0 and finite; take 1 where nothing else is known"
+        "c is {c}, but the weight of the output error must be above 0 and at most 1e40; take 1 where nothing else is known"
     )]
     Weight {
         /// The value that was given.

@@ -79,7 +79,8 @@ pub enum Outcome {
     Capped,
     /// The regressor is silent: nothing was forgotten.
     Silent,
-    /// A signal is not finite, or beyond any sense: a regressor above 1e30, an output error above 1e100. Nothing was done.
+    /// A signal is not finite, or beyond any sense: a regressor above 1e30, an output error above 1e100; or a step of
+    /// [`Euler`](crate::Euler) or [`Rk4`](crate::Rk4) would lead beyond the floating-point range. Nothing was done.
     NotFinite,
     /// `dt` is not above 0 and at most 1e30 s, or `eta dt` is above 300: nothing was done.
     BadStep,

@@ -11,8 +11,9 @@
 //! Cost per update: `2 p^2` multiplications. Reference: A. J. Udink ten Cate, WP-85-54, 1985, section 6.
 
 use crate::Error;
+use crate::factor::dot;
 use crate::integrator::sealed::{Refusal, Rule};
-use crate::integrator::{Plain, dot};
+use crate::integrator::{Plain, take};
 use crate::settings::{MAX_EPSILON, Step, Weights};
 
 /// Euler's rule, on `P` as it stands. Stops where its step is too long.
@@ -53,13 +54,15 @@ impl Rule for Euler {
             }));
         }
         let rate = weights.gamma() * step.dt;
+        let (mut next, mut moved) = (state.0, *theta);
         for i in 0..P {
             for j in 0..P {
                 // the same bits for (i, j) and (j, i)
-                state.0[i][j] = limit * state.0[i][j] - rate * (k[i] * k[j]);
+                next[i][j] = limit * next[i][j] - rate * (k[i] * k[j]);
             }
-            theta[i] += weights.c() * step.dt * epsilon * k[i];
+            moved[i] += weights.c() * step.dt * epsilon * k[i];
         }
+        take(theta, state, moved, Plain(next))?;
         Ok(s)
     }
 }

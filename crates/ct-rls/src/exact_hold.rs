@@ -90,6 +90,11 @@ impl<const P: usize> Covariance<P> for UdFactor<P> {
         self.times(x)
     }
 
+    #[inline]
+    fn root(&self) -> Result<SMatrix<f64, P, P>, Error> {
+        Ok(self.root())
+    }
+
     fn smallest_pivot(&self) -> Result<f64, (usize, f64)> {
         let mut smallest = f64::INFINITY;
         for (j, &d) in self.d.iter().enumerate() {

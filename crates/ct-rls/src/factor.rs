@@ -93,6 +93,21 @@ pub(crate) fn information_norm(u: &[f64], d: &[f64], x: &mut [f64]) -> f64 {
     sum
 }
 
+/// `a' b`, in one order of summation whether the length is known when the program is built or not.
+#[inline(always)]
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((fours_a, rest_a), (fours_b, rest_b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    // adding it changes nothing, not even the sign of 0, so where there are no fours it costs nothing
+    let mut sums = [-0.0; 4];
+    for (a, b) in fours_a.iter().zip(fours_b) {
+        for i in 0..4 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
 /// `f = U' phi` and `s = phi' P phi`.
 #[inline(always)]
 pub(crate) fn project(u: &[f64], d: &[f64], phi: &[f64], f: &mut [f64]) -> f64 {
@@ -229,6 +244,20 @@ impl<const P: usize> UdFactor<P> {
     /// `U D U'`.
     pub fn to_matrix(&self) -> SMatrix<f64, P, P> {
         SMatrix::from_fn(|i, j| entry(self.u.as_flattened(), &self.d, i, j))
+    }
+
+    /// `L = U D^(1/2)`, upper triangular, with `P = L L'`.
+    #[inline]
+    pub fn root(&self) -> SMatrix<f64, P, P> {
+        let mut root = SMatrix::zeros();
+        for j in 0..P {
+            let spread = libm::sqrt(self.d[j]);
+            for i in 0..j {
+                root[(i, j)] = self.u[j][i] * spread;
+            }
+            root[(j, j)] = spread;
+        }
+        root
     }
 
     /// Sum of the diagonal of `U D U'`.

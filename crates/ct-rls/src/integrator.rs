@@ -34,6 +34,8 @@ pub(crate) mod sealed {
         fn smallest_pivot(&self) -> Result<f64, (usize, f64)>;
         /// `(P x, x'P x)`
         fn times(&self, x: &SVector<f64, P>) -> (SVector<f64, P>, f64);
+        /// `L` of `P = L L'`
+        fn root(&self) -> Result<SMatrix<f64, P, P>, Error>;
     }
 
     /// Why a step was not made; the state is as before.
@@ -110,6 +112,10 @@ impl<const P: usize> sealed::Covariance<P> for Plain<P> {
         (k, k.dot(x))
     }
 
+    fn root(&self) -> Result<nalgebra::SMatrix<f64, P, P>, crate::Error> {
+        Ok(crate::UdFactor::new(&self.to_matrix())?.root())
+    }
+
     fn smallest_pivot(&self) -> Result<f64, (usize, f64)> {
         let mut m = self.0;
         let mut smallest = f64::INFINITY;
@@ -130,6 +136,17 @@ impl<const P: usize> sealed::Covariance<P> for Plain<P> {
     }
 }
 
-pub(crate) fn dot<const P: usize>(a: &[f64; P], b: &[f64; P]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// Makes the step to `next` where all its numbers are finite.
+pub(crate) fn take<const P: usize>(
+    theta: &mut [f64; P],
+    state: &mut Plain<P>,
+    next_theta: [f64; P],
+    next_state: Plain<P>,
+) -> Result<(), sealed::Refusal> {
+    let mut numbers = next_theta.iter().chain(next_state.0.as_flattened());
+    if !numbers.all(|x| x.is_finite()) {
+        return Err(sealed::Refusal::NotFinite);
+    }
+    (*theta, *state) = (next_theta, next_state);
+    Ok(())
 }

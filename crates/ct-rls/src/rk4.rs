@@ -7,8 +7,9 @@
 //! Cost per update: about `14 p^2` multiplications, and `p^3/6` for the check. Reference: A. J. Udink ten Cate, WP-85-54, 1985, (2.14).
 
 use crate::Error;
+use crate::factor::dot;
 use crate::integrator::sealed::{Covariance, Refusal, Rule};
-use crate::integrator::{Plain, dot};
+use crate::integrator::{Plain, take};
 use crate::settings::{MAX_EPSILON, Step, Weights};
 
 /// Runge-Kutta of fourth order, on `P` as it stands. Stops where `P` is no longer positive definite.
@@ -63,10 +64,10 @@ impl Rule for Rk4 {
                 dt: h,
             }));
         }
-        *state = next;
-        for (theta, moved) in theta.iter_mut().zip(moved) {
-            *theta += moved;
+        for (moved, theta) in moved.iter_mut().zip(&*theta) {
+            *moved += theta;
         }
+        take(theta, state, moved, next)?;
         Ok(s)
     }
 }

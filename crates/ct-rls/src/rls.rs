@@ -144,23 +144,30 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     /// `1 - exp(-pull f'P f)`, which is the exact solution of `dtheta/dt = w P f (chi - f' theta)` with `pull = w h`;
     /// `f64::INFINITY` moves all the way. At least 0.
     ///
-    /// Returns `chi - f' theta` before; `None`, and nothing is done, where a number is out of range.
+    /// Returns `chi - f' theta` before; `None`, and nothing is done, where a number is out of range: `f` longer than 1e30, the
+    /// returned difference above 1e100, `f'P f` below 1e-200 for an `f` other than 0.
     pub fn relax(&mut self, f: &SVector<f64, P>, chi: f64, pull: f64) -> Option<f64> {
         let epsilon = chi - f.dot(&self.theta);
         let (k, s) = self.state.times(f);
         if !(pull >= 0.0 && epsilon.abs() <= MAX_EPSILON && f.norm_squared() <= MAX_PHI_SQUARED) {
             return None;
         }
-        if s > 0.0 {
+        if s >= MIN_RELAXED {
             let share = -libm::expm1(-pull * s);
             self.theta += k * (epsilon * share / s);
+        } else if f.iter().any(|x| *x != 0.0) {
+            return None;
         }
         Some(epsilon)
     }
 
-    /// `(P x, x'P x)`.
-    pub fn times(&self, x: &SVector<f64, P>) -> (SVector<f64, P>, f64) {
-        self.state.times(x)
+    /// `L`, upper triangular, with `P = L L'`.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] where a rule other than [`ExactHold`] has lost it.
+    #[inline]
+    pub fn root(&self) -> Result<SMatrix<f64, P, P>, Error> {
+        self.state.root()
     }
 
     /// The same estimator with other guards against wind-up.
@@ -211,7 +218,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     /// [`update`](RecursiveEstimator::update) with weights for this step alone.
     #[inline]
     pub fn update_with(&mut self, sample: &Sample<P>, dt: f64, weights: &Weights) -> Innovation {
-        let epsilon = sample.y - sample.phi.dot(&self.theta);
+        let epsilon = sample.y - factor::dot(sample.phi.as_slice(), self.theta.as_slice());
         let (step, outcome) = match self.guard.begin(sample.phi.as_slice(), dt, weights.eta()) {
             Ok(begun) => begun,
             Err(outcome) => return Innovation::unused(epsilon, outcome),
@@ -268,6 +275,9 @@ impl<const P: usize, I: Integrator> RecursiveEstimator for ContinuousRls<P, I> {
     }
 }
 
+/// With a smaller `f'P f` a step along `P f` may leave the floating-point range.
+const MIN_RELAXED: f64 = 1e-200;
+
 /// The start of the cap on the trace, times the trace of `P(0)`.
 const TRACE_LIMIT: f64 = 1e6;
 
@@ -320,7 +330,8 @@ impl Guard {
         guards.check(trace)?;
         self.guards = guards;
         self.limit = guards.cap();
-        self.silent_below_squared = guards.silent_below * guards.silent_below.abs();
+        let squared = guards.silent_below * guards.silent_below.abs();
+        self.silent_below_squared = squared.min(MAX_PHI_SQUARED);
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use crate::Error;
 
 /// `c`, `gamma` and `eta` of `dtheta/dt = c P phi eps`, `dP/dt = eta P - gamma P phi phi' P`.
 ///
-/// A value of this type is valid: `c > 0`, `0 <= gamma < 2 c`, `eta >= 0`, all finite. They may
+/// A value of this type is valid: `0 < c <= 1e40`, `0 <= gamma < 2 c`, `eta >= 0`, all finite. They may
 /// vary in time: hand other weights to an update, made once and kept.
 ///
 /// Which `eta`? The memory is `1/eta` seconds; take at least 5 to 10 of the process's dominant time
@@ -39,14 +39,14 @@ impl TryFrom<Unchecked> for Weights {
 impl Weights {
     /// Weights from the paper's symbols.
     ///
-    /// - `c`: weight of the output error, 1/(s unit(y)^2) where `P` has the unit of `theta theta'`; above 0.
+    /// - `c`: weight of the output error, 1/(s unit(y)^2) where `P` has the unit of `theta theta'`; above 0, at most 1e40.
     /// - `gamma`: gain of the Riccati equation, as `c`; `0 <= gamma < 2 c`.
     /// - `eta`: forgetting rate, 1/s; at least 0.
     ///
     /// # Errors
     /// [`Error::Weight`], [`Error::Gamma`], [`Error::Forgetting`].
     pub fn new(c: f64, gamma: f64, eta: f64) -> Result<Self, Error> {
-        if !(c > 0.0 && c.is_finite()) {
+        if !(c > 0.0 && c <= MAX_C) {
             return Err(Error::Weight { c });
         }
         if !(0.0..2.0 * c).contains(&gamma) {
@@ -107,7 +107,8 @@ pub struct Guards {
     /// there, forgetting is nearly off in all directions.
     pub trace_limit: f64,
     /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`.
-    /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's.
+    /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's. Above 1e30 it
+    /// is 1e30, the limit of a regressor.
     pub silent_below: f64,
 }
 
@@ -160,6 +161,8 @@ pub(crate) const MAX_PHI_SQUARED: f64 = MAX_REGRESSOR * MAX_REGRESSOR;
 pub(crate) const MAX_EPSILON: f64 = 1e100;
 /// As above, for the step, s.
 const MAX_DT: f64 = 1e30;
+/// As above, for `c`.
+const MAX_C: f64 = 1e40;
 /// As above, for the trace of P; its pivots start above the inverse of it.
 pub(crate) const MAX_TRACE: f64 = 1e100;
 

@@ -11,8 +11,21 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use support::{normal, normals, rng, spd};
 
 #[test]
-fn the_same_numbers() {
-    const P: usize = 6;
+fn the_same_numbers_for_any_size() {
+    same_numbers::<1>();
+    same_numbers::<2>();
+    same_numbers::<3>();
+    same_numbers::<4>();
+    same_numbers::<5>();
+    same_numbers::<6>();
+    same_numbers::<7>();
+    same_numbers::<8>();
+    same_numbers::<9>();
+    same_numbers::<10>();
+    same_numbers::<16>();
+}
+
+fn same_numbers<const P: usize>() {
     let mut rng = rng(8);
     let weights = Weights::new(1.0, 0.7, 0.05).unwrap();
     let p0: SMatrix<f64, P, P> = spd::<P>(&mut rng) * 1e4;

@@ -176,6 +176,10 @@ fn bad_settings_are_refused_with_their_numbers() {
         Weights::new(f64::INFINITY, 0.0, 0.0),
         Err(Error::Weight { .. })
     ));
+    assert!(matches!(
+        Weights::new(1.1e40, 0.0, 0.0),
+        Err(Error::Weight { .. })
+    ));
     for eta in [-1e-9, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             Weights::new(1.0, 1.0, eta),
@@ -286,4 +290,28 @@ fn excitation_is_the_smallest_eigenvalue_of_the_information() {
             assert!((health.trace - eigenvalues.sum()).abs() < 1e-9 * health.trace);
         }
     }
+}
+
+#[test]
+fn no_threshold_of_silence_lets_a_regressor_in_that_is_too_long() {
+    for silent_below in [1e31, 1e200, f64::MAX] {
+        let guards = Guards {
+            trace_limit: 1e9,
+            silent_below,
+        };
+        let mut rls = estimator(0.1).with_guards(guards).unwrap();
+        let long = Sample::new([1.1e30, 0.0], 0.0);
+        assert_eq!(rls.update(&long, 1.0).outcome, Outcome::NotFinite);
+        let short = Sample::new([0.9e30, 0.0], 0.0);
+        assert_eq!(rls.update(&short, 1.0).outcome, Outcome::Silent);
+    }
+}
+
+#[test]
+fn a_relaxation_beyond_the_floating_point_range_is_refused() {
+    let mut rls = estimator(0.1);
+    let row = vector![1e-160, 0.0];
+    assert_eq!(rls.relax(&row, 1.0, f64::INFINITY), None);
+    assert_eq!(*rls.theta(), vector![0.0, 0.0]);
+    assert_eq!(rls.relax(&SVector::zeros(), 1.0, 1.0), Some(1.0));
 }

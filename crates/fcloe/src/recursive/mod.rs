@@ -45,6 +45,9 @@ const DECAY: f64 = 0.01;
 /// A parameter smaller than this share of its scale may change by the step limit times this share.
 const SMALL: f64 = 0.1;
 
+/// Sizes of a scale with which P, in the parameters' units, stays in the floating-point range.
+const SCALES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+
 /// One sample of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopSample {
@@ -96,7 +99,7 @@ impl RecursiveFcloe {
         Self::with_scale(start, &scale, controller, settings)
     }
 
-    /// The same with a size for each parameter, by which it is scaled; its sign does not matter.
+    /// The same with a size for each parameter, 1e-100 to 1e100, by which it is scaled; its sign does not matter.
     ///
     /// # Errors
     /// As [`RecursiveFcloe::new`]; [`Error::Length`].
@@ -118,6 +121,13 @@ impl RecursiveFcloe {
         }
         if let Some(index) = scale.iter().position(|s| *s == 0.0 || !s.is_finite()) {
             return Err(Error::ZeroStart { index });
+        }
+        if let Some(&value) = scale.iter().find(|s| !SCALES.contains(&s.abs())) {
+            return Err(Error::Setting {
+                what: "the scale of a parameter",
+                value,
+                range: "1e-100 to 1e100 in size; choose other units",
+            });
         }
         let closed = ClosedLoop::new(start, controller)?;
         closed.require_stable()?;
@@ -337,7 +347,9 @@ impl RecursiveEstimator for RecursiveFcloe {
     type Error = Error;
 
     /// Learns from y at this sample, then moves the model over dt with the drive held. Where y is missing (NaN) or of
-    /// no sense the model moves on all the same; where the drive is not finite, the last one is held.
+    /// no sense the model moves on all the same; where the drive is not finite, the last one is held. Where the model's states
+    /// leave the range of numbers it begins again from rest; the outcome says what was done with the sample. Steps are 1e-40 to
+    /// 1e30 of the time's unit, and no longer than 10 000 time constants of the fastest root.
     fn update(&mut self, sample: &LoopSample, dt: f64) -> Innovation {
         let point = self.settings.operating_point;
         let level = if self.controller.is_open_loop() {
@@ -360,7 +372,7 @@ impl RecursiveEstimator for RecursiveFcloe {
                 outcome: Outcome::BadStep,
             };
         }
-        let mut innovation = if known {
+        let innovation = if known {
             self.learn(self.last_drive, epsilon, dt)
         } else {
             Innovation {
@@ -369,9 +381,8 @@ impl RecursiveEstimator for RecursiveFcloe {
                 outcome: Outcome::NotFinite,
             }
         };
-        if !self.model.advance(self.last_drive, dt) {
-            innovation.outcome = Outcome::NotFinite;
-        }
+        // what was learnt stays learnt where the model's states leave the range of numbers and it begins again from rest
+        self.model.advance(self.last_drive, dt);
         self.time += dt;
         innovation
     }

@@ -68,7 +68,7 @@ impl Default for PipelineSettings {
 /// 10 over the longest record's duration to half the sampling rate, three to a decade.
 ///
 /// # Errors
-/// [`Error::NoRecord`]; [`Error::Setting`] for a sampling interval; [`Error::Lti`].
+/// [`Error::NoRecord`]; [`Error::Setting`] for a sampling interval, or where the records are longer than the largest number; [`Error::Lti`].
 pub fn lambda_ladder(
     records: &[LoopRecord],
     controller: &Controller,
@@ -87,8 +87,9 @@ pub fn lambda_ladder(
     }
     positive("the sampling interval", step)?;
     let length = |r: &LoopRecord| r.step * r.len() as f64;
-    let longest = records.iter().map(length).fold(0.0, f64::max);
-    let (low, high) = (10.0 / longest.max(20.0 * step), 0.5 / step);
+    let longest = records.iter().map(length).fold(20.0 * step, f64::max);
+    positive("the duration of the longest record", longest)?;
+    let (low, high) = (10.0 / longest, 0.5 / step);
     let rungs = (3.0 * (high / low).log10()).ceil().max(1.0);
     let at = |k: usize| low * (high / low).powf(k as f64 / rungs);
     Ok((0..=rungs as usize).map(at).collect())

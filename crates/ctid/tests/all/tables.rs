@@ -227,7 +227,7 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
 fn both_papers_at_once() {
     let place = Place::empty();
     // Its own file may be written again.
-    place.write("both.json", "{\"schema\": 1, \"udink\": {}}");
+    place.write("both.json", "{\"written_by\": \"ctid\", \"schema\": 1}");
     let text = place.succeeds("tables all --runs 20 --json both.json");
     assert!(text.contains("Table 4") && text.contains("Table II"));
     let both = place.json("both.json");

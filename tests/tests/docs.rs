@@ -77,6 +77,7 @@ fn links_lead_to_files() {
     for page in [
         "README.md",
         "CONTRIBUTING.md",
+        "SECURITY.md",
         "benches/README.md",
         "docs/adding-an-effect.md",
         "docs/block-diagonal-gain.md",

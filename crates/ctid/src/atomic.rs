@@ -1,7 +1,12 @@
 //! Writes a file whole or not at all: beside it under another name first, then renamed.
 
-use std::fs::{self, File, TryLockError};
-use std::io::{self, Write};
+#[cfg_attr(unix, path = "atomic/unix.rs")]
+#[cfg_attr(not(unix), path = "atomic/other.rs")]
+mod attributes;
+
+use std::ffi::OsStr;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Duration;
@@ -14,7 +19,13 @@ use crate::Error;
 const TRIES: u32 = 100;
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// Puts `content` where `path` says; an existing file keeps its permissions, a link stays a link.
+/// What a run that was killed leaves behind has such a name, with so many letters and digits between.
+const PREFIX: &str = ".ctid-";
+const SUFFIX: &str = ".part";
+const LETTERS: usize = 12;
+
+/// Puts `content` where `path` says. An existing file keeps its owner, permissions and extended attributes, a link stays a link; a
+/// file with several hard links, or whose owner or attributes the user cannot give to a new file, is written in place.
 pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
     write_if(path, content, || true).map(|_| ())
 }
@@ -25,14 +36,28 @@ pub(crate) fn write_if(
     content: &[u8],
     still: impl FnOnce() -> bool,
 ) -> Result<bool, Error> {
-    replace(path, content, still).map_err(|error| {
-        Error::file(
-            path,
-            format!(
-                "cannot be written: {error}; nothing was changed; check the folder's permissions and the free space"
-            ),
-        )
-    })
+    replace(path, content, still).map_err(|error| unwritten(path, &error))
+}
+
+/// Puts `content` into a new file; whether there was none.
+pub(crate) fn create(path: &Path, content: &[u8]) -> Result<bool, Error> {
+    let created = fs::symlink_metadata(path).is_err();
+    let created = created.then(|| new(path, content));
+    match created {
+        None => Ok(false),
+        Some(Ok(())) => Ok(true),
+        Some(Err(error)) if error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+        Some(Err(error)) => Err(unwritten(path, &error)),
+    }
+}
+
+fn unwritten(path: &Path, error: &io::Error) -> Error {
+    Error::file(
+        path,
+        format!(
+            "cannot be written: {error}; nothing was changed; check the folder's permissions and the free space"
+        ),
+    )
 }
 
 /// Keeps other `ctid` programs from changing files of the folder in which `path` lies, until it is dropped. Where the system
@@ -51,38 +76,140 @@ pub(crate) fn lock_beside(path: &Path) -> Option<File> {
 }
 
 fn replace(path: &Path, content: &[u8], still: impl FnOnce() -> bool) -> io::Result<bool> {
-    // A file that is not there yet has no canonical name, and no link to keep.
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    let mut file = beside(&target)?;
-    file.write_all(content)?;
-    if let Ok(metadata) = fs::metadata(&target) {
-        if metadata.permissions().readonly() {
-            return Err(io::Error::new(
-                io::ErrorKind::PermissionDenied,
-                "it is write-protected",
-            ));
+    let target = target(path)?;
+    let old = match File::open(&target) {
+        Ok(old) => old,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return if still() {
+                new(&target, content).map(|()| true)
+            } else {
+                Ok(false)
+            };
         }
-        fs::set_permissions(file.path(), metadata.permissions())?;
+        Err(error) => return Err(error),
+    };
+    let metadata = old.metadata()?;
+    if metadata.permissions().readonly() {
+        return Err(io::Error::new(
+            io::ErrorKind::PermissionDenied,
+            "it is write-protected",
+        ));
     }
+    // Nobody reads the new text whom the old file does not let.
+    let mut file = beside_with(&target, 0o600)?;
+    let alike = attributes::links(&metadata) == 1
+        && attributes::copy(&old, &metadata, file.as_file()).is_ok();
+    file.write_all(content)?;
     file.as_file().sync_all()?;
     if !still() {
         return Ok(false);
     }
-    file.persist(&target)?;
+    if alike {
+        file.persist(&target)?;
+        sync_folder(&target);
+    } else {
+        write_in_place(&target, content)?;
+    }
     Ok(true)
+}
+
+/// A new file; one that is there is an error, also where it came at the last moment.
+fn new(path: &Path, content: &[u8]) -> io::Result<()> {
+    let mut file = beside(path)?;
+    file.write_all(content)?;
+    file.as_file().sync_all()?;
+    file.persist_noclobber(path)?;
+    sync_folder(path);
+    Ok(())
+}
+
+/// The file that a path leads to.
+fn target(path: &Path) -> io::Result<PathBuf> {
+    match fs::canonicalize(path) {
+        Ok(target) => Ok(target),
+        Err(_) if leads_nowhere(path) => Err(io::Error::new(
+            io::ErrorKind::NotFound,
+            "it is a link to a file that is not there",
+        )),
+        // A file that is not there yet has no canonical name.
+        Err(_) => Ok(path.to_path_buf()),
+    }
+}
+
+/// A link whose file is not there.
+pub(crate) fn leads_nowhere(path: &Path) -> bool {
+    let link = fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink());
+    link && fs::metadata(path).is_err()
+}
+
+/// The last resort: what stood there is written back where this fails, but a kill between leaves a part.
+fn write_in_place(path: &Path, content: &[u8]) -> io::Result<()> {
+    let before = fs::read(path)?;
+    let mut file = OpenOptions::new().write(true).open(path)?;
+    let mut put = |content: &[u8]| {
+        file.rewind()?;
+        file.write_all(content)?;
+        file.set_len(content.len() as u64)?;
+        file.sync_all()
+    };
+    put(content).inspect_err(|_| {
+        let _ = put(&before);
+    })
+}
+
+/// The new name is then on the disk too. Some systems cannot do this to a folder; the file is in its place all the same.
+fn sync_folder(path: &Path) {
+    if let Ok(folder) = File::open(folder(path)) {
+        let _ = folder.sync_all();
+    }
 }
 
 /// A file in the same folder that vanishes unless it is renamed.
 pub(crate) fn beside(path: &Path) -> io::Result<NamedTempFile> {
+    // As any new file: the umask takes its part away.
+    beside_with(path, 0o666)
+}
+
+fn beside_with(path: &Path, mode: u32) -> io::Result<NamedTempFile> {
+    let folder = folder(path);
+    remove_abandoned(&folder);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".ctid-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any new file: the umask takes its part away.
-        builder.permissions(fs::Permissions::from_mode(0o666));
+    builder.prefix(PREFIX).suffix(SUFFIX).rand_bytes(LETTERS);
+    attributes::set_mode(&mut builder, mode);
+    for _ in 0..TRIES {
+        let file = builder.tempfile_in(&folder)?;
+        // Another run may have taken it for abandoned just before it was locked.
+        let taken = matches!(file.as_file().try_lock(), Err(TryLockError::WouldBlock));
+        if !taken && file.path().exists() {
+            return Ok(file);
+        }
     }
-    builder.tempfile_in(folder(path))
+    Err(io::ErrorKind::ResourceBusy.into())
+}
+
+/// Removes what killed runs have left in a folder: a run locks its file as long as it lives.
+fn remove_abandoned(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        if is_temporary(&entry.file_name()) && entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            let file = File::open(entry.path());
+            if file.is_ok_and(|file| file.try_lock().is_ok()) {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
+fn is_temporary(name: &OsStr) -> bool {
+    let letters = name.to_str().and_then(|name| {
+        let name = name.strip_prefix(PREFIX)?;
+        name.strip_suffix(SUFFIX)
+    });
+    letters.is_some_and(|letters| {
+        letters.len() == LETTERS && letters.bytes().all(|byte| byte.is_ascii_alphanumeric())
+    })
 }
 
 /// The folder that holds a path.
@@ -92,3 +219,6 @@ pub(crate) fn folder(path: &Path) -> PathBuf {
         _ => PathBuf::from("."),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,10 +6,12 @@ use std::process::ExitCode;
 use clap::Parser;
 use ctid::look::Look;
 use ctid::{Cli, one_line, run};
+#[cfg(unix)]
+use nix::sys::signal::{SigSet, Signal};
 
 fn main() -> ExitCode {
     let message = match Cli::try_parse() {
-        Ok(cli) => match run(cli, &mut io::stdout().lock(), Look::of_stdout()) {
+        Ok(cli) => match start_threads().and_then(|()| done(cli)) {
             Ok(()) => return ExitCode::SUCCESS,
             Err(error) => format!("error: {error}"),
         },
@@ -25,4 +27,26 @@ fn main() -> ExitCode {
     // Whoever has closed standard error still gets the exit code.
     let _ = writeln!(io::stderr(), "{}", one_line(&message));
     ExitCode::from(2)
+}
+
+fn done(cli: Cli) -> Result<(), String> {
+    run(cli, &mut io::stdout().lock(), Look::of_stdout()).map_err(|error| error.to_string())
+}
+
+/// Starts those that compute. Left to the first computation, a failed start ends the program with a panic. All threads keep back the
+/// signal that a file larger than allowed sends, which would end the program: the write then fails with an error.
+fn start_threads() -> Result<(), String> {
+    #[cfg(unix)]
+    {
+        let mut held_back = SigSet::empty();
+        held_back.add(Signal::SIGXFSZ);
+        held_back
+            .thread_block()
+            .map_err(|error| format!("a signal cannot be held back: {error}"))?;
+    }
+    rayon::ThreadPoolBuilder::new().build_global().map_err(|error| {
+        format!(
+            "the threads that compute cannot be started: {error}; allow more processes or memory, or set RAYON_NUM_THREADS=1"
+        )
+    })
 }

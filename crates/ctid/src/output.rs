@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use missing_effect::Diagnosis;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::identify::Identification;
 use crate::tables::{baysse, udink};
@@ -14,8 +14,24 @@ use crate::{Error, atomic, report, term_file};
 /// How much of an existing page is looked at: the mark stands in its head.
 const HEAD: u64 = 4096;
 
-/// Keys that tell JSON of ctid's from others', beside `schema`: one for each kind of result.
-const KEYS: [&str; 5] = ["verdict", "paper", "method", "udink", "between"];
+/// Who has written a file of results, as its first key says.
+const WRITTEN_BY: &str = "ctid";
+
+/// Results as they are written.
+#[derive(Serialize)]
+struct Marked<'a, T> {
+    written_by: &'static str,
+    #[serde(flatten)]
+    found: &'a T,
+}
+
+/// What tells JSON of ctid's from others'.
+#[derive(Deserialize)]
+struct Mark {
+    written_by: String,
+    #[serde(rename = "schema")]
+    _schema: u32,
+}
 
 /// What is in a file that the program writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +46,7 @@ pub enum Kind {
     Unknown,
 }
 
-/// What a command finds, which is written as JSON with `schema` and one of the keys that ctid knows its own files by, or as a page.
+/// What a command finds, which is written as JSON with `schema` and the mark that ctid knows its own files by, or as a page.
 pub trait Found: Serialize {
     /// The page, complete, where there is one.
     fn page(&self) -> String {
@@ -92,6 +108,8 @@ impl Found for Studies {}
 pub struct Output {
     kind: Kind,
     path: PathBuf,
+    /// A file of ctid's, or an empty one, stood there when the command began.
+    replaces: bool,
 }
 
 impl Found for Identification {
@@ -106,6 +124,7 @@ impl Found for Identification {
 /// # Errors
 /// One line that names the file and the mend; nothing has been written.
 pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, Error> {
+    let mut outputs = Vec::with_capacity(wanted.len());
     for (index, &(kind, path)) in wanted.iter().enumerate() {
         if inputs.iter().any(|input| same_file(input, path)) {
             return Err(Error::file(
@@ -122,13 +141,13 @@ pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, E
                 "two results cannot share a file; choose another name for one of them",
             ));
         }
-        check(kind, path)?;
+        outputs.push(Output {
+            kind,
+            path: path.to_path_buf(),
+            replaces: check(kind, path)? == Standing::Ours,
+        });
     }
-    let planned = |&(kind, path): &(Kind, &Path)| Output {
-        kind,
-        path: path.to_path_buf(),
-    };
-    Ok(wanted.iter().map(planned).collect())
+    Ok(outputs)
 }
 
 impl Output {
@@ -147,11 +166,15 @@ impl Output {
     /// Writes it; says whether there was something to write.
     ///
     /// # Errors
-    /// Where the disk does not take it; what stood there before is then still there.
+    /// Where the disk does not take it, or something else stands there than when the command began; that is then still there.
     pub fn write(&self, found: &impl Found) -> Result<bool, Error> {
         let content = match self.kind {
             Kind::Json => {
-                let text = serde_json::to_string_pretty(found)
+                let marked = Marked {
+                    written_by: WRITTEN_BY,
+                    found,
+                };
+                let text = serde_json::to_string_pretty(&marked)
                     .map_err(|error| Error::file(&self.path, error.to_string()))?;
                 Some(text + "\n")
             }
@@ -162,8 +185,19 @@ impl Output {
         let Some(content) = content else {
             return Ok(false);
         };
-        atomic::write(&self.path, content.as_bytes())?;
-        Ok(true)
+        let as_it_was = || standing(self.kind, &self.path) == Standing::Ours;
+        let written = if self.replaces && !is_missing(&self.path) {
+            atomic::write_if(&self.path, content.as_bytes(), as_it_was)?
+        } else {
+            atomic::create(&self.path, content.as_bytes())?
+        };
+        if written {
+            return Ok(true);
+        }
+        Err(Error::file(
+            &self.path,
+            "somebody else has written it while this command ran, so that it was not overwritten; choose another name and run it again",
+        ))
     }
 }
 
@@ -184,7 +218,7 @@ pub fn free_report(folder: &Path, record: &str) -> Result<Output, Error> {
         let free = match standing(Kind::Report, &path) {
             Standing::Nothing => true,
             Standing::Ours => is_empty_or_shows(record, &path),
-            Standing::Folder | Standing::NotOurs => false,
+            Standing::Folder | Standing::NotOurs | Standing::LeadsNowhere => false,
         };
         if free {
             return Ok(plan(&[(Kind::Report, &path)], &[])?.remove(0));
@@ -215,9 +249,17 @@ enum Standing {
     Ours,
     Folder,
     NotOurs,
+    LeadsNowhere,
+}
+
+fn is_missing(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_err()
 }
 
 fn standing(kind: Kind, path: &Path) -> Standing {
+    if atomic::leads_nowhere(path) {
+        return Standing::LeadsNowhere;
+    }
     let Ok(metadata) = fs::metadata(path) else {
         return Standing::Nothing;
     };
@@ -231,7 +273,7 @@ fn standing(kind: Kind, path: &Path) -> Standing {
     }
 }
 
-/// ctid wrote it: a page with the mark, or JSON with the keys of a result.
+/// ctid wrote it: a page that begins as its pages do, JSON with the mark, or the header of a shape with all its columns.
 fn is_ours(kind: Kind, path: &Path) -> bool {
     let Ok(mut file) = fs::File::open(path) else {
         return false;
@@ -242,28 +284,25 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
         Kind::Report => {
             let mut head = Vec::new();
             let read = file.take(HEAD).read_to_end(&mut head);
-            read.is_ok() && String::from_utf8_lossy(&head).contains(report::GENERATOR)
+            read.is_ok() && head.starts_with(report::head().as_bytes())
         }
         Kind::Unknown => {
             let mut head = Vec::new();
             let read = file.take(HEAD).read_to_end(&mut head);
-            read.is_ok() && head.starts_with(term_file::HEADER.as_bytes())
+            read.is_ok() && term_file::is_own(&String::from_utf8_lossy(&head))
         }
         Kind::Json => {
             let mut text = String::new();
             let read = file.read_to_string(&mut text);
-            let value = serde_json::from_str::<serde_json::Value>(&text);
-            read.is_ok()
-                && value.is_ok_and(|value| {
-                    let has = |key: &&str| value.get(key).is_some();
-                    has(&"schema") && KEYS.iter().any(has)
-                })
+            let mark = serde_json::from_str::<Mark>(&text);
+            read.is_ok() && mark.is_ok_and(|mark| mark.written_by == WRITTEN_BY)
         }
     }
 }
 
-fn check(kind: Kind, path: &Path) -> Result<(), Error> {
-    match standing(kind, path) {
+fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
+    let standing = standing(kind, path);
+    match standing {
         Standing::Folder => {
             return Err(Error::file(
                 path,
@@ -279,6 +318,12 @@ fn check(kind: Kind, path: &Path) -> Result<(), Error> {
                 }
             };
             return Err(Error::file(path, why));
+        }
+        Standing::LeadsNowhere => {
+            return Err(Error::file(
+                path,
+                "it is a link to a file that is not there; give the name of that file, or delete the link",
+            ));
         }
         Standing::Nothing | Standing::Ours => {}
     }
@@ -297,7 +342,8 @@ fn check(kind: Kind, path: &Path) -> Result<(), Error> {
                 path,
                 format!("nothing can be written there: {error}; choose another folder"),
             )
-        })
+        })?;
+    Ok(standing)
 }
 
 /// Two paths lead to one file, whether it is there yet or not.
@@ -327,14 +373,29 @@ mod tests {
         let both = [(Kind::Json, json.as_path()), (Kind::Report, page.as_path())];
         assert_eq!(plan(&both, &[]).unwrap().len(), 2);
 
-        fs::write(&json, "{\"schema\": 1, \"verdict\": \"effect\"}").unwrap();
-        fs::write(&page, format!("<html><head>{}", report::GENERATOR)).unwrap();
+        fs::write(&json, "{\"written_by\": \"ctid\", \"schema\": 1}").unwrap();
+        fs::write(&page, report::head()).unwrap();
         plan(&both, &[]).unwrap();
 
+        let quoted = format!("<!-- as in {} -->", report::head());
+        let shape = folder.path().join("shape.csv");
         for (path, kind, text) in [
             (&json, Kind::Json, "{\"verdict\": 1}"),
+            (
+                &json,
+                Kind::Json,
+                "{\"schema\": \"x\", \"method\": \"mine\"}",
+            ),
+            (&json, Kind::Json, "{\"schema\": 1, \"verdict\": \"mine\"}"),
+            (
+                &json,
+                Kind::Json,
+                "{\"written_by\": \"ctid\", \"schema\": \"x\"}",
+            ),
             (&json, Kind::Json, "not json"),
             (&page, Kind::Report, "<html>my notes</html>"),
+            (&page, Kind::Report, &quoted),
+            (&shape, Kind::Unknown, "place,variable,at [cm],value [V]\n"),
         ] {
             fs::write(path, text).unwrap();
             let message = refused(&[(kind, path)], &[]);
@@ -348,6 +409,56 @@ mod tests {
             );
             assert_eq!(fs::read_to_string(path).unwrap(), text);
         }
+    }
+
+    /// Something to write.
+    #[derive(Serialize)]
+    struct Number {
+        schema: u32,
+    }
+
+    impl Found for Number {}
+
+    const NUMBER: Number = Number { schema: 1 };
+
+    #[test]
+    fn what_comes_while_the_command_runs_is_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let json = folder.path().join("out.json");
+        let planned = || plan(&[(Kind::Json, &json)], &[]).unwrap().remove(0);
+        let mine = "{\"mine\": 1}";
+        for before in ["", "ours"] {
+            match before {
+                "" => drop(fs::remove_file(&json)),
+                _ => assert!(planned().write(&NUMBER).unwrap()),
+            }
+            let output = planned();
+            fs::write(&json, mine).unwrap();
+            let refused = output.write(&NUMBER).unwrap_err().to_string();
+            assert!(refused.contains("while this command ran"), "{refused}");
+            assert_eq!(fs::read_to_string(&json).unwrap(), mine);
+            fs::remove_file(&json).unwrap();
+        }
+        // Its own are written again and again.
+        for _ in 0..3 {
+            assert!(planned().write(&NUMBER).unwrap());
+        }
+        let text = fs::read_to_string(&json).unwrap();
+        assert!(text.starts_with("{\n  \"written_by\": \"ctid\",\n  \"schema\": 1"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_that_leads_nowhere_is_no_place_for_a_result() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("out.json");
+        std::os::unix::fs::symlink(folder.path().join("gone"), &link).unwrap();
+        let message = refused(&[(Kind::Json, &link)], &[]);
+        assert!(
+            message.contains("a link to a file that is not there"),
+            "{message}"
+        );
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
     }
 
     #[test]
@@ -384,7 +495,7 @@ mod tests {
             let output = free_report(folder.path(), "a.csv").unwrap();
             output.path().file_name().unwrap().to_owned()
         };
-        let page = |record: &str| format!("{}{{\"name\":\"{record}\"}}", report::GENERATOR);
+        let page = |record: &str| format!("{}{{\"name\":\"{record}\"}}", report::head());
         assert_eq!(name(), "report.html");
         fs::write(folder.path().join("report.html"), "mine, on \"a.csv\"").unwrap();
         assert_eq!(name(), "report-2.html");

@@ -83,6 +83,15 @@ pub(crate) fn variable_of(word: &str) -> Result<Variable, String> {
         .ok_or_else(|| format!("\"{word}\" is no variable; write level, rate, input or time"))
 }
 
+/// Whether a file begins as those of a diagnosis do: with all their columns, of which nobody need write the last.
+pub(crate) fn is_own(text: &str) -> bool {
+    let header = text.lines().next().unwrap_or_default();
+    let columns: Vec<&str> = header.split(',').collect();
+    header.starts_with(HEADER)
+        && matches!(&columns[..], [.., last] if last.starts_with("std_error ["))
+        && columns.len() == 5
+}
+
 /// The file of what a diagnosis found.
 #[must_use]
 pub fn text(unknown: &Unknown) -> String {

@@ -21,7 +21,7 @@ fn unnamed() -> String {
 
 #[test]
 fn the_plant_is_asked_for_where_it_alone_is_missing() {
-    let address = format!("http://{}/", serve(&[]));
+    let address = serve(&[]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;
@@ -66,7 +66,7 @@ fn the_plant_is_asked_for_where_it_alone_is_missing() {
 #[test]
 fn a_search_has_an_effort_and_an_end() {
     let _alone = alone();
-    let tab = Tab::open(serve(&[]));
+    let tab = Tab::open(&serve(&[]));
     let rig = Rig {
         samples: 3000,
         colour: 0.9,

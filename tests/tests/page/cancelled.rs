@@ -45,8 +45,8 @@ fn long_record() -> String {
 #[test]
 fn what_is_cancelled_stops() {
     let _alone = alone();
-    let address = serve(&[]);
-    let tab = Tab::open(address);
+    let page = serve(&[]);
+    let tab = Tab::open(&page);
     assert_eq!(
         tab.post("/api/record?name=long.csv", long_record().as_bytes())
             .status,
@@ -80,7 +80,7 @@ fn what_is_cancelled_stops() {
     gone("another took its place");
     // A tab that is forgotten takes its computation with it.
     begin();
-    let _others: Vec<Tab> = (0..8).map(|_| Tab::open(address)).collect();
+    let _others: Vec<Tab> = (0..8).map(|_| Tab::open(&page)).collect();
     assert_eq!(tab.get("/api/state").status, 410);
     gone("its tab was forgotten");
 }
@@ -89,7 +89,7 @@ fn what_is_cancelled_stops() {
 #[test]
 fn a_fit_of_an_older_model_stops() {
     let _alone = alone();
-    let tab = Tab::open(serve(&[]));
+    let tab = Tab::open(&serve(&[]));
     let record = long_record();
     assert_eq!(
         tab.post("/api/record?name=long.csv", record.as_bytes())

@@ -34,8 +34,8 @@ fn a_loop_is_treated_in_both_ways() {
     let ways = ["simulated", "measured"].map(|way| (way, compared(way)));
     assert_ne!(ways[0].1["steps"][0]["rmse"], ways[1].1["steps"][0]["rmse"]);
 
-    let address = serve(&[&data, "--model", &model]);
-    let tab = Tab::open(address);
+    let page = serve(&[&data, "--model", &model]);
+    let tab = Tab::open(&page);
     let mut fits = Vec::new();
     for (way, compared) in &ways {
         let body = json!({ "measured": *way == "measured" }).to_string();
@@ -53,7 +53,7 @@ fn a_loop_is_treated_in_both_ways() {
     let state = tab.post("/api/loop", br#"{"measured": false}"#).json();
     assert_eq!(state["current"], fits[0]);
 
-    let address = format!("http://{address}/");
+    let address = page.to_string();
     let Some(mut browser) = Browser::open(&address) else {
         return;
     };
@@ -90,7 +90,7 @@ fn wave(seed: u64) -> String {
 /// The shape of what nothing explains is drawn, kept under a name, taken out and put back.
 #[test]
 fn the_unexplained_is_kept_by_name() {
-    let address = format!("http://{}/", serve(&[]));
+    let address = serve(&[]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;
@@ -143,7 +143,7 @@ fn so_many_effects_and_no_more() {
         ..Rig::single_tank()
     };
     let _alone = alone();
-    let tab = Tab::open(serve(&[]));
+    let tab = Tab::open(&serve(&[]));
     let record = csv(&rig.run(&mut ChaCha8Rng::seed_from_u64(1)));
     assert_eq!(
         tab.post("/api/record?name=a.csv", record.as_bytes()).status,

@@ -172,7 +172,7 @@ fn look_around(browser: &mut Browser, name: &str) {
 /// The bundled record: everything but a second effect, which it does not have.
 #[test]
 fn the_bundled_record_with_the_mouse() {
-    let address = format!("http://{}/", serve(&[]));
+    let address = serve(&[]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;
@@ -246,7 +246,7 @@ fn two_undecided_effects_show_their_experiment() {
         hidden: vec![("sensor_lag", 0, vec![8.0])],
         ..Rig::single_tank()
     };
-    let address = format!("http://{}/", serve(&[]));
+    let address = serve(&[]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;
@@ -304,7 +304,7 @@ fn page_and_commands_are_mixed() {
     let text = std::fs::read_to_string(bundled("tour.toml")).unwrap();
     std::fs::write(&model, format!("# ours\n{text}")).unwrap();
     let (model, data) = (model.display().to_string(), data.display().to_string());
-    let address = format!("http://{}/", serve(&[&data, "--model", &model]));
+    let address = serve(&[&data, "--model", &model]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;
@@ -332,7 +332,7 @@ fn the_form_deletes_nothing_that_it_does_not_show() {
     let text = format!("hold = \"first\"\n{text}");
     std::fs::write(&file, &text).unwrap();
     let path = file.display().to_string();
-    let address = format!("http://{}/", serve(&["--model", &path]));
+    let address = serve(&["--model", &path]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;
@@ -358,7 +358,7 @@ fn the_measured_tanks_with_the_mouse() {
         );
         return;
     };
-    let address = format!("http://{}/", serve(&[]));
+    let address = serve(&[]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;

@@ -6,7 +6,7 @@ use std::net::{SocketAddr, TcpStream, UdpSocket};
 use serde_json::json;
 
 use crate::browser::Browser;
-use crate::server::{Answer, Tab, alone, bundled, exchange, serve};
+use crate::server::{Answer, Page, Tab, alone, bundled, exchange, serve};
 
 fn tour() -> Vec<u8> {
     std::fs::read(bundled("tour.csv")).unwrap()
@@ -14,15 +14,16 @@ fn tour() -> Vec<u8> {
 
 #[test]
 fn other_pages_are_refused() {
-    let address = serve(&[]);
-    let tab = Tab::open(address);
+    let page = serve(&[]);
+    let Page { address, secret } = &page;
+    let tab = Tab::open(&page);
     let port = address.port();
     let ask = |method: &str, path: &str, headers: &str| {
-        exchange(address, format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n{headers}Content-Length: 0\r\n\r\n").as_bytes())
+        exchange(*address, format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n{headers}Content-Length: 0\r\n\r\n").as_bytes())
     };
     let host = format!("Host: {address}\r\n");
-    let token = format!("x-ctid-token: {}\r\n", tab.token);
-    let state = format!("/api/state?session={}", tab.session);
+    let home = format!("/{secret}/");
+    let state = format!("{home}api/state?session={}", tab.session);
     // As the page itself asks.
     let own = format!("{host}Origin: http://{address}\r\n");
     assert_eq!(ask("GET", &state, &own).status, 200);
@@ -38,11 +39,11 @@ fn other_pages_are_refused() {
         "null",
     ] {
         for (method, path) in [
-            ("GET", state.as_str()),
-            ("GET", "/"),
-            ("POST", "/api/session"),
+            ("GET", &state),
+            ("GET", &home),
+            ("POST", &format!("{home}api/session")),
         ] {
-            let answer = ask(method, path, &format!("{host}{token}Origin: {origin}\r\n"));
+            let answer = ask(method, path, &format!("{host}Origin: {origin}\r\n"));
             assert_eq!(answer.status, 403, "{origin}: {answer:?}");
         }
     }
@@ -53,40 +54,30 @@ fn other_pages_are_refused() {
         format!("127.0.0.1.example.org:{port}"),
         String::new(),
     ] {
-        let answer = ask("GET", "/", &format!("Host: {name}\r\n"));
+        let answer = ask("GET", &home, &format!("Host: {name}\r\n"));
         assert!([400, 403].contains(&answer.status), "{name}: {answer:?}");
-        assert!(!answer.body.contains(&tab.token));
-    }
-    // What changes something needs the token.
-    for wrong in [
-        String::new(),
-        format!("x-ctid-token: {}\r\n", "0".repeat(32)),
-    ] {
-        for path in [
-            "session", "record", "settings", "text", "effect", "run", "cancel", "forget",
-        ] {
-            let path = format!("/api/{path}?session={}&name=a.csv", tab.session);
-            assert_eq!(
-                ask("POST", &path, &format!("{host}{wrong}")).status,
-                403,
-                "{path}"
-            );
-        }
     }
     // The browser is told to load nothing from elsewhere, and to give nothing to others.
-    let page = ask("GET", "/", &host);
+    let answer = ask("GET", &home, &host);
+    assert_eq!(answer.status, 200);
     assert!(
-        page.head
-            .contains("content-security-policy: default-src 'self'"),
+        answer
+            .head
+            .contains("content-security-policy: default-src 'self'")
+            && answer.head.contains("referrer-policy: no-referrer"),
         "{}",
-        page.head
+        answer.head
     );
-    assert!(!page.head.contains("access-control-allow"), "{}", page.head);
+    assert!(
+        !answer.head.contains("access-control-allow"),
+        "{}",
+        answer.head
+    );
 }
 
 #[test]
 fn it_listens_on_this_machine_alone() {
-    let address = serve(&[]);
+    let address = serve(&[]).address;
     assert!(address.ip().is_loopback());
     // An address of this machine that others see; nothing is sent.
     let socket = UdpSocket::bind("0.0.0.0:0").unwrap();
@@ -113,8 +104,8 @@ fn resident() -> Option<usize> {
 
 #[test]
 fn a_file_of_200_megabytes_is_refused_early() {
-    let address = serve(&[]);
-    let tab = Tab::open(address);
+    let page = serve(&[]);
+    let tab = Tab::open(&page);
     let path = format!("/api/record?session={}&name=large.csv", tab.session);
     let refused = |answer: &Answer| {
         assert_eq!(answer.status, 413, "{answer:?}");
@@ -125,10 +116,10 @@ fn a_file_of_200_megabytes_is_refused_early() {
     };
     // Where its length is said, before anything of it is read.
     let head = tab.head("POST", &path, 200 << 20) + "\r\n";
-    refused(&exchange(address, head.as_bytes()));
+    refused(&exchange(page.address, head.as_bytes()));
     // Where it is not, once it is too long.
     let before = resident();
-    let mut stream = TcpStream::connect(address).unwrap();
+    let mut stream = TcpStream::connect(page.address).unwrap();
     let head = tab
         .head("POST", &path, 0)
         .replace("Content-Length: 0", "Transfer-Encoding: chunked");
@@ -153,7 +144,7 @@ fn a_file_of_200_megabytes_is_refused_early() {
 
 #[test]
 fn unfortunate_files_are_refused_with_the_mend() {
-    let tab = Tab::open(serve(&[]));
+    let tab = Tab::open(&serve(&[]));
     let send = |name: &str, bytes: &[u8]| tab.post(&format!("/api/record?name={name}"), bytes);
     let names: Vec<String> = (0..10_000).map(|k| format!("column {k}")).collect();
     let row = vec!["1"; 10_000].join(",");
@@ -235,7 +226,7 @@ fn unfortunate_files_are_refused_with_the_mend() {
 fn no_parameter_reaches_the_file_system() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("secret.txt"), "root:x:0:0").unwrap();
-    let tab = Tab::open(serve(&[]));
+    let tab = Tab::open(&serve(&[]));
     let secret = folder.path().join("secret.txt").display().to_string();
     let encoded = |path: &str| path.replace('/', "%2F");
     for path in [
@@ -284,8 +275,8 @@ fn no_parameter_reaches_the_file_system() {
 
 #[test]
 fn two_tabs_do_not_meet_and_the_oldest_of_many_goes() {
-    let address = serve(&[]);
-    let (first, second) = (Tab::open(address), Tab::open(address));
+    let page = serve(&[]);
+    let (first, second) = (Tab::open(&page), Tab::open(&page));
     assert_ne!(first.session, second.session);
     assert_eq!(first.post("/api/record?name=tour.csv", &tour()).status, 200);
     assert_eq!(first.state()["records"].as_array().unwrap().len(), 1);
@@ -296,7 +287,7 @@ fn two_tabs_do_not_meet_and_the_oldest_of_many_goes() {
         first.post("/api/session", body.as_bytes()).json()["session"],
         json!(first.session)
     );
-    let tabs: Vec<Tab> = (0..8).map(|_| Tab::open(address)).collect();
+    let tabs: Vec<Tab> = (0..8).map(|_| Tab::open(&page)).collect();
     for gone in [&first, &second] {
         let answer = gone.get("/api/state");
         assert_eq!(answer.status, 410, "{answer:?}");
@@ -311,9 +302,9 @@ fn no_change_of_two_tabs_is_lost() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("m.toml");
     std::fs::write(&file, "plant = \"single-tank\"\n").unwrap();
-    let address = serve(&["--model", &file.display().to_string()]);
+    let page = serve(&["--model", &file.display().to_string()]);
     let effects = ["overflow", "pump_deadzone"];
-    let tabs = effects.map(|effect| (effect, Tab::open(address)));
+    let tabs = effects.map(|effect| (effect, Tab::open(&page)));
     for _ in 0..30 {
         for way in ["add", "remove"] {
             std::thread::scope(|scope| {
@@ -338,7 +329,7 @@ fn a_model_file_that_was_away_is_no_failure_for_ever() {
     let folder = tempfile::tempdir().unwrap();
     let (file, away) = (folder.path().join("m.toml"), folder.path().join("away"));
     std::fs::write(&file, "plant = \"single-tank\"\n").unwrap();
-    let tab = Tab::open(serve(&["--model", &file.display().to_string()]));
+    let tab = Tab::open(&serve(&["--model", &file.display().to_string()]));
     assert!(tab.state()["failure"].is_null());
     std::fs::rename(&file, &away).unwrap();
     let failure = tab.state()["failure"].to_string();
@@ -350,7 +341,7 @@ fn a_model_file_that_was_away_is_no_failure_for_ever() {
 /// Names from files are text, whatever they hold.
 #[test]
 fn markup_in_names_is_text() {
-    let address = format!("http://{}/", serve(&[]));
+    let address = serve(&[]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;

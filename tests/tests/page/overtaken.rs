@@ -26,10 +26,7 @@ fn type_over(browser: &mut Browser, id: &str, text: &str) {
 
 /// A page that shows a model file; `None` where there is no browser.
 fn opened(file: &Path) -> Option<(Browser, String, MutexGuard<'static, ()>)> {
-    let address = format!(
-        "http://{}/",
-        serve(&["--model", &file.display().to_string()])
-    );
+    let address = serve(&["--model", &file.display().to_string()]).to_string();
     let alone = alone();
     let mut browser = Browser::open(&address)?;
     browser.until("document.getElementById('known-area')?.value === '154'");
@@ -105,8 +102,8 @@ fn fields_that_are_filled_in_quickly_do_not_overtake_each_other() {
 #[test]
 fn what_was_filled_from_an_older_model_is_refused() {
     let (_folder, file, text) = model();
-    let address = serve(&["--model", &file.display().to_string()]);
-    let (first, second) = (Tab::open(address), Tab::open(address));
+    let page = serve(&["--model", &file.display().to_string()]);
+    let (first, second) = (Tab::open(&page), Tab::open(&page));
     let form = |tab: &Tab, from: &serde_json::Value, area: f64| {
         let mut said = from.clone();
         said["known"]["area"] = json!(area);
@@ -131,7 +128,7 @@ fn what_was_filled_from_an_older_model_is_refused() {
     let now = std::fs::read_to_string(&file).unwrap();
     assert_eq!(replaced(&now), 200);
     // Where the model is in no file it is the same.
-    let tab = Tab::open(serve(&[]));
+    let tab = Tab::open(&serve(&[]));
     let bare = br#"{"text": "plant = 'single-tank'"}"#;
     assert_eq!(tab.post("/api/text", bare).status, 200);
     assert_eq!(tab.post("/api/text", bare).status, 409);

@@ -1,5 +1,6 @@
 //! The program's server on a thread of its own, and requests to it as bytes.
 
+use std::fmt::{Display, Formatter};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
@@ -71,8 +72,22 @@ impl Write for Pipe {
     }
 }
 
+/// Where the page is.
+#[derive(Debug, Clone)]
+pub struct Page {
+    pub address: SocketAddr,
+    pub secret: String,
+}
+
+/// As it is printed.
+impl Display for Page {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "http://{}/{}/", self.address, self.secret)
+    }
+}
+
 /// Serves until the test ends.
-pub fn serve(arguments: &[&str]) -> SocketAddr {
+pub fn serve(arguments: &[&str]) -> Page {
     // A thread is named like the one that begins it: the pool's are not to be named like one that computes.
     rayon::broadcast(|_| ());
     let words: Vec<String> = ["ctid", "serve", "--port", "0"]
@@ -93,7 +108,11 @@ pub fn serve(arguments: &[&str]) -> SocketAddr {
             &String::from_utf8(receiver.recv_timeout(Duration::from_secs(60)).unwrap()).unwrap();
     }
     let rest = said.split("http://").nth(1).unwrap();
-    rest.split('/').next().unwrap().parse().unwrap()
+    let mut parts = rest.split('/');
+    Page {
+        address: parts.next().unwrap().parse().unwrap(),
+        secret: parts.next().unwrap().to_string(),
+    }
 }
 
 /// An answer.
@@ -145,30 +164,15 @@ pub fn exchange(address: SocketAddr, bytes: &[u8]) -> Answer {
 /// A tab without a browser.
 #[derive(Clone)]
 pub struct Tab {
-    pub address: SocketAddr,
-    pub token: String,
+    pub page: Page,
     pub session: String,
 }
 
 impl Tab {
-    /// Loads the page and opens a session.
-    pub fn open(address: SocketAddr) -> Self {
-        let page = exchange(
-            address,
-            format!("GET / HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").as_bytes(),
-        );
-        assert_eq!(page.status, 200);
-        let token = page
-            .body
-            .split("name=\"ctid-token\" content=\"")
-            .nth(1)
-            .unwrap()
-            .split('"')
-            .next()
-            .unwrap();
+    /// Opens a session.
+    pub fn open(page: &Page) -> Self {
         let mut tab = Self {
-            address,
-            token: token.to_string(),
+            page: page.clone(),
             session: String::new(),
         };
         let opened = tab.post("/api/session", br#"{"session": null}"#);
@@ -179,8 +183,8 @@ impl Tab {
 
     pub fn head(&self, method: &str, path: &str, length: usize) -> String {
         format!(
-            "{method} {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\nx-ctid-token: {}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n",
-            self.address, self.token
+            "{method} /{}{path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n",
+            self.page.secret, self.page.address
         )
     }
 
@@ -191,7 +195,7 @@ impl Tab {
 
     pub fn get(&self, path: &str) -> Answer {
         exchange(
-            self.address,
+            self.page.address,
             (self.head("GET", &self.with_session(path), 0) + "\r\n").as_bytes(),
         )
     }
@@ -200,7 +204,7 @@ impl Tab {
         let mut bytes =
             (self.head("POST", &self.with_session(path), body.len()) + "\r\n").into_bytes();
         bytes.extend_from_slice(body);
-        exchange(self.address, &bytes)
+        exchange(self.page.address, &bytes)
     }
 
     pub fn state(&self) -> Value {

@@ -23,7 +23,7 @@ fn written(browser: &mut Browser, id: &str, text: &str) {
 
 #[test]
 fn a_leak_of_three_tanks_is_found_and_added() {
-    let address = format!("http://{}/", serve(&[]));
+    let address = serve(&[]).to_string();
     let _alone = alone();
     let Some(mut browser) = Browser::open(&address) else {
         return;

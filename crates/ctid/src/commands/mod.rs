@@ -156,17 +156,22 @@ fn finish(
     out: &mut dyn Write,
     look: Look,
 ) -> Result<(), Error> {
-    // The files first: whoever pipes the text into `head` still gets them.
-    let mut written = Vec::with_capacity(outputs.len());
-    for output in outputs {
-        written.push(output.write(found)?);
-    }
+    // The files first: whoever pipes the text into `head` still gets them. Where one cannot be written the text is not lost.
+    let written: Vec<_> = outputs.iter().map(|output| output.write(found)).collect();
     let mut text = text.to_string();
     if !outputs.is_empty() {
         text.push('\n');
     }
+    let mut failed = Ok(());
     for (output, written) in outputs.iter().zip(written) {
         let path = output.path().display();
+        let written = match written {
+            Ok(written) => written,
+            Err(error) => {
+                failed = Err(error);
+                continue;
+            }
+        };
         text += &look.faint(match (written, output.kind()) {
             (true, _) => format!("wrote {path}"),
             (false, Kind::Record) => format!("{path} is not written: nothing is worth playing"),
@@ -176,7 +181,8 @@ fn finish(
         });
         text.push('\n');
     }
-    say(out, &text)
+    say(out, &text)?;
+    failed
 }
 
 /// Writes text; a reader that has seen enough and gone is no error.

@@ -24,14 +24,12 @@ use missing_effect::{Diagnosis, Shown, Step, Verdict};
 pub use self::baysse::html as baysse;
 pub(crate) use self::data::{json as drawing, records as drawing_of_records, rounded};
 pub use self::identification::html as identification;
+pub use self::page::head;
 use self::page::{NOTICES, Page, figure, figure_with, items, large, section};
 pub(crate) use self::page::{PLOTLY, PLOTS, STYLE};
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
 use crate::findings::{self, Reader};
-
-/// Stands in the head of every report: a file that holds it may be overwritten by a new one.
-pub const GENERATOR: &str = "<meta name=\"generator\" content=\"ctid\">";
 
 /// Draws a diagnosis, here and on the page that is served.
 pub(crate) const DIAGNOSIS_FIGURES: &str = include_str!("diagnosis_figures.js");

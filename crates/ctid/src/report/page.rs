@@ -1,6 +1,5 @@
 //! What every page shares: the shell that holds style, data and scripts, and the places for what it shows.
 
-use super::GENERATOR;
 use super::text::escape;
 
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
@@ -28,6 +27,16 @@ pub(super) struct Page<'a> {
     pub script: &'a str,
 }
 
+/// How every page begins, with its mark: a file that begins so may be overwritten by a new one.
+#[must_use]
+pub fn head() -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
+         <meta name=\"generator\" content=\"ctid\">\n"
+    )
+}
+
 /// The complete file.
 pub(super) fn html(page: &Page) -> String {
     let Page {
@@ -37,16 +46,15 @@ pub(super) fn html(page: &Page) -> String {
         script,
     } = page;
     format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-         {GENERATOR}\n\
+        "{}\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <link rel=\"icon\" href=\"data:,\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}\n\
          <script type=\"application/json\" id=\"data\">{data}</script>\n\
          <script type=\"text/plain\" id=\"plotly\">{PLOTLY}</script>\n\
-         <script>\n{PLOTS}{script}</script>\n</body>\n</html>\n"
+         <script>\n{PLOTS}{script}</script>\n</body>\n</html>\n",
+        head()
     )
 }
 

@@ -2,20 +2,21 @@
 
 use std::num::NonZeroU8;
 use std::sync::Arc;
-use std::time::Duration;
 
-use axum::body::{Body, Bytes, to_bytes};
-use axum::extract::{DefaultBodyLimit, Query, State};
-use axum::http::StatusCode;
+use axum::body::Body;
+use axum::extract::{Query, Request, State};
+use axum::http::{HeaderMap, StatusCode};
+use axum::middleware::{self, Next};
+use axum::response::Response;
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use missing_effect::design::Limits;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
-use tokio::time::timeout;
 
-use super::guard::{LARGEST_BODY, Refusal};
+use super::body::whole;
+use super::guard::{LARGEST_BODY, Refusal, check_length};
 use super::jobs::{self, Task};
 use super::session::{Session, lock};
 use super::sessions::Shared;
@@ -27,15 +28,13 @@ use crate::effort::EffortLevel;
 use crate::term_file::TermFile;
 
 /// Requests in JSON are no larger \[bytes\].
-const LARGEST_REQUEST: usize = 1 << 20;
-/// A file is here within this time: the next one waits for it.
-const LONGEST_UPLOAD: Duration = Duration::from_secs(60);
+pub(super) const LARGEST_REQUEST: usize = 1 << 20;
 /// Characters of a record's name at most.
 const LONGEST_NAME: usize = 100;
 
 type Answer = Result<Json<Value>, Refusal>;
 
-pub(super) fn routes() -> Router<Arc<App>> {
+pub(super) fn routes(app: &Arc<App>) -> Router<Arc<App>> {
     Router::new()
         .route("/api/session", post(open))
         .route("/api/state", get(show))
@@ -48,9 +47,26 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/api/finish", post(finish))
         .route("/api/forget", post(forget))
         .merge(downloads::routes())
-        .layer(DefaultBodyLimit::max(LARGEST_REQUEST))
-        // It limits its body itself.
+        .layer(middleware::from_fn_with_state(app.clone(), read_first))
+        // It reads its body itself.
         .route("/api/record", post(record))
+}
+
+/// Reads the request before anything is done with it.
+async fn read_first(
+    State(app): State<Arc<App>>,
+    request: Request,
+    next: Next,
+) -> Result<Response, Refusal> {
+    let (parts, body) = request.into_parts();
+    let too_large = || {
+        Refusal::new(
+            StatusCode::PAYLOAD_TOO_LARGE,
+            "the request is larger than 1 MB, which is the most that the page takes; shorten the model file",
+        )
+    };
+    let (body, _room) = whole(body, LARGEST_REQUEST, &app.asking, too_large).await?;
+    Ok(next.run(Request::from_parts(parts, body.into())).await)
 }
 
 /// Which tab asks.
@@ -158,20 +174,15 @@ pub(super) fn plain_name(name: &str) -> String {
     }
 }
 
-async fn record(State(app): State<Arc<App>>, Query(new): Query<NewRecord>, body: Body) -> Answer {
-    // Files are taken one after the other: so many bytes are held at once, and no more.
-    let closed = |_| Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the server is closing");
-    let _turn = app.uploading.acquire().await.map_err(closed)?;
+async fn record(
+    State(app): State<Arc<App>>,
+    Query(new): Query<NewRecord>,
+    headers: HeaderMap,
+    body: Body,
+) -> Answer {
+    check_length(&headers)?;
     let session = find(&app, &new.session)?;
-    let late = |_| {
-        Refusal::input(
-            "the file did not arrive within a minute; copy it to this machine and drop it again",
-        )
-    };
-    let content: Bytes = timeout(LONGEST_UPLOAD, to_bytes(body, LARGEST_BODY))
-        .await
-        .map_err(late)?
-        .map_err(|_| Refusal::too_large())?;
+    let (content, _room) = whole(body, LARGEST_BODY, &app.uploading, Refusal::too_large).await?;
     let all = app.clone();
     aside(move || {
         let upload = Upload::new(&plain_name(&new.name), new.held_out, content)?;

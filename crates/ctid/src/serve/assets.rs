@@ -3,7 +3,6 @@
 use std::sync::{Arc, LazyLock};
 
 use axum::Router;
-use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
@@ -12,15 +11,13 @@ use base64::Engine;
 use super::App;
 use crate::report;
 
-const PAGE: &str = include_str!("page/index.html");
-/// Stands in the page where the token goes.
-const TOKEN: &str = "{{token}}";
-
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
+const PAGE: &str = "text/html; charset=utf-8";
 
 /// Path, kind and content of what does not change.
-const FILES: [(&str, &str, &str); 14] = [
+const FILES: [(&str, &str, &str); 15] = [
+    ("/", PAGE, include_str!("page/index.html")),
     ("/report.css", STYLE, report::STYLE),
     ("/page.css", STYLE, include_str!("page/page.css")),
     ("/plots.js", SCRIPT, report::PLOTS),
@@ -45,19 +42,12 @@ static PLOTLY: LazyLock<Vec<u8>> = LazyLock::new(|| {
 });
 
 pub(super) fn routes() -> Router<Arc<App>> {
-    let mut router = Router::new()
-        .route("/", get(page))
-        .route("/plotly.js", get(plotly));
+    let mut router = Router::new().route("/plotly.js", get(plotly));
     for (path, kind, content) in FILES {
         let file = move || async move { ([(header::CONTENT_TYPE, kind)], content) };
         router = router.route(path, get(file));
     }
     router
-}
-
-async fn page(State(app): State<Arc<App>>) -> impl IntoResponse {
-    let page = PAGE.replace(TOKEN, app.guard.token());
-    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], page)
 }
 
 async fn plotly() -> impl IntoResponse {

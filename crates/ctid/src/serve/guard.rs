@@ -1,26 +1,23 @@
-//! Who may ask: pages that this server has sent, on this machine, and nobody else.
+//! Who may ask: who knows the secret of this run, on pages that this server has sent.
 //!
-//! A page of another site that is open in the same browser can send requests to any local server. Three things keep it out.
-//! Its requests carry its own `Origin`, which is refused. A name that it has pointed at 127.0.0.1 after it was loaded stands in
-//! `Host`, which is refused too. And what changes anything needs a token that only this server's own page holds, which no
-//! other page can read.
+//! Every address begins with the secret, which stands in the address that is printed and nowhere else: other users of the machine
+//! can connect, but without it nothing is answered. It is no cookie, which a browser would also send to the servers of others at
+//! other ports of this machine.
+//!
+//! A page of another site that is open in the same browser can send requests to any local server. Its requests carry its own
+//! `Origin`, which is refused. A name that it has pointed at 127.0.0.1 after it was loaded stands in `Host`, which is refused too.
+//! And it does not know the secret.
 
-use std::sync::Arc;
+use std::hint::black_box;
 
 use axum::Json;
-use axum::extract::{Request, State};
-use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
-use axum::middleware::Next;
+use axum::http::uri::PathAndQuery;
+use axum::http::{HeaderMap, HeaderValue, Request, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-use super::App;
-
 /// The largest body that is taken \[bytes\].
 pub(super) const LARGEST_BODY: usize = 64 << 20;
-
-/// Carries the token.
-const TOKEN: &str = "x-ctid-token";
 
 /// What the browser may do with the page: everything comes from here. Plotly writes styles into its elements, and draws the
 /// picture that it saves from a blob.
@@ -80,11 +77,11 @@ impl IntoResponse for Refusal {
     }
 }
 
-/// Who may speak for this server, and the token.
+/// Who may speak for this server, and the secret.
 #[derive(Debug)]
 pub(super) struct Guard {
     hosts: Vec<String>,
-    token: String,
+    secret: String,
 }
 
 impl Guard {
@@ -97,51 +94,85 @@ impl Guard {
         }
         Self {
             hosts,
-            token: format!("{:032x}", rand::random::<u128>()),
+            secret: format!("{:032x}", rand::random::<u128>()),
         }
     }
 
-    pub(super) fn token(&self) -> &str {
-        &self.token
+    /// The first part of every address.
+    pub(super) fn secret(&self) -> &str {
+        &self.secret
     }
 
-    /// Why a request is refused, if it is.
-    fn refuses(&self, method: &Method, headers: &HeaderMap) -> Option<Refusal> {
-        let text = |name| {
-            headers
-                .get(name)
-                .map(|value: &HeaderValue| value.to_str().unwrap_or("?"))
-        };
+    /// Whether the request may be answered; its address is then the one behind the secret.
+    ///
+    /// # Errors
+    /// Why it is refused.
+    pub(super) fn admit<B>(&self, request: &mut Request<B>) -> Result<(), Refusal> {
+        self.is_of_this_server(request.headers())?;
+        let behind = self.behind_the_secret(request.uri());
+        *request.uri_mut() = behind.ok_or_else(|| {
+            forbidden(
+                "the address lacks the secret of this run of ctid; open the one that ctid printed",
+            )
+        })?;
+        Ok(())
+    }
+
+    fn is_of_this_server(&self, headers: &HeaderMap) -> Result<(), Refusal> {
         let ours = |host: &str| self.hosts.iter().any(|known| known == host);
-        let forbidden = |what| Some(Refusal::new(StatusCode::FORBIDDEN, what));
-        if !text(header::HOST).is_some_and(ours) {
-            return forbidden(
+        if !text(headers, header::HOST).is_some_and(ours) {
+            return Err(forbidden(
                 "this server answers to 127.0.0.1 alone; open the address that ctid printed",
-            );
+            ));
         }
-        let origin =
-            text(header::ORIGIN).map(|origin| origin.strip_prefix("http://").unwrap_or("?"));
+        let origin = text(headers, header::ORIGIN)
+            .map(|origin| origin.strip_prefix("http://").unwrap_or("?"));
         if !origin.is_none_or(ours) {
-            return forbidden("the request comes from another page than this server's own");
+            return Err(forbidden(
+                "the request comes from another page than this server's own",
+            ));
         }
-        let safe = method == Method::GET || method == Method::HEAD;
-        if !safe && text(header::HeaderName::from_static(TOKEN)) != Some(&self.token) {
-            return forbidden("the page is of another run of ctid; load it again");
+        Ok(())
+    }
+
+    fn behind_the_secret(&self, uri: &Uri) -> Option<Uri> {
+        let path = uri.path_and_query().map_or("", PathAndQuery::as_str);
+        let (given, behind) = path
+            .strip_prefix('/')?
+            .split_at_checked(self.secret.len())?;
+        if !is_same(given, &self.secret) || !behind.starts_with('/') {
+            return None;
         }
-        let length = text(header::CONTENT_LENGTH).and_then(|length| length.parse::<u64>().ok());
-        if length.is_some_and(|length| length > LARGEST_BODY as u64) {
-            return Some(Refusal::too_large());
-        }
-        None
+        behind.parse().ok()
     }
 }
 
-/// Lets through what may pass, and tells the browser what the answer may do.
-pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    let mut response = match app.guard.refuses(request.method(), request.headers()) {
-        Some(refusal) => refusal.into_response(),
-        None => next.run(request).await,
-    };
+/// Whether two texts of one length are the same; how long that takes does not tell where they differ.
+fn is_same(given: &str, secret: &str) -> bool {
+    let pairs = given.bytes().zip(secret.bytes());
+    pairs.fold(0, |differing, (a, b)| black_box(differing | (a ^ b))) == 0
+}
+
+fn forbidden(what: &str) -> Refusal {
+    Refusal::new(StatusCode::FORBIDDEN, what)
+}
+
+fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
+    let value = headers.get(name)?;
+    Some(value.to_str().unwrap_or("?"))
+}
+
+/// Refuses a body that says itself that it is too large, before it is read.
+pub(super) fn check_length(headers: &HeaderMap) -> Result<(), Refusal> {
+    let length = text(headers, header::CONTENT_LENGTH).and_then(|text| text.parse::<u64>().ok());
+    if length.is_some_and(|length| length > LARGEST_BODY as u64) {
+        return Err(Refusal::too_large());
+    }
+    Ok(())
+}
+
+/// Tells the browser what the answer may do.
+pub(super) fn restrict<B>(response: &mut Response<B>) {
     for (name, value) in [
         (header::CONTENT_SECURITY_POLICY, POLICY),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
@@ -157,5 +188,49 @@ pub(super) async fn guard(State(app): State<Arc<App>>, request: Request, next: N
             .headers_mut()
             .insert(name, HeaderValue::from_static(value));
     }
-    response
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn the_address_begins_with_the_secret() {
+        let guard = Guard::new(8420);
+        let secret = guard.secret().to_string();
+        assert_eq!(secret.len(), 32);
+        let behind = |address: &str| {
+            let host = ("Host", "127.0.0.1:8420");
+            let request = Request::builder().header(host.0, host.1).uri(address);
+            let mut request = request.body(()).unwrap();
+            guard
+                .admit(&mut request)
+                .map(|()| request.uri().to_string())
+        };
+        assert_eq!(behind(&format!("/{secret}/")).unwrap(), "/");
+        assert_eq!(
+            behind(&format!("/{secret}/api/x?a=1")).unwrap(),
+            "/api/x?a=1"
+        );
+        let mut other = secret.clone().into_bytes();
+        other[31] ^= 1;
+        let other = String::from_utf8(other).unwrap();
+        for wrong in [
+            "/".to_string(),
+            "/api/state".to_string(),
+            format!("/{secret}"),
+            format!("/{}/", &secret[..31]),
+            format!("/{other}/"),
+            format!("/{secret}0/"),
+            format!("/?{secret}/"),
+        ] {
+            let refused = behind(&wrong).unwrap_err().to_string();
+            assert!(
+                refused.contains("open the one that ctid printed"),
+                "{wrong}"
+            );
+        }
+    }
 }

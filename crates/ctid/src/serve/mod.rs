@@ -3,7 +3,7 @@
 //! # What it is made of
 //! | what | where |
 //! |---|---|
-//! | who may ask | `guard.rs`; how many at once: `connections.rs` |
+//! | who may ask | `guard.rs`; how many at once: `connections.rs`; what they send: `body.rs` |
 //! | the page's files | `assets.rs`, `page/` |
 //! | what one tab works on | `session.rs`, its records `upload.rs`; all of them: `sessions.rs`; what they hold: `held.rs` |
 //! | the form of the model | `settings.rs` |
@@ -17,8 +17,8 @@
 //!
 //! # The requests
 //! Every tab has a session, named in the query; what is sent is JSON but for a record, what comes back is JSON but for
-//! a download. No parameter ever reaches the file system. A `POST` carries the token that stands in the page. A refusal is
-//! `{"error": "..."}` with a status of 400 or more: one line with the mend, as the commands write it. What the page never sends,
+//! a download. No parameter ever reaches the file system. Every address begins with the secret of the run, `/SECRET/api/state`, which
+//! the table leaves out. A refusal is `{"error": "..."}` with a status of 400 or more: one line with the mend, as the commands write it. What the page never sends,
 //! such as broken JSON, is refused in plain text.
 //!
 //! | request | takes | gives |
@@ -43,12 +43,16 @@
 //! effects, `job` `{what, phase, done, total, seconds, limit, ending}` while something is computed. A fit stops where the model becomes another.
 //!
 //! # What is bounded
-//! Eight tabs, and 64 connections whose requests begin within ten seconds. 64 MB of files and 20 records in a tab, 500 columns in a file,
+//! Eight tabs. 64 connections on which the secret was known, and 128 others whose request begins within ten seconds and which end with
+//! their one refusal; where there are more, the one that has stood still for the longest time is closed. An answer that is not taken, and a
+//! body of which nothing more comes, for ten seconds end their connection; nobody waits for them. Of the bodies 256 MB are under way at once.
+//! 64 MB of files and 20 records in a tab, 500 columns in a file,
 //! twelve fits in a tab. Over all tabs 512 MB of files, of what is read from them (at most four times as much) and of what was computed; the
 //! tab that was seen last may hold more, and is then alone. One computation in a tab, which takes a copy of what was read; it stops when another begins, when its tab is forgotten, and three minutes after its page has asked last.
 
 mod api;
 mod assets;
+mod body;
 mod connections;
 mod downloads;
 mod guard;
@@ -67,11 +71,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::{Router, middleware};
+use axum::Router;
 use clap::Args;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 
+use self::api::LARGEST_REQUEST;
 use self::connections::Bounds;
 use self::guard::{Guard, LARGEST_BODY};
 use self::sessions::Sessions;
@@ -84,6 +89,10 @@ use crate::input::Files;
 const PORT: u16 = 8420;
 /// So many ports from the first on are tried.
 const TRIED: u16 = 20;
+/// Files of the largest size that may be on their way at once.
+const FILES_AT_ONCE: usize = 4;
+/// Other requests of the largest size.
+const REQUESTS_AT_ONCE: usize = 64;
 
 /// What may be typed.
 #[derive(Debug, Args)]
@@ -105,10 +114,11 @@ pub struct Arguments {
 /// What all requests share.
 #[derive(Debug)]
 struct App {
-    guard: Guard,
     sessions: Sessions,
-    /// One file is taken at a time.
+    /// Bytes of files that may be on their way.
     uploading: Semaphore,
+    /// Bytes of other requests that may be.
+    asking: Semaphore,
 }
 
 impl Arguments {
@@ -121,12 +131,16 @@ impl Arguments {
         let records = self.records()?;
         let listener = runtime.block_on(listen(self.port))?;
         let address = listener.local_addr()?;
+        let guard = Guard::new(address.port());
+        let secret = guard.secret();
         say(
             out,
-            &format!("The page is at http://{address}/, on this machine alone; Ctrl-C ends it.\n"),
+            &format!(
+                "The page is at http://{address}/{secret}/, on this machine, for whoever knows this address; Ctrl-C ends it.\n"
+            ),
         )?;
         let sessions = Sessions::new(self.model.clone(), records);
-        runtime.block_on(serve(listener, address, sessions))
+        runtime.block_on(serve(listener, guard, sessions))
     }
 
     /// The records of the command line; what is wrong with them or the model is said before anything is served.
@@ -190,15 +204,11 @@ async fn listen(port: u16) -> Result<TcpListener, Error> {
     }
 }
 
-async fn serve(
-    listener: TcpListener,
-    address: SocketAddr,
-    sessions: Sessions,
-) -> Result<(), Error> {
+async fn serve(listener: TcpListener, guard: Guard, sessions: Sessions) -> Result<(), Error> {
     let app = Arc::new(App {
-        guard: Guard::new(address.port()),
         sessions,
-        uploading: Semaphore::new(1),
+        uploading: Semaphore::new(FILES_AT_ONCE * LARGEST_BODY),
+        asking: Semaphore::new(REQUESTS_AT_ONCE * LARGEST_REQUEST),
     });
     let watched = app.clone();
     tokio::spawn(async move {
@@ -216,9 +226,8 @@ async fn serve(
     });
     let router = Router::new()
         .merge(assets::routes())
-        .merge(api::routes())
-        .layer(middleware::from_fn_with_state(app.clone(), guard::guard))
+        .merge(api::routes(&app))
         .with_state(app);
-    connections::serve(listener, router, Bounds::default()).await;
+    connections::serve(listener, guard, router, Bounds::default()).await;
     Ok(())
 }

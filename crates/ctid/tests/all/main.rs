@@ -13,5 +13,6 @@ mod mutations;
 mod own_term;
 mod program;
 mod results;
+mod system_limits;
 mod tables;
 mod udink_reference;

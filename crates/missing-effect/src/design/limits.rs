@@ -5,6 +5,9 @@ use serde::Serialize;
 
 use crate::{Problem, numbers::significant};
 
+/// A range reaches so many times as far from zero as the records at most.
+const WIDEST: f64 = 1e6;
+
 /// So much, to three digits and not less.
 fn at_least(value: f64) -> String {
     let digit = 10_f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
@@ -62,6 +65,18 @@ pub enum Refused {
         low: f64,
         /// Second end.
         high: f64,
+    },
+    /// The range leaves what can be computed with.
+    #[error(
+        "--range {low:e} {high:e} goes beyond {most:.2e}, a million times what the records visited; stay within it"
+    )]
+    TooWide {
+        /// As given.
+        low: f64,
+        /// As given.
+        high: f64,
+        /// How far either end may be from zero.
+        most: f64,
     },
     /// The range leaves what the plant can do.
     #[error("--range {low} {high} leaves {from} .. {to}, {what}; stay within it")]
@@ -221,6 +236,11 @@ impl Bounds {
                 to,
                 what,
             });
+        }
+        let largest = seen.0.abs().max(seen.1.abs());
+        let most = WIDEST * if largest > 0.0 { largest } else { 1.0 };
+        if low.abs().max(high.abs()) > most {
+            return Err(Refused::TooWide { low, high, most });
         }
         let longest = |of: fn(&Record) -> f64| problem.records.iter().map(of).fold(0.0, f64::max);
         let interval = problem

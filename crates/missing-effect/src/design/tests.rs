@@ -210,6 +210,25 @@ fn exact_twins_have_no_power() {
     }
 }
 
+/// Where nothing is said of what the command can be.
+#[test]
+fn a_range_that_cannot_be_computed_with_is_refused() {
+    let mut problem = problem(Plant::SingleTank, ("const_leak", 8.0), 100);
+    problem.known.input_range = None;
+    for range in [(-1.0, 1e300), (-1e300, 1.0), (-f64::MAX, f64::MAX)] {
+        let limits = Limits {
+            range: Some(range),
+            ..Limits::default()
+        };
+        let pair = between("const_leak", "pump_deadzone");
+        let found = design(&problem, pair, &limits, &Options::default(), &|_| {});
+        assert!(
+            matches!(found, Err(Error::Design(Refused::TooWide { .. }))),
+            "{found:?}"
+        );
+    }
+}
+
 #[test]
 fn what_cannot_be_is_refused() {
     let problem = problem(Plant::SingleTank, ("const_leak", 8.0), 100);

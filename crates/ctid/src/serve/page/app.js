@@ -88,7 +88,7 @@ function compareIfNeeded(state) {
 function cancel() {
   cancelled = task(server.current());
   chains.forget();
-  server.send("/api/cancel").catch((e) => fail(e.message));
+  server.send("api/cancel").catch((e) => fail(e.message));
 }
 
 function show(state, trouble) {
@@ -126,7 +126,7 @@ try {
   chains.start(fail);
   experiment.start(fail);
   $("cancel").addEventListener("click", cancel);
-  $("finish").addEventListener("click", () => server.send("/api/finish").catch((e) => fail(e.message)));
+  $("finish").addEventListener("click", () => server.send("api/finish").catch((e) => fail(e.message)));
   $("fit").addEventListener("click", compare);
   show(opened.state);
   plots.start(() => { fit.draw(); unknown.draw(); chains.draw(); experiment.draw(); });

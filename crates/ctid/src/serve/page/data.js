@@ -10,7 +10,7 @@ const OPTIONAL = { reference: "none", input_2: "none (off)" };
 async function replace(file) {
   const { file: old, text: from } = server.current();
   if (old && !confirm(`Overwrite ${old} with ${file.name}? What stands there is not kept.`)) return;
-  await server.send("/api/text", { text: await file.text(), from });
+  await server.send("api/text", { text: await file.text(), from });
 }
 
 /** Takes dropped files: a model file is taken for the model, everything else for a record. */
@@ -61,7 +61,7 @@ function record(one, fail) {
   return make("li", {},
     make("div", {}, make("strong", {}, one.name), " ", make("span", { className: "badge" }, one.held_out ? "held out" : "fitted")),
     make("p", { className: read ? "caption" : "alert" }, about),
-    button("Remove", { className: "quiet", ariaLabel: `Remove ${one.name}` }, () => server.send("/api/forget", { name: one.name }).catch((e) => fail(e.message))));
+    button("Remove", { className: "quiet", ariaLabel: `Remove ${one.name}` }, () => server.send("api/forget", { name: one.name }).catch((e) => fail(e.message))));
 }
 
 // `y [cm]` is `y` in `cm`.

@@ -21,8 +21,8 @@ const isOn = (state, effect) => state.effects.some((one) => one.effect === effec
 function instead(on, effect, place, fail, id) {
   const press = async () => {
     try {
-      await server.send("/api/effect", { do: "remove", effect: on });
-      await server.send("/api/effect", { do: "add", effect, place });
+      await server.send("api/effect", { do: "remove", effect: on });
+      await server.send("api/effect", { do: "add", effect, place });
     } catch (error) {
       fail(error.message);
     }
@@ -34,7 +34,7 @@ function instead(on, effect, place, fail, id) {
 function toggle(state, effect, place, fail, id) {
   const on = isOn(state, effect);
   const name = named({ effect, place });
-  const press = () => server.send("/api/effect", { do: on ? "remove" : "add", effect, place: on ? null : place }).catch((e) => fail(e.message));
+  const press = () => server.send("api/effect", { do: on ? "remove" : "add", effect, place: on ? null : place }).catch((e) => fail(e.message));
   return button(on ? "Remove" : "Add", { id, className: on ? "added" : "primary", ariaLabel: `${on ? "Remove" : "Add"} ${name}` }, press);
 }
 
@@ -83,7 +83,7 @@ function keep(state, found, fail) {
     const wanted = box.value.trim();
     if (!wanted) { box.focus(); return; }
     kept.set(found.id, wanted);
-    await server.send("/api/effect", { do: "keep", effect: wanted }).catch((e) => { kept.delete(found.id); fail(e.message); });
+    await server.send("api/effect", { do: "keep", effect: wanted }).catch((e) => { kept.delete(found.id); fail(e.message); });
   };
   box.addEventListener("keydown", (event) => { if (event.key === "Enter") press(); });
   const alone = found.unknown === "time" ? " It is a function of time, so it says nothing of other records." : "";

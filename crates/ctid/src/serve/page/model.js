@@ -172,7 +172,7 @@ export async function changed() {
     draft = null;
     overtaken = null;
     const before = turn ?? Promise.resolve({ ...from, ...data.filled() });
-    const written = before.then((stands) => server.send("/api/settings", { ...said, from: stands }));
+    const written = before.then((stands) => server.send("api/settings", { ...said, from: stands }));
     const after = written.then(() => said, () => before);
     turn = after;
     after.then(() => { if (turn === after) turn = null; });
@@ -230,7 +230,7 @@ export function start(known, fail) {
     if (!$("law").value || server.current().settings.controller) changed();
     else $("law-fields").querySelector("input").focus();
   });
-  $("loop").addEventListener("change", () => server.send("/api/loop", { measured: $("loop").value === "measured" }).catch((e) => fail(e.message)));
+  $("loop").addEventListener("change", () => server.send("api/loop", { measured: $("loop").value === "measured" }).catch((e) => fail(e.message)));
   $("law-fields").addEventListener("change", () => {
     const boxes = [...$("law-fields").querySelectorAll("input")].slice(0, 2);
     if (boxes.every((box) => box.value.trim())) changed();
@@ -239,7 +239,7 @@ export function start(known, fail) {
 
 function effect(one, fail) {
   const name = named(one);
-  const remove = () => server.send("/api/effect", { do: "remove", effect: one.effect }).catch((e) => fail(e.message));
+  const remove = () => server.send("api/effect", { do: "remove", effect: one.effect }).catch((e) => fail(e.message));
   return make("li", { title: one.physics }, make("code", {}, name), button("Remove", { className: "quiet", ariaLabel: `Remove ${name}` }, remove));
 }
 
@@ -251,7 +251,7 @@ function more(state, known, fail) {
   select.setAttribute("aria-label", "An effect to add");
   return make("li", { className: "more" }, select, button("Add", { id: "add-any" }, () => {
     if (!select.value) return;
-    server.send("/api/effect", { do: "add", ...JSON.parse(select.value) }).catch((e) => fail(e.message));
+    server.send("api/effect", { do: "add", ...JSON.parse(select.value) }).catch((e) => fail(e.message));
   }));
 }
 

@@ -1,6 +1,6 @@
-// Speaks with the server that has sent the page: one session for each tab, and a state that is asked for again and again.
+// Speaks with the server that has sent the page: one session for each tab, and a state that is asked for again and again. Addresses
+// are relative to that of the page, which holds the secret of this run.
 
-const token = document.querySelector('meta[name="ctid-token"]').content;
 const KEY = "ctid-session";
 /** Bytes that the server takes at most. */
 const LARGEST = 64 * 1024 * 1024;
@@ -28,7 +28,7 @@ async function post(path, body, more = null) {
   const raw = body instanceof Blob;
   return answer(await fetch(path + query, {
     method: "POST",
-    headers: { "x-ctid-token": token, "content-type": raw ? "text/csv" : "application/json" },
+    headers: { "content-type": raw ? "text/csv" : "application/json" },
     body: raw ? body : JSON.stringify(body),
   }));
 }
@@ -55,7 +55,7 @@ function later() {
 
 let lost = false;
 /** Takes the state as it is now. */
-export const renew = async () => take(await ask("/api/state", { since: state ? state.version : 0 }));
+export const renew = async () => take(await ask("api/state", { since: state ? state.version : 0 }));
 
 async function poll() {
   try {
@@ -71,7 +71,7 @@ async function poll() {
 /** Begins; `listener` is called with the state whenever it has changed, and with a trouble, if there is one. */
 export async function begin(listener) {
   told = listener;
-  const opened = await post("/api/session", { session: sessionStorage.getItem(KEY) });
+  const opened = await post("api/session", { session: sessionStorage.getItem(KEY) });
   session = opened.session;
   sessionStorage.setItem(KEY, session);
   document.addEventListener("visibilitychange", () => { if (!document.hidden) poll(); });
@@ -86,14 +86,14 @@ export async function send(path, body = {}) {
   later();
 }
 
-export const run = (what, more = {}) => send("/api/run", { what, ...more });
+export const run = (what, more = {}) => send("api/run", { what, ...more });
 
 /** A file as it was dropped. */
 export async function upload(file, heldOut) {
   if (file.size > LARGEST) {
     throw new Error(`${file.name} is larger than 64 MB, which is the most that the page takes; keep the columns that are in use, or fewer rows, or run \`ctid diagnose\` on it`);
   }
-  take(await post("/api/record", file, { name: file.name, held_out: heldOut }));
+  take(await post("api/record", file, { name: file.name, held_out: heldOut }));
   later();
 }
 
@@ -102,13 +102,13 @@ const fits = new Map();
 export function fit(id) {
   if (!fits.has(id)) {
     if (fits.size > 24) fits.delete(fits.keys().next().value);
-    const asked = ask("/api/model", { id });
+    const asked = ask("api/model", { id });
     asked.catch(() => fits.delete(id));
     fits.set(id, asked);
   }
   return fits.get(id);
 }
 
-export const data = () => ask("/api/data");
-export const link = (of) => `/api/file?${new URLSearchParams({ session, of })}`;
+export const data = () => ask("api/data");
+export const link = (of) => `api/file?${new URLSearchParams({ session, of })}`;
 export const current = () => state;

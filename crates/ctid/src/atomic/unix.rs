@@ -1,0 +1,57 @@
+//! What a file has beside its content: owner, group, permissions, extended attributes, other names.
+
+use std::fs::{File, Metadata, Permissions};
+use std::io;
+use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+
+/// Names of the file.
+pub(super) fn links(metadata: &Metadata) -> u64 {
+    metadata.nlink()
+}
+
+/// Gives a file what another has beside its content.
+///
+/// # Errors
+/// Where the user may not, as with the owner of a file of somebody else.
+pub(super) fn copy(old: &File, metadata: &Metadata, new: &File) -> io::Result<()> {
+    let made = new.metadata()?;
+    if (made.uid(), made.gid()) != (metadata.uid(), metadata.gid()) {
+        fchown(new, Some(metadata.uid()), Some(metadata.gid()))?;
+    }
+    // After the owner, whose change takes some of them away, and before the attributes, among which finer ones may be.
+    new.set_permissions(metadata.permissions())?;
+    copy_extended(old, new)
+}
+
+#[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
+fn copy_extended(old: &File, new: &File) -> io::Result<()> {
+    use rustix::fs::{XattrFlags, fgetxattr, flistxattr, fsetxattr};
+    use rustix::io::Errno;
+
+    /// What Linux allows for all names, and for one value \[bytes\].
+    const LARGEST: usize = 1 << 16;
+
+    let mut names = vec![0; LARGEST];
+    let length = match flistxattr(old, names.as_mut_slice()) {
+        // The file system has none.
+        Err(Errno::NOTSUP) => return Ok(()),
+        length => length?,
+    };
+    let mut value = vec![0; LARGEST];
+    let names = names[..length].split(|&byte| byte == 0);
+    for name in names.filter(|name| !name.is_empty()) {
+        let length = fgetxattr(old, name, value.as_mut_slice())?;
+        fsetxattr(new, name, &value[..length], XattrFlags::empty())?;
+    }
+    Ok(())
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "android", target_vendor = "apple")))]
+fn copy_extended(_: &File, _: &File) -> io::Result<()> {
+    Ok(())
+}
+
+/// With which permissions it is made, from which the umask takes its part.
+pub(super) fn set_mode(builder: &mut tempfile::Builder<'_, '_>, mode: u32) {
+    builder.permissions(Permissions::from_mode(mode));
+}

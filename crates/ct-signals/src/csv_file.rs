@@ -303,7 +303,7 @@ fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error
 /// The one of comma, semicolon and tab that the first row has most of.
 pub(crate) fn delimiter(text: &str) -> u8 {
     let header = text
-        .lines()
+        .split(['\n', '\r'])
         .find(|line| !line.trim().is_empty() && !line.starts_with('#'))
         .unwrap_or_default();
     let count = |delimiter: &u8| header.bytes().filter(|byte| byte == delimiter).count();
@@ -311,11 +311,12 @@ pub(crate) fn delimiter(text: &str) -> u8 {
     b";\t,".iter().copied().max_by_key(count).unwrap_or(b',')
 }
 
-/// Line numbers of the rows, past the blank lines and comments that the reader skips.
+/// Line numbers of the rows, past the blank lines and comments that the reader skips. A line ends as it does for the reader: at a line
+/// feed, a carriage return, or the two together.
 struct LineCounter<'a> {
     text: &'a str,
     byte: usize,
-    newlines: u64,
+    ends: u64,
 }
 
 impl<'a> LineCounter<'a> {
@@ -323,7 +324,7 @@ impl<'a> LineCounter<'a> {
         LineCounter {
             text,
             byte: 0,
-            newlines: 0,
+            ends: 0,
         }
     }
 
@@ -331,9 +332,17 @@ impl<'a> LineCounter<'a> {
     fn advance(&mut self, end: u64) -> u64 {
         let end = usize::try_from(end).unwrap_or(usize::MAX);
         let read = self.text.get(self.byte..end).unwrap_or_default();
-        let count = |text: &str| text.bytes().filter(|byte| *byte == b'\n').count() as u64;
-        let line = self.newlines + count(read.trim_end_matches(['\r', '\n'])) + 1;
-        self.newlines += count(read);
+        let before = self.text[..self.byte].as_bytes().last().copied();
+        let count = |text: &str| {
+            let pairs = text
+                .bytes()
+                .scan(before, |before, byte| Some((before.replace(byte), byte)));
+            pairs
+                .filter(|&(before, byte)| byte == b'\r' || byte == b'\n' && before != Some(b'\r'))
+                .count() as u64
+        };
+        let line = self.ends + count(read.trim_end_matches(['\r', '\n'])) + 1;
+        self.ends += count(read);
         self.byte += read.len();
         line
     }

@@ -400,6 +400,18 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Whether it is a header's unit that is refused: it is none of the time, or another than the model's.
+    #[must_use]
+    pub fn of_units(&self) -> bool {
+        match self {
+            Self::UnknownTimeUnit { .. } => true,
+            Self::Column { fault, .. } => matches!(**fault, ColumnFault::Unit { .. }),
+            _ => false,
+        }
+    }
+}
+
 fn samples(count: u64) -> String {
     if count == 1 {
         "1 sample is".into()

@@ -1,4 +1,5 @@
-//! Bytes into lines, of bounded length: what has no end is thrown away up to the next line.
+//! Bytes into lines, of bounded length: what has no end is thrown away up to the next line. A line ends as in a file: at a line
+//! feed, a carriage return, or the two together.
 
 /// The longest line that is read \[bytes\].
 pub(super) const LONGEST: usize = 64 * 1024;
@@ -17,6 +18,8 @@ pub(super) enum Cut<'a> {
 pub(super) struct Lines {
     part: Vec<u8>,
     too_long: bool,
+    /// The byte before was a carriage return: a line feed behind it ends nothing more.
+    returned: bool,
 }
 
 impl Lines {
@@ -26,9 +29,13 @@ impl Lines {
         mut bytes: &[u8],
         each: &mut impl FnMut(Cut) -> Result<(), E>,
     ) -> Result<(), E> {
-        while let Some(end) = bytes.iter().position(|byte| *byte == b'\n') {
+        while let Some(end) = bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r')) {
             let (line, rest) = (&bytes[..end], &bytes[end + 1..]);
+            let with_return = std::mem::replace(&mut self.returned, bytes[end] == b'\r');
             bytes = rest;
+            if with_return && !self.returned && line.is_empty() {
+                continue;
+            }
             if !self.too_long && self.part.is_empty() && line.len() <= LONGEST {
                 each(Cut::Line(line))?;
                 continue;
@@ -36,6 +43,7 @@ impl Lines {
             self.keep(line);
             self.end(each)?;
         }
+        self.returned &= bytes.is_empty();
         self.keep(bytes);
         Ok(())
     }
@@ -88,8 +96,17 @@ mod tests {
     #[test]
     fn lines_may_come_in_pieces() {
         assert_eq!(cut(&[b"a,b\nc", b",d", b"\ne"]), ["a,b", "c,d", "e"]);
-        assert_eq!(cut(&[b"a\r\n\nb\n"]), ["a\r", "", "b"]);
         assert!(cut(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_line_ends_as_in_a_file() {
+        assert_eq!(cut(&[b"a\r\n\nb\n"]), ["a", "", "b"]);
+        assert_eq!(
+            cut(&[b"a\rb\nc\r", b"\nd\r", b"e"]),
+            ["a", "b", "c", "d", "e"]
+        );
+        assert_eq!(cut(&[b"a\r\rb"]), ["a", "", "b"]);
     }
 
     #[test]

@@ -11,7 +11,10 @@ use csv::{Reader, ReaderBuilder, StringRecord, Trim};
 
 use crate::columns::{Columns, Found, Heading, Layout};
 use crate::record::{MIN_ROWS, median_step, quantile_of_steps};
-use crate::{Error, Hold, Record, Signal, unit};
+use crate::{
+    Error, Hold, LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, Record, Signal, quoted, read_file,
+    unit,
+};
 
 /// A step of the time above this many usual steps is a gap: half-way between one sample and two,
 /// so that one missing sample does not pass where the steps are even.
@@ -66,13 +69,7 @@ fn named_by_file(
     parse: impl FnOnce(&str, &[u8]) -> Result<Record, Error>,
 ) -> Result<Record, Error> {
     let file = path.display().to_string();
-    if path.is_dir() {
-        return Err(Error::Folder { file });
-    }
-    let bytes = std::fs::read(path).map_err(|source| Error::CannotOpen {
-        file: file.clone(),
-        source,
-    })?;
+    let bytes = read_file(path, LARGEST_RECORD)?;
     let record = parse(&file, &bytes)?;
     let name = path.file_name().map(|name| name.to_string_lossy());
     Ok(Record {
@@ -157,6 +154,17 @@ fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Error> {
         return Err(not_text("binary data"));
     }
     let text = std::str::from_utf8(bytes).map_err(|_| not_text("in another encoding"))?;
+    let long = text
+        .split(['\n', '\r'])
+        .find(|line| line.len() > LONGEST_LINE);
+    if let Some(line) = long {
+        let begin = line.as_ptr() as usize - text.as_ptr() as usize;
+        return Err(Error::LongLine {
+            file: file.into(),
+            row: LineCounter::new(text).advance((begin + line.len()) as u64),
+            longest: LONGEST_LINE,
+        });
+    }
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
@@ -202,7 +210,7 @@ fn read_table(file: &str, text: &str, columns: &Columns) -> Result<(Layout, Tabl
             return Err(Error::UnitRow {
                 file: file.into(),
                 row,
-                header: unit::shown(&format!("{name} [{unit}]")),
+                header: quoted(&format!("{name} [{unit}]")),
             });
         }
         let mut cell = |column: &Found| numbers.parse(row, column, &record[column.index]);
@@ -287,14 +295,22 @@ fn resolve(
     columns.resolve(file, row, &headers)
 }
 
-/// Numbers alone are no header.
+/// Numbers alone are no header, and nor are columns without number.
 fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error> {
+    if record.len() > MOST_COLUMNS {
+        return Err(Error::ManyColumns {
+            file: file.into(),
+            row,
+            found: record.len(),
+            most: MOST_COLUMNS,
+        });
+    }
     let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
     if record.iter().all(|cell| cell.is_empty() || is_number(cell)) {
         return Err(Error::NoHeader {
             file: file.into(),
             row,
-            first: unit::shown(&record.iter().collect::<Vec<_>>().join(", ")),
+            first: quoted(&record.iter().collect::<Vec<_>>().join(", ")),
         });
     }
     Ok(())
@@ -358,7 +374,7 @@ struct Numbers<'a> {
 
 impl Numbers<'_> {
     fn parse(&mut self, row: u64, column: &Found, cell: &str) -> Result<f64, Error> {
-        let (file, header) = (self.file.to_string(), column.header.clone());
+        let (file, header) = (self.file.to_string(), quoted(&column.header));
         if cell.is_empty() {
             return Err(Error::EmptyCell {
                 file,
@@ -377,7 +393,7 @@ impl Numbers<'_> {
             file: file.clone(),
             row,
             column: header.clone(),
-            text: unit::shown(cell),
+            text: quoted(cell),
             mend: if cell.contains(',') {
                 "write decimals with a point and without separators for thousands"
             } else {
@@ -389,7 +405,7 @@ impl Numbers<'_> {
                 file,
                 row,
                 column: header,
-                text: cell.into(),
+                text: quoted(cell),
             });
         }
         let mark = if comma {
@@ -405,7 +421,7 @@ impl Numbers<'_> {
                 file,
                 row,
                 column: header,
-                text: cell.into(),
+                text: quoted(cell),
                 here: word(here),
                 before: word(before),
             });
@@ -416,7 +432,7 @@ impl Numbers<'_> {
 }
 
 fn check_order(file: &str, row: u64, column: &str, previous: f64, time: f64) -> Result<(), Error> {
-    let (file, column) = (file.to_string(), column.to_string());
+    let (file, column) = (file.to_string(), quoted(column));
     if time == previous {
         Err(Error::RepeatedTime {
             file,
@@ -463,7 +479,7 @@ impl Table {
         match constant(&self.input) {
             Some(value) => Err(Error::ConstantInput {
                 file: file.into(),
-                column: layout.input.header.clone(),
+                column: quoted(&layout.input.header),
                 value,
                 rows: self.time.len(),
             }),
@@ -486,7 +502,7 @@ impl Table {
         if let Some(value) = constant(&self.output) {
             return Err(Error::ConstantOutput {
                 file: file.into(),
-                column: layout.output.header.clone(),
+                column: quoted(&layout.output.header),
                 value,
                 rows,
             });
@@ -500,7 +516,7 @@ impl Table {
         if !(1.0 / LARGEST..=LARGEST).contains(&interval) {
             return Err(Error::InvalidInterval {
                 file: file.into(),
-                column: layout.time.header.clone(),
+                column: quoted(&layout.time.header),
                 interval: rounded(interval),
                 low: 1.0 / LARGEST,
                 high: LARGEST,
@@ -513,7 +529,7 @@ impl Table {
                 return Err(Error::TooLarge {
                     file: file.into(),
                     row: self.rows[k],
-                    column: column.header.clone(),
+                    column: quoted(&column.header),
                     value: values[k],
                     limit: LARGEST,
                 });
@@ -522,7 +538,7 @@ impl Table {
             if largest < 1.0 / LARGEST {
                 return Err(Error::TooSmall {
                     file: file.into(),
-                    column: column.header.clone(),
+                    column: quoted(&column.header),
                     value: rounded(largest),
                     limit: 1.0 / LARGEST,
                 });
@@ -540,7 +556,7 @@ impl Table {
                 return Err(Error::Gap {
                     file: file.into(),
                     row: self.rows[k + 1],
-                    column: column.header.clone(),
+                    column: quoted(&column.header),
                     missing: (step / interval).round() as u64 - 1,
                     previous: pair[0],
                     time: pair[1],
@@ -576,7 +592,7 @@ impl Table {
         let unit = if column.unit.is_empty() {
             String::new()
         } else {
-            format!(" {}", column.unit)
+            format!(" {}", quoted(&column.unit))
         };
         let limits = [(at_low, low), (at_high, high)]
             .iter()
@@ -586,7 +602,7 @@ impl Table {
             .join(", ");
         Err(Error::Saturated {
             file: file.into(),
-            column: column.header.clone(),
+            column: quoted(&column.header),
             count,
             rows,
             limits,

@@ -8,7 +8,7 @@
 use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
 use crate::columns::Layout;
-use crate::{Columns, Error, unit};
+use crate::{Columns, Error, MOST_COLUMNS, quoted, unit};
 
 /// The names of the columns in use, and which they are in a row without a header.
 const ROLES: [&str; 3] = ["time", "input", "output"];
@@ -144,6 +144,14 @@ impl Rows {
             rows.seconds = columns.time_header().1;
             return Ok((rows, true));
         }
+        if cells.len() > MOST_COLUMNS {
+            return Err(Error::ManyColumns {
+                file: file.into(),
+                row,
+                found: cells.len(),
+                most: MOST_COLUMNS,
+            });
+        }
         let Layout {
             time,
             seconds,
@@ -190,7 +198,9 @@ impl Rows {
         match (&self.header, self.fields) {
             (Some(_), _) => format!(
                 "a header: \"{}\" is the time, \"{}\" the command, \"{}\" the reading",
-                self.names[0], self.names[1], self.names[2]
+                quoted(&self.names[0]),
+                quoted(&self.names[1]),
+                quoted(&self.names[2])
             ),
             (None, 4) => {
                 "no header: the columns are taken as time, reference, command, reading (t, r, u, y)"
@@ -258,7 +268,7 @@ impl Rows {
     }
 
     fn number(&mut self, role: usize, cell: &str) -> Result<f64, BadLine> {
-        let column = || self.names[role].clone();
+        let column = || quoted(&self.names[role]);
         if cell.is_empty() {
             return Err(BadLine::Empty { column: column() });
         }
@@ -276,7 +286,7 @@ impl Rows {
         let Ok(value) = value else {
             return Err(BadLine::Text {
                 column: column(),
-                text: unit::shown(cell),
+                text: quoted(cell),
                 mend: if commas > 0 {
                     "write decimals with a point and without separators for thousands"
                 } else if role == 0 && cell.contains(|c: char| c.is_ascii_digit()) {
@@ -296,7 +306,7 @@ impl Rows {
         {
             return Err(BadLine::DecimalMark {
                 column: column(),
-                text: unit::shown(cell),
+                text: quoted(cell),
             });
         }
         self.mark = self.mark.or(mark);

@@ -3,12 +3,9 @@
 use std::path::Path;
 
 use ::monitor::{Monitor, Refused, Row, Units, instant};
-use ct_signals::{BadLine, Columns, Line, Rows};
+use ct_signals::{BadLine, Columns, LONGEST_LINE, Line, Rows, quoted};
 
-use super::{
-    Halt, INPUT, Session, blame,
-    lines::{Cut, LONGEST},
-};
+use super::{Halt, INPUT, Session, blame, lines::Cut};
 use crate::{Error, one_line};
 
 /// So many lines at the beginning may be parts of rows.
@@ -25,7 +22,7 @@ impl Session<'_> {
             Cut::Line(line) => line,
             Cut::TooLong => {
                 self.bad(|| {
-                    format!("more than {LONGEST} bytes without an end of line; end every row with a line feed")
+                    format!("more than {LONGEST_LINE} bytes without an end of line; end every row with a line feed")
                 });
                 return Ok(());
             }
@@ -103,8 +100,10 @@ impl Session<'_> {
         for (before, now) in pairs {
             if !now.is_empty() && !before.is_empty() && now != before {
                 return Err(Error::Usage(format!(
-                    "{INPUT}, row {}: the header comes again with [{now}] where it was [{before}], and the model was learned in that; convert the rows, or begin anew",
-                    self.line
+                    "{INPUT}, row {}: the header comes again with [{}] where it was [{}], and the model was learned in that; convert the rows, or begin anew",
+                    self.line,
+                    quoted(now),
+                    quoted(before)
                 )));
             }
         }
@@ -176,8 +175,13 @@ impl Session<'_> {
         let state = self.monitor.state();
         let saved = state.units();
         if saved != units {
-            let named =
-                |units: &Units| format!("command [{}], reading [{}]", units.input, units.output);
+            let named = |units: &Units| {
+                format!(
+                    "command [{}], reading [{}]",
+                    quoted(&units.input),
+                    quoted(&units.output)
+                )
+            };
             return Err(Error::Usage(format!(
                 "the saved state is in {}, but the rows are in {}; convert the rows, or name another --state",
                 named(saved),
@@ -277,9 +281,10 @@ impl Session<'_> {
 
     /// What is wrong with a row's value, with its column and the mend.
     fn named(&self, refused: &Refused) -> String {
-        let column = self.rows.as_ref().map_or(String::new(), |rows| {
-            rows.name(refused.column()).to_string()
-        });
+        let column = self
+            .rows
+            .as_ref()
+            .map_or(String::new(), |rows| quoted(rows.name(refused.column())));
         let mend = match refused {
             Refused::NotFinite { .. } => "check what writes it",
             Refused::BeyondRange { .. } => {

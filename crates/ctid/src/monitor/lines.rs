@@ -1,15 +1,14 @@
 //! Bytes into lines, of bounded length: what has no end is thrown away up to the next line. A line ends as in a file: at a line
 //! feed, a carriage return, or the two together.
 
-/// The longest line that is read \[bytes\].
-pub(super) const LONGEST: usize = 64 * 1024;
+use ct_signals::LONGEST_LINE;
 
 /// A line, or what is left of one that is too long.
 #[derive(Debug, PartialEq)]
 pub(super) enum Cut<'a> {
     /// Without its end.
     Line(&'a [u8]),
-    /// Longer than [`LONGEST`]; said once, when its end has come.
+    /// Longer than [`LONGEST_LINE`]; said once, when its end has come.
     TooLong,
 }
 
@@ -36,7 +35,7 @@ impl Lines {
             if with_return && !self.returned && line.is_empty() {
                 continue;
             }
-            if !self.too_long && self.part.is_empty() && line.len() <= LONGEST {
+            if !self.too_long && self.part.is_empty() && line.len() <= LONGEST_LINE {
                 each(Cut::Line(line))?;
                 continue;
             }
@@ -63,7 +62,7 @@ impl Lines {
     }
 
     fn keep(&mut self, bytes: &[u8]) {
-        if self.too_long || self.part.len() + bytes.len() > LONGEST {
+        if self.too_long || self.part.len() + bytes.len() > LONGEST_LINE {
             self.too_long = true;
             self.part.clear();
         } else {
@@ -111,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_line_without_an_end_is_not_kept() {
-        let part = vec![b'1'; LONGEST / 2 + 1];
+        let part = vec![b'1'; LONGEST_LINE / 2 + 1];
         assert_eq!(
             cut(&[b"a\n", &part, &part, b"\nb\n"]),
             ["a", "too long", "b"]
@@ -121,6 +120,6 @@ mod tests {
         for _ in 0..100 {
             lines.push(&part, &mut |_| Ok::<(), ()>(())).unwrap();
         }
-        assert!(lines.part.capacity() <= 2 * LONGEST);
+        assert!(lines.part.capacity() <= 2 * LONGEST_LINE);
     }
 }

@@ -289,6 +289,35 @@ fn a_row_without_a_reading_is_said_and_its_command_used() {
     assert_says(&outcome, &format!("{lost} of them with something wrong"));
 }
 
+/// Each of the first digits of the state's numbers, changed to another: the file is JSON still, and its numbers are others.
+#[test]
+fn a_state_in_which_a_digit_has_changed_is_refused() {
+    let place = place();
+    let text = text(HEADER, &rows(1500, 9999));
+    assert_eq!(fed(&place, "--state s.json", &text).code, Some(0));
+    let state = place.read("s.json");
+    let from = state.find("\"kept\"").unwrap();
+    let digits: Vec<usize> = state[from..]
+        .char_indices()
+        .filter(|(_, c)| c.is_ascii_digit())
+        .map(|(at, _)| from + at)
+        .step_by(state.len() / 8)
+        .collect();
+    assert!(!digits.is_empty());
+    for at in digits {
+        let mut spoilt = state.clone();
+        let other = if &state[at..=at] == "7" { "8" } else { "7" };
+        spoilt.replace_range(at..=at, other);
+        place.write("s.json", spoilt);
+        let outcome = fed(&place, "--state s.json", &text);
+        assert_eq!(outcome.code, Some(2));
+        assert_says(
+            &outcome,
+            "s.json: it is damaged: its numbers do not agree with its checksum; give --state another name, or delete the file to begin anew",
+        );
+    }
+}
+
 #[test]
 fn a_line_ends_at_a_carriage_return_as_in_a_file() {
     let outcome = fed(&place(), "", "0,1,2\n1,1,3\r2,1,3\n");

@@ -251,7 +251,7 @@ fn bad_rows_are_said_skipped_and_not_flooded_with() {
     for said in [
         "standard input, row 102: column \"t [s]\": \"text\" is not a number",
         "standard input, row 104: column \"u [V]\": the cell is empty",
-        "standard input, row 106: column \"t [s]\": the time goes back from 204 s to 1 s",
+        "standard input, row 106: column \"t [s]\": the time goes back from 202 s to 1 s",
         "2 fields where 4 are read",
         "; the row is skipped",
     ] {
@@ -322,7 +322,7 @@ fn a_state_in_which_a_digit_has_changed_is_refused() {
 fn a_line_ends_at_a_carriage_return_as_in_a_file() {
     let outcome = fed(&place(), "", "0,1,2\n1,1,3\r2,1,3\n");
     assert_eq!(outcome.code, Some(0), "{}", outcome.err);
-    assert_says(&outcome, "the rows have ended after 3 lines;");
+    assert_says(&outcome, "the rows have ended after 3 lines");
 }
 
 #[test]

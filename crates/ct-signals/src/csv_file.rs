@@ -348,7 +348,7 @@ impl<'a> LineCounter<'a> {
     fn advance(&mut self, end: u64) -> u64 {
         let end = usize::try_from(end).unwrap_or(usize::MAX);
         let read = self.text.get(self.byte..end).unwrap_or_default();
-        let before = self.text[..self.byte].as_bytes().last().copied();
+        let before = self.text.as_bytes()[..self.byte].last().copied();
         let count = |text: &str| {
             let pairs = text
                 .bytes()

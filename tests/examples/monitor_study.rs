@@ -4,10 +4,12 @@
 //! random in which an effect of five kinds begins half-way, 1500 rows before and 1500 after, and 30 in which
 //! none does, 20 000 rows each. Plants, controllers and set points are drawn, the noise is white in every other loop and
 //! correlated in the others; the size is such that the believed model, refitted to the whole record without noise, misses it by `R` times the
-//! noise.
+//! noise. `--lost S` takes the share S of the readings away, at random or, with `--at-steps`, in bursts where the set point steps;
+//! `--open` opens the loops in which nothing begins.
 
 use clap::Parser;
-use ctid_tests::onset::Onset;
+use ctid_tests::Drive;
+use ctid_tests::onset::{Lost, Onset};
 use monitor::{Alarm, Settings};
 use rayon::prelude::*;
 
@@ -37,6 +39,18 @@ struct Arguments {
     /// Number of the first loop: another thirty
     #[arg(long, default_value_t = 0)]
     first: u64,
+    /// Share of the readings that are lost
+    #[arg(long)]
+    lost: Option<f64>,
+    /// They are lost in bursts that begin at steps
+    #[arg(long, requires = "lost")]
+    at_steps: bool,
+    /// The loops in which nothing begins are open
+    #[arg(long)]
+    open: bool,
+    /// Leave out the loops in which an effect begins
+    #[arg(long)]
+    only_quiet: bool,
 }
 
 fn main() {
@@ -53,13 +67,23 @@ fn main() {
             arguments.colour
         }
     };
+    let lost = arguments.lost.map(|share| Lost {
+        share,
+        at_steps: arguments.at_steps,
+    });
     let numbers = arguments.first..arguments.first + arguments.loops;
-    let found: Vec<_> = numbers
+    let with_effect = if arguments.only_quiet {
+        0..0
+    } else {
+        numbers.clone()
+    };
+    let found: Vec<_> = with_effect
         .clone()
         .into_par_iter()
         .map(|number| {
             let mut onset = Onset::drawn(number, arguments.rows, arguments.ratio, colour(number))?;
             onset.tails = arguments.tails;
+            onset.lost = lost;
             let alarms = onset.watched(settings, 500 + number)?;
             Some((onset, alarms))
         })
@@ -69,7 +93,7 @@ fn main() {
     );
     let (mut seen, mut seen_visible, mut named, mut named_at_once, mut early, mut drawn) =
         (0, 0, 0, 0, 0, 0);
-    for (number, found) in numbers.clone().zip(&found) {
+    for (number, found) in with_effect.zip(&found) {
         let Some((onset, alarms)) = found else {
             println!("loop {number}: the effect can have this size in none of the rigs drawn");
             continue;
@@ -119,17 +143,22 @@ fn main() {
         .map(|number| {
             let mut onset = Onset::nothing(arguments.quiet_rows, colour(number), number);
             onset.tails = arguments.tails;
+            onset.lost = lost;
+            if arguments.open {
+                onset.rig.drive = Drive::Open;
+            }
             let alarms = onset.watched(settings, 900 + number);
             (onset, alarms)
         })
         .collect();
-    let mut most = 0;
+    let (mut most, mut all) = (0, 0);
     for (onset, alarms) in &quiet {
         let count = alarms.as_ref().map_or(usize::MAX, |alarms| {
             let new = |alarm: &&Alarm| alarm.event == monitor::Stage::Alarm;
             alarms.iter().filter(new).count()
         });
         most = most.max(count);
+        all = usize::saturating_add(all, count);
         if count > 0 {
             println!(
                 "nothing began: {count} alarms, {} colour {} tau {:.0}",
@@ -140,7 +169,7 @@ fn main() {
         }
     }
     println!(
-        "nothing began in {} loops of {} rows: at most {most} alarms in one",
+        "nothing began in {} loops of {} rows: {all} alarms, at most {most} in one",
         quiet.len(),
         arguments.quiet_rows
     );

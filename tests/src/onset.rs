@@ -23,6 +23,15 @@ pub const EFFECTS: [&str; 5] = [
 /// Structural error over noise is met within this part.
 const MET: f64 = 0.02;
 
+/// Readings that are lost, the commands of their rows are not.
+#[derive(Debug, Clone, Copy)]
+pub struct Lost {
+    /// Share of the readings.
+    pub share: f64,
+    /// In bursts that begin where the set point steps, or the command of an open loop; else at random.
+    pub at_steps: bool,
+}
+
 /// A loop in which an effect begins.
 #[derive(Debug, Clone)]
 pub struct Onset {
@@ -34,6 +43,8 @@ pub struct Onset {
     pub row: usize,
     /// Degrees of freedom of the noise, above two; `None`: it is Gaussian.
     pub tails: Option<f64>,
+    /// Readings that the monitor does not get.
+    pub lost: Option<Lost>,
 }
 
 impl Onset {
@@ -47,6 +58,7 @@ impl Onset {
             effect: None,
             row: samples,
             tails: None,
+            lost: None,
         }
     }
 
@@ -78,6 +90,7 @@ impl Onset {
             rig: rig.clone(),
             row,
             tails: None,
+            lost: None,
         };
         let reached = |size: f64| Some(at(size).misfit()? / rig.noise);
         let (mut low, mut high) = (1e-6_f64, 1e-4_f64);
@@ -147,7 +160,7 @@ impl Onset {
         }
     }
 
-    /// Runs it; `None` where the rig is not possible. The set point moves by random steps.
+    /// Runs it; `None` where the rig is not possible. The set point moves by random steps, or, where the loop is open, the command.
     #[must_use]
     pub fn run(&self, noisy: bool, seed: u64) -> Option<Record> {
         let rig = &self.rig;
@@ -162,6 +175,12 @@ impl Onset {
             rng,
         )
         .ok()?;
+        let open = matches!(rig.drive, Drive::Open);
+        let (low, high) = rig.command;
+        let commands = open
+            .then(|| excitation::steps(rig.samples, rig.hold.0..=rig.hold.1, low, high, rng))
+            .transpose()
+            .ok()?;
         let e = match (noisy, self.tails) {
             (false, _) => vec![0.0; rig.samples],
             (true, Some(degrees)) => heavy(rig, degrees, rng)?,
@@ -184,7 +203,10 @@ impl Onset {
                 simulator = Simulator::new(&with, &theta, &levels, before).ok()?;
             }
             let reading = simulator.read() + e[k];
-            let command = controller.command(wanted[k], reading, rig.interval);
+            let command = match &commands {
+                Some(commands) => commands[k],
+                None => controller.command(wanted[k], reading, rig.interval),
+            };
             simulator.advance(Command::held(command), rig.interval);
             before = command;
             y.push(reading);
@@ -196,7 +218,7 @@ impl Onset {
             input: Signal::new("u", "V", u),
             input_2: None,
             output: Signal::new("y", "cm", y),
-            reference: Some(Signal::new("r", "cm", wanted)),
+            reference: commands.is_none().then(|| Signal::new("r", "cm", wanted)),
             hold: Hold::Zero,
         })
     }
@@ -214,16 +236,42 @@ impl Onset {
             input: record.input.unit.clone(),
         };
         let mut monitor = Monitor::new(model, settings, units).ok()?;
+        let lost = self.lost_rows(&record, seed);
         let mut alarms = Vec::new();
         for k in 0..record.len() {
             let row = Row {
                 time: record.time[k],
                 input: record.input.values[k],
-                output: record.output.values[k],
+                output: if lost[k] {
+                    f64::NAN
+                } else {
+                    record.output.values[k]
+                },
             };
             alarms.extend(monitor.update(&row).ok()?.alarm);
         }
         Some(alarms)
+    }
+
+    /// In which rows of its record the reading is lost.
+    fn lost_rows(&self, record: &Record, seed: u64) -> Vec<bool> {
+        let mut rows = vec![false; record.len()];
+        let Some(lost) = self.lost else { return rows };
+        let rng = &mut ChaCha8Rng::seed_from_u64(9_000_000 + seed);
+        if !lost.at_steps {
+            rows.fill_with(|| rng.random_bool(lost.share));
+            return rows;
+        }
+        let steps = record.reference.as_ref().unwrap_or(&record.input);
+        let between = 0.5 * (self.rig.hold.0 + self.rig.hold.1) as f64;
+        let burst = ((lost.share * between).round() as usize).max(1);
+        for k in 1..rows.len() {
+            if steps.values[k] != steps.values[k - 1] {
+                let end = (k + burst).min(rows.len());
+                rows[k..end].fill(true);
+            }
+        }
+        rows
     }
 
     /// The first row at which what began shows in the reading by as much as the noise: without noise, the reading beside that of the plant

@@ -1,7 +1,8 @@
 //! The monitor on loops drawn at random: a part of `cargo run --release -p ctid-tests --example monitor_study`.
 #![allow(clippy::unwrap_used)]
 
-use ctid_tests::onset::Onset;
+use ctid_tests::Drive;
+use ctid_tests::onset::{Lost, Onset};
 use monitor::Settings;
 use rayon::prelude::*;
 
@@ -42,4 +43,26 @@ fn nothing_is_seen_where_nothing_begins() {
         })
         .collect();
     assert_eq!(alarms, [0; 4]);
+}
+
+/// Readings that are lost at random and at steps, in loops that are open and closed, in white and coloured noise.
+#[test]
+fn nothing_is_seen_where_readings_are_lost() {
+    let alarms: Vec<usize> = (50..58)
+        .into_par_iter()
+        .map(|number| {
+            let colour = if number % 2 == 0 { 0.0 } else { 0.5 };
+            let mut onset = Onset::nothing(6000, colour, number);
+            if number % 4 < 2 {
+                onset.rig.drive = Drive::Open;
+            }
+            onset.lost = Some(Lost {
+                share: 0.05,
+                at_steps: number < 54,
+            });
+            let alarms = onset.watched(Settings::default(), number).unwrap();
+            alarms.len()
+        })
+        .collect();
+    assert_eq!(alarms, [0; 8]);
 }

@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{ColumnFault, Error, unit};
+use crate::{ColumnFault, Error, quoted, unit};
 
 /// The names of the columns, as `[columns]` of a model file gives them; what is absent is guessed.
 ///
@@ -191,7 +191,7 @@ impl Columns {
             let Some(column) = column else { continue };
             if let Some((_, first)) = taken.iter().find(|(index, _)| *index == column.index) {
                 return Err(header.fault(ColumnFault::Shared {
-                    column: column.header.clone(),
+                    column: quoted(&column.header),
                     first,
                     second: role.name,
                 }));
@@ -213,8 +213,8 @@ impl Columns {
         let seconds = unit::seconds(&time.unit).ok_or_else(|| Error::UnknownTimeUnit {
             file: file.into(),
             row,
-            column: time.header.clone(),
-            unit: time.unit.clone(),
+            column: quoted(&time.header),
+            unit: quoted(&time.unit),
         })?;
         Ok(Layout {
             time,
@@ -267,9 +267,9 @@ impl Header<'_> {
         let file_unit = file_unit(&self.names[index]);
         if !file_unit.is_empty() && !model_unit.is_empty() && !unit::same(&file_unit, model_unit) {
             return Err(self.fault(ColumnFault::Unit {
-                column: self.names[index].clone(),
-                file_unit,
-                named_unit: model_unit.into(),
+                column: quoted(&self.names[index]),
+                file_unit: quoted(&file_unit),
+                named_unit: quoted(model_unit),
             }));
         }
         if !file_unit.is_empty() {
@@ -330,18 +330,18 @@ impl Header<'_> {
         self.fault(ColumnFault::Missing {
             role: role.name,
             wanted: match wanted {
-                Some(wanted) => format!("\"{wanted}\""),
+                Some(wanted) => format!("\"{}\"", quoted(wanted)),
                 None => format!("beginning with \"{}\"", role.letter),
             },
-            columns: quoted(self.names.iter()),
-            closest: wanted.and_then(|wanted| closest(wanted, self.names).cloned()),
+            columns: list(self.names.iter()),
+            closest: wanted.and_then(|wanted| Some(quoted(closest(wanted, self.names)?))),
         })
     }
 
     fn ambiguous(&self, role: &Role, indices: &[usize]) -> Error {
         self.fault(ColumnFault::Ambiguous {
             role: role.name,
-            candidates: quoted(indices.iter().map(|&index| &self.names[index])),
+            candidates: list(indices.iter().map(|&index| &self.names[index])),
         })
     }
 
@@ -354,11 +354,15 @@ impl Header<'_> {
     }
 }
 
-fn quoted<'a>(names: impl Iterator<Item = &'a String>) -> String {
-    names
-        .map(|name| format!("\"{}\"", unit::shown(name)))
-        .collect::<Vec<_>>()
-        .join(", ")
+/// Names as messages list them: the first ones.
+fn list<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    const MOST: usize = 12;
+    let mut names = names.map(|name| format!("\"{}\"", quoted(name)));
+    let first: Vec<String> = names.by_ref().take(MOST).collect();
+    match names.count() {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
+    }
 }
 
 /// The header whose name is fewest edits away, when that is at most half of the name.

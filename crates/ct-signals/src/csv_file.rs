@@ -11,7 +11,10 @@ use csv::{Reader, ReaderBuilder, StringRecord, Trim};
 
 use crate::columns::{Columns, Found, Heading, Layout};
 use crate::record::{MIN_ROWS, median_step, quantile_of_steps};
-use crate::{Error, Hold, Record, Signal, unit};
+use crate::{
+    Error, Hold, LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, Record, Signal, quoted, read_file,
+    unit,
+};
 
 /// A step of the time above this many usual steps is a gap: half-way between one sample and two,
 /// so that one missing sample does not pass where the steps are even.
@@ -66,13 +69,7 @@ fn named_by_file(
     parse: impl FnOnce(&str, &[u8]) -> Result<Record, Error>,
 ) -> Result<Record, Error> {
     let file = path.display().to_string();
-    if path.is_dir() {
-        return Err(Error::Folder { file });
-    }
-    let bytes = std::fs::read(path).map_err(|source| Error::CannotOpen {
-        file: file.clone(),
-        source,
-    })?;
+    let bytes = read_file(path, LARGEST_RECORD)?;
     let record = parse(&file, &bytes)?;
     let name = path.file_name().map(|name| name.to_string_lossy());
     Ok(Record {
@@ -157,6 +154,17 @@ fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Error> {
         return Err(not_text("binary data"));
     }
     let text = std::str::from_utf8(bytes).map_err(|_| not_text("in another encoding"))?;
+    let long = text
+        .split(['\n', '\r'])
+        .find(|line| line.len() > LONGEST_LINE);
+    if let Some(line) = long {
+        let begin = line.as_ptr() as usize - text.as_ptr() as usize;
+        return Err(Error::LongLine {
+            file: file.into(),
+            row: LineCounter::new(text).advance((begin + line.len()) as u64),
+            longest: LONGEST_LINE,
+        });
+    }
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
@@ -202,7 +210,7 @@ fn read_table(file: &str, text: &str, columns: &Columns) -> Result<(Layout, Tabl
             return Err(Error::UnitRow {
                 file: file.into(),
                 row,
-                header: unit::shown(&format!("{name} [{unit}]")),
+                header: quoted(&format!("{name} [{unit}]")),
             });
         }
         let mut cell = |column: &Found| numbers.parse(row, column, &record[column.index]);
@@ -287,14 +295,22 @@ fn resolve(
     columns.resolve(file, row, &headers)
 }
 
-/// Numbers alone are no header.
+/// Numbers alone are no header, and nor are columns without number.
 fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error> {
+    if record.len() > MOST_COLUMNS {
+        return Err(Error::ManyColumns {
+            file: file.into(),
+            row,
+            found: record.len(),
+            most: MOST_COLUMNS,
+        });
+    }
     let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
     if record.iter().all(|cell| cell.is_empty() || is_number(cell)) {
         return Err(Error::NoHeader {
             file: file.into(),
             row,
-            first: unit::shown(&record.iter().collect::<Vec<_>>().join(", ")),
+            first: quoted(&record.iter().collect::<Vec<_>>().join(", ")),
         });
     }
     Ok(())
@@ -303,7 +319,7 @@ fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error
 /// The one of comma, semicolon and tab that the first row has most of.
 pub(crate) fn delimiter(text: &str) -> u8 {
     let header = text
-        .lines()
+        .split(['\n', '\r'])
         .find(|line| !line.trim().is_empty() && !line.starts_with('#'))
         .unwrap_or_default();
     let count = |delimiter: &u8| header.bytes().filter(|byte| byte == delimiter).count();
@@ -311,11 +327,12 @@ pub(crate) fn delimiter(text: &str) -> u8 {
     b";\t,".iter().copied().max_by_key(count).unwrap_or(b',')
 }
 
-/// Line numbers of the rows, past the blank lines and comments that the reader skips.
+/// Line numbers of the rows, past the blank lines and comments that the reader skips. A line ends as it does for the reader: at a line
+/// feed, a carriage return, or the two together.
 struct LineCounter<'a> {
     text: &'a str,
     byte: usize,
-    newlines: u64,
+    ends: u64,
 }
 
 impl<'a> LineCounter<'a> {
@@ -323,7 +340,7 @@ impl<'a> LineCounter<'a> {
         LineCounter {
             text,
             byte: 0,
-            newlines: 0,
+            ends: 0,
         }
     }
 
@@ -331,9 +348,17 @@ impl<'a> LineCounter<'a> {
     fn advance(&mut self, end: u64) -> u64 {
         let end = usize::try_from(end).unwrap_or(usize::MAX);
         let read = self.text.get(self.byte..end).unwrap_or_default();
-        let count = |text: &str| text.bytes().filter(|byte| *byte == b'\n').count() as u64;
-        let line = self.newlines + count(read.trim_end_matches(['\r', '\n'])) + 1;
-        self.newlines += count(read);
+        let before = self.text.as_bytes()[..self.byte].last().copied();
+        let count = |text: &str| {
+            let pairs = text
+                .bytes()
+                .scan(before, |before, byte| Some((before.replace(byte), byte)));
+            pairs
+                .filter(|&(before, byte)| byte == b'\r' || byte == b'\n' && before != Some(b'\r'))
+                .count() as u64
+        };
+        let line = self.ends + count(read.trim_end_matches(['\r', '\n'])) + 1;
+        self.ends += count(read);
         self.byte += read.len();
         line
     }
@@ -349,7 +374,7 @@ struct Numbers<'a> {
 
 impl Numbers<'_> {
     fn parse(&mut self, row: u64, column: &Found, cell: &str) -> Result<f64, Error> {
-        let (file, header) = (self.file.to_string(), column.header.clone());
+        let (file, header) = (self.file.to_string(), quoted(&column.header));
         if cell.is_empty() {
             return Err(Error::EmptyCell {
                 file,
@@ -368,7 +393,7 @@ impl Numbers<'_> {
             file: file.clone(),
             row,
             column: header.clone(),
-            text: unit::shown(cell),
+            text: quoted(cell),
             mend: if cell.contains(',') {
                 "write decimals with a point and without separators for thousands"
             } else {
@@ -380,7 +405,7 @@ impl Numbers<'_> {
                 file,
                 row,
                 column: header,
-                text: cell.into(),
+                text: quoted(cell),
             });
         }
         let mark = if comma {
@@ -396,7 +421,7 @@ impl Numbers<'_> {
                 file,
                 row,
                 column: header,
-                text: cell.into(),
+                text: quoted(cell),
                 here: word(here),
                 before: word(before),
             });
@@ -407,7 +432,7 @@ impl Numbers<'_> {
 }
 
 fn check_order(file: &str, row: u64, column: &str, previous: f64, time: f64) -> Result<(), Error> {
-    let (file, column) = (file.to_string(), column.to_string());
+    let (file, column) = (file.to_string(), quoted(column));
     if time == previous {
         Err(Error::RepeatedTime {
             file,
@@ -454,7 +479,7 @@ impl Table {
         match constant(&self.input) {
             Some(value) => Err(Error::ConstantInput {
                 file: file.into(),
-                column: layout.input.header.clone(),
+                column: quoted(&layout.input.header),
                 value,
                 rows: self.time.len(),
             }),
@@ -477,7 +502,7 @@ impl Table {
         if let Some(value) = constant(&self.output) {
             return Err(Error::ConstantOutput {
                 file: file.into(),
-                column: layout.output.header.clone(),
+                column: quoted(&layout.output.header),
                 value,
                 rows,
             });
@@ -491,7 +516,7 @@ impl Table {
         if !(1.0 / LARGEST..=LARGEST).contains(&interval) {
             return Err(Error::InvalidInterval {
                 file: file.into(),
-                column: layout.time.header.clone(),
+                column: quoted(&layout.time.header),
                 interval: rounded(interval),
                 low: 1.0 / LARGEST,
                 high: LARGEST,
@@ -504,7 +529,7 @@ impl Table {
                 return Err(Error::TooLarge {
                     file: file.into(),
                     row: self.rows[k],
-                    column: column.header.clone(),
+                    column: quoted(&column.header),
                     value: values[k],
                     limit: LARGEST,
                 });
@@ -513,7 +538,7 @@ impl Table {
             if largest < 1.0 / LARGEST {
                 return Err(Error::TooSmall {
                     file: file.into(),
-                    column: column.header.clone(),
+                    column: quoted(&column.header),
                     value: rounded(largest),
                     limit: 1.0 / LARGEST,
                 });
@@ -531,7 +556,7 @@ impl Table {
                 return Err(Error::Gap {
                     file: file.into(),
                     row: self.rows[k + 1],
-                    column: column.header.clone(),
+                    column: quoted(&column.header),
                     missing: (step / interval).round() as u64 - 1,
                     previous: pair[0],
                     time: pair[1],
@@ -567,7 +592,7 @@ impl Table {
         let unit = if column.unit.is_empty() {
             String::new()
         } else {
-            format!(" {}", column.unit)
+            format!(" {}", quoted(&column.unit))
         };
         let limits = [(at_low, low), (at_high, high)]
             .iter()
@@ -577,7 +602,7 @@ impl Table {
             .join(", ");
         Err(Error::Saturated {
             file: file.into(),
-            column: column.header.clone(),
+            column: quoted(&column.header),
             count,
             rows,
             limits,

@@ -17,6 +17,46 @@ pub enum Error {
         /// What the operating system says.
         source: std::io::Error,
     },
+    /// A device, which may never end.
+    #[error("{file}: it is a device; name a file or a pipe")]
+    Device {
+        /// The path as it was given.
+        file: String,
+    },
+    /// A file that is larger than any of its kind.
+    #[error("{file}: it has more than {largest} bytes, which is the most that is read; {}", too_large(*.largest))]
+    FileTooLarge {
+        /// The path as it was given.
+        file: String,
+        /// The most that is read \[bytes\].
+        largest: u64,
+    },
+    /// A line that is longer than any row.
+    #[error(
+        "{file}, row {row}: the line has more than {longest} bytes; check what wrote the file, and end every row with a line feed"
+    )]
+    LongLine {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// The longest line that is read \[bytes\].
+        longest: usize,
+    },
+    /// More columns than any record has.
+    #[error(
+        "{file}, row {row}: {found} columns, and {most} are the most; delete those that are not used"
+    )]
+    ManyColumns {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the header.
+        row: u64,
+        /// Columns of the file.
+        found: usize,
+        /// The most that are read.
+        most: usize,
+    },
     /// A folder where a file is expected.
     #[error("{file}: it is a folder; name a file in it")]
     Folder {
@@ -398,6 +438,27 @@ pub enum Error {
         /// Length of the second.
         second: usize,
     },
+}
+
+impl Error {
+    /// Whether it is a header's unit that is refused: it is none of the time, or another than the model's.
+    #[must_use]
+    pub fn of_units(&self) -> bool {
+        match self {
+            Self::UnknownTimeUnit { .. } => true,
+            Self::Column { fault, .. } => matches!(**fault, ColumnFault::Unit { .. }),
+            _ => false,
+        }
+    }
+}
+
+/// The mend for a file that is too large.
+fn too_large(largest: u64) -> &'static str {
+    if largest == crate::LARGEST_RECORD {
+        "split the record, or leave rows out"
+    } else {
+        "check that it is the right file"
+    }
 }
 
 fn samples(count: u64) -> String {

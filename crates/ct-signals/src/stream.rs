@@ -5,10 +5,10 @@
 //! Understood as in a file: commas, semicolons or tabs, a decimal comma where commas do not separate, a byte-order mark, CRLF,
 //! blank lines and comments, quotes. A line that cannot be used is refused by itself, and the next one is read on.
 
-use csv::{ReaderBuilder, StringRecord, Trim};
+use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
 use crate::columns::Layout;
-use crate::{Columns, Error, unit};
+use crate::{Columns, Error, MOST_COLUMNS, quoted, unit};
 
 /// The names of the columns in use, and which they are in a row without a header.
 const ROLES: [&str; 3] = ["time", "input", "output"];
@@ -35,10 +35,12 @@ pub struct Rows {
 }
 
 /// What a line holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Line {
     /// Time \[s\], input and output, finite or not.
     Row([f64; 3]),
+    /// Time \[s\] and input, finite or not, and why there is no output: its cell is empty or holds no number.
+    NoOutput([f64; 2], BadLine),
     /// Nothing: it is blank, a comment, or the header again.
     Nothing,
 }
@@ -142,6 +144,14 @@ impl Rows {
             rows.seconds = columns.time_header().1;
             return Ok((rows, true));
         }
+        if cells.len() > MOST_COLUMNS {
+            return Err(Error::ManyColumns {
+                file: file.into(),
+                row,
+                found: cells.len(),
+                most: MOST_COLUMNS,
+            });
+        }
         let Layout {
             time,
             seconds,
@@ -188,7 +198,9 @@ impl Rows {
         match (&self.header, self.fields) {
             (Some(_), _) => format!(
                 "a header: \"{}\" is the time, \"{}\" the command, \"{}\" the reading",
-                self.names[0], self.names[1], self.names[2]
+                quoted(&self.names[0]),
+                quoted(&self.names[1]),
+                quoted(&self.names[2])
             ),
             (None, 4) => {
                 "no header: the columns are taken as time, reference, command, reading (t, r, u, y)"
@@ -200,7 +212,7 @@ impl Rows {
         }
     }
 
-    /// Reads a line.
+    /// Reads a line, which was cut off at its end: a carriage return or a line feed within it is part of a cell.
     ///
     /// # Errors
     /// [`BadLine`]: the line is not used.
@@ -213,34 +225,31 @@ impl Rows {
         if self.header.as_deref() == Some(line) {
             return Ok(Line::Nothing);
         }
-        let mut values = [f64::NAN; 3];
+        let mut values = [const { Ok(f64::NAN) }; 3];
         if line.contains('"') {
             let cells = cells(line, self.delimiter);
             self.check_count(cells.len())?;
             for (role, &at) in self.at.clone().iter().enumerate() {
-                values[role] = self.number(role, cells.get(at).map_or("", String::as_str))?;
+                values[role] = self.number(role, cells.get(at).map_or("", String::as_str));
             }
         } else {
             let mut found = 0;
-            let mut bad = None;
             for (i, cell) in line.split(char::from(self.delimiter)).enumerate() {
                 found += 1;
                 let Some(role) = self.at.iter().position(|at| *at == i) else {
                     continue;
                 };
-                match self.number(role, cell.trim()) {
-                    Ok(value) => values[role] = value,
-                    Err(error) => bad = bad.or(Some(error)),
-                }
+                values[role] = self.number(role, cell.trim());
             }
             // A row that is not whole has wrong cells too.
             self.check_count(found)?;
-            if let Some(bad) = bad {
-                return Err(bad);
-            }
         }
-        values[0] *= self.seconds;
-        Ok(Line::Row(values))
+        let [time, input, output] = values;
+        let (time, input) = (time? * self.seconds, input?);
+        Ok(match output {
+            Ok(output) => Line::Row([time, input, output]),
+            Err(bad) => Line::NoOutput([time, input], bad),
+        })
     }
 
     fn check_count(&self, found: usize) -> Result<(), BadLine> {
@@ -259,7 +268,7 @@ impl Rows {
     }
 
     fn number(&mut self, role: usize, cell: &str) -> Result<f64, BadLine> {
-        let column = || self.names[role].clone();
+        let column = || quoted(&self.names[role]);
         if cell.is_empty() {
             return Err(BadLine::Empty { column: column() });
         }
@@ -277,7 +286,7 @@ impl Rows {
         let Ok(value) = value else {
             return Err(BadLine::Text {
                 column: column(),
-                text: unit::shown(cell),
+                text: quoted(cell),
                 mend: if commas > 0 {
                     "write decimals with a point and without separators for thousands"
                 } else if role == 0 && cell.contains(|c: char| c.is_ascii_digit()) {
@@ -297,7 +306,7 @@ impl Rows {
         {
             return Err(BadLine::DecimalMark {
                 column: column(),
-                text: unit::shown(cell),
+                text: quoted(cell),
             });
         }
         self.mark = self.mark.or(mark);
@@ -318,6 +327,8 @@ fn cells(line: &str, delimiter: u8) -> Vec<String> {
         .has_headers(false)
         .delimiter(delimiter)
         .trim(Trim::All)
+        // The line was cut at its end, so nothing in it ends it again.
+        .terminator(Terminator::Any(b'\n'))
         .from_reader(line.as_bytes());
     let mut record = StringRecord::new();
     // From memory nothing fails.
@@ -351,10 +362,13 @@ mod tests {
             Ok(Line::Nothing)
         );
         assert_eq!(read(&mut rows, "# a comment"), Ok(Line::Nothing));
-        let message = read(&mut rows, "12.5;4;1;").unwrap_err();
+        let Ok(Line::NoOutput([60.0, 4.0], bad)) = read(&mut rows, "12.5;4;1;") else {
+            panic!("the command of a row counts whatever the reading is");
+        };
         assert!(
-            message.contains("\"12.5\" has another decimal mark"),
-            "{message}"
+            bad.to_string()
+                .contains("\"12.5\" has another decimal mark"),
+            "{bad}"
         );
         let message = read(&mut rows, "12,5;4").unwrap_err();
         assert!(
@@ -376,10 +390,17 @@ mod tests {
             read(&mut three, "1\t5\t15"),
             Ok(Line::Row([1.0, 5.0, 15.0]))
         );
-        let message = read(&mut three, "1\t5\t").unwrap_err();
+        let Ok(Line::NoOutput([1.0, 5.0], bad)) = read(&mut three, "1\t5\t") else {
+            panic!("the command of a row counts whatever the reading is");
+        };
+        assert_eq!(
+            bad.to_string(),
+            "column \"output\": the cell is empty; check what writes the rows"
+        );
+        let message = read(&mut three, "1\t\t5").unwrap_err();
         assert_eq!(
             message,
-            "column \"output\": the cell is empty; check what writes the rows"
+            "column \"input\": the cell is empty; check what writes the rows"
         );
         let message = read(&mut three, "12:30\t5\t1").unwrap_err();
         assert!(message.contains("give the time as a number"), "{message}");
@@ -390,5 +411,14 @@ mod tests {
                 .starts_with("input, row 3: 2 numbers and no header")
         );
         assert_eq!(three.read(&[0xff, 0xfe]), Err(BadLine::NotText));
+    }
+
+    /// What the first line is taken for is what it is read as: else it would be begun with again and again.
+    #[test]
+    fn a_carriage_return_within_a_line_is_part_of_a_cell_for_both() {
+        let line = "1,1,3\r2,1,3";
+        assert!(Rows::begin("input", 1, line, &Columns::default()).is_err());
+        let (mut rows, _) = rows("0,1,2");
+        assert!(read(&mut rows, line).is_err());
     }
 }

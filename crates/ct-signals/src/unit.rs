@@ -41,17 +41,6 @@ pub(crate) fn split_bracket(header: &str) -> Option<(&str, &str)> {
     None
 }
 
-/// What a file says, as a message may quote it: the whole rest of a file is one cell where a quote
-/// is not closed.
-pub(crate) fn shown(text: &str) -> String {
-    const LONGEST: usize = 40;
-    let mut shown: String = text.chars().take(LONGEST).collect();
-    if shown.len() < text.len() {
-        shown += "...";
-    }
-    shown
-}
-
 /// Whether two units are the same, written differently or not.
 pub(crate) fn same(a: &str, b: &str) -> bool {
     canonical(a) == canonical(b)

@@ -344,3 +344,36 @@ fn memory_is_limited_and_short_memories_are_left_alone() {
         max_relative = 1e-9
     );
 }
+
+#[test]
+fn rows_behind_lost_ones_come_out_white_and_of_the_same_variance() {
+    let n = 14;
+    for lost in [&[0][..], &[3], &[2, 4, 5, 6, 7, 10], &[0, 1, 13]] {
+        for coefficients in PROCESSES {
+            let model = ArModel::from_coefficients(coefficients, 0.3).unwrap();
+            let l = cholesky(&autocovariance(coefficients, n));
+            let mut whitener = model.whitener(n);
+            let mut whitened: Vec<Vec<f64>> = Vec::new();
+            for k in 0..n {
+                if lost.contains(&k) {
+                    whitener.skip();
+                    continue;
+                }
+                let mut row = l[k].clone();
+                whitener.push(&mut row);
+                whitened.push(row);
+            }
+            // Each row is a sum of n independent unit values: their covariance has to be the identity.
+            for (i, a) in whitened.iter().enumerate() {
+                for (j, b) in whitened.iter().enumerate() {
+                    let covariance: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+                    let identity = if i == j { 1.0 } else { 0.0 };
+                    assert!(
+                        (covariance - identity).abs() < 1e-8,
+                        "{coefficients:?} without {lost:?}: [{i}, {j}] {covariance}"
+                    );
+                }
+            }
+        }
+    }
+}

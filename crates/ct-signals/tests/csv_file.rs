@@ -660,3 +660,66 @@ fn a_row_of_units_below_the_header() {
         assert!(matches!(error, Error::TextInCell { .. }), "{error:?}");
     }
 }
+
+fn refusal(content: &[u8]) -> String {
+    let read = ct_signals::parse_csv("a.csv", content, &Columns::default(), Hold::Zero);
+    read.unwrap_err().to_string()
+}
+
+#[test]
+fn a_line_and_the_number_of_columns_have_a_limit() {
+    let commas = ",".repeat(1_000_000);
+    assert_eq!(
+        refusal(format!("t,u,y\r\n0,1,2\n{commas}\n").as_bytes()),
+        "a.csv, row 3: the line has more than 65536 bytes; check what wrote the file, and end every row with a line feed"
+    );
+    // A cell in quotes may hold ends of lines.
+    let header = "t,u,y".to_string() + &",\"a\n\"".repeat(20_000);
+    assert!(refusal(header.as_bytes()).contains("20003 columns, and 4096 are the most"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_device_is_refused_before_it_is_read() {
+    let read = ct_signals::read_csv("/dev/zero".as_ref(), &Columns::default(), Hold::Zero);
+    assert_eq!(
+        read.unwrap_err().to_string(),
+        "/dev/zero: it is a device; name a file or a pipe"
+    );
+}
+
+#[test]
+fn a_file_that_is_too_large_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    std::fs::write(&path, [b'a'; 101]).unwrap();
+    assert_eq!(ct_signals::read_file(&path, 101).unwrap().len(), 101);
+    let message = ct_signals::read_file(&path, 100).unwrap_err().to_string();
+    assert!(
+        message.ends_with(
+            "more than 100 bytes, which is the most that is read; check that it is the right file"
+        ),
+        "{message}"
+    );
+}
+
+#[test]
+fn rows_of_a_file_whose_lines_end_at_carriage_returns_are_counted() {
+    let message = refusal(b"t,u,y\r0,1,2\r1,x,2\r");
+    assert!(
+        message.starts_with("a.csv, row 3, column \"u\""),
+        "{message}"
+    );
+}
+
+#[test]
+fn what_is_quoted_is_short_and_steers_nothing() {
+    let long = "z".repeat(3000);
+    let message =
+        refusal(format!("t,u\u{202e} {long},y\n0,1,2\n1,abc\u{202e}{long},2\n").as_bytes());
+    assert!(message.len() < 300, "{message}");
+    assert!(
+        !message.contains('\u{202e}') && message.contains("\\u{202e}"),
+        "{message}"
+    );
+}

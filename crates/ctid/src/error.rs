@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use ct_signals::escaped;
+
 /// Everything that ends the program with exit code 2.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -80,7 +82,7 @@ impl Error {
     }
 }
 
-/// A message on one line, without what would steer the terminal: files and their names are quoted
+/// A message on one line, without what would steer the terminal or turn the direction of the text: files and their names are quoted
 /// in messages, whatever they hold.
 #[must_use]
 pub fn one_line(message: &str) -> String {
@@ -93,7 +95,7 @@ pub fn one_line(message: &str) -> String {
                 "; "
             };
         }
-        line.extend(part.chars().map(|c| if c.is_control() { ' ' } else { c }));
+        line += &escaped(part);
     }
     line
 }
@@ -113,6 +115,9 @@ mod tests {
             one_line("these are missing:\n  --model <M>\n"),
             "these are missing: --model <M>"
         );
-        assert_eq!(one_line("a \u{1b}[31mred\r cell"), "a  [31mred  cell");
+        assert_eq!(
+            one_line("a \u{1b}[31mred\r cell \u{202e}"),
+            "a \\u{1b}[31mred\\r cell \\u{202e}"
+        );
     }
 }

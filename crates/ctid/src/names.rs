@@ -1,5 +1,6 @@
 //! The name that was probably meant.
 
+use ct_signals::quoted;
 use plants::{CATALOGUE, EffectInfo};
 
 use crate::Error;
@@ -27,7 +28,8 @@ pub(crate) fn effect(id: &str) -> Result<&'static EffectInfo, Error> {
 /// What to say of a name that is not in the catalogue.
 pub(crate) fn unknown_effect(id: &str) -> String {
     format!(
-        "unknown effect \"{id}\": `ctid effects` lists the catalogue{}",
+        "unknown effect \"{}\": `ctid effects` lists the catalogue{}",
+        quoted(id),
         suggestion(id, CATALOGUE.iter().map(|effect| effect.id))
     )
 }

@@ -11,10 +11,12 @@
 
 use std::path::Path;
 
+use ct_signals::{quoted, read_file};
 use missing_effect::Unknown;
 use plants::{MOST_KNOTS, Place, Plant, Variable};
 
 use crate::Error;
+use crate::model_file::LARGEST;
 
 /// The beginning of every such file.
 pub(crate) const HEADER: &str = "place,variable,at";
@@ -69,7 +71,8 @@ pub(crate) fn place_of(plant: Plant, word: &str) -> Result<(Place, usize), Strin
                 names.join(", ")
             };
             format!(
-                "\"{word}\" is no place of plant {}; write actuator, {vessels} or sensor",
+                "\"{}\" is no place of plant {}; write actuator, {vessels} or sensor",
+                quoted(word),
                 plant.id()
             )
         })
@@ -80,7 +83,12 @@ pub(crate) fn variable_of(word: &str) -> Result<Variable, String> {
     Variable::ALL
         .into_iter()
         .find(|variable| variable.name() == word)
-        .ok_or_else(|| format!("\"{word}\" is no variable; write level, rate, input or time"))
+        .ok_or_else(|| {
+            format!(
+                "\"{}\" is no variable; write level, rate, input or time",
+                quoted(word)
+            )
+        })
 }
 
 /// Whether a file begins as those of a diagnosis do: with all their columns, of which nobody need write the last.
@@ -112,11 +120,12 @@ pub fn text(unknown: &Unknown) -> String {
 /// # Errors
 /// One line that names the file, the row, the column and the mend.
 pub fn read(path: &Path) -> Result<TermFile, Error> {
-    let text = std::fs::read(path).map_err(|error| {
-        Error::file(
+    let text = read_file(path, LARGEST as u64).map_err(|error| match error {
+        ct_signals::Error::CannotOpen { source, .. } => Error::file(
             path,
-            format!("the shape cannot be read: {error}; check the path"),
-        )
+            format!("the shape cannot be read: {source}; check the path"),
+        ),
+        error => error.into(),
     })?;
     let text = String::from_utf8(text)
         .map_err(|_| Error::file(path, "the shape is not UTF-8 text; save it as UTF-8"))?;
@@ -183,9 +192,18 @@ pub fn parse(file: &str, text: &str) -> Result<TermFile, Error> {
         };
         let number = |index: usize, name: &str| {
             let text = cell(index, name)?;
-            text.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
-                at_line(line, format!("column \"{name}\" holds {text:?}, which is no finite number; correct it"))
-            })
+            text.parse::<f64>()
+                .ok()
+                .filter(|v| v.is_finite())
+                .ok_or_else(|| {
+                    at_line(
+                        line,
+                        format!(
+                            "column \"{name}\" holds \"{}\", which is no finite number; correct it",
+                            quoted(text)
+                        ),
+                    )
+                })
         };
         for (index, name, kept) in [
             (place, "place", &mut shape.place),
@@ -198,7 +216,9 @@ pub fn parse(file: &str, text: &str) -> Result<TermFile, Error> {
                 return Err(at_line(
                     line,
                     format!(
-                        "column \"{name}\" holds {word:?}, the rows before it {kept:?}; a term has one {name}"
+                        "column \"{name}\" holds \"{}\", the rows before it \"{}\"; a term has one {name}",
+                        quoted(word),
+                        quoted(kept)
                     ),
                 ));
             }

@@ -59,7 +59,8 @@ pub enum Error {
     },
 }
 
-/// Why a row is not used. It leaves the monitor as it was, but for the count of times that go back.
+/// Why a row is not used, or only its command ([`Step::lost`](crate::Step::lost)). A row that is not used leaves the monitor as it was,
+/// but for the count of times that go back.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {

@@ -7,6 +7,9 @@
 //!
 //! A process that is sampled much faster than it moves is watched in blocks: time, command and reading are their means over
 //! `every` rows, and the command runs in a straight line from one mean to the next.
+//!
+//! A row may lack its reading. In a block such a row is taken on the straight line between the readings beside it; a block whose last
+//! row lacks its reading, or more than half of its rows, has none.
 
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +34,8 @@ pub(crate) struct Sample {
     /// \[s\]
     pub time: f64,
     pub input: f64,
-    pub output: f64,
+    /// `None` where the reading is lost.
+    pub output: Option<f64>,
     /// How it follows the one before.
     pub follows: Follows,
 }
@@ -52,6 +56,21 @@ pub(crate) struct Taken {
     /// What is to be watched, where a block is complete.
     pub sample: Option<Sample>,
     pub notice: Option<Notice>,
+}
+
+/// A value that can be computed with.
+pub(crate) fn usable(column: &'static str, value: f64) -> Result<f64, Refused> {
+    if !value.is_finite() {
+        return Err(Refused::NotFinite { column, value });
+    }
+    if value.abs() > LARGEST {
+        return Err(Refused::TooLarge {
+            column,
+            value,
+            limit: LARGEST,
+        });
+    }
+    Ok(value)
 }
 
 /// The state between two rows.
@@ -75,6 +94,11 @@ pub(crate) struct Intake {
     filled: usize,
     begun: f64,
     follows: Follows,
+    /// The latest reading of the stretch, and rows without one since.
+    reading: Option<f64>,
+    without: usize,
+    /// Rows of the block with a reading.
+    readings: usize,
 }
 
 impl Intake {
@@ -91,39 +115,31 @@ impl Intake {
             filled: 0,
             begun: 0.0,
             follows: Follows::Gap,
+            reading: None,
+            without: 0,
+            readings: 0,
         }
     }
 
     /// The numbers that a file may have spoilt.
     pub(crate) fn sound(&self) -> bool {
-        self.every > 0 && self.steps.len() <= STEPS && self.filled < self.every
+        self.every > 0
+            && self.steps.len() <= STEPS
+            && self.filled < self.every
+            && self.readings <= self.filled
     }
 
     /// Begins a new block, after `every` has changed.
     pub(crate) fn begin(&mut self) {
         self.filled = 0;
+        self.readings = 0;
         self.sums = [0.0; 3];
     }
 
-    pub(crate) fn take(&mut self, row: &Row) -> Result<Taken, Refused> {
-        let cells = [
-            ("time", row.time),
-            ("input", row.input),
-            ("output", row.output),
-        ];
-        for (column, value) in cells {
-            if !value.is_finite() {
-                return Err(Refused::NotFinite { column, value });
-            }
-            if value.abs() > LARGEST {
-                return Err(Refused::TooLarge {
-                    column,
-                    value,
-                    limit: LARGEST,
-                });
-            }
-        }
-        let time = row.time;
+    /// Takes in a row with its `reading`, where that can be used.
+    pub(crate) fn take(&mut self, row: &Row, reading: Option<f64>) -> Result<Taken, Refused> {
+        let time = usable("time", row.time)?;
+        let input = usable("input", row.input)?;
         let mut notice = None;
         if let Some(previous) = self.last {
             if time == previous {
@@ -142,15 +158,20 @@ impl Intake {
             self.begun = time;
         }
         self.sums[0] += time - self.begun;
-        self.sums[1] += row.input;
-        self.sums[2] += row.output;
+        self.sums[1] += input;
         self.filled += 1;
+        if let Some(reading) = reading {
+            self.read(reading);
+        } else {
+            self.without += 1;
+        }
+        let has_reading = reading.is_some() && 2 * self.readings >= self.every;
         let sample = (self.filled == self.every).then(|| {
             let mean = |sum: f64| sum / self.every as f64;
             Sample {
                 time: self.begun + mean(self.sums[0]),
                 input: mean(self.sums[1]),
-                output: mean(self.sums[2]),
+                output: has_reading.then(|| mean(self.sums[2])),
                 follows: self.follows,
             }
         });
@@ -161,11 +182,26 @@ impl Intake {
         Ok(Taken { sample, notice })
     }
 
+    /// Adds a reading to the block, and what the rows of the block right before it lack.
+    fn read(&mut self, reading: f64) {
+        let in_block = self.without.min(self.filled - 1);
+        let before = self.reading.unwrap_or(reading);
+        let slope = (reading - before) / (self.without + 1) as f64;
+        let first = (self.without - in_block + 1) as f64;
+        let steps = in_block as f64 * (first + self.without as f64) / 2.0;
+        self.sums[2] += in_block as f64 * before + slope * steps + reading;
+        self.readings += 1;
+        self.reading = Some(reading);
+        self.without = 0;
+    }
+
     /// Begins a new stretch.
     fn part(&mut self) {
         if self.follows == Follows::On {
             self.follows = Follows::Gap;
         }
+        self.reading = None;
+        self.without = 0;
         self.begin();
     }
 

@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     intake::Sample,
     learn::{BEGIN as BEGIN_IN_BAND, Learned, record},
+    lost::interpolated,
     sensitivity::command,
 };
 
@@ -72,10 +73,17 @@ pub(crate) struct Kept {
     pub levels: [f64; MAX_VESSELS],
     /// Where in it stood what the command moves: play has a memory without an end, and no run-up finds it.
     pub stands: f64,
-    /// Measured minus the learned model.
-    pub residual: f64,
-    /// Whitened residual in its standard deviations.
+    /// Reading of the learned model.
+    pub modelled: f64,
+    /// Whitened residual in its standard deviations; zero where the reading is lost.
     pub innovation: f64,
+}
+
+impl Kept {
+    /// Measured minus the learned model.
+    fn residual(&self) -> Option<f64> {
+        Some(self.sample.output? - self.modelled)
+    }
 }
 
 /// An effect that explains the latest rows, as well as it can.
@@ -110,7 +118,7 @@ impl Suspect {
 }
 
 /// Every effect that may have begun, best first: an implausible size comes after every plausible one. The noise is `growth` times as large as
-/// it was learned.
+/// it was learned. Residuals of lost readings are taken on straight lines between those beside them, which holds for any effect.
 pub(crate) fn isolate(
     structure: &Structure,
     learned: &Learned,
@@ -118,9 +126,15 @@ pub(crate) fn isolate(
     rows: &[Kept],
     growth: f64,
 ) -> Vec<Suspect> {
-    let Some(noise) = learned.noise() else {
+    let residuals: Vec<Option<f64>> = rows.iter().map(Kept::residual).collect();
+    let (Some(noise), Some(residuals)) = (learned.noise(), interpolated(&residuals)) else {
         return Vec::new();
     };
+    let readings = rows.iter().zip(&residuals);
+    let readings = readings
+        .map(|(row, residual)| row.sample.output.unwrap_or(row.modelled + residual))
+        .collect();
+    let innovations = innovations(rows, &residuals, &noise);
     let search = Search {
         structure,
         learned,
@@ -128,14 +142,16 @@ pub(crate) fn isolate(
         hold,
         rows,
         variance: (growth * learned.sigma).powi(2),
-        squares: rows
+        squares: innovations
             .iter()
             .rev()
-            .scan(0.0, |sum, row| {
-                *sum += (row.innovation / growth).powi(2);
+            .scan(0.0, |sum, innovation| {
+                *sum += (innovation / growth).powi(2);
                 Some(*sum)
             })
             .collect(),
+        readings,
+        residuals,
     };
     let mut suspects: Vec<Suspect> = structure
         .candidates()
@@ -161,12 +177,31 @@ pub(crate) fn isolate(
     best
 }
 
+/// Innovations in their standard deviations, of lost readings too: as a fit to the filled record has them.
+fn innovations(rows: &[Kept], residuals: &[f64], noise: &ArModel) -> Vec<f64> {
+    let p = noise.order();
+    (0..rows.len())
+        .map(|k| {
+            let from = k.saturating_sub(p);
+            if rows[from..=k].iter().all(|row| row.sample.output.is_some()) {
+                return rows[k].innovation;
+            }
+            let past = residuals[from..k].iter().rev();
+            let foretold: f64 = past.zip(noise.coefficients()).map(|(r, a)| a * r).sum();
+            (residuals[k] - foretold) / noise.sigma()
+        })
+        .collect()
+}
+
 struct Search<'a> {
     structure: &'a Structure,
     learned: &'a Learned,
     noise: ArModel,
     hold: Hold,
     rows: &'a [Kept],
+    /// Of each row, measured or filled in; and the same less the learned model's.
+    readings: Vec<f64>,
+    residuals: Vec<f64>,
     /// Of the noise's innovations.
     variance: f64,
     /// Sum of squared innovations over the last 1, 2, ... rows.
@@ -241,11 +276,12 @@ impl Search<'_> {
 
     /// A fit begins with play, lags and dead time at rest at its first command. What the learned model, begun in the same way, misses of the
     /// one that ran on is taken from the readings.
-    fn put_right(&self, record: &mut Record, rows: &[Kept]) -> Option<()> {
+    fn put_right(&self, record: &mut Record, from: usize) -> Option<()> {
         if self.structure.effects().is_empty() && self.structure.terms().is_empty() {
             return Some(());
         }
         let vessels = self.structure.plant.vessels();
+        let rows = &self.rows[from..];
         let first = rows.first()?;
         let mut begun = Simulator::<f64>::new(
             self.structure,
@@ -256,13 +292,14 @@ impl Search<'_> {
         .ok()?;
         begun.set_substeps(self.learned.substeps);
         let mut before: Option<&Kept> = None;
-        for (row, reading) in rows.iter().zip(&mut record.output.values) {
+        let readings = record.output.values.iter_mut();
+        for ((row, residual), reading) in rows.iter().zip(&self.residuals[from..]).zip(readings) {
             if let Some(before) = before {
                 let step = row.sample.time - before.sample.time;
                 begun.advance(command(self.hold, &before.sample, &row.sample), step);
             }
             before = Some(row);
-            *reading = begun.read() + row.residual;
+            *reading = begun.read() + residual;
         }
         Some(())
     }
@@ -277,8 +314,12 @@ impl Search<'_> {
     ) -> Option<(Suspect, Vec<f64>)> {
         let from = self.rows.len().checked_sub(length)?;
         let rows = &self.rows[from..];
-        let mut records = [record(rows.iter().map(|row| &row.sample), self.hold)];
-        self.put_right(&mut records[0], rows)?;
+        let mut records = [record(
+            rows.iter().map(|row| &row.sample),
+            self.readings[from..].to_vec(),
+            self.hold,
+        )];
+        self.put_right(&mut records[0], from)?;
         let mut structure = self.structure.with(placed).ok()?;
         structure.scales.duration = records[0].duration();
         let mut fixed: BTreeMap<String, f64> = self

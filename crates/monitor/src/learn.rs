@@ -3,14 +3,24 @@
 use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Hold, Record, Signal};
-use greybox::{FitOptions, LinearPlant, Setup, coloured, fit_from, random_starts};
+use greybox::{Fit, FitOptions, LinearPlant, Setup, coloured, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Scales, Structure, Term};
 use serde::{Deserialize, Serialize};
 
-use crate::{intake::Sample, scatter::Limit};
+use crate::{
+    intake::Sample,
+    lost::{expect, interpolated},
+    scatter::Limit,
+};
 
 /// A command that moves by less of itself stands still.
 const STILL: f64 = 1e-9;
+
+/// Fewest rows with a reading, as a part of all.
+const READ: f64 = 0.5;
+
+/// Fits in turn with what is expected of lost readings: each leaves of the error of the one before about the share of readings that are lost.
+const ROUNDS: usize = 2;
 
 /// More of either was never learned: a state that says so would be computed for ever.
 const MOST_SUBSTEPS: usize = 1024;
@@ -130,14 +140,18 @@ impl Learned {
     }
 }
 
-/// Rows as a record; the time counts from the first.
-pub(crate) fn record<'a>(rows: impl Iterator<Item = &'a Sample>, hold: Hold) -> Record {
+/// Rows as a record, with a reading for each; the time counts from the first.
+pub(crate) fn record<'a>(
+    rows: impl Iterator<Item = &'a Sample>,
+    readings: Vec<f64>,
+    hold: Hold,
+) -> Record {
     let mut record = Record {
         name: "the rows".to_string(),
         time: Vec::new(),
         input: Signal::default(),
         input_2: None,
-        output: Signal::default(),
+        output: Signal::new("", "", readings),
         reference: None,
         hold,
     };
@@ -145,7 +159,6 @@ pub(crate) fn record<'a>(rows: impl Iterator<Item = &'a Sample>, hold: Hold) -> 
     for row in rows {
         record.time.push(row.time - *first.get_or_insert(row.time));
         record.input.values.push(row.input);
-        record.output.values.push(row.output);
     }
     record
 }
@@ -154,7 +167,28 @@ pub(crate) fn record<'a>(rows: impl Iterator<Item = &'a Sample>, hold: Hold) -> 
 pub(crate) const BEGIN: &str = "stiction_backlash.begin";
 
 /// The fit, and the levels at the first row; in words why there is none.
-pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f64>), String> {
+///
+/// Where readings are lost, what is expected of them under the fitted model and its noise stands in for them, and the fit is repeated
+/// (the EM algorithm; A. P. Dempster, N. M. Laird, D. B. Rubin, J. Royal Statistical Society B 39, 1977).
+pub(crate) fn learn(
+    model: &Model,
+    samples: &[Sample],
+    hold: Hold,
+) -> Result<(Learned, Vec<f64>), String> {
+    let readings: Vec<Option<f64>> = samples.iter().map(|sample| sample.output).collect();
+    let lost: Vec<usize> = (0..samples.len())
+        .filter(|&k| readings[k].is_none())
+        .collect();
+    let read = samples.len() - lost.len();
+    let filled = interpolated(&readings).filter(|_| read as f64 >= READ * samples.len() as f64);
+    let Some(filled) = filled else {
+        return Err(format!(
+            "{} of {} rows have no reading: check the sensor",
+            lost.len(),
+            samples.len()
+        ));
+    };
+    let records = &[record(samples.iter(), filled, hold)];
     let options = FitOptions::default();
     let said = |error: &dyn std::fmt::Display| error.to_string();
     let mut fixed = model.fixed();
@@ -200,10 +234,20 @@ pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f
         .with_structure(setup.structure.clone())
         .map_err(|error| said(&error))?;
     let fit = fit_from(&setup, &[fit.x], &white, options.stopping).map_err(|error| said(&error))?;
-    let fit = coloured(&setup, fit, options.noise_order, options.stopping)
+    let mut fit = coloured(&setup, fit, options.noise_order, options.stopping)
         .map_err(|error| said(&error))?;
+    let mut refilled = records.clone();
+    if !lost.is_empty() {
+        for _ in 0..ROUNDS {
+            fit = again(&setup, &mut refilled, &fit, &lost, &options)
+                .map_err(|error| said(&error))?;
+        }
+    }
 
     let n = setup.parameter_count();
+    // What stands in for a lost reading has no noise, and says nothing of its own.
+    let all_over_read = samples.len() as f64 / read as f64;
+    let widened = all_over_read * all_over_read;
     let errors = fit.std_errors();
     let mut covariance = vec![0.0; n * n];
     if let Some((positions, correlations)) = fit.correlations() {
@@ -213,7 +257,7 @@ pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f
                 let (Some(ei), Some(ej)) = (errors[i], errors[j]) else {
                     continue;
                 };
-                covariance[i * n + j] = correlations[a][b] * ei * ej;
+                covariance[i * n + j] = widened * correlations[a][b] * ei * ej;
             }
         }
     } else {
@@ -221,16 +265,21 @@ pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f
             "the rows do not determine the parameters: the command has not moved enough".into(),
         );
     }
-    let sigma = fit.noise.sigma();
+    let sigma = fit.noise.sigma() * all_over_read.sqrt();
     if !(sigma.is_finite() && sigma > 0.0 && covariance.iter().all(|c| c.is_finite())) {
         return Err("the model leaves no noise to judge by: are the readings measured?".into());
     }
     let residuals = setup.residuals(&fit.x).map_err(|error| said(&error))?;
-    let innovations: Vec<f64> = residuals
-        .iter()
-        .flat_map(|residual| fit.noise.whiten(residual))
-        .map(|e| e / sigma)
-        .collect();
+    let mut whitener = fit.noise.whitener(1);
+    let mut innovations = Vec::with_capacity(read);
+    for (mut residual, reading) in residuals.into_iter().flatten().zip(&readings) {
+        if reading.is_some() {
+            whitener.push(std::slice::from_mut(&mut residual));
+            innovations.push(residual / sigma);
+        } else {
+            whitener.skip();
+        }
+    }
     let scatter = Limit::learned(&innovations, setup.free().len())
         .ok_or("the model leaves no noise to judge by: do the readings move?")?;
     let commands = &record.input.values;
@@ -252,7 +301,7 @@ pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f
         covariance,
         coefficients: fit.noise.coefficients().to_vec(),
         sigma,
-        rows: record.len(),
+        rows: read,
         time_constant: slowest,
         interval,
         scales: setup.structure.scales.clone(),
@@ -261,4 +310,31 @@ pub(crate) fn learn(model: &Model, records: &[Record]) -> Result<(Learned, Vec<f
     };
     let levels = fit.x[n..].to_vec();
     Ok((learned, levels))
+}
+
+/// The fit once more, with what is expected of lost readings beside it in the record.
+fn again(
+    setup: &Setup,
+    records: &mut [Record; 1],
+    fit: &Fit,
+    lost: &[usize],
+    options: &FitOptions,
+) -> Result<Fit, greybox::Error> {
+    let before = setup.with_records(&*records)?;
+    let residuals = before.residuals(&fit.x)?;
+    if let Some(residual) = residuals.first() {
+        let mut expected = residual.clone();
+        expect(&fit.noise, &mut expected, lost);
+        for &k in lost {
+            records[0].output.values[k] += expected[k] - residual[k];
+        }
+    }
+    let setup = setup.with_records(&*records)?;
+    let next = fit_from(
+        &setup,
+        std::slice::from_ref(&fit.x),
+        &fit.noise,
+        options.stopping,
+    )?;
+    coloured(&setup, next, options.noise_order, options.stopping)
 }

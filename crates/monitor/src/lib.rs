@@ -53,6 +53,7 @@ mod fingerprint;
 mod intake;
 mod isolate;
 mod learn;
+mod lost;
 mod monitor;
 mod scatter;
 mod sensitivity;

@@ -6,11 +6,11 @@ use crate::{
     Alarm, Error, Model, Refused, ScatterAlarm, Settings, Units,
     core::{Checkpoint, Core, Phase},
     fingerprint::{Fingerprint, differences, fingerprint},
-    intake::{Intake, Sample},
+    intake::{Intake, Sample, usable},
 };
 
 /// The version of [`State`].
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// A command above so many times its full range is in another unit, or none, as in a record.
 const BEYOND: f64 = 1.01;
 /// A reading above so many times the tank's height is in another unit, or none; below it a sensor may be off, which is to be seen.
@@ -23,15 +23,17 @@ pub struct Row {
     pub time: f64,
     /// Command \[input unit\].
     pub input: f64,
-    /// Reading \[output unit\], made before the command acts.
+    /// Reading \[output unit\], made before the command acts. NaN where it is lost: the command of the row is used all the same.
     pub output: f64,
 }
 
 /// What a row says.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Step {
-    /// The learned model beside the row; `None` while learning, and within a block of rows.
+    /// The learned model beside the row; `None` while learning, within a block of rows, and without a reading.
     pub innovation: Option<Innovation>,
+    /// Why the reading is not used, where it is not; the command is.
+    pub lost: Option<Refused>,
     /// Something about the rows or the phase, where there is something.
     pub notices: [Option<Notice>; 2],
     /// The model does not fit any more, or more is known of that.
@@ -274,18 +276,20 @@ impl Monitor {
 
     /// Takes in a row.
     ///
+    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command,
+    /// and nothing is judged by the row.
+    ///
     /// # Errors
-    /// [`Refused`]: the row is not used.
+    /// [`Refused`]: time or command cannot be used, and the row is not.
     pub fn update(&mut self, row: &Row) -> Result<Step, Refused> {
         let known = self.core.known();
-        if let Some(height) = known.tank_height
-            && row.output > ABOVE * height
-        {
-            return Err(Refused::AboveTank {
+        let reading = match known.tank_height {
+            Some(height) if row.output > ABOVE * height => Err(Refused::AboveTank {
                 value: row.output,
                 height,
-            });
-        }
+            }),
+            _ => usable("output", row.output),
+        };
         if let Some(range) = known.input_range
             && row.input.abs() > BEYOND * range
         {
@@ -294,15 +298,15 @@ impl Monitor {
                 range,
             });
         }
-        let taken = self.intake.take(row)?;
-        let mut step = Step::default();
+        let taken = self.intake.take(row, reading.as_ref().ok().copied())?;
+        let mut step = Step {
+            lost: reading.err(),
+            ..Step::default()
+        };
         step.notices[0] = taken.notice;
         if let Some(sample) = taken.sample {
             let fed = self.core.feed(sample);
-            step.innovation = fed.said.map(|said| Innovation {
-                residual: said.residual,
-                standardised: said.innovation,
-            });
+            step.innovation = fed.said.and_then(|said| said.innovation);
             step.notices[1] = fed.notice;
             step.alarm = fed.alarm;
             step.scatter = fed.scatter;

@@ -4,6 +4,7 @@ use ct_signals::{Hold, Whitener};
 use plants::{MAX_VESSELS, Structure};
 
 use crate::{
+    Innovation,
     bank::Bank,
     intake::Sample,
     isolate::Kept,
@@ -19,6 +20,8 @@ pub(crate) struct Watch {
     hold: Hold,
     inverse_sigma: f64,
     last: Option<Sample>,
+    /// Seconds since the last reading.
+    since: f64,
     /// A derivative for each lane, one for an offset of the reading, the residual.
     row: Vec<f64>,
 }
@@ -30,11 +33,11 @@ pub(crate) struct Said {
     pub levels: [f64; MAX_VESSELS],
     /// Where what the command moves stands \[input unit\].
     pub stands: f64,
-    /// Measured minus model \[output unit\].
-    pub residual: f64,
-    /// Whitened, in standard deviations of the noise's innovations.
-    pub innovation: f64,
-    /// Seconds since the row before; zero for the first.
+    /// Its reading \[output unit\].
+    pub modelled: f64,
+    /// What the reading says; `None` where that is lost.
+    pub innovation: Option<Innovation>,
+    /// Seconds since the reading before; zero for the first.
     pub step: f64,
 }
 
@@ -45,8 +48,8 @@ impl Said {
             sample,
             levels: self.levels,
             stands: self.stands,
-            residual: self.residual,
-            innovation: self.innovation,
+            modelled: self.modelled,
+            innovation: self.innovation.map_or(0.0, |said| said.standardised),
         }
     }
 }
@@ -76,38 +79,49 @@ impl Watch {
             hold,
             inverse_sigma: 1.0 / learned.sigma,
             last: None,
+            since: 0.0,
             row: vec![0.0; lanes + 2],
         })
     }
 
     /// Follows the plant to its next row.
     pub(crate) fn follow(&mut self, sample: &Sample) -> Said {
-        let mut step = 0.0;
         if let Some(last) = &self.last {
-            step = sample.time - last.time;
+            let step = sample.time - last.time;
             self.model.advance(command(self.hold, last, sample), step);
+            self.since += step;
         }
         self.last = Some(*sample);
         let lanes = self.row.len() - 2;
         let (levels, stands) = (self.model.levels(), self.model.stands());
         let modelled = self.model.read(&mut self.row[..lanes]);
-        let residual = sample.output - modelled;
+        let mut said = Said {
+            levels,
+            stands,
+            modelled,
+            innovation: None,
+            step: 0.0,
+        };
+        let Some(output) = sample.output else {
+            self.whitener.skip();
+            return said;
+        };
+        let residual = output - modelled;
         self.row[lanes] = 1.0;
         self.row[lanes + 1] = residual;
         self.whitener.push(&mut self.row);
         for value in &mut self.row {
             *value *= self.inverse_sigma;
         }
-        Said {
-            levels,
-            stands,
+        said.innovation = Some(Innovation {
             residual,
-            innovation: self.row[lanes + 1],
-            step,
-        }
+            standardised: self.row[lanes + 1],
+        });
+        said.step = std::mem::take(&mut self.since);
+        said
     }
 
-    /// Lets the scores and the tracker see the row that was followed last, `growth` times as noisy as was learned.
+    /// Lets the scores and the tracker see the reading that was followed last, `growth` times as noisy as was learned.
     pub(crate) fn judge(
         &mut self,
         bank: &mut Bank,

@@ -1,5 +1,6 @@
 //! The controller of the loop.
 
+use ct_signals::quoted;
 use plants::controller::Controller;
 use toml::Spanned;
 
@@ -115,7 +116,10 @@ impl Source<'_> {
                 ),
             ],
             other => {
-                let what = format!("controller type \"{other}\" is not known; {TYPES}");
+                let what = format!(
+                    "controller type \"{}\" is not known; {TYPES}",
+                    quoted(other)
+                );
                 return Err(self.at(kind.span().start, what));
             }
         };
@@ -160,7 +164,8 @@ impl Source<'_> {
                 Some(("p", _)) => ControllerLaw::Continuous { r, s },
                 Some((other, place)) => {
                     let what = format!(
-                        "variable \"{other}\" is not known; write variable = \"q\" for powers of a delay of one sample, or \"p\" for derivatives, highest power first"
+                        "variable \"{}\" is not known; write variable = \"q\" for powers of a delay of one sample, or \"p\" for derivatives, highest power first",
+                        quoted(other)
                     );
                     return Err(self.at(place, what));
                 }

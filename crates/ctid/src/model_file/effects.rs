@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use ct_signals::quoted;
 use plants::{EffectInfo, Fitted, Known, Place, Placed, Plant, Scales, Structure, Term};
 use toml::Spanned;
 
@@ -58,7 +59,7 @@ impl Source<'_> {
                     (key, _) => {
                         return Err(self.at(
                             at,
-                            format!("{key} has to be a finite number, without quotes"),
+                            format!("{} has to be a finite number, without quotes", quoted(key)),
                         ));
                     }
                 }
@@ -119,8 +120,9 @@ impl Source<'_> {
         let names: Vec<&str> = infos.iter().map(|info| info.name).collect();
         let unknown = |name: &str| {
             format!(
-                "{} has no parameter {name}; it has {}{}",
+                "{} has no parameter {}; it has {}{}",
                 effect.id,
+                quoted(name),
                 names.join(", "),
                 names::suggestion(name, names.iter().copied())
             )
@@ -190,7 +192,8 @@ impl Source<'_> {
                 return Err(self.at(
                     name.span().start,
                     format!(
-                        "[start] has {key}, which is not a parameter of this model; it has {}{}",
+                        "[start] has {}, which is not a parameter of this model; it has {}{}",
+                        quoted(key),
                         names.join(", "),
                         names::suggestion(key, names.iter().map(String::as_str))
                     ),
@@ -225,14 +228,16 @@ pub(crate) fn vessel(
     if places == 1 {
         return Err(if effect.place == Place::Vessel {
             format!(
-                "plant {} has one vessel, so where = \"{word}\" has no meaning; leave it out",
-                plant.id()
+                "plant {} has one vessel, so where = \"{}\" has no meaning; leave it out",
+                plant.id(),
+                quoted(word)
             )
         } else {
             format!(
-                "{} acts at the {}, so where = \"{word}\" has no meaning; leave it out",
+                "{} acts at the {}, so where = \"{}\" has no meaning; leave it out",
                 effect.id,
-                effect.place.name()
+                effect.place.name(),
+                quoted(word)
             )
         });
     }
@@ -247,7 +252,8 @@ pub(crate) fn vessel(
                 "pump"
             };
             format!(
-                "where = \"{word}\" is no {kind}; write {}",
+                "where = \"{}\" is no {kind}; write {}",
+                quoted(word),
                 names.join(" or ")
             )
         })

@@ -32,7 +32,7 @@ mod source;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use ct_signals::{Columns, Hold};
+use ct_signals::{Columns, Hold, read_file};
 use plants::{Known, Placed, Plant, Scales, Structure, Term};
 
 use crate::Error;
@@ -41,6 +41,9 @@ pub use controller::{ControllerLaw, ControllerSettings};
 pub(crate) use effects::{any_structure, vessel};
 use raw::Raw;
 use source::Source;
+
+/// The largest model file, and the largest file of a term \[bytes\].
+pub(crate) const LARGEST: usize = 1024 * 1024;
 
 /// What a model file says, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,13 +122,11 @@ pub fn read(path: &Path) -> Result<ModelFile, Error> {
 /// The text of a model file.
 pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     let cannot = |what: String| Error::file(path, what);
-    if path.is_dir() {
-        return Err(cannot("it is a folder; name a file in it".to_string()));
-    }
-    let bytes = std::fs::read(path).map_err(|error| {
-        cannot(format!(
-            "the model file cannot be opened: {error}; check the path and the permissions"
-        ))
+    let bytes = read_file(path, LARGEST as u64).map_err(|error| match error {
+        ct_signals::Error::CannotOpen { source, .. } => cannot(format!(
+            "the model file cannot be opened: {source}; check the path and the permissions"
+        )),
+        error => error.into(),
     })?;
     let text = String::from_utf8(bytes)
         .map_err(|_| cannot("the model file is not UTF-8 text; save it as UTF-8".to_string()))?;
@@ -141,6 +142,15 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
 /// # Errors
 /// As [`read`].
 pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
+    if text.len() > LARGEST {
+        return Err(Error::File {
+            file: file.to_string(),
+            what: format!(
+                "a model file of {} bytes, and {LARGEST} are the most; check that it is the right file",
+                text.len()
+            ),
+        });
+    }
     let source = Source { file, text };
     let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
     let plant = source.plant(raw.plant.as_ref())?;

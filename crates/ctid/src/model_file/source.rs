@@ -1,6 +1,6 @@
 //! The file being read: what is wrong in it is said with its line.
 
-use ct_signals::Columns;
+use ct_signals::{Columns, quoted};
 use plants::{Known, MAX_VESSELS, Plant};
 use toml::Spanned;
 
@@ -25,13 +25,23 @@ impl Source<'_> {
 
     /// What the parser refuses, in one line, with the key that was probably meant.
     pub(super) fn syntax(&self, error: &toml::de::Error) -> Error {
-        let mut what = error.message().trim().replace('\n', "; ");
+        // Words of the file stand between backquotes.
+        let parts = error.message().trim().split('`').enumerate();
+        let parts = parts.map(|(i, part)| {
+            if i % 2 == 1 {
+                quoted(part)
+            } else {
+                part.replace('\n', "; ")
+            }
+        });
+        let mut what = parts.collect::<Vec<_>>().join("`");
         if let Some(rest) = what.strip_prefix("unknown field `") {
             let mut names = rest.split('`').step_by(2);
             let written = names.next().unwrap_or_default();
             let known: Vec<&str> = rest.split('`').skip(2).step_by(2).collect();
             what = format!(
-                "unknown key {written}: one of {} may stand here{}",
+                "unknown key {}: one of {} may stand here{}",
+                quoted(written),
                 known.join(", "),
                 names::suggestion(written, known.iter().copied())
             );
@@ -39,14 +49,16 @@ impl Source<'_> {
             // The only key that takes one of some words without being looked at afterwards.
             let word = rest.split('`').next().unwrap_or_default();
             what = format!(
-                "hold = \"{word}\" is not known; write hold = \"zero\" (the command is held between rows) or hold = \"first\" (a straight line between rows)"
+                "hold = \"{}\" is not known; write hold = \"zero\" (the command is held between rows) or hold = \"first\" (a straight line between rows)",
+                quoted(word)
             );
         } else if let Some(word) = what
             .strip_prefix("invalid type: string ")
             .and_then(|rest| rest.strip_suffix(", expected a sequence"))
         {
             let line = self.line(error);
-            let key = line.split('=').next().unwrap_or_default().trim();
+            let key = quoted(line.split('=').next().unwrap_or_default().trim());
+            let word = quoted(word);
             what = format!("{key} is a list; write {key} = [{word}]");
         } else if let Some(mend) = number_with_more(self.line(error)) {
             what = format!("numbers without a unit and with a decimal point: {mend}");
@@ -84,7 +96,8 @@ impl Source<'_> {
         name.as_ref().parse().map_err(|_| {
             let name_text = name.as_ref();
             let what = format!(
-                "unknown plant \"{name_text}\": take one of {all}{}",
+                "unknown plant \"{}\": take one of {all}{}",
+                quoted(name_text),
                 names::suggestion(name_text, ids())
             );
             self.at(name.span().start, what)
@@ -258,7 +271,7 @@ impl Source<'_> {
         found.map(Some).ok_or_else(|| {
             self.at(
                 at,
-                format!("measured = \"{word}\" is no tank; write {TANKS}"),
+                format!("measured = \"{}\" is no tank; write {TANKS}", quoted(word)),
             )
         })
     }
@@ -296,7 +309,7 @@ fn number_with_more(line: &str) -> Option<String> {
     {
         return None;
     }
-    let key = key.trim();
+    let key = quoted(key.trim());
     // 1,000.0 may be a thousand, or a slip.
     if word.matches([',', '.']).count() > 1 {
         return Some(format!("{key} = 154.0, say"));

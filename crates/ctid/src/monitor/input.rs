@@ -3,16 +3,15 @@
 use std::path::Path;
 
 use ::monitor::{Monitor, Refused, Row, Units, instant};
-use ct_signals::{BadLine, Columns, Line, Rows};
+use ct_signals::{BadLine, Columns, LONGEST_LINE, Line, Rows, quoted};
 
-use super::{
-    Halt, INPUT, Session, blame,
-    lines::{Cut, LONGEST},
-};
+use super::{Halt, INPUT, Session, blame, lines::Cut};
 use crate::{Error, one_line};
 
 /// So many lines at the beginning may be parts of rows.
 const PARTS: usize = 2;
+/// What becomes of a row without a reading.
+const LOST: &str = "the reading is lost, the command of the row is used";
 /// The mend where names are missing: `tail -f` alone begins in the middle of the file.
 const HEADER_FIRST: &str = "begin with the header: tail -n +1 -f FILE";
 
@@ -23,7 +22,7 @@ impl Session<'_> {
             Cut::Line(line) => line,
             Cut::TooLong => {
                 self.bad(|| {
-                    format!("more than {LONGEST} bytes without an end of line; end every row with a line feed")
+                    format!("more than {LONGEST_LINE} bytes without an end of line; end every row with a line feed")
                 });
                 return Ok(());
             }
@@ -31,26 +30,39 @@ impl Session<'_> {
         if self.rows.is_none() && !self.first(line)? {
             return Ok(());
         }
-        let Some(rows) = &mut self.rows else {
-            return Ok(());
-        };
-        match rows.read(line) {
-            Ok(Line::Nothing) => Ok(()),
-            Ok(Line::Row([time, input, output])) => self.row(&Row {
-                time,
-                input,
-                output,
-            }),
-            Err(BadLine::Fields { .. })
-                if self.taken <= 1 && !self.restored && !rows.has_header() =>
-            {
-                // Who listens to a running line hears the end of a row first.
-                self.bad(|| "the row before was not whole".to_string());
-                self.rows = None;
-                self.taken = 0;
-                self.line -= 1;
-                self.line(Cut::Line(line))
+        let mut read = self.read(line);
+        if self.taken <= 1
+            && !self.restored
+            && matches!(read, Err(BadLine::Fields { .. }))
+            && self.rows.as_ref().is_some_and(|rows| !rows.has_header())
+        {
+            // Who listens to a running line hears the end of a row first.
+            self.bad(|| "the row before was not whole".to_string());
+            self.rows = None;
+            self.taken = 0;
+            if !self.first(line)? {
+                return Ok(());
             }
+            read = self.read(line);
+        }
+        match read {
+            Ok(Line::Nothing) => Ok(()),
+            Ok(Line::Row([time, input, output])) => self.row(
+                &Row {
+                    time,
+                    input,
+                    output,
+                },
+                None,
+            ),
+            Ok(Line::NoOutput([time, input], bad)) => self.row(
+                &Row {
+                    time,
+                    input,
+                    output: f64::NAN,
+                },
+                Some(bad),
+            ),
             Err(bad @ (BadLine::Text { .. } | BadLine::Fields { .. })) => {
                 if !self.header_again(line)? {
                     self.bad(|| bad.to_string());
@@ -64,21 +76,34 @@ impl Session<'_> {
         }
     }
 
+    /// A line in the order of the first one.
+    fn read(&mut self, line: &[u8]) -> Result<Line, BadLine> {
+        match &mut self.rows {
+            Some(rows) => rows.read(line),
+            None => Ok(Line::Nothing),
+        }
+    }
+
     /// Whether a line that is no row is a header of another form: what follows is read in its order.
     fn header_again(&mut self, line: &[u8]) -> Result<bool, Error> {
         let (Some(known), Ok(text)) = (&self.rows, std::str::from_utf8(line)) else {
             return Ok(false);
         };
-        let Ok((rows, false)) = Rows::begin(INPUT, self.line, text, &self.columns) else {
-            return Ok(false);
+        let rows = match Rows::begin(INPUT, self.line, text, &self.columns) {
+            Ok((rows, false)) => rows,
+            // The rows behind it are in units that are not those of the model.
+            Err(error) if error.of_units() => return Err(error.into()),
+            _ => return Ok(false),
         };
         // Who does not say a unit does not change it.
         let pairs = known.units().into_iter().zip(rows.units());
         for (before, now) in pairs {
             if !now.is_empty() && !before.is_empty() && now != before {
                 return Err(Error::Usage(format!(
-                    "{INPUT}, row {}: the header comes again with [{now}] where it was [{before}], and the model was learned in that; convert the rows, or begin anew",
-                    self.line
+                    "{INPUT}, row {}: the header comes again with [{}] where it was [{}], and the model was learned in that; convert the rows, or begin anew",
+                    self.line,
+                    quoted(now),
+                    quoted(before)
                 )));
             }
         }
@@ -150,8 +175,13 @@ impl Session<'_> {
         let state = self.monitor.state();
         let saved = state.units();
         if saved != units {
-            let named =
-                |units: &Units| format!("command [{}], reading [{}]", units.input, units.output);
+            let named = |units: &Units| {
+                format!(
+                    "command [{}], reading [{}]",
+                    quoted(&units.input),
+                    quoted(&units.output)
+                )
+            };
             return Err(Error::Usage(format!(
                 "the saved state is in {}, but the rows are in {}; convert the rows, or name another --state",
                 named(saved),
@@ -170,7 +200,8 @@ impl Session<'_> {
         Ok(())
     }
 
-    fn row(&mut self, row: &Row) -> Result<(), Halt> {
+    /// A row; `bad`: why it has no reading, where the line says so.
+    fn row(&mut self, row: &Row, bad: Option<BadLine>) -> Result<(), Halt> {
         if self.restored
             && self.taken == 0
             && let Some(last) = self.monitor.last_time()
@@ -199,7 +230,14 @@ impl Session<'_> {
             ));
         }
         self.taken += 1;
-        self.trouble.good();
+        match (bad, &step.lost) {
+            (None, None) => self.trouble.good(),
+            (Some(bad), _) => self.trouble_in_row(|| format!("{bad}; {LOST}")),
+            (None, Some(lost)) => {
+                let text = self.named(lost);
+                self.trouble_in_row(|| format!("{text}; {LOST}"));
+            }
+        }
         self.last_time = row.time;
         for notice in step.notices.iter().flatten() {
             self.notice(notice)?;
@@ -221,22 +259,34 @@ impl Session<'_> {
         Ok(())
     }
 
+    /// A row that is not used.
     fn bad(&mut self, what: impl FnOnce() -> String) {
+        self.trouble_in_row(|| format!("{}; the row is skipped", what()));
+    }
+
+    fn trouble_in_row(&mut self, what: impl FnOnce() -> String) {
         let line = self.line;
         let message = self
             .trouble
-            .bad(|| format!("{INPUT}, row {line}: {}; the row is skipped", what()));
+            .bad(|| format!("{INPUT}, row {line}: {}", what()));
         if let Some(message) = message {
             self.screen.say(&one_line(&message));
         }
     }
 
     fn refused(&mut self, refused: &Refused) {
-        let column = self.rows.as_ref().map_or(String::new(), |rows| {
-            rows.name(refused.column()).to_string()
-        });
+        let text = self.named(refused);
+        self.bad(|| text);
+    }
+
+    /// What is wrong with a row's value, with its column and the mend.
+    fn named(&self, refused: &Refused) -> String {
+        let column = self
+            .rows
+            .as_ref()
+            .map_or(String::new(), |rows| quoted(rows.name(refused.column())));
         let mend = match refused {
-            Refused::NotFinite { .. } => "check the sensor, or leave the row out",
+            Refused::NotFinite { .. } => "check what writes it",
             Refused::BeyondRange { .. } => {
                 "check what writes it, or correct the range in the model file"
             }
@@ -246,6 +296,6 @@ impl Session<'_> {
             Refused::TooLarge { .. } => "correct it, or give the column in a larger unit",
             _ => "rows have to come in the order of time: check the clock",
         };
-        self.bad(|| format!("column \"{column}\": {refused}; {mend}"));
+        format!("column \"{column}\": {refused}; {mend}")
     }
 }

@@ -1,14 +1,14 @@
-//! Bytes into lines, of bounded length: what has no end is thrown away up to the next line.
+//! Bytes into lines, of bounded length: what has no end is thrown away up to the next line. A line ends as in a file: at a line
+//! feed, a carriage return, or the two together.
 
-/// The longest line that is read \[bytes\].
-pub(super) const LONGEST: usize = 64 * 1024;
+use ct_signals::LONGEST_LINE;
 
 /// A line, or what is left of one that is too long.
 #[derive(Debug, PartialEq)]
 pub(super) enum Cut<'a> {
     /// Without its end.
     Line(&'a [u8]),
-    /// Longer than [`LONGEST`]; said once, when its end has come.
+    /// Longer than [`LONGEST_LINE`]; said once, when its end has come.
     TooLong,
 }
 
@@ -17,6 +17,8 @@ pub(super) enum Cut<'a> {
 pub(super) struct Lines {
     part: Vec<u8>,
     too_long: bool,
+    /// The byte before was a carriage return: a line feed behind it ends nothing more.
+    returned: bool,
 }
 
 impl Lines {
@@ -26,16 +28,21 @@ impl Lines {
         mut bytes: &[u8],
         each: &mut impl FnMut(Cut) -> Result<(), E>,
     ) -> Result<(), E> {
-        while let Some(end) = bytes.iter().position(|byte| *byte == b'\n') {
+        while let Some(end) = bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r')) {
             let (line, rest) = (&bytes[..end], &bytes[end + 1..]);
+            let with_return = std::mem::replace(&mut self.returned, bytes[end] == b'\r');
             bytes = rest;
-            if !self.too_long && self.part.is_empty() && line.len() <= LONGEST {
+            if with_return && !self.returned && line.is_empty() {
+                continue;
+            }
+            if !self.too_long && self.part.is_empty() && line.len() <= LONGEST_LINE {
                 each(Cut::Line(line))?;
                 continue;
             }
             self.keep(line);
             self.end(each)?;
         }
+        self.returned &= bytes.is_empty();
         self.keep(bytes);
         Ok(())
     }
@@ -55,7 +62,7 @@ impl Lines {
     }
 
     fn keep(&mut self, bytes: &[u8]) {
-        if self.too_long || self.part.len() + bytes.len() > LONGEST {
+        if self.too_long || self.part.len() + bytes.len() > LONGEST_LINE {
             self.too_long = true;
             self.part.clear();
         } else {
@@ -88,13 +95,22 @@ mod tests {
     #[test]
     fn lines_may_come_in_pieces() {
         assert_eq!(cut(&[b"a,b\nc", b",d", b"\ne"]), ["a,b", "c,d", "e"]);
-        assert_eq!(cut(&[b"a\r\n\nb\n"]), ["a\r", "", "b"]);
         assert!(cut(&[]).is_empty());
     }
 
     #[test]
+    fn a_line_ends_as_in_a_file() {
+        assert_eq!(cut(&[b"a\r\n\nb\n"]), ["a", "", "b"]);
+        assert_eq!(
+            cut(&[b"a\rb\nc\r", b"\nd\r", b"e"]),
+            ["a", "b", "c", "d", "e"]
+        );
+        assert_eq!(cut(&[b"a\r\rb"]), ["a", "", "b"]);
+    }
+
+    #[test]
     fn a_line_without_an_end_is_not_kept() {
-        let part = vec![b'1'; LONGEST / 2 + 1];
+        let part = vec![b'1'; LONGEST_LINE / 2 + 1];
         assert_eq!(
             cut(&[b"a\n", &part, &part, b"\nb\n"]),
             ["a", "too long", "b"]
@@ -104,6 +120,6 @@ mod tests {
         for _ in 0..100 {
             lines.push(&part, &mut |_| Ok::<(), ()>(())).unwrap();
         }
-        assert!(lines.part.capacity() <= 2 * LONGEST);
+        assert!(lines.part.capacity() <= 2 * LONGEST_LINE);
     }
 }

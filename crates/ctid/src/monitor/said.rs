@@ -3,6 +3,7 @@
 use std::io;
 
 use ::monitor::{Notice, instant};
+use ct_signals::quoted;
 
 use super::{Halt, INPUT, Session};
 use crate::numbers::significant;
@@ -29,8 +30,7 @@ impl Session<'_> {
                 let name = self
                     .rows
                     .as_ref()
-                    .map_or("", |rows| rows.name("time"))
-                    .to_string();
+                    .map_or(String::new(), |rows| quoted(rows.name("time")));
                 let rows = match missing {
                     1 => "1 row is".to_string(),
                     n => format!("{n} rows are"),

@@ -1,4 +1,4 @@
-//! The saved state: written whole or not at all, and nothing else is overwritten.
+//! The saved state: written whole or not at all, and nothing else is overwritten. A checksum of its numbers tells a damaged one.
 
 use std::fs;
 use std::io;
@@ -15,12 +15,14 @@ const LARGEST: u64 = 64 * 1024 * 1024;
 #[derive(Serialize)]
 struct Written<'a> {
     written_by: &'a str,
+    checksum: u32,
     state: &'a State,
 }
 
 #[derive(Deserialize)]
 struct Read {
     written_by: String,
+    checksum: u32,
     state: State,
 }
 
@@ -89,16 +91,29 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
             "it is no state that `ctid monitor` wrote".to_string(),
         ));
     }
+    if read.checksum != checksum(&read.state).map_err(|error| not_ours(error.to_string()))? {
+        return Err(not_ours(
+            "it is damaged: its numbers do not agree with its checksum".to_string(),
+        ));
+    }
     Ok(Some(read.state))
+}
+
+/// CRC-32 of the state as it is written: numbers are read and written again to the last digit.
+fn checksum(state: &State) -> serde_json::Result<u32> {
+    Ok(crc32fast::hash(&serde_json::to_vec(state)?))
 }
 
 /// Saves a state.
 pub(super) fn write(path: &Path, state: &State) -> Result<(), Error> {
-    let written = Written {
-        written_by: WRITTEN_BY,
-        state,
-    };
-    let text = serde_json::to_string(&written)
+    let text = checksum(state)
+        .and_then(|checksum| {
+            serde_json::to_string(&Written {
+                written_by: WRITTEN_BY,
+                checksum,
+                state,
+            })
+        })
         .map_err(|error| Error::file(path, format!("the state cannot be written: {error}")))?;
     atomic::write(path, text.as_bytes())
 }

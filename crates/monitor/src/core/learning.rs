@@ -8,7 +8,8 @@ use crate::{
     bank::Bank,
     intake::Sample,
     isolate::Kept,
-    learn::{Learned, learn, record},
+    learn::{Learned, learn},
+    lost::interpolated,
     scatter::Scatter,
     watch::as_learned,
 };
@@ -53,17 +54,14 @@ impl Core {
             sample,
             levels: [0.0; plants::MAX_VESSELS],
             stands: sample.input,
-            residual: 0.0,
+            modelled: 0.0,
             innovation: 0.0,
         });
         if self.now.kept.len() < next.min(KEPT) {
             return Fed::default();
         }
-        let records = [record(
-            self.now.kept.iter().map(|kept| &kept.sample),
-            self.hold(),
-        )];
-        let notice = match learn(&self.model, &records) {
+        let samples: Vec<Sample> = self.now.kept.iter().map(|kept| kept.sample).collect();
+        let notice = match learn(&self.model, &samples, self.hold()) {
             Err(why) => {
                 // The older half goes: what comes next may say more.
                 self.later(2 * next, span, |kept| {
@@ -72,7 +70,7 @@ impl Core {
                 Some(Notice::NotLearned { why })
             }
             Ok((learned, levels)) => {
-                let span = records[0].duration();
+                let span = sample.time - samples[0].time;
                 let needed = self.settings.learning_time_constants * learned.time_constant;
                 if span < needed {
                     let full = self.now.kept.len() == KEPT;
@@ -142,15 +140,20 @@ impl Core {
     }
 }
 
-/// Means of pairs of rows.
+/// Means of pairs of rows; a pair without any reading has none.
 fn halve(kept: &mut VecDeque<Kept>) {
     let pairs = kept.len() / 2;
+    let readings: Vec<Option<f64>> = kept.iter().map(|kept| kept.sample.output).collect();
+    let filled = interpolated(&readings).unwrap_or_default();
     for i in 0..pairs {
         let (a, b) = (kept[2 * i].sample, kept[2 * i + 1].sample);
         kept[i].sample = Sample {
             time: 0.5 * (a.time + b.time),
             input: 0.5 * (a.input + b.input),
-            output: 0.5 * (a.output + b.output),
+            output: a
+                .output
+                .or(b.output)
+                .map(|_| 0.5 * (filled[2 * i] + filled[2 * i + 1])),
             follows: a.follows,
         };
     }

@@ -8,7 +8,6 @@ use crate::{
     intake::Sample,
     isolate::{Kept, isolate},
     scatter::Moved,
-    watch::Said,
 };
 
 /// After a long gap the levels are not known for so many slowest time constants.
@@ -51,7 +50,9 @@ impl Core {
             .back()
             .map_or(learned.scales.operating_level, |k| k.levels);
         let last = self.model.plant.vessels() - 1;
-        levels[last] = sample.output;
+        if let Some(output) = sample.output {
+            levels[last] = output;
+        }
         self.now.kept.clear();
         self.now.judged = 0;
         self.now.scatter.begin();
@@ -72,7 +73,10 @@ impl Core {
             said: Some(said),
             ..Fed::default()
         };
-        if !said.innovation.is_finite() {
+        if said
+            .innovation
+            .is_some_and(|said| !said.standardised.is_finite())
+        {
             // A level that left all bounds: what was learned is of no use any more.
             let every = self.now.every;
             self.begin(every);
@@ -81,10 +85,14 @@ impl Core {
             });
             return fed;
         }
-        if self.now.settling > 0 {
+        let settling = self.now.settling;
+        if settling > 0 {
             self.now.settling -= 1;
         } else {
             self.now.judged = (self.now.judged + 1).min(self.now.kept.len());
+        }
+        // A row without a reading says nothing.
+        if let (0, Some(innovation)) = (settling, said.innovation) {
             let share = match self.now.phase {
                 Phase::Alarmed(_) => QUIET,
                 _ => 1.0,
@@ -96,7 +104,7 @@ impl Core {
                 share * running.threshold,
                 (said.step, self.now.scatter.growth()),
             );
-            fed.scatter = self.scatter(&said, sample.time);
+            fed.scatter = self.scatter(innovation.standardised, sample.time);
             // A score of the smaller noise says nothing of the larger.
             let passed = passed && fed.scatter.is_none();
             (fed.alarm, fed.notice) = self.judge(passed, sample.time);
@@ -108,14 +116,14 @@ impl Core {
     }
 
     /// Whether the scatter has moved. Where an effect explains an alarm, its residual is no noise.
-    fn scatter(&mut self, said: &Said, time: f64) -> Option<ScatterAlarm> {
+    fn scatter(&mut self, innovation: f64, time: f64) -> Option<ScatterAlarm> {
         let (learned, running) = (self.now.learned.as_ref()?, self.running.as_ref()?);
         if matches!(self.now.phase, Phase::Alarmed(following) if following.explained) {
             self.now.scatter.begin();
             return None;
         }
         let scatter = &mut self.now.scatter;
-        let moved = scatter.update(said.innovation, &learned.scatter, &running.most)?;
+        let moved = scatter.update(innovation, &learned.scatter, &running.most)?;
         if let Some(bank) = &mut self.now.bank
             && matches!(moved, Moved::Grown(_))
         {

@@ -1,0 +1,50 @@
+//! What a file says, as a message may quote it: short, and without what steers a terminal or turns the direction of the text.
+
+use std::borrow::Cow;
+
+/// The most characters that are quoted.
+const LONGEST: usize = 60;
+
+/// A text from a file or a stream as messages quote it: its first 60 characters, escaped as by [`escaped`].
+#[must_use]
+pub fn quoted(text: &str) -> String {
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", escaped(&text[..end])),
+        None => escaped(text).into_owned(),
+    }
+}
+
+/// A text with its control characters, and those that turn the direction of what follows or cannot be seen, as `\u{202e}`.
+#[must_use]
+pub fn escaped(text: &str) -> Cow<'_, str> {
+    if !text.contains(misleading) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if misleading(c) {
+            shown.extend(c.escape_default());
+        } else {
+            shown.push(c);
+        }
+    }
+    Cow::Owned(shown)
+}
+
+fn misleading(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quotation_is_short_and_steers_nothing() {
+        assert_eq!(quoted("y [°C]"), "y [°C]");
+        assert_eq!(quoted("a\u{202e}b\u{1b}[1m\t"), "a\\u{202e}b\\u{1b}[1m\\t");
+        assert_eq!(quoted(&"é".repeat(60)), "é".repeat(60));
+        assert_eq!(quoted(&"é".repeat(3000)), "é".repeat(60) + "...");
+    }
+}

@@ -236,13 +236,12 @@ impl Onset {
             input: record.input.unit.clone(),
         };
         let mut monitor = Monitor::new(model, settings, units).ok()?;
-        let lost = self.lost_rows(&record, seed);
         let mut alarms = Vec::new();
-        for k in 0..record.len() {
+        for (k, lost) in self.lost_rows(&record, seed).into_iter().enumerate() {
             let row = Row {
                 time: record.time[k],
                 input: record.input.values[k],
-                output: if lost[k] {
+                output: if lost {
                     f64::NAN
                 } else {
                     record.output.values[k]

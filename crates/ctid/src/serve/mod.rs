@@ -168,20 +168,16 @@ impl Arguments {
 }
 
 fn read(path: &Path, name: &str, held_out: bool) -> Result<Upload, Error> {
-    let unreadable = |error| {
-        Error::file(
+    let content = ct_signals::read_file(path, LARGEST_BODY as u64).map_err(|error| match error {
+        ct_signals::Error::FileTooLarge { .. } => Error::file(
             path,
-            format!("the record cannot be read: {error}; check the path"),
-        )
-    };
-    if std::fs::metadata(path).map_err(unreadable)?.len() > LARGEST_BODY as u64 {
-        let what = format!(
-            "it is larger than {} MB, the most that the page takes; run `ctid diagnose` on it",
-            LARGEST_BODY >> 20
-        );
-        return Err(Error::file(path, what));
-    }
-    let content = std::fs::read(path).map_err(unreadable)?;
+            format!(
+                "it is larger than {} MB, the most that the page takes; run `ctid diagnose` on it",
+                LARGEST_BODY >> 20
+            ),
+        ),
+        other => other.into(),
+    })?;
     Upload::new(name, held_out, content.into()).map_err(|refusal| Error::Usage(refusal.to_string()))
 }
 

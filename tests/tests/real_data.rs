@@ -100,6 +100,21 @@ fn the_sensor_of_a_heater_lags() {
     }
 }
 
+/// The flow stands still while the command falls by two percent. A pump that saturates and an outlet that changes as the set point steps leave
+/// no less, and do not carry over to the next record of the loop.
+#[test]
+#[cfg_attr(
+    not(measured_records),
+    ignore = "no measured records beside the checkout"
+)]
+fn a_valve_that_sticks_comes_before_events_that_imitate_it() {
+    let case = case("valve_loops/S_2411FIC20102_1002_1627.csv").unwrap();
+    let found = diagnosed(&case.problem).unwrap();
+    assert_eq!(found.effects, ["stiction_backlash"]);
+    let [before, after] = [&found.steps[0], &found.steps[1]].map(|step| step.rmse_test.unwrap());
+    assert!(after < 0.7 * before, "{before} {after}");
+}
+
 /// Loops whose valves their authors call free.
 #[test]
 #[cfg_attr(

@@ -72,8 +72,10 @@ pub fn project<const P: usize, const R: usize, I: Integrator>(
 /// Moves the estimates to the nearest point of the box `lower <= theta <= upper`, entry by entry; infinite bounds are none.
 /// Returns whether anything moved.
 ///
+/// Where `P` is so nearly singular that rounding hides which point is nearest, each entry goes to its nearer bound.
+///
 /// # Errors
-/// [`Error::Bounds`], and [`Error::Rls`] where `P` is not positive definite, which [`ExactHold`](ct_rls::ExactHold) excludes;
+/// [`Error::Bounds`], [`Error::NotFinite`] where a violation leaves the floating-point range, and [`Error::Rls`] where `P` is not positive definite, which [`ExactHold`](ct_rls::ExactHold) excludes;
 /// nothing is changed then.
 pub fn project_box<const P: usize, I: Integrator>(
     rls: &mut ContinuousRls<P, I>,
@@ -90,7 +92,11 @@ pub fn project_box<const P: usize, I: Integrator>(
             high: upper[i],
         }
     });
-    let moved = nearest(rls, &intervals)?;
+    let moved = match nearest(rls, &intervals) {
+        // a box that is not empty has a point
+        Err(Error::NoCommonPoint { .. }) => false,
+        moved => moved?,
+    };
     // rounding may have left an entry a little outside
     let inside = rls
         .theta()
@@ -177,10 +183,11 @@ fn most_violated<const P: usize, const N: usize>(
         if excess <= 0.0 || passed(row) {
             continue;
         }
-        let share = excess / interval.size(sign, entries);
-        if share.is_nan() {
-            return Some((row, sign, share));
+        let size = interval.size(sign, entries);
+        if !(excess.is_finite() && size.is_finite()) {
+            return Some((row, sign, f64::INFINITY));
         }
+        let share = excess / size;
         if share > most {
             most = share;
             found = Some((row, sign, excess));
@@ -334,11 +341,16 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         self.entries = ends + self.spread * (WAY / OBEYED * self.way);
     }
 
+    /// 1 over the row's length in the metric, its terms added up; 1 where it has none.
+    fn unit(&self, row: usize) -> f64 {
+        let scale = self.rows[row].f.abs().dot(&self.spread);
+        if scale > 0.0 { 1.0 / scale } else { 1.0 }
+    }
+
     /// Makes a row active whose bound on one side is exceeded, and lets others go that are in its way. `false` where no point obeys
     /// this row and the active ones.
     fn enter(&mut self, row: usize, sign: f64, excess: f64) -> bool {
-        let scale = self.rows[row].f.abs().dot(&self.spread);
-        let unit = if scale > 0.0 { 1.0 / scale } else { 1.0 };
+        let unit = self.unit(row);
         let mut entering = Active {
             row,
             sign,
@@ -351,8 +363,14 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
             let (h, z, slope) = self.split(&g);
             let r = self.combination(h);
             let shares = || self.active().iter().zip(r.map(f64::abs));
+            // An only row is measured by nothing but itself.
             let independent = self.count < P
-                && libm::sqrt(slope) > DEPENDENT * (1.0 + shares().map(|(_, r)| r).sum::<f64>());
+                && libm::sqrt(slope)
+                    > if self.count == 0 {
+                        0.0
+                    } else {
+                        DEPENDENT * (1.0 + shares().map(|(_, r)| r).sum::<f64>())
+                    };
             if !independent && first {
                 let sizes = shares().map(|(active, r)| r * self.size(active));
                 if excess <= OBEYED * (self.size(&entering) + sizes.sum::<f64>()) {
@@ -366,8 +384,8 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
                 f64::INFINITY
             };
             let leaving = (0..self.count)
-                .filter(|&j| r[j] > 0.0 && !self.rows[self.active[j].row].equality())
-                .map(|j| (self.active[j].lambda / r[j], j))
+                .filter(|&j| r[j] > f64::EPSILON && !self.rows[self.active[j].row].equality())
+                .map(|j| (self.active[j].lambda.max(0.0) / r[j], j))
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             let (t, leaves) = match leaving {
                 Some((t, j)) if t < full => (t, Some(j)),
@@ -410,10 +428,11 @@ fn nearest<const P: usize, const N: usize, I: Integrator>(
     let mut search = Search::new(rows, start, rls.root()?);
     for _ in 0..STEPS * (N + P) {
         let (row, sign, excess) = next;
-        if !excess.is_finite() {
+        let in_units = excess * search.unit(row);
+        if !in_units.is_finite() {
             return Err(Error::NotFinite {
                 what: "the violation",
-                value: excess,
+                value: in_units,
             });
         }
         if !search.enter(row, sign, excess) {

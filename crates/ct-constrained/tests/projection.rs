@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use ct_constrained::{Error, Row, project, project_box};
-use ct_rls::{ContinuousRls, RecursiveEstimator, UdFactor, Weights};
+use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, UdFactor, Weights};
 use nalgebra::{SMatrix, SVector, matrix, vector};
 use proptest::prelude::*;
 
@@ -120,6 +120,41 @@ fn a_box_may_have_a_fixed_entry() {
     let mut rls = estimator(vector![0.0, -3.9], matrix![3.5, 1.34; 1.34, 3.24]);
     let moved = project_box(&mut rls, &vector![0.0, 0.0], &vector![0.0, 2.0]);
     assert_eq!(moved, Ok(true));
+    assert_eq!(*rls.theta(), vector![0.0, 0.0]);
+}
+
+/// The difference of the entries is known to fourteen digits, their sum hardly.
+fn nearly_singular() -> ContinuousRls<2> {
+    let weights = Weights::least_squares(0.0).unwrap();
+    let mut rls = ContinuousRls::new(SVector::zeros(), SMatrix::identity(), weights).unwrap();
+    rls.update(&Sample::new([1e14, -1e14], 0.0), 1.0);
+    rls
+}
+
+#[test]
+fn an_only_row_is_met_however_little_is_left_to_learn_along_it() {
+    let mut rls = nearly_singular();
+    let rows = [Row::equal([1.0, -1.0], 1.0, 0.0).unwrap()];
+    assert_eq!(project(&mut rls, &rows), Ok(true));
+    let theta = rls.theta();
+    assert!((theta[0] - theta[1] - 1.0).abs() < 1e-9, "{theta}");
+}
+
+#[test]
+fn a_box_that_is_not_empty_is_never_refused() {
+    let mut rls = nearly_singular();
+    let (lower, upper) = (vector![1.0, f64::NEG_INFINITY], vector![f64::INFINITY, 0.0]);
+    assert_eq!(project_box(&mut rls, &lower, &upper), Ok(true));
+    let theta = rls.theta();
+    assert!(theta[0] >= 1.0 && theta[1] <= 0.0, "{theta}");
+}
+
+#[test]
+fn a_row_without_length_is_an_error_where_it_is_violated() {
+    let mut rls = estimator(vector![0.0, 0.0], SMatrix::identity());
+    let rows = [Row::at_most([1e-310, 0.0], -1.0, 0.0).unwrap()];
+    let error = project(&mut rls, &rows).unwrap_err();
+    assert!(matches!(error, Error::NotFinite { .. }), "{error}");
     assert_eq!(*rls.theta(), vector![0.0, 0.0]);
 }
 

@@ -58,12 +58,6 @@ pub fn diagnose(
     let (doubted, single) = rayon::join(|| doubt(&base, &found, widen), || grown.singles(metric));
     let doubted = doubted?;
     let mut confirmed = doubted.confirmed;
-    if let Some(position) = confirmed.narrow_stiction().filter(|_| widen) {
-        confirmed = confirm(
-            without(&confirmed, position, &found.noise, FINE)?,
-            &found.noise,
-        )?;
-    }
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;
     if stopped {

@@ -2,6 +2,7 @@
 //! any course of time.
 
 use greybox::{Fit, coloured};
+use rayon::prelude::*;
 
 use crate::{
     Error,
@@ -9,7 +10,7 @@ use crate::{
     find::Found,
     groups::NEARLY,
     jump::{Jump, jump},
-    node::{Node, refine, without_clock},
+    node::{FINE, Node, ROUGH, best_first, fitted, refine, without, without_clock},
     noise_floor::NOISE_ORDER,
     problem::STOPPING,
     random_walk::beyond_random_walk,
@@ -73,11 +74,15 @@ pub(crate) fn doubt<'a>(
             confirmed = others;
         }
     }
-    if in_loop
-        && by_clock(&confirmed)
-        && let Some(simpler) = simpler(&confirmed, found)?
-    {
-        confirmed = simpler;
+    if in_loop {
+        if let Some(position) = confirmed.narrow_stiction() {
+            confirmed = confirm(without(&confirmed, position, noise, FINE)?, noise)?;
+        }
+        if by_clock(&confirmed)
+            && let Some(simpler) = simpler(&confirmed, found)
+        {
+            confirmed = simpler;
+        }
     }
     Ok(Doubted {
         confirmed,
@@ -86,30 +91,44 @@ pub(crate) fn doubt<'a>(
     })
 }
 
-/// The best smaller set without effects that follow time alone which leaves noise, and nearly as little of it; `None` where there is none.
+/// The best smaller set without effects that follow time alone all of which are called for, and which leaves noise, nearly as little of
+/// it; `None` where there is none.
 ///
 /// In a loop the command answers to every disturbance, and the likelihood of a model that runs on the measured command is biased by as
 /// much as a few effects gain. A valve that sticks is then imitated by a pump that saturates and an outlet that changes at the instant of
 /// a slip: chosen instants and limits meet the noise better than what the valve is bound to do.
-fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Result<Option<Node<'a>>, Error> {
-    let smaller = |node: &Node| (1..confirmed.added.len()).contains(&node.added.len());
-    let mut smaller: Vec<Node> = found
-        .sets()
-        .into_iter()
-        .filter(|node| smaller(node) && !by_clock(node))
-        .filter_map(|node| refine(&node, &found.noise, &[]).ok())
-        .filter(|node| {
-            node.fit.cost < NEARLY * confirmed.fit.cost
-                && node.plausible()
-                && node.narrow_stiction().is_none()
-        })
-        .collect();
-    smaller.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
-    for node in smaller {
-        let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?;
-        if remains(&node, &own)?.is_none() {
-            return Ok(Some(node));
-        }
+fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Option<Node<'a>> {
+    if confirmed
+        .setup
+        .leaves_out("smaller sets in the place of the confirmed one")
+    {
+        return None;
     }
-    Ok(None)
+    let noise = &found.noise;
+    let nearly = |node: &Node| node.fit.cost < NEARLY * confirmed.fit.cost;
+    let called_for = |node: &Node| {
+        node.gain_over(&found.base) > BIC_MARGIN
+            && beyond_chance(node, &found.base)
+            && confirm(node.clone(), noise).is_ok_and(|kept| kept.added.len() == node.added.len())
+    };
+    let leaves_noise = |node: &Node| {
+        let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING);
+        own.is_ok_and(|own| remains(node, &own).is_ok_and(|left| left.is_none()))
+    };
+    let sizes = 1..confirmed.added.len();
+    let smaller: Vec<Node> = found
+        .sets()
+        .into_par_iter()
+        .filter(|node| sizes.contains(&node.added.len()) && !by_clock(node))
+        .filter_map(|node| fitted(&node, noise, ROUGH, &[]).ok())
+        .filter(|node| nearly(node))
+        .filter_map(|node| refine(&node, noise, &[]).ok())
+        .collect();
+    best_first(smaller).into_iter().find(|node| {
+        nearly(node)
+            && node.plausible()
+            && node.narrow_stiction().is_none()
+            && called_for(node)
+            && leaves_noise(node)
+    })
 }

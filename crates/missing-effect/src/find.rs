@@ -141,7 +141,7 @@ pub(crate) fn find<'a>(
             &noise,
             breadth,
             pays,
-            // It was exhausted in this colour, which is that of its own residual.
+            // It was exhausted in this colour, which is that of its own residual, and its pairs were looked at there.
             |node| {
                 if grown.exhausted_by(node) {
                     Ok(Rest::White)

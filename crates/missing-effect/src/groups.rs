@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::{
     Error, PlaceScore,
-    exchange::exchanges,
-    node::{Node, best_first, refine},
+    exchange::{NEAR, exchanges},
+    node::{Node, ROUGH, best_first, fitted, refine},
     step::place_name,
 };
 
@@ -52,17 +52,37 @@ pub(crate) fn groups<'a>(
                 .collect();
             // In the white metric a coloured residual counts each sample for less than one.
             let behind = |node: &Node| (node.fit.bic() - last.fit.bic()) / per_sample;
-            let mut nodes = exchanges(last, position, metric, singles)?;
-            let near = |set: &&Node| {
-                let other = stand_in(set, last, position);
-                other.is_some_and(|other| {
-                    let found = nodes.iter().filter(|node| node.added.contains(&other));
-                    found.map(behind).fold(f64::INFINITY, f64::min) >= GROUP_MARGIN
-                })
+            // A size at its edge speaks against a stand-in, but where the final model has it too.
+            let possible = |node: &Node| {
+                let at_the_edge = |placed: &Placed| {
+                    node.at_the_edge(*placed)
+                        && !(last.added.contains(placed) && last.at_the_edge(*placed))
+                };
+                !node.added.iter().any(at_the_edge)
+                    && !(in_loop && node.narrow_stiction().is_some())
             };
-            let more = searched.par_iter().filter(near);
-            let more: Vec<Node> = more
-                .filter_map(|set| refine(set, metric, &[]).ok())
+            let mut nodes = exchanges(last, position, metric, singles)?;
+            let missed = |set: &&Node| {
+                let found = |other: Placed| {
+                    let mut same = nodes.iter().filter(|node| node.added.contains(&other));
+                    same.any(|node| behind(node) < GROUP_MARGIN && possible(node))
+                };
+                stand_in(set, last, position).is_some_and(|other| !found(other))
+            };
+            // Those of an only effect are all begun again.
+            let known = if last.added.len() == 1 && singles.is_some() || last.setup.out_of_time() {
+                &[]
+            } else {
+                searched
+            };
+            let more: Vec<Node> = known
+                .par_iter()
+                .filter(missed)
+                .filter_map(|set| {
+                    let rough = fitted(set, metric, ROUGH, &[]).ok()?;
+                    (rough.fit.bic() - last.fit.bic() < NEAR)
+                        .then(|| refine(&rough, metric, &[]).ok())?
+                })
                 .collect();
             nodes.extend(more);
             for node in best_first(nodes) {
@@ -83,12 +103,7 @@ pub(crate) fn groups<'a>(
                     });
                     continue;
                 }
-                // A size at its edge speaks against a stand-in, but where the final model has it too.
-                let plausible = node.added.iter().all(|placed| {
-                    !node.at_the_edge(*placed)
-                        || last.added.contains(placed) && last.at_the_edge(*placed)
-                });
-                if in_loop && node.narrow_stiction().is_some() {
+                if !possible(&node) {
                     continue;
                 }
                 // An effect at an instant or with a course that the fit has chosen follows any disturbance: what hangs on the
@@ -96,10 +111,7 @@ pub(crate) fn groups<'a>(
                 let nearly = own.effect.by_clock
                     && node.added.iter().all(|placed| !placed.effect.by_clock)
                     && node.fit.cost < NEARLY * last.fit.cost;
-                if plausible
-                    && (behind(&node) < GROUP_MARGIN || nearly)
-                    && !group.iter().any(|g| g == id)
-                {
+                if (behind(&node) < GROUP_MARGIN || nearly) && !group.iter().any(|g| g == id) {
                     group.push(id.to_string());
                 }
             }

@@ -209,6 +209,7 @@ pub(crate) fn grow<'a>(
             *kept <= 4 * breadth.beam
         });
         if nodes.is_empty() {
+            grown.exhausted = may_end;
             break;
         }
         // A pair is looked at even where no single effect pays; after two sizes that do not pay there is no more.

@@ -215,8 +215,8 @@ impl Plant {
             let mut valve = alpha(name, meaning, scales.area[vessel]);
             if let Some(orifice) = scales.orifice {
                 valve.unit = Unit::ONE;
-                valve.lower /= orifice;
                 valve.upper = (valve.upper / orifice).min(MOST_OF_AN_ORIFICE);
+                valve.lower = (valve.lower / orifice).min(valve.upper);
             }
             valve
         };

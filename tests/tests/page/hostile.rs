@@ -146,13 +146,13 @@ fn a_file_of_200_megabytes_is_refused_early() {
 fn unfortunate_files_are_refused_with_the_mend() {
     let tab = Tab::open(&serve(&[]));
     let send = |name: &str, bytes: &[u8]| tab.post(&format!("/api/record?name={name}"), bytes);
-    let names: Vec<String> = (0..10_000).map(|k| format!("column {k}")).collect();
-    let row = vec!["1"; 10_000].join(",");
+    let names: Vec<String> = (0..2_000).map(|k| format!("column {k}")).collect();
+    let row = vec!["1"; 2_000].join(",");
     let wide = names.join(",") + "\n" + &format!("{row}\n").repeat(20);
     let answer = send("wide.csv", wide.as_bytes());
     assert_eq!(answer.status, 422);
     assert!(
-        answer.error().contains("10000 columns") && answer.error().contains("at most 500"),
+        answer.error().contains("2000 columns") && answer.error().contains("at most 500"),
         "{answer:?}"
     );
     let line = [b"t".as_slice(), &vec![b','; 2 << 20], b"a\n1\n"].concat();

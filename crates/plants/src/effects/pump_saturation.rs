@@ -18,7 +18,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.input();
-    // Over all of the range, and on what was visited most.
+    // Over all of the range, on what was visited most, and near the top.
     let mut starts = spread(low, high, 4);
     starts.extend([0.3, 0.7, 0.9, 0.97].map(|share| site.input_quantile(share)));
     vec![ParameterInfo {

@@ -37,6 +37,29 @@ fn back_and_forth(k: usize, every: usize) -> [f64; 2] {
 }
 
 #[test]
+fn a_flow_coefficient_of_a_known_orifice_is_at_most_two() {
+    let structure = rig(1, true);
+    let coefficients = |structure: &Structure| {
+        let all = structure.plant.parameters(&structure.scales).into_iter();
+        all.filter(|parameter| parameter.name.starts_with("az"))
+            .map(|parameter| (parameter.lower, parameter.upper))
+            .collect::<Vec<_>>()
+    };
+    for (lower, upper) in coefficients(&structure) {
+        assert!(0.0 < lower && lower < upper && upper == 2.0);
+    }
+    // Of an orifice that is not known they have a unit.
+    let mut scales = Scales::from_ranges((0.0, 10.0), (5.0, 50.0), 1.0, 1000.0);
+    scales.input_2 = Some((0.0, 10.0));
+    let known = Known {
+        measured: Some(1),
+        ..Known::default()
+    };
+    let unknown = Structure::new(Plant::ThreeTank, known, scales);
+    assert!(coefficients(&unknown).iter().all(|(_, upper)| *upper > 2.0));
+}
+
+#[test]
 fn water_is_neither_made_nor_lost() {
     let mut theta = THETA;
     // The outlet shut: all that is pumped stays.

@@ -8,11 +8,11 @@ use plants::Placed;
 use crate::{
     Acceptance, ControlLoop, Diagnosis, Effort, Error, GROUP_MARGIN, NoiseFloor, Options, Problem,
     Progress, Rankings, Score, Shown, Step, Verdict,
-    confirm::{BIC_MARGIN, confirm},
+    confirm::BIC_MARGIN,
     doubt::doubt,
     find::{Found, find, shortened},
     judge::{Course, Grade, Judge, PART, WHOLE},
-    node::{FINE, Node, without},
+    node::Node,
     partial::largest_part,
     problem::base,
     remains::remains,

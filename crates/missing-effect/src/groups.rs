@@ -54,12 +54,12 @@ pub(crate) fn groups<'a>(
             let behind = |node: &Node| (node.fit.bic() - last.fit.bic()) / per_sample;
             // A size at its edge speaks against a stand-in, but where the final model has it too.
             let possible = |node: &Node| {
+                let narrow = in_loop && node.narrow_stiction().is_some();
                 let at_the_edge = |placed: &Placed| {
                     node.at_the_edge(*placed)
                         && !(last.added.contains(placed) && last.at_the_edge(*placed))
                 };
-                !node.added.iter().any(at_the_edge)
-                    && !(in_loop && node.narrow_stiction().is_some())
+                !(narrow || node.added.iter().any(at_the_edge))
             };
             let mut nodes = exchanges(last, position, metric, singles)?;
             let missed = |set: &&Node| {

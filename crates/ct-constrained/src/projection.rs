@@ -364,13 +364,12 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
             let r = self.combination(h);
             let shares = || self.active().iter().zip(r.map(f64::abs));
             // An only row is measured by nothing but itself.
-            let independent = self.count < P
-                && libm::sqrt(slope)
-                    > if self.count == 0 {
-                        0.0
-                    } else {
-                        DEPENDENT * (1.0 + shares().map(|(_, r)| r).sum::<f64>())
-                    };
+            let least = if self.count == 0 {
+                0.0
+            } else {
+                DEPENDENT * (1.0 + shares().map(|(_, r)| r).sum::<f64>())
+            };
+            let independent = self.count < P && libm::sqrt(slope) > least;
             if !independent && first {
                 let sizes = shares().map(|(active, r)| r * self.size(active));
                 if excess <= OBEYED * (self.size(&entering) + sizes.sum::<f64>()) {

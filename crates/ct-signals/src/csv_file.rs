@@ -295,18 +295,28 @@ fn resolve(
     columns.resolve(file, row, &headers)
 }
 
-/// Numbers alone are no header, and nor are columns without number.
-fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error> {
-    if record.len() > MOST_COLUMNS {
+/// A header names so many columns at most.
+pub(crate) fn check_width(file: &str, row: u64, found: usize) -> Result<(), Error> {
+    if found > MOST_COLUMNS {
         return Err(Error::ManyColumns {
             file: file.into(),
             row,
-            found: record.len(),
+            found,
             most: MOST_COLUMNS,
         });
     }
-    let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
-    if record.iter().all(|cell| cell.is_empty() || is_number(cell)) {
+    Ok(())
+}
+
+/// A cell that names no column: a number, with a decimal comma too, or nothing.
+pub(crate) fn is_number(cell: &str) -> bool {
+    cell.is_empty() || cell.replace(',', ".").parse::<f64>().is_ok()
+}
+
+/// Numbers alone are no header, and neither are too many columns.
+fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error> {
+    check_width(file, row, record.len())?;
+    if record.iter().all(is_number) {
         return Err(Error::NoHeader {
             file: file.into(),
             row,

@@ -8,7 +8,8 @@
 use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
 use crate::columns::Layout;
-use crate::{Columns, Error, MOST_COLUMNS, quoted, unit};
+use crate::csv_file::{check_width, delimiter, is_number};
+use crate::{Columns, Error, quoted, unit};
 
 /// The names of the columns in use, and which they are in a row without a header.
 const ROLES: [&str; 3] = ["time", "input", "output"];
@@ -105,9 +106,8 @@ impl Rows {
         columns: &Columns,
     ) -> Result<(Self, bool), Error> {
         let line = text(line);
-        let delimiter = crate::csv_file::delimiter(line);
+        let delimiter = delimiter(line);
         let cells = cells(line, delimiter);
-        let number = |cell: &str| cell.is_empty() || cell.replace(',', ".").parse::<f64>().is_ok();
         let mut rows = Self {
             delimiter,
             header: None,
@@ -119,7 +119,7 @@ impl Rows {
             mark: None,
             scratch: String::new(),
         };
-        if cells.iter().all(|cell| number(cell)) {
+        if cells.iter().all(|cell| is_number(cell)) {
             rows.at = match cells.len() {
                 3 => [0, 1, 2],
                 4 => [0, 2, 3],
@@ -144,14 +144,7 @@ impl Rows {
             rows.seconds = columns.time_header().1;
             return Ok((rows, true));
         }
-        if cells.len() > MOST_COLUMNS {
-            return Err(Error::ManyColumns {
-                file: file.into(),
-                row,
-                found: cells.len(),
-                most: MOST_COLUMNS,
-            });
-        }
+        check_width(file, row, cells.len())?;
         let Layout {
             time,
             seconds,

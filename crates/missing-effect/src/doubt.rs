@@ -120,7 +120,7 @@ fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Option<Node<'a>> {
         .sets()
         .into_par_iter()
         .filter(|node| sizes.contains(&node.added.len()) && !by_clock(node))
-        .filter_map(|node| fitted(&node, noise, ROUGH, &[]).ok())
+        .filter_map(|node| fitted(node, noise, ROUGH, &[]).ok())
         .filter(|node| nearly(node))
         .filter_map(|node| refine(&node, noise, &[]).ok())
         .collect();

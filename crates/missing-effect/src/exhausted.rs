@@ -14,8 +14,8 @@ pub(crate) enum Rest {
     Structure,
     /// What looks like coloured noise; a noise model may have taken up an effect.
     Coloured,
-    /// White noise.
-    White,
+    /// Noise that hides no effect: it is white, or was searched before.
+    Noise,
 }
 
 /// What a set leaves: noise, where in the metric of that noise no effect more promises what it would cost.
@@ -44,6 +44,6 @@ pub(crate) fn rest(node: &Node) -> Result<Rest, Error> {
     } else if noise.order() > 0 {
         Rest::Coloured
     } else {
-        Rest::White
+        Rest::Noise
     })
 }

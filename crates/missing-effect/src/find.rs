@@ -47,13 +47,9 @@ pub(crate) struct Found<'a> {
 
 impl<'a> Found<'a> {
     /// All sets that were grown, in either weighting.
-    pub fn sets(&self) -> Vec<Node<'a>> {
+    pub fn sets(&self) -> Vec<&Node<'a>> {
         let grown = std::iter::once(&self.grown).chain(&self.prewhitened);
-        grown
-            .flat_map(|grown| &grown.sizes)
-            .flatten()
-            .cloned()
-            .collect()
+        grown.flat_map(|grown| &grown.sizes).flatten().collect()
     }
 }
 
@@ -144,7 +140,7 @@ pub(crate) fn find<'a>(
             // It was exhausted in this colour, which is that of its own residual, and its pairs were looked at there.
             |node| {
                 if grown.exhausted_by(node) {
-                    Ok(Rest::White)
+                    Ok(Rest::Noise)
                 } else {
                     rest(node)
                 }

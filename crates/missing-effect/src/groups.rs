@@ -34,7 +34,7 @@ pub(crate) fn groups<'a>(
     metric: &ArModel,
     per_sample: f64,
     singles: Option<&[Node<'a>]>,
-    searched: &[Node<'a>],
+    searched: &[&Node<'a>],
     in_loop: bool,
 ) -> Result<Vec<Group>, Error> {
     (0..last.added.len())
@@ -62,14 +62,14 @@ pub(crate) fn groups<'a>(
                 !(narrow || node.added.iter().any(at_the_edge))
             };
             let mut nodes = exchanges(last, position, metric, singles)?;
-            let missed = |set: &&Node| {
+            let missed = |set: &&&Node| {
                 let found = |other: Placed| {
                     let mut same = nodes.iter().filter(|node| node.added.contains(&other));
                     same.any(|node| behind(node) < GROUP_MARGIN && possible(node))
                 };
                 stand_in(set, last, position).is_some_and(|other| !found(other))
             };
-            // Those of an only effect are all begun again.
+            // The exchanges of an only effect are all candidates there are.
             let known = if last.added.len() == 1 && singles.is_some() || last.setup.out_of_time() {
                 &[]
             } else {

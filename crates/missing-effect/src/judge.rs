@@ -55,7 +55,7 @@ pub(crate) struct Judge<'s, 'a> {
     /// The single effects, in the metric in which they were refitted last.
     pub singles: &'s [Node<'a>],
     /// The sets that the search has fitted.
-    pub searched: &'s [Node<'a>],
+    pub searched: &'s [&'s Node<'a>],
 }
 
 /// What was found of a set.

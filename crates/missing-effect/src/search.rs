@@ -167,7 +167,7 @@ pub(crate) fn grow<'a>(
         if !best_before.added.is_empty() && idle == 0 {
             let rest = rest(best_before)?;
             may_end = (rest != Rest::Structure).then(|| best_before.added.clone());
-            if may_end.is_some() && (size > PAIR || rest == Rest::White) {
+            if may_end.is_some() && (size > PAIR || rest == Rest::Noise) {
                 grown.exhausted = may_end;
                 break;
             }
@@ -208,19 +208,13 @@ pub(crate) fn grow<'a>(
             *kept += 1;
             *kept <= 4 * breadth.beam
         });
-        if nodes.is_empty() {
+        let pays = !nodes.is_empty() && worth(best_before, &nodes);
+        if nodes.is_empty() || !pays && may_end.is_some() {
             grown.exhausted = may_end;
             break;
         }
         // A pair is looked at even where no single effect pays; after two sizes that do not pay there is no more.
-        idle = if worth(best_before, &nodes) {
-            0
-        } else if may_end.is_some() {
-            grown.exhausted = may_end;
-            break;
-        } else {
-            idle + 1
-        };
+        idle = if pays { 0 } else { idle + 1 };
         sizes.push(nodes);
         grown.paid = idle == 0;
         if idle == 2 {

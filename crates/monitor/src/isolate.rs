@@ -118,7 +118,7 @@ impl Suspect {
 }
 
 /// Every effect that may have begun, best first: an implausible size comes after every plausible one. The noise is `growth` times as large as
-/// it was learned. Residuals of lost readings are taken on straight lines between those beside them, which holds for any effect.
+/// it was learned. Residuals of lost readings are taken on straight lines between those beside them, for each effect alike; they count as readings.
 pub(crate) fn isolate(
     structure: &Structure,
     learned: &Learned,

@@ -19,7 +19,7 @@ const STILL: f64 = 1e-9;
 /// Fewest rows with a reading, as a part of all.
 const READ: f64 = 0.5;
 
-/// Fits in turn with what is expected of lost readings: each leaves of the error of the one before about the share of readings that are lost.
+/// Fits in turn with what is expected of lost readings: each leaves of the error of the one before the share of the information that is lost.
 const ROUNDS: usize = 2;
 
 /// More of either was never learned: a state that says so would be computed for ever.
@@ -169,7 +169,8 @@ pub(crate) const BEGIN: &str = "stiction_backlash.begin";
 /// The fit, and the levels at the first row; in words why there is none.
 ///
 /// Where readings are lost, what is expected of them under the fitted model and its noise stands in for them, and the fit is repeated
-/// (the EM algorithm; A. P. Dempster, N. M. Laird, D. B. Rubin, J. Royal Statistical Society B 39, 1977).
+/// (after the EM algorithm, A. P. Dempster, N. M. Laird, D. B. Rubin, J. Royal Statistical Society B 39, 1977, without the covariance of what is
+/// missing: the more readings are lost, the more coloured the noise looks).
 pub(crate) fn learn(
     model: &Model,
     samples: &[Sample],

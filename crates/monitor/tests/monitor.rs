@@ -106,6 +106,20 @@ fn notices(steps: &[Step]) -> Vec<&Notice> {
         .collect()
 }
 
+/// The first and the last alarm of a leak that begins at 4000 s, which was seen, named and dated.
+fn first_and_last<'a>(alarms: &[&'a Alarm]) -> (&'a Alarm, &'a Alarm) {
+    let first = alarms.first().unwrap();
+    // A time constant is 100 s.
+    assert!((4000.0..4200.0).contains(&first.time), "{first:?}");
+    let last = alarms
+        .iter()
+        .find(|alarm| alarm.event == Stage::Final)
+        .unwrap();
+    assert!(last.effects.iter().any(|e| e == "const_leak"), "{last:?}");
+    assert!((last.since.unwrap() - 4000.0).abs() < 60.0, "{last:?}");
+    (first, last)
+}
+
 #[test]
 fn a_leak_is_seen_named_and_dated() {
     let tank = Tank {
@@ -114,17 +128,9 @@ fn a_leak_is_seen_named_and_dated() {
     };
     let steps = all(&mut new(), &tank.run());
     let alarms = alarms(&steps);
-    let first = alarms.first().unwrap();
-    // A time constant is 100 s.
-    assert!((4000.0..4200.0).contains(&first.time), "{first:?}");
+    let (first, last) = first_and_last(&alarms);
     assert_eq!(first.event, Stage::Alarm);
     assert!(first.score > first.threshold);
-    let last = alarms
-        .iter()
-        .find(|alarm| alarm.event == Stage::Final)
-        .unwrap();
-    assert!(last.effects.iter().any(|e| e == "const_leak"), "{last:?}");
-    assert!((last.since.unwrap() - 4000.0).abs() < 60.0, "{last:?}");
     assert!(last.evidence.unwrap() > first.evidence.unwrap());
     assert!(last.sentence.contains(" since t = ") && last.sentence.contains(" against "));
     // The group is what cannot be told apart: a member is within six of the best.
@@ -490,14 +496,7 @@ fn what_begins_is_seen_and_named_where_readings_are_lost() {
     };
     let steps = all(&mut new(), &without_steps(&tank.run(), 2));
     let alarms = alarms(&steps);
-    let first = alarms.first().unwrap();
-    assert!((4000.0..4200.0).contains(&first.time), "{first:?}");
-    let last = alarms
-        .iter()
-        .find(|alarm| alarm.event == Stage::Final)
-        .unwrap();
-    assert!(last.effects.iter().any(|e| e == "const_leak"), "{last:?}");
-    assert!((last.since.unwrap() - 4000.0).abs() < 60.0, "{last:?}");
+    first_and_last(&alarms);
 }
 
 /// A plant that moves slowly is watched in means of several rows: one lost reading does not lose the others.

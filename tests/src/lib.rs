@@ -1,6 +1,7 @@
 //! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
 
 pub mod draw;
+pub mod fuzz;
 pub mod measured;
 pub mod onset;
 pub mod outside;

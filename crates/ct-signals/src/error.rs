@@ -1,7 +1,7 @@
 //! What can be wrong with a record or a setting: each message names the place, the numbers that
 //! disagree and the mend, in one line.
 
-use crate::ColumnFault;
+use crate::{ColumnFault, shown};
 
 /// Everything this crate can refuse.
 ///
@@ -215,7 +215,8 @@ pub enum Error {
     },
     /// Two rows in a row have the same time.
     #[error(
-        "{file}, row {row}, column \"{column}\": the time {time} is repeated from the row before; remove one of the two rows, or write the time with more digits"
+        "{file}, row {row}, column \"{column}\": the time {time} is repeated from the row before; remove one of the two rows, or write the time with more digits",
+        time = shown(*.time)
     )]
     RepeatedTime {
         /// The path as it was given.
@@ -229,7 +230,9 @@ pub enum Error {
     },
     /// The time runs backward.
     #[error(
-        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; sort the rows by time, or split the file there: each part is a record of its own"
+        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; sort the rows by time, or split the file there: each part is a record of its own",
+        time = shown(*.time),
+        previous = shown(*.previous)
     )]
     BackwardTime {
         /// The path as it was given.
@@ -246,7 +249,10 @@ pub enum Error {
     /// Samples are missing.
     #[error(
         "{file}, row {row}, column \"{column}\": {missing} missing before this row (the time steps from {previous} to {time}, elsewhere by {interval}); split the file there: each part is a record of its own",
-        missing = samples(*.missing)
+        missing = samples(*.missing),
+        time = shown(*.time),
+        previous = shown(*.previous),
+        interval = shown(*.interval)
     )]
     Gap {
         /// The path as it was given.
@@ -266,7 +272,8 @@ pub enum Error {
     },
     /// The input never moves.
     #[error(
-        "{file}, column \"{column}\": the input is {value} in all {rows} rows, so nothing can be learnt about the process; record an experiment in which it moves, or name another column with input = \"...\" under [columns]"
+        "{file}, column \"{column}\": the input is {value} in all {rows} rows, so nothing can be learnt about the process; record an experiment in which it moves, or name another column with input = \"...\" under [columns]",
+        value = shown(*.value)
     )]
     ConstantInput {
         /// The path as it was given.
@@ -280,7 +287,8 @@ pub enum Error {
     },
     /// The output never moves.
     #[error(
-        "{file}, column \"{column}\": the output is {value} in all {rows} rows; check the sensor, or name another column with output = \"...\" under [columns]"
+        "{file}, column \"{column}\": the output is {value} in all {rows} rows; check the sensor, or name another column with output = \"...\" under [columns]",
+        value = shown(*.value)
     )]
     ConstantOutput {
         /// The path as it was given.
@@ -381,7 +389,9 @@ pub enum Error {
         found: usize,
     },
     /// A value in a record or a series is NaN or infinite.
-    #[error("{record}: {signal}[{index}] is {value}; every value has to be finite")]
+    #[error("{record}: {signal}[{index}] is {value}; every value has to be finite",
+        value = shown(*.value)
+    )]
     ValueNotFinite {
         /// The record's name, or the function that refuses.
         record: String,
@@ -394,7 +404,9 @@ pub enum Error {
     },
     /// The times of a record do not increase.
     #[error(
-        "{record}: time[{index}] = {time} s does not follow time[{index} - 1] = {previous} s; times have to increase"
+        "{record}: time[{index}] = {time} s does not follow time[{index} - 1] = {previous} s; times have to increase",
+        time = shown(*.time),
+        previous = shown(*.previous)
     )]
     TimeNotIncreasing {
         /// The record's name.

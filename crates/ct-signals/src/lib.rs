@@ -79,6 +79,6 @@ pub use columns::{Columns, Heading};
 pub use csv_file::{csv_header, parse_csv, parse_csv_any_input, read_csv, read_csv_any_input};
 pub use error::Error;
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
-pub use quote::{escaped, quoted};
+pub use quote::{escaped, quoted, shown};
 pub use record::{Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, Signal};
 pub use stream::{BadLine, Line, Rows};

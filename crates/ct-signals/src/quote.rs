@@ -14,6 +14,16 @@ pub fn quoted(text: &str) -> String {
     }
 }
 
+/// A number as messages show it: as it was written, or with a power of ten where its digits would fill a line.
+#[must_use]
+pub fn shown(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// A text with its control characters, and those that turn the direction of what follows or cannot be seen, as `\u{202e}`.
 #[must_use]
 pub fn escaped(text: &str) -> Cow<'_, str> {
@@ -39,6 +49,22 @@ fn misleading(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_is_short() {
+        for (value, said) in [
+            (0.1, "0.1"),
+            (-154.0, "-154"),
+            (0.0, "0"),
+            (1e-6, "0.000001"),
+            (1e15, "1e15"),
+            (-1e308, "-1e308"),
+            (5e-324, "5e-324"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(shown(value), said);
+        }
+    }
 
     #[test]
     fn a_quotation_is_short_and_steers_nothing() {

@@ -1,6 +1,8 @@
 //! What a diagnosis says of its parts, for the terminal, the report and the page alike.
 
-use missing_effect::{Acceptance, Diagnosis, GROUP_MARGIN, HeldOutError, PlaceScore, Score};
+use missing_effect::{
+    Acceptance, Diagnosis, Effort, GROUP_MARGIN, HeldOutError, PlaceScore, Score,
+};
 
 use crate::effort::{EffortLevel, limit_text};
 use crate::numbers;
@@ -221,9 +223,20 @@ pub(crate) enum Reader {
     Page,
 }
 
+/// What the limit on the time, or the user, has left out.
+pub(crate) fn left_out(effort: &Effort) -> Option<String> {
+    if effort.left_out.is_empty() {
+        return None;
+    }
+    let why = match effort.limit.filter(|_| !effort.interrupted) {
+        Some(limit) => format!("Left out by the time limit of {}", limit_text(limit)),
+        None => "Left out".to_string(),
+    };
+    Some(format!("{why}: {}.", effort.left_out.join("; ")))
+}
+
 /// What the limit on the time, or the user, has left out, and how to get more.
-pub(crate) fn effort(diagnosis: &Diagnosis, reader: Reader) -> Vec<String> {
-    let effort = &diagnosis.effort;
+pub(crate) fn effort(effort: &Effort, reader: Reader) -> Vec<String> {
     let mut said = Vec::new();
     if effort.interrupted {
         said.push(
@@ -231,13 +244,7 @@ pub(crate) fn effort(diagnosis: &Diagnosis, reader: Reader) -> Vec<String> {
                 .to_string(),
         );
     }
-    if !effort.left_out.is_empty() {
-        let why = match effort.limit.filter(|_| !effort.interrupted) {
-            Some(limit) => format!("Left out by the time limit of {}", limit_text(limit)),
-            None => "Left out".to_string(),
-        };
-        said.push(format!("{why}: {}.", effort.left_out.join("; ")));
-    }
+    said.extend(left_out(effort));
     if effort.interrupted || effort.left_out.is_empty() {
         return said;
     }
@@ -356,7 +363,7 @@ mod tests {
     #[test]
     fn what_was_left_out_is_said_with_how_to_get_more() {
         let mut diagnosis = sample::two_tanks();
-        assert!(effort(&diagnosis, Reader::Commands).is_empty());
+        assert!(effort(&diagnosis.effort, Reader::Commands).is_empty());
         diagnosis.effort = Effort {
             limit: Some(20.0),
             left_out: vec![
@@ -366,18 +373,18 @@ mod tests {
             interrupted: false,
         };
         assert_eq!(
-            effort(&diagnosis, Reader::Commands),
+            effort(&diagnosis.effort, Reader::Commands),
             [
                 "Left out by the time limit of 20 s: pairs of effects; refits from random starts.",
                 "For a longer search: `--effort thorough` (limit 10 min)."
             ]
         );
         diagnosis.effort.limit = Some(600.0);
-        let said = effort(&diagnosis, Reader::Page);
+        let said = effort(&diagnosis.effort, Reader::Page);
         assert!(said[1].contains("fewer rows"), "{said:?}");
         diagnosis.effort.interrupted = true;
         assert_eq!(
-            effort(&diagnosis, Reader::Page),
+            effort(&diagnosis.effort, Reader::Page),
             [
                 "The search was interrupted: this is the best result that was found until then.",
                 "Left out: pairs of effects; refits from random starts."

@@ -75,7 +75,8 @@ const MANY: usize = 20;
 const LINEARISED: usize = 12;
 
 /// Of many starts of an effect at the actuator keeps those whose simulations fit best, once the gain of the pump and, to first order,
-/// the other parameters but time constants are fitted to each; they begin with that gain. Few starts stay as they are.
+/// the other parameters but time constants are fitted to each; they begin with that gain. Few starts stay as they are. Those that the
+/// time limit of the setup leaves no time for count as the worst.
 pub fn keep_best_simulated(
     setup: &Setup,
     placed: Placed,
@@ -107,7 +108,8 @@ pub fn keep_best_simulated(
 
 /// A start with the other parameters fitted to it in one step, by those of the free ones that are named, where that is a better one.
 fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &ArModel) -> Vec<f64> {
-    let Some(triangle) = setup.linearise(&start, noise) else {
+    let triangle = (!over(setup)).then(|| setup.linearise(&start, noise));
+    let Some(triangle) = triangle.flatten() else {
         return start;
     };
     let scale: Vec<f64> = (0..setup.free().len())
@@ -123,6 +125,11 @@ fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &ArModel) ->
     } else {
         moved
     }
+}
+
+/// Nothing more is to be computed.
+fn over(setup: &Setup) -> bool {
+    setup.stopped() || setup.leaves_out("further starts of effects at the actuator")
 }
 
 /// Where the effect's own parameters stand in the vector, and those of time constants, which are not fitted at a start.
@@ -179,8 +186,11 @@ fn scores_of_simulations(
     }
     // The effect's own columns take no part; those of time constants only where the model fits best without the effect, since elsewhere
     // they are not near what they will be.
-    let squares =
-        |x: &Vec<f64>| whitened(setup, x, noise).map_or(f64::INFINITY, |left| dot(&left, &left));
+    let simulated = |x: &Vec<f64>| {
+        let left = (!over(setup)).then(|| whitened(setup, x, noise));
+        left.flatten()
+    };
+    let squares = |x: &Vec<f64>| simulated(x).map_or(f64::INFINITY, |left| dot(&left, &left));
     let best = models
         .par_iter()
         .map(|x| (squares(x), x))
@@ -191,6 +201,9 @@ fn scores_of_simulations(
     let models: Vec<WithoutEffect> = models
         .into_par_iter()
         .filter_map(|x| {
+            if over(setup) {
+                return None;
+            }
             let apart = if Some(&x) == best.as_ref() {
                 &own
             } else {
@@ -202,7 +215,7 @@ fn scores_of_simulations(
     let scores = starts.par_iter().map(|start| {
         let without = without(start);
         let model = models.iter().find(|model| model.x == without)?;
-        let simulated = model.with(whitened(setup, start, noise)?);
+        let simulated = model.with(simulated(start)?);
         Some(simulated).filter(|simulated| simulated.left.is_finite())
     });
     let none = Simulated {

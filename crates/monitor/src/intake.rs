@@ -27,6 +27,10 @@ const BACK: usize = 100;
 const BRIDGED: f64 = 5.0;
 /// Values beyond this cannot be raised to the powers that a fit takes.
 const LARGEST: f64 = 1e15;
+/// Rows that a monitor counts; at a million rows a second it comes to so many after 285 years.
+const MOST_ROWS: u64 = 1 << 53;
+/// Rows in a block.
+pub(crate) const LONGEST_BLOCK: usize = 1 << 24;
 
 /// A row, or the mean of a block of rows, as it is watched.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -123,10 +127,14 @@ impl Intake {
 
     /// The numbers that a file may have spoilt.
     pub(crate) fn sound(&self) -> bool {
-        self.every > 0
+        (1..=LONGEST_BLOCK).contains(&self.every)
+            && self.rows <= MOST_ROWS
             && self.steps.len() <= STEPS
+            && self.back.is_none_or(|(_, count)| count < BACK)
+            && self.other < OTHER
             && self.filled < self.every
             && self.readings <= self.filled
+            && self.without as u64 <= self.rows
     }
 
     /// Begins a new block, after `every` has changed.

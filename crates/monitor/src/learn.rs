@@ -8,6 +8,7 @@ use plants::{Known, Placed, Plant, Scales, Structure, Term};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    core::KEPT,
     intake::Sample,
     lost::{expect, interpolated},
     scatter::Limit,
@@ -133,6 +134,7 @@ impl Learned {
         self.theta.len() == parameters
             && self.covariance.len() == parameters * parameters
             && finite.iter().all(|v| v.is_finite() && *v > 0.0)
+            && self.rows <= KEPT
             && self.substeps <= MOST_SUBSTEPS
             && self.coefficients.len() <= MOST_COEFFICIENTS
             && self.noise().is_some()

@@ -217,7 +217,7 @@ impl Controller {
                 gain,
                 integral_time,
             } => format!("gain = {gain}, integral_time = {integral_time} s"),
-            Kind::Sampled { r, s, .. } => format!("r = {r:?}, s = {s:?} (sampled)"),
+            Kind::Sampled { r, s, .. } => format!("r = {}, s = {} (sampled)", list(r), list(s)),
         }
     }
 
@@ -279,6 +279,22 @@ impl Controller {
             d: self.direct(),
         }
     }
+}
+
+/// Polynomials of a model file are short; of a long one the first coefficients stand for all.
+const MOST_SHOWN: usize = 4;
+
+/// Coefficients to five digits.
+fn list(coefficients: &[f64]) -> String {
+    let digits = |value: &f64| {
+        let rounded = format!("{value:.4e}").parse().unwrap_or(*value);
+        format!("{rounded:?}")
+    };
+    let mut shown: Vec<String> = coefficients.iter().take(MOST_SHOWN).map(digits).collect();
+    if coefficients.len() > MOST_SHOWN {
+        shown.push(format!("... ({} in all)", coefficients.len()));
+    }
+    format!("[{}]", shown.join(", "))
 }
 
 fn times(a: &[f64], b: &[f64], n: usize) -> Vec<f64> {

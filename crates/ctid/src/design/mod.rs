@@ -11,6 +11,7 @@ use missing_effect::design::{Candidacy, Design, Limits};
 use plants::{EffectInfo, Placed, Plant};
 use serde::Serialize;
 
+use crate::effort::EffortLevel;
 use crate::input::Files;
 use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
@@ -41,6 +42,9 @@ pub struct Arguments {
     /// What sequences are drawn from
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
+    /// Limit on the time of the search; the result says what it left out
+    #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
+    effort: EffortLevel,
     /// Where the experiment goes as CSV, if one is worth playing; without it next.csv, or next-2.csv where that is there
     #[arg(long, value_name = "F.csv")]
     out: Option<PathBuf>,
@@ -200,12 +204,16 @@ impl Arguments {
         let columns = model.columns.clone();
         let problem = files.read_with(model)?;
         let mut outputs = self.outputs(&files.all())?;
-        let bar = Bar::new();
+        let options = Options {
+            time_limit: Some(self.effort.limit()),
+            ..Options::default()
+        };
+        let bar = Bar::with_limit(options.time_limit);
         let design = missing_effect::design::design(
             &problem,
             [first, second],
             &self.limits(),
-            &Options::default(),
+            &options,
             &|progress| bar.show(progress),
         );
         bar.clear();

@@ -2,6 +2,7 @@
 
 use missing_effect::design::{Candidate, Design, Power, Rival};
 
+use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 
@@ -142,7 +143,8 @@ fn power(power: &Power, refitted: bool) -> String {
 
 fn findings(design: &Design, look: Look) -> String {
     let mut text = format!("{}\n", look.heading("The next experiment"));
-    for sentence in &design.sentences {
+    let effort = findings::effort(&design.effort, Reader::Commands);
+    for sentence in design.sentences.iter().chain(&effort) {
         text += &look.paragraph("  ", sentence);
     }
     text

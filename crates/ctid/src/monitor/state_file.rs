@@ -5,6 +5,7 @@ use std::io;
 use std::path::Path;
 
 use ::monitor::State;
+use ct_signals::quoted;
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, atomic, output};
@@ -80,10 +81,12 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
         .map_err(|error| not_ours(format!("it cannot be read: {error}")))?;
     let read: Read = serde_json::from_str(&text).map_err(|error| {
         let head = serde_json::from_str::<Head>(&text);
+        // It may quote what the file holds.
+        let why = quoted(&error.to_string());
         not_ours(if head.is_ok_and(|head| head.written_by == WRITTEN_BY) {
-            format!("another version of `ctid monitor` wrote it, or it is damaged ({error})")
+            format!("another version of `ctid monitor` wrote it, or it is damaged ({why})")
         } else {
-            format!("it is no state that `ctid monitor` wrote ({error})")
+            format!("it is no state that `ctid monitor` wrote ({why})")
         })
     })?;
     if read.written_by != WRITTEN_BY {

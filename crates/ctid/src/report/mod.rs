@@ -67,7 +67,7 @@ pub fn html(diagnosis: &Diagnosis) -> String {
 
 /// The verdict, the fall of the error in large numbers, and what was looked at.
 fn headline(diagnosis: &Diagnosis) -> String {
-    let effort = findings::effort(diagnosis, Reader::Commands);
+    let effort = findings::effort(&diagnosis.effort, Reader::Commands);
     let sentences: String = diagnosis
         .sentences
         .iter()

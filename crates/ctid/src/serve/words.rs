@@ -30,7 +30,7 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
         noise: String,
         seconds: f64,
     }
-    let effort = findings::effort(diagnosis, Reader::Page);
+    let effort = findings::effort(&diagnosis.effort, Reader::Page);
     let sentences = diagnosis.sentences.iter().chain(&effort);
     let body = Body {
         id,
@@ -120,7 +120,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "acceptance": acceptance,
         "rankings": rankings,
         "held_out_error": diagnosis.steps.last().and_then(|step| held_out_error(diagnosis, step)),
-        "effort": findings::effort(diagnosis, Reader::Page),
+        "effort": findings::effort(&diagnosis.effort, Reader::Page),
         "ranking": ranked.collect::<Vec<_>>(),
         // What the shape depends on, where nothing explains it.
         "unknown": diagnosis.unknown.as_ref().map(|unknown| unknown.variable),
@@ -227,7 +227,7 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
             Some(place) => format!("{} ({place})", rival.effect),
             None => rival.effect.clone(),
         }),
-        "sentences": design.sentences,
+        "sentences": design.sentences.iter().cloned().chain(findings::left_out(&design.effort)).collect::<Vec<_>>(),
         "rows": candidates.chain(&design.again).map(row).collect::<Vec<_>>(),
         "twins": design.twins(),
         "limits": format!(

@@ -406,7 +406,7 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
     for sentence in &diagnosis.sentences {
         text += &look.paragraph("  ", sentence);
     }
-    for sentence in findings::effort(diagnosis, Reader::Commands) {
+    for sentence in findings::effort(&diagnosis.effort, Reader::Commands) {
         text += &look.paragraph("  ", &sentence);
     }
     text

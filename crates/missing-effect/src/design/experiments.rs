@@ -4,9 +4,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ct_signals::Record;
 use greybox::Triangle;
+use rand::{SeedableRng, seq::SliceRandom};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::{
+    CONFIRMED, INSTEAD,
     limits::{Bounds, Refused},
     plan::{Candidate, Reach, SecondSensor, Wider},
     play::{Loop, Played, play},
@@ -14,13 +17,15 @@ use super::{
     separation::{Metric, imagined, information, linear, misfit_before, refitted},
     sequences::{Sequence, sequences},
 };
-use crate::{Error, Problem, Progress, node::Node};
+use crate::{Error, Problem, Progress, diagnose::allow, node::Node};
 
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 6;
 const MOST_REFITS: usize = 30;
 /// More power than this is of no use: it decides even where the effect is half as large as the records make it.
 const PLENTY: f64 = 200.0;
+/// So many sequences are tried whatever the time limit.
+const FEWEST: usize = 2;
 /// A sequence that drives a controller to a limit is played so that it crosses its range in so many time constants.
 const SLOWER: [f64; 2] = [1.0, 4.0];
 /// Excursions that differ by less than this are one.
@@ -75,6 +80,12 @@ impl Search<'_, '_> {
     /// By how much each is ahead of the other.
     pub fn ahead_of_each(&self) -> [f64; 2] {
         [self.ahead(), -self.ahead()]
+    }
+
+    /// Whether a part has to be left out for want of time, or because the user gave up.
+    pub fn leaves_out(&self, part: &str) -> bool {
+        let setup = &self.nodes[0].setup;
+        setup.stopped() || setup.leaves_out(part)
     }
 
     fn before(&self) -> Result<Before, Error> {
@@ -185,7 +196,7 @@ impl Search<'_, '_> {
         Some((first, sequence))
     }
 
-    /// The same, the other refitted.
+    /// The same, the other refitted; as it was where the time did not suffice, for what a refit misses would count as power.
     pub fn confirmed(
         &self,
         (candidate, sequence): &Tried,
@@ -203,8 +214,12 @@ impl Search<'_, '_> {
             )
             .ok()
         };
+        let if_true = [of(0)?, of(1)?];
+        if self.leaves_out("refits that confirm experiments") {
+            return Some(candidate.clone());
+        }
         Some(Candidate {
-            power: power([of(0)?, of(1)?], self.ahead_of_each()),
+            power: power(if_true, self.ahead_of_each()),
             refitted: true,
             ..candidate.clone()
         })
@@ -224,20 +239,31 @@ impl Search<'_, '_> {
         seed: u64,
         before: &Before,
     ) -> Result<(Vec<Tried>, [usize; 2]), Error> {
-        let all = sequences(bounds, self.time_constant, seed)?;
-        let (total, done) = (all.len(), AtomicUsize::new(0));
-        let mut tried: Vec<Tried> = all
+        let mut all: Vec<(usize, Sequence)> = sequences(bounds, self.time_constant, seed)?
+            .into_iter()
+            .enumerate()
+            .collect();
+        // Of each kind some, where the time does not suffice for all.
+        all.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+        let (total, begun, done) = (all.len(), AtomicUsize::new(0), AtomicUsize::new(0));
+        let mut tried: Vec<(usize, Tried)> = all
             .into_par_iter()
-            .filter_map(|sequence| {
+            .filter_map(|(place, sequence)| {
+                let first = begun.fetch_add(1, Ordering::Relaxed) < FEWEST;
+                if !first && self.leaves_out("some of the experiments") {
+                    return None;
+                }
                 let tried = self.off_the_limits(sequence, bounds, before);
                 (self.progress)(Progress {
                     phase: "trying experiments",
                     done: done.fetch_add(1, Ordering::Relaxed) + 1,
                     total,
                 });
-                tried
+                Some((place, tried?))
             })
             .collect();
+        tried.sort_by_key(|(place, _)| *place);
+        let mut tried: Vec<Tried> = tried.into_iter().map(|(_, tried)| tried).collect();
         let finite = tried.len();
         tried.retain(|(candidate, _)| !self.overfills(candidate));
         let overfull = finite - tried.len();
@@ -255,7 +281,10 @@ impl Search<'_, '_> {
     /// Refits in rounds until a refit leads, so that no promise is above what a refit has shown.
     fn refit(&self, tried: &mut Vec<Tried>, bounds: &Bounds, before: &Before) {
         let mut done = 0;
-        while done < MOST_REFITS && tried.first().is_some_and(|(first, _)| !first.refitted) {
+        while done < MOST_REFITS
+            && tried.first().is_some_and(|(first, _)| !first.refitted)
+            && !self.leaves_out("refits that confirm experiments")
+        {
             let wanted: Vec<usize> = (0..tried.len())
                 .filter(|&i| !tried[i].0.refitted)
                 .take(ROUND)
@@ -286,7 +315,9 @@ impl Search<'_, '_> {
     pub fn run(&self, bounds: &Bounds, seed: u64) -> Result<Found, Error> {
         let before = self.before()?;
         let (mut tried, [overfull, limited]) = self.promises(bounds, seed, &before)?;
+        allow(&self.nodes[0], CONFIRMED);
         self.refit(&mut tried, bounds, &before);
+        allow(&self.nodes[0], INSTEAD);
         if self.nodes[0].setup.stopped() {
             return Err(greybox::Error::Stopped.into());
         }
@@ -298,15 +329,18 @@ impl Search<'_, '_> {
             }
             .into());
         };
-        let again = self.again(bounds, &before);
+        let instead = || !self.leaves_out("what could be done instead");
+        let again = instead().then(|| self.again(bounds, &before)).flatten();
         // More than plenty needs no wider range.
-        let wider = if best.power.power < PLENTY {
+        let wider = if best.power.power < PLENTY && instead() {
             self.wider(bounds, seed, &before)?
         } else {
             None
         };
-        let times_as_long = self.times_as_long(&(best.clone(), sequence.clone()), bounds, &before);
-        let second_sensor = self.second_sensor(&sequence, bounds, &before);
+        let longer = || self.times_as_long(&(best.clone(), sequence.clone()), bounds, &before);
+        let times_as_long = instead().then(longer).flatten();
+        let sensor = || self.second_sensor(&sequence, bounds, &before);
+        let second_sensor = instead().then(sensor).flatten();
         Ok(Found {
             candidates: tried.into_iter().map(|(candidate, _)| candidate).collect(),
             overfull,

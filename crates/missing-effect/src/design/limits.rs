@@ -1,6 +1,6 @@
 //! What the user allows an experiment to do, checked against the record and the plant.
 
-use ct_signals::{MIN_ROWS, ROWS_PER_PARAMETER, Record};
+use ct_signals::{MIN_ROWS, ROWS_PER_PARAMETER, Record, shown};
 use serde::Serialize;
 
 use crate::{Problem, numbers::significant};
@@ -59,7 +59,11 @@ pub enum Refused {
         second: String,
     },
     /// The range's ends are exchanged, equal or no numbers.
-    #[error("--range {low} {high}: the smaller value comes first, and they have to differ")]
+    #[error(
+        "--range {} {}: the smaller value comes first, and they have to differ",
+        shown(*low),
+        shown(*high)
+    )]
     Range {
         /// First end.
         low: f64,
@@ -79,7 +83,13 @@ pub enum Refused {
         most: f64,
     },
     /// The range leaves what the plant can do.
-    #[error("--range {low} {high} leaves {from} .. {to}, {what}; stay within it")]
+    #[error(
+        "--range {} {} leaves {} .. {}, {what}; stay within it",
+        shown(*low),
+        shown(*high),
+        shown(*from),
+        shown(*to)
+    )]
     Beyond {
         /// First end.
         low: f64,
@@ -94,7 +104,8 @@ pub enum Refused {
     },
     /// What is played never moved, and nobody says how far it may.
     #[error(
-        "the records hold one {what} of {value} alone, which says nothing of where it may go; give --range"
+        "the records hold one {what} of {} alone, which says nothing of where it may go; give --range",
+        shown(*value)
     )]
     NoRange {
         /// The command, or the reference.
@@ -103,7 +114,12 @@ pub enum Refused {
         value: f64,
     },
     /// Too few samples.
-    #[error("--duration {duration} s holds {samples} samples at one every {interval} s, and {needed} are needed to fit the parameters; give at least {} s", at_least(*needed as f64 * interval))]
+    #[error(
+        "--duration {} s holds {samples} samples at one every {} s, and {needed} are needed to fit the parameters; give at least {} s",
+        shown(*duration),
+        shown(*interval),
+        at_least(*needed as f64 * interval)
+    )]
     Duration {
         /// The length \[s\].
         duration: f64,
@@ -116,7 +132,9 @@ pub enum Refused {
     },
     /// So many samples that nobody meant it.
     #[error(
-        "--duration {duration} s holds {samples} samples at one every {interval} s, and {most} are the most that are searched; give a shorter one"
+        "--duration {} s holds {samples} samples at one every {} s, and {most} are the most that are searched; give a shorter one",
+        shown(*duration),
+        shown(*interval)
     )]
     TooLong {
         /// The length \[s\].
@@ -129,7 +147,7 @@ pub enum Refused {
         interval: f64,
     },
     /// Too slow to get anywhere.
-    #[error("--slew {slew} a second moves by {} in {duration} s, less than the {} of the range; give at least {}", significant(*moves, 3), significant(*span, 3), at_least(span / duration))]
+    #[error("--slew {} a second moves by {} in {} s, less than the {} of the range; give at least {}", shown(*slew), significant(*moves, 3), shown(*duration), significant(*span, 3), at_least(span / duration))]
     Slew {
         /// Largest change in a second.
         slew: f64,
@@ -142,7 +160,10 @@ pub enum Refused {
     },
     /// Everything that was tried would overfill a tank.
     #[error(
-        "every experiment between {low} and {high} would lead above the tank_height of {height}; give a --range that stays lower"
+        "every experiment between {} and {} would lead above the tank_height of {}; give a --range that stays lower",
+        shown(*low),
+        shown(*high),
+        shown(*height)
     )]
     Overfull {
         /// Lower end.

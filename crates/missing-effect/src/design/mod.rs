@@ -29,7 +29,7 @@ pub use sequences::Kind;
 use crate::{
     Error, Options, Problem, Progress,
     control_loop::slowest_time_constant,
-    diagnose::FITTED,
+    diagnose::{allow, effort},
     groups::GROUP_MARGIN,
     node::{FINE, Node, refine},
     noise_floor::colour,
@@ -57,6 +57,15 @@ impl Candidacy {
         self.effect.id == other.effect.id && (same_place || self.vessel == other.vessel)
     }
 }
+
+/// Shares of the time limit until which both effects are fitted, ...
+const BOTH: f64 = 0.25;
+/// ... experiments are tried, ...
+const TRIED: f64 = 0.5;
+/// ... the best of them are confirmed, ...
+pub(crate) const CONFIRMED: f64 = 0.7;
+/// ... and what could be done instead is looked at.
+pub(crate) const INSTEAD: f64 = 0.8;
 
 /// Both rivals on the records, and the metric in which they are compared.
 struct Fitted<'a> {
@@ -101,6 +110,7 @@ pub fn design(
         total: 1,
     });
     let fitted = fitted(problem, between, options)?;
+    allow(&fitted.base, TRIED);
     let in_loop = !fitted.base.setup.replays().is_empty();
     let parameters = fitted.nodes.iter().map(|node| node.setup.free().len());
     let bounds = Bounds::new(problem, limits, in_loop, parameters.max().unwrap_or(0))?;
@@ -145,6 +155,7 @@ pub fn design(
         noise_floor: fitted.metric.noise.stationary_std() / fitted.metric.noise.sigma()
             * fitted.metric.variance.sqrt(),
         sentences: Vec::new(),
+        effort: effort(&fitted.base, options),
         plant: problem.plant.id().to_string(),
         output_unit: problem.records[0].output.unit.clone(),
         seconds: 0.0,
@@ -167,7 +178,7 @@ fn fitted<'a>(
     between: [Candidacy; 2],
     options: &Options<'a>,
 ) -> Result<Fitted<'a>, Error> {
-    let (base, _) = base(problem, options, FITTED)?;
+    let (base, _) = base(problem, options, BOTH)?;
     for Candidacy { effect, vessel } in between {
         let vessel = vessel.unwrap_or_else(|| effect.usual_site(problem.plant));
         base.setup.structure.with(Placed { effect, vessel })?;

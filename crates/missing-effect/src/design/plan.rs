@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{limits::Bounds, sequences::Kind};
-use crate::Parameter;
+use crate::{Effort, Parameter};
 
 /// One of the two effects that are to be told apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -162,6 +162,8 @@ pub struct Design {
     pub noise_floor: f64,
     /// The findings in words.
     pub sentences: Vec<String>,
+    /// What the time limit left out.
+    pub effort: Effort,
     /// The plant, as the model file names it.
     pub plant: String,
     /// Unit of the output.

@@ -6,7 +6,7 @@ use super::{Core, Fed, KEPT, Phase};
 use crate::{
     Gathered, Notice,
     bank::Bank,
-    intake::Sample,
+    intake::{LONGEST_BLOCK, Sample},
     isolate::Kept,
     learn::{Learned, learn},
     lost::interpolated,
@@ -78,7 +78,7 @@ impl Core {
                     // A little more, for the estimate of the time constant moves.
                     self.later((1.02 * rows).ceil() as usize, Some(needed), halve);
                     if full {
-                        self.now.every *= 2;
+                        self.now.every = (2 * self.now.every).min(LONGEST_BLOCK);
                         self.set_checkpoint();
                     }
                     None

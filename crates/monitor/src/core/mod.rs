@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     Alarm, Estimate, Model, Notice, ScatterAlarm, Settings, Units,
     bank::Bank,
-    intake::{Follows, Sample},
+    intake::{Follows, LONGEST_BLOCK, Sample},
     isolate::Kept,
     learn::Learned,
     scatter::{Most, Scatter},
@@ -146,7 +146,8 @@ impl Core {
         let learning = matches!(checkpoint.phase, Phase::Learning { .. });
         if checkpoint.kept.len() > KEPT
             || checkpoint.judged > checkpoint.kept.len()
-            || checkpoint.every == 0
+            || !(1..=LONGEST_BLOCK).contains(&checkpoint.every)
+            || matches!(checkpoint.phase, Phase::Learning { next, .. } if next > KEPT)
             || since.len() > KEPT + STRETCH
         {
             return Err("it holds more rows than a monitor keeps".into());

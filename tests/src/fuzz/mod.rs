@@ -1,0 +1,214 @@
+//! The program on inputs drawn at random: well formed ones with everything that a file may hold, and the same damaged.
+//!
+//! Each case is one run of the program as a process of its own, or one request to its page, and is drawn from its kind and
+//! number alone. [`run`] says what it must not do.
+//!
+//! | what | where |
+//! |---|---|
+//! | numbers, names and damage | `source` |
+//! | records | `records` |
+//! | model files | `models` |
+//! | rows for the monitor, and its saved states | `streams`, `states` |
+//! | requests to the page | `requests` |
+//! | the process and what it must keep | `process` |
+
+mod models;
+mod process;
+mod records;
+mod requests;
+mod source;
+mod states;
+mod streams;
+
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
+
+pub use process::as_program;
+use source::Source;
+
+/// What is drawn at random.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A record, for `compare`, `diagnose`, `identify` and `design`.
+    Record,
+    /// A model file, for the same commands, and to be edited.
+    Model,
+    /// Rows that come to `monitor`.
+    Stream,
+    /// A saved state of `monitor`.
+    State,
+    /// Requests to the page.
+    Request,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 5] = [
+        Self::Record,
+        Self::Model,
+        Self::Stream,
+        Self::State,
+        Self::Request,
+    ];
+}
+
+impl Display for Kind {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Record => "record",
+            Self::Model => "model",
+            Self::Stream => "stream",
+            Self::State => "state",
+            Self::Request => "request",
+        })
+    }
+}
+
+impl FromStr for Kind {
+    type Err = String;
+    fn from_str(word: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|kind| kind.to_string() == word);
+        found.ok_or_else(|| format!("no such kind: {word}"))
+    }
+}
+
+/// What happened in the cases of a kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// The kind.
+    pub kind: Kind,
+    /// Cases that were run.
+    pub cases: u64,
+    /// Those that ended with a result, or were answered with one; the others were refused.
+    pub accepted: u64,
+    /// The longest processor time of a case \[s\].
+    pub longest: f64,
+    /// The largest memory of a process \[MB\].
+    pub largest: f64,
+    /// What was said in the cases that were refused, with the case's number.
+    pub refusals: Vec<(u64, String)>,
+    /// What must not happen and did, with the case's number.
+    pub faults: Vec<(u64, String)>,
+}
+
+/// How a case went.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ended {
+    pub accepted: bool,
+    /// Processor time \[s\].
+    pub seconds: f64,
+    /// Largest memory \[MB\].
+    pub megabytes: f64,
+    /// What was said where it was refused.
+    pub refusal: String,
+    pub fault: Option<String>,
+}
+
+impl Ended {
+    /// Of a case that has no process of its own.
+    fn without_process(accepted: bool, refusal: String, fault: Option<String>) -> Self {
+        Self {
+            accepted,
+            seconds: 0.0,
+            megabytes: 0.0,
+            refusal,
+            fault,
+        }
+    }
+}
+
+/// Runs the cases `first..first + cases` of a kind on all cores, and calls `progress` with how many are done.
+///
+/// A fault is: a panic, an abort, a signal, an exit code other than 0 and 2, above 20 s of processor time, above 500 MB of memory,
+/// a result with NaN, an error that is not one line, is longer than 300 characters or has control or direction characters in it,
+/// an input that is changed or an output that is there after a refusal; of the page also a status of 500 and above, and another
+/// request that is not answered within 2 s.
+///
+/// The executable calls [`as_program`] first.
+pub fn run(kind: Kind, first: u64, cases: u64, progress: impl Fn(u64) + Sync) -> Report {
+    let (next, done, stop) = (
+        AtomicU64::new(first),
+        AtomicU64::new(0),
+        AtomicBool::new(false),
+    );
+    let end = first + cases;
+    let workers = thread::available_parallelism().map_or(1, usize::from);
+    let mut all: Vec<(u64, Ended)> = thread::scope(|scope| {
+        scope.spawn(|| {
+            while !stop.load(Ordering::Relaxed) {
+                progress(done.load(Ordering::Relaxed));
+                thread::sleep(Duration::from_millis(100));
+            }
+        });
+        let work = || {
+            let mut worker = Worker::new(kind);
+            let mut ended = Vec::new();
+            loop {
+                let number = next.fetch_add(1, Ordering::Relaxed);
+                if number >= end {
+                    break ended;
+                }
+                ended.push((number, worker.case(number)));
+                done.fetch_add(1, Ordering::Relaxed);
+            }
+        };
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        let joined = threads
+            .into_iter()
+            .flat_map(|thread| thread.join().unwrap_or_default())
+            .collect();
+        stop.store(true, Ordering::Relaxed);
+        joined
+    });
+    all.sort_by_key(|(number, _)| *number);
+    Report {
+        kind,
+        cases: all.len() as u64,
+        accepted: all.iter().filter(|(_, case)| case.accepted).count() as u64,
+        longest: all.iter().map(|(_, case)| case.seconds).fold(0.0, f64::max),
+        largest: all
+            .iter()
+            .map(|(_, case)| case.megabytes)
+            .fold(0.0, f64::max),
+        refusals: all
+            .iter()
+            .filter(|(_, case)| !case.accepted)
+            .map(|(number, case)| (*number, case.refusal.clone()))
+            .collect(),
+        faults: all
+            .into_iter()
+            .filter_map(|(number, case)| Some((number, case.fault?)))
+            .collect(),
+    }
+}
+
+/// What a thread keeps from case to case.
+enum Worker {
+    /// Nothing: each case has a process and a folder of its own.
+    Files(fn(&mut Source) -> Ended),
+    /// The page.
+    Page(requests::Page),
+}
+
+impl Worker {
+    fn new(kind: Kind) -> Self {
+        match kind {
+            Kind::Record => Self::Files(records::case),
+            Kind::Model => Self::Files(models::case),
+            Kind::Stream => Self::Files(streams::case),
+            Kind::State => Self::Files(states::case),
+            Kind::Request => Self::Page(requests::Page::default()),
+        }
+    }
+
+    fn case(&mut self, number: u64) -> Ended {
+        let mut source = Source::new(number);
+        match self {
+            Self::Files(case) => case(&mut source),
+            Self::Page(page) => page.case(&mut source),
+        }
+    }
+}

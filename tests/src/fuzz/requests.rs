@@ -1,0 +1,427 @@
+//! Requests to the page.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, ChildStderr, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use super::process::{Folder, message, waited};
+use super::source::Source;
+use super::{Ended, models, records};
+
+/// Within this another request is answered, whatever was sent before.
+const AT_ONCE: Duration = Duration::from_secs(2);
+/// An answer that has not come by then does not come.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Requests that one page gets.
+const REQUESTS: usize = 500;
+/// Memory of the page at most \[MB\]; it keeps up to eight tabs.
+const MOST_MEGABYTES: f64 = 500.0;
+
+/// A page that runs, and the requests that it has got.
+#[derive(Default)]
+pub(super) struct Page {
+    running: Option<Running>,
+}
+
+struct Running {
+    child: Child,
+    folder: Folder,
+    address: String,
+    secret: String,
+    session: String,
+    err: Option<ChildStderr>,
+    sent: usize,
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        if let Some(mut running) = self.running.take() {
+            let _ = running.child.kill();
+            let _ = running.child.wait();
+        }
+    }
+}
+
+impl Running {
+    fn begin() -> Result<Self, String> {
+        let folder = Folder::new();
+        folder.write("model.toml", "plant = \"single-tank\"\n");
+        let mut command = folder.command(["serve", "--port", "0", "--model", "model.toml"]);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().map_err(|error| error.to_string())?;
+        let mut line = String::new();
+        if let Some(out) = child.stdout.take() {
+            BufReader::new(out)
+                .read_line(&mut line)
+                .map_err(|error| error.to_string())?;
+        }
+        let mut parts = line.split("http://").nth(1).unwrap_or_default().split('/');
+        let (address, secret) = (
+            parts.next().unwrap_or_default(),
+            parts.next().unwrap_or_default(),
+        );
+        let mut running = Self {
+            err: child.stderr.take(),
+            child,
+            folder,
+            address: address.to_string(),
+            secret: secret.to_string(),
+            session: String::new(),
+            sent: 0,
+        };
+        running.open()?;
+        let path = format!("/api/record?session={}&name=data.csv", running.session);
+        let record = models::record(&mut Source::new(0));
+        let answer =
+            running.exchange(&running.request("POST", &path, record.as_bytes()), PATIENCE)?;
+        if answer.status != Some(200) {
+            return Err(format!("a good record is not taken: {answer:?}"));
+        }
+        Ok(running)
+    }
+
+    /// A tab of its own.
+    fn open(&mut self) -> Result<(), String> {
+        let answer = self.exchange(
+            &self.request("POST", "/api/session", b"{\"session\": null}"),
+            PATIENCE,
+        )?;
+        let json: Value =
+            serde_json::from_str(&answer.body).map_err(|error| format!("{error}: {answer:?}"))?;
+        self.session = json["session"].as_str().unwrap_or_default().to_string();
+        Ok(())
+    }
+
+    fn request(&self, method: &str, path: &str, body: &[u8]) -> Vec<u8> {
+        let head = format!(
+            "{method} /{}{path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n",
+            self.secret,
+            self.address,
+            body.len()
+        );
+        [head.as_bytes(), body].concat()
+    }
+
+    fn exchange(&self, bytes: &[u8], patience: Duration) -> Result<Answer, String> {
+        let mut stream =
+            TcpStream::connect(&self.address).map_err(|error| format!("no connection: {error}"))?;
+        stream
+            .set_read_timeout(Some(patience))
+            .map_err(|error| error.to_string())?;
+        // A server that has refused already does not take the rest.
+        let _ = stream.write_all(bytes);
+        let mut answer = Vec::new();
+        let mut part = [0; 1 << 16];
+        while let Ok(count @ 1..) = stream.read(&mut part) {
+            answer.extend_from_slice(&part[..count]);
+        }
+        let text = String::from_utf8_lossy(&answer).into_owned();
+        let (head, body) = text.split_once("\r\n\r\n").unwrap_or_default();
+        Ok(Answer {
+            status: head
+                .split(' ')
+                .nth(1)
+                .and_then(|status| status.parse().ok()),
+            body: body.to_string(),
+        })
+    }
+
+    /// What is seen of it after a request: it runs, it answers, and its memory is bounded.
+    fn lives(&mut self) -> Result<(), String> {
+        let began = Instant::now();
+        let answer = self.exchange(&self.request("GET", "/", b""), PATIENCE)?;
+        if answer.status != Some(200) {
+            return Err(format!(
+                "the page itself is answered with {:?}",
+                answer.status
+            ));
+        }
+        if began.elapsed() > AT_ONCE {
+            return Err(format!(
+                "the page itself is answered after {:?}",
+                began.elapsed()
+            ));
+        }
+        let path = format!("/proc/{}/status", self.child.id());
+        let status = std::fs::read_to_string(path).unwrap_or_default();
+        let line = status.lines().find(|line| line.starts_with("VmHWM:"));
+        let kilobytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse::<f64>().ok());
+        match kilobytes.unwrap_or(0.0) / 1024.0 {
+            megabytes if megabytes > MOST_MEGABYTES => Err(format!("{megabytes:.0} MB")),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// An answer; without a status where the connection was closed instead.
+#[derive(Debug)]
+struct Answer {
+    status: Option<u16>,
+    body: String,
+}
+
+/// A value for a key of a request.
+fn value(source: &mut Source, usual: &[Value]) -> Value {
+    match source.below(10) {
+        0 => serde_json::from_str(&source.number()).unwrap_or(Value::Null),
+        1 => json!(source.word()),
+        2 => json!(source.name()),
+        3 => [
+            Value::Null,
+            json!([]),
+            json!({}),
+            json!(true),
+            json!([[[[[]]]]]),
+        ][source.below(5)]
+        .clone(),
+        _ => usual[source.below(usual.len())].clone(),
+    }
+}
+
+/// Path and body of a request as the page sends them, with other values.
+fn asked(source: &mut Source, running: &Running) -> (&'static str, String, Vec<u8>) {
+    let effects = [
+        json!("overflow"),
+        json!("pump_lag"),
+        json!("sensor_drift"),
+        json!("no_such_effect"),
+    ];
+    let places = [Value::Null, json!("upper"), json!("sensor"), json!("T3")];
+    let session = &running.session;
+    let (path, body) = match source.below(14) {
+        0 => (
+            "/api/session",
+            json!({ "session": value(source, &[json!(session), Value::Null]) }),
+        ),
+        1 => {
+            let plants = [
+                json!("single-tank"),
+                json!("cascaded-tanks"),
+                json!("three-tank"),
+                json!("first-order"),
+            ];
+            let mut form = json!({ "plant": value(source, &plants) });
+            let hold = value(source, &[json!("zero"), json!("first")]);
+            let known = json!({ "area": value(source, &[json!(154.0), Value::Null]) });
+            let columns = json!({ "time": value(source, &[json!("t [s]")]), "input": value(source, &[json!("u [V]")]) });
+            let list = [json!([1.0, 2.0]), json!([1e300, -1e300])];
+            let controller = json!({ "type": value(source, &[json!("PI"), json!("RS")]), "gain": value(source, &[json!(0.5)]),
+                "integral_time": value(source, &[json!(100.0)]), "r": value(source, &list), "s": value(source, &list) });
+            for (key, entry) in [
+                ("hold", hold),
+                ("known", known),
+                ("columns", columns),
+                ("controller", controller),
+            ] {
+                if source.chance(0.4) {
+                    form[key] = entry;
+                }
+            }
+            if source.chance(0.3) {
+                form["from"] = form.clone();
+            }
+            ("/api/settings", form)
+        }
+        2 => {
+            let text = String::from_utf8_lossy(&models::text(source)).into_owned();
+            (
+                "/api/text",
+                json!({ "text": text, "from": value(source, &[json!("")]) }),
+            )
+        }
+        3 | 4 => {
+            let ways = [json!("add"), json!("remove"), json!("keep")];
+            let (way, effect, place) = (
+                value(source, &ways),
+                value(source, &effects),
+                value(source, &places),
+            );
+            (
+                "/api/effect",
+                json!({ "do": way, "effect": effect, "place": place }),
+            )
+        }
+        5 => (
+            "/api/loop",
+            json!({ "measured": value(source, &[json!(true), json!(false)]) }),
+        ),
+        6 => ("/api/run", json!({ "what": "compare" })),
+        7 => {
+            let (most, effort) = (
+                value(source, &[json!(1), json!(2)]),
+                value(source, &[json!("quick"), json!("normal")]),
+            );
+            (
+                "/api/run",
+                json!({ "what": "diagnose", "max_effects": most, "effort": effort }),
+            )
+        }
+        8 => {
+            let between = json!([value(source, &effects), value(source, &effects)]);
+            let numbers = [json!([3.0, 6.0]), Value::Null];
+            let (range, slew) = (
+                value(source, &numbers),
+                value(source, &[json!(1.0), Value::Null]),
+            );
+            let duration = value(source, &[json!(100.0), Value::Null]);
+            (
+                "/api/run",
+                json!({ "what": "design", "group": source.below(3), "between": between, "range": range, "slew": slew, "duration": duration }),
+            )
+        }
+        9 => (
+            "/api/run",
+            json!({ "what": "chain", "effects": [[value(source, &effects), value(source, &places)]] }),
+        ),
+        10 => ("/api/cancel", json!({})),
+        11 => ("/api/finish", json!({})),
+        12 => (
+            "/api/forget",
+            json!({ "name": value(source, &[json!("data.csv")]) }),
+        ),
+        _ => {
+            let name = [
+                "data.csv",
+                "",
+                "..%2f..%2fx",
+                "%e2%80%ae.csv",
+                "a%00b",
+                "%ff",
+            ][source.below(6)];
+            let held = ["", "", "&held_out=true", "&held_out=7"][source.below(4)];
+            let path = format!("/api/record?session={session}&name={name}{held}");
+            return ("POST", path, records::text(source));
+        }
+    };
+    (
+        "POST",
+        format!("{path}?session={session}"),
+        body.to_string().into_bytes(),
+    )
+}
+
+/// What the page only reads.
+fn read(source: &mut Source, running: &Running) -> (&'static str, String, Vec<u8>) {
+    let paths = [
+        "/",
+        "/plotly.js",
+        "/page.js",
+        "/api/state",
+        "/api/data",
+        "/api/model",
+        "/api/file",
+        "/api/no_such",
+    ];
+    let numbers = [
+        source.number(),
+        source.word(),
+        source.name().replace([' ', '\r', '\n'], ""),
+    ];
+    let path = format!(
+        "{}?session={}&since={}&of={}&id={}",
+        source.pick(&paths),
+        running.session,
+        numbers[source.below(3)],
+        ["json", "report", "experiment", "x"][source.below(4)],
+        numbers[source.below(3)],
+    );
+    (
+        ["GET", "GET", "HEAD", "PUT", "OPTIONS", "DELETE"][source.below(6)],
+        path,
+        Vec::new(),
+    )
+}
+
+impl Page {
+    /// A request, and one after it that has to be answered.
+    pub fn case(&mut self, source: &mut Source) -> Ended {
+        let running = match self.running.take().map_or_else(Running::begin, Ok) {
+            Ok(running) => self.running.insert(running),
+            Err(fault) => return Ended::without_process(false, String::new(), Some(fault)),
+        };
+        running.sent += 1;
+        let (method, path, mut body) = if source.chance(0.15) {
+            read(source, running)
+        } else {
+            asked(source, running)
+        };
+        if source.chance(0.15) {
+            body = source.damaged(&body, ',');
+        }
+        let mut bytes = running.request(method, &path, &body);
+        // A damaged head may promise more than comes: the page waits for it, and this does not.
+        let mut patience = PATIENCE;
+        if source.chance(0.1) {
+            bytes = source.damaged(&bytes, ' ');
+            patience = AT_ONCE / 10;
+        }
+        let what = format!(
+            "{method} {path} {}",
+            String::from_utf8_lossy(&body)
+                .chars()
+                .take(300)
+                .collect::<String>()
+        );
+        let checked = running.exchange(&bytes, patience).and_then(|answer| {
+            answered(&answer)?;
+            running.lives()?;
+            // The session that was begun last is the one that is asked on.
+            if running.sent.is_multiple_of(50) {
+                running.open()?;
+            }
+            Ok(answer)
+        });
+        match checked {
+            Ok(answer) => {
+                let accepted = answer.status.is_some_and(|status| status < 300);
+                let last = running.sent >= REQUESTS;
+                let fault = if last { self.end().err() } else { None };
+                let fault = fault.map(|fault| format!("{what}: {fault}"));
+                Ended::without_process(accepted, answer.body, fault)
+            }
+            Err(fault) => {
+                let died = self.end().err().unwrap_or_default();
+                let fault = format!("{what}: {fault} {died}");
+                Ended::without_process(false, String::new(), Some(fault))
+            }
+        }
+    }
+
+    /// Ends the page, which has to run still and to have said nothing on standard error.
+    fn end(&mut self) -> Result<(), String> {
+        let Some(mut running) = self.running.take() else {
+            return Ok(());
+        };
+        let gone = running.child.try_wait().ok().flatten();
+        let _ = running.child.kill();
+        let mut said = String::new();
+        if let Some(mut err) = running.err.take() {
+            let _ = err.read_to_string(&mut said);
+        }
+        let _ = waited(running.child);
+        drop(running.folder);
+        if let Some(status) = gone {
+            return Err(format!("the page ended: {status}: {said}"));
+        }
+        if said.is_empty() {
+            Ok(())
+        } else {
+            Err(format!("the page says {said}"))
+        }
+    }
+}
+
+/// Every answer is one that was thought of.
+fn answered(answer: &Answer) -> Result<(), String> {
+    match answer.status {
+        Some(status) if status >= 500 => Err(format!("{answer:?}")),
+        Some(400..) => {
+            let json: Value = serde_json::from_str(&answer.body).unwrap_or_default();
+            json["error"].as_str().map_or(Ok(()), message)
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,36 @@
+//! Inputs drawn at random, a thousand of each kind: none does what [`ctid_tests::fuzz::run`] calls a fault.
+
+use std::process::ExitCode;
+
+use ctid_tests::fuzz::{Kind, as_program, run};
+
+/// Cases of each kind.
+const CASES: u64 = 1000;
+/// The smallest and the largest share of cases with a result; others would say that the inputs are all good or all bad.
+const RESULTS: std::ops::Range<f64> = 0.1..0.9;
+
+fn main() -> ExitCode {
+    if let Some(code) = as_program() {
+        return code;
+    }
+    let mut failed = false;
+    for kind in Kind::ALL {
+        let report = run(kind, 0, CASES, |_| ());
+        let share = report.accepted as f64 / report.cases as f64;
+        println!(
+            "{kind}: {} cases, {:.0} % with a result, {} faults",
+            report.cases,
+            100.0 * share,
+            report.faults.len()
+        );
+        for (number, fault) in &report.faults {
+            println!("{kind} {number}: {fault}");
+        }
+        failed |= report.cases != CASES || !report.faults.is_empty() || !RESULTS.contains(&share);
+    }
+    if failed {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    }
+}

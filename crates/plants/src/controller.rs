@@ -60,7 +60,8 @@ fn checked(kind: Kind, limits: (f64, f64)) -> Result<Controller, Error> {
     if limits.0.is_nan() || limits.1.is_nan() || limits.0 >= limits.1 {
         return refused(format!(
             "u_min = {} is not below u_max = {}: swap them",
-            limits.0, limits.1
+            short(limits.0),
+            short(limits.1)
         ));
     }
     Ok(Controller { kind, limits })
@@ -73,11 +74,15 @@ impl Controller {
     /// Where a setting is not finite, the gain is zero, the integral time not positive, or the limits are crossed.
     pub fn pi(gain: f64, integral_time: f64, limits: (f64, f64)) -> Result<Self, Error> {
         if !gain.is_finite() || gain == 0.0 {
-            return refused(format!("gain = {gain}: give a finite gain other than zero"));
+            return refused(format!(
+                "gain = {}: give a finite gain other than zero",
+                short(gain)
+            ));
         }
         if !(integral_time.is_finite() && integral_time > 0.0) {
             return refused(format!(
-                "integral_time = {integral_time} s: give a positive time"
+                "integral_time = {} s: give a positive time",
+                short(integral_time)
             ));
         }
         checked(
@@ -216,7 +221,11 @@ impl Controller {
             Kind::Pi {
                 gain,
                 integral_time,
-            } => format!("gain = {gain}, integral_time = {integral_time} s"),
+            } => format!(
+                "gain = {}, integral_time = {} s",
+                short(*gain),
+                short(*integral_time)
+            ),
             Kind::Sampled { r, s, .. } => format!("r = {}, s = {} (sampled)", list(r), list(s)),
         }
     }
@@ -281,14 +290,23 @@ impl Controller {
     }
 }
 
-/// Polynomials of a model file are short; of a long one the first coefficients stand for all.
-const MOST_SHOWN: usize = 4;
+/// A number as it was written, or with a power of ten where its digits would fill a line.
+fn short(value: f64) -> String {
+    if value == 0.0 || (1e-6..1e15).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
 
-/// Coefficients to five digits.
+/// Polynomials of a model file are short; of a long one the first coefficients stand for all.
+const MOST_SHOWN: usize = 3;
+
+/// Coefficients to four digits.
 fn list(coefficients: &[f64]) -> String {
     let digits = |value: &f64| {
-        let rounded = format!("{value:.4e}").parse().unwrap_or(*value);
-        format!("{rounded:?}")
+        let rounded = format!("{value:.3e}").parse().unwrap_or(*value);
+        short(rounded)
     };
     let mut shown: Vec<String> = coefficients.iter().take(MOST_SHOWN).map(digits).collect();
     if coefficients.len() > MOST_SHOWN {

@@ -9,7 +9,6 @@ mod identify;
 mod identify_loop;
 mod model_file;
 mod monitor;
-mod mutations;
 mod own_term;
 mod program;
 mod results;

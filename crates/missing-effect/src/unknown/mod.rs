@@ -116,7 +116,11 @@ fn place_name(plant: Plant, spot: Spot) -> String {
     .to_string()
 }
 
-/// The missing term beside a fitted node; `None` where nothing moves.
+/// What is left out where the time limit has passed.
+pub(crate) const PART: &str = "the shape of what is not explained";
+
+/// The missing term beside a fitted node; `None` where nothing moves. Where the time limit of its setup passes, places and variables
+/// that were not looked at by then are left out.
 pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     let plant = node.setup.structure.plant;
     let mut spots = vec![Spot {

@@ -12,7 +12,10 @@ use greybox::{Setup, at_rest, commands};
 use nalgebra::{DMatrix, DVector};
 use plants::{Fitted, Simulator, Term, Variable};
 
-use super::smooth::{Smoothed, Spot, carrier};
+use super::{
+    PART,
+    smooth::{Smoothed, Spot, carrier},
+};
 use crate::{Error, node::Node, noise_floor::slowness};
 
 /// Knots of a polyline.
@@ -227,7 +230,7 @@ struct Fit {
 }
 
 /// Least squares with a prior, by Levenberg and Marquardt's steps. Without a prior the plant's parameters and the ordinates
-/// would run off together, since the ones imitate the others.
+/// would run off together, since the ones imitate the others. `None` too where the time limit passes.
 fn fit(setup: &Setup, start: Vec<f64>, ordinates: Range<usize>, size: f64) -> Option<Fit> {
     let mean = x_free(setup, &start);
     let rows = |x: &[f64]| {
@@ -264,6 +267,9 @@ fn fit(setup: &Setup, start: Vec<f64>, ordinates: Range<usize>, size: f64) -> Op
     };
     let mut weights = known.clone();
     for _ in 0..ROUNDS {
+        if setup.leaves_out(PART) {
+            return None;
+        }
         let variance = residual.norm_squared() / residual.len() as f64;
         weights = &known * variance;
         let free = x_free(setup, &x);

@@ -21,6 +21,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use plants::{Fitted, Place, Term, Variable};
 
+use super::PART;
 use crate::{Error, node::Node};
 
 /// Instants of a path: at most so many, and so many samples for each at least.
@@ -131,6 +132,9 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
     }
     let mut best = None;
     for _ in 0..ROUNDS {
+        if best.is_some() && node.setup.leaves_out(PART) {
+            break;
+        }
         let Some(blocks) = runs
             .iter()
             .map(|(setup, x, time)| block(setup, x, count, time))

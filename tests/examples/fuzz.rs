@@ -47,15 +47,12 @@ fn main() -> ExitCode {
         bar.set_message(kind.to_string());
         let report = run(kind, cli.first, cases, |done| bar.set_position(done));
         bar.finish_and_clear();
-        let times = match report.longest {
-            // The page is one process for many requests.
-            0.0 => "- | -".to_string(),
-            longest => format!("{longest:.1} | {:.0}", report.largest),
-        };
         println!(
-            "| {kind} | {} | {} | {times} | {} |",
+            "| {kind} | {} | {} | {:.1} | {:.0} | {} |",
             report.cases,
             report.accepted,
+            report.longest,
+            report.largest,
             report.faults.len()
         );
         if cli.refusals {
@@ -66,7 +63,8 @@ fn main() -> ExitCode {
         for (number, fault) in &report.faults {
             eprintln!("{kind} {number} (`fuzz 1 --kind {kind} --first {number}`): {fault}");
         }
-        faults += report.faults.len();
+        // A case that is lost is one too.
+        faults += report.faults.len() + (cases - report.cases) as usize;
     }
     if faults == 0 {
         ExitCode::SUCCESS

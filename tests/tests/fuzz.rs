@@ -1,5 +1,6 @@
 //! Inputs drawn at random, a thousand of each kind: none does what [`ctid_tests::fuzz::run`] calls a fault.
 
+use std::env;
 use std::process::ExitCode;
 
 use ctid_tests::fuzz::{Kind, as_program, run};
@@ -13,8 +14,21 @@ fn main() -> ExitCode {
     if let Some(code) = as_program() {
         return code;
     }
+    // As the usual harness understands them: a list, or a part of a name.
+    let words: Vec<String> = env::args().skip(1).collect();
+    let wanted = |kind: &Kind| {
+        let mut names = words
+            .iter()
+            .filter(|word| !word.starts_with('-'))
+            .peekable();
+        names.peek().is_none() || names.any(|name| format!("fuzz::{kind}").contains(name.as_str()))
+    };
     let mut failed = false;
-    for kind in Kind::ALL {
+    for kind in Kind::ALL.into_iter().filter(wanted) {
+        if words.iter().any(|word| word == "--list") {
+            println!("fuzz::{kind}: test");
+            continue;
+        }
         let report = run(kind, 0, CASES, |_| ());
         let share = report.accepted as f64 / report.cases as f64;
         println!(

@@ -67,6 +67,8 @@ fn time_constants(setup: &Setup) -> Vec<usize> {
         .collect()
 }
 
+/// What is left out where the time limit has passed.
+const STARTS: &str = "further starts of effects at the actuator";
 /// Damping of the step by the other parameters, against what the data do not determine.
 const DAMPING: f64 = 1e-9;
 /// With more starts than this an effect at the actuator is simulated from all of them, without derivatives, before it is linearised ...
@@ -108,7 +110,7 @@ pub fn keep_best_simulated(
 
 /// A start with the other parameters fitted to it in one step, by those of the free ones that are named, where that is a better one.
 fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &ArModel) -> Vec<f64> {
-    let triangle = (!over(setup)).then(|| setup.linearise(&start, noise));
+    let triangle = (!setup.leaves_out(STARTS)).then(|| setup.linearise(&start, noise));
     let Some(triangle) = triangle.flatten() else {
         return start;
     };
@@ -125,11 +127,6 @@ fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &ArModel) ->
     } else {
         moved
     }
-}
-
-/// Nothing more is to be computed.
-fn over(setup: &Setup) -> bool {
-    setup.stopped() || setup.leaves_out("further starts of effects at the actuator")
 }
 
 /// Where the effect's own parameters stand in the vector, and those of time constants, which are not fitted at a start.
@@ -187,7 +184,7 @@ fn scores_of_simulations(
     // The effect's own columns take no part; those of time constants only where the model fits best without the effect, since elsewhere
     // they are not near what they will be.
     let simulated = |x: &Vec<f64>| {
-        let left = (!over(setup)).then(|| whitened(setup, x, noise));
+        let left = (!setup.leaves_out(STARTS)).then(|| whitened(setup, x, noise));
         left.flatten()
     };
     let squares = |x: &Vec<f64>| simulated(x).map_or(f64::INFINITY, |left| dot(&left, &left));
@@ -201,7 +198,7 @@ fn scores_of_simulations(
     let models: Vec<WithoutEffect> = models
         .into_par_iter()
         .filter_map(|x| {
-            if over(setup) {
+            if setup.leaves_out(STARTS) {
                 return None;
             }
             let apart = if Some(&x) == best.as_ref() {

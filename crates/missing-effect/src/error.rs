@@ -18,7 +18,7 @@ pub enum Error {
     Design(#[from] crate::design::Refused),
     /// The controller and the fitted plant do not make a stable loop.
     #[error(
-        "controller: the loop of {controller} and the fitted plant is unstable (it grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",
+        "controller: the loop of {controller} and the fitted plant is unstable (its output grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",
         growth(*radius)
     )]
     UnstableLoop {

@@ -1,6 +1,6 @@
 //! The program on inputs drawn at random: well formed ones with everything that a file may hold, and the same damaged.
 //!
-//! Each case is one run of the program as a process of its own, or one request to its page, and is drawn from its kind and
+//! Each case is one run of the program as a process of its own, or a page with some requests, and is drawn from its kind and
 //! number alone. [`run`] says what it must not do.
 //!
 //! | what | where |
@@ -40,7 +40,7 @@ pub enum Kind {
     Stream,
     /// A saved state of `monitor`.
     State,
-    /// Requests to the page.
+    /// A page, and requests to it.
     Request,
 }
 
@@ -134,6 +134,13 @@ pub fn run(kind: Kind, first: u64, cases: u64, progress: impl Fn(u64) + Sync) ->
         AtomicU64::new(0),
         AtomicBool::new(false),
     );
+    let case = match kind {
+        Kind::Record => records::case,
+        Kind::Model => models::case,
+        Kind::Stream => streams::case,
+        Kind::State => states::case,
+        Kind::Request => requests::case,
+    };
     let end = first + cases;
     let workers = thread::available_parallelism().map_or(1, usize::from);
     let mut all: Vec<(u64, Ended)> = thread::scope(|scope| {
@@ -144,14 +151,13 @@ pub fn run(kind: Kind, first: u64, cases: u64, progress: impl Fn(u64) + Sync) ->
             }
         });
         let work = || {
-            let mut worker = Worker::new(kind);
             let mut ended = Vec::new();
             loop {
                 let number = next.fetch_add(1, Ordering::Relaxed);
                 if number >= end {
                     break ended;
                 }
-                ended.push((number, worker.case(number)));
+                ended.push((number, case(&mut Source::new(number))));
                 done.fetch_add(1, Ordering::Relaxed);
             }
         };
@@ -182,33 +188,5 @@ pub fn run(kind: Kind, first: u64, cases: u64, progress: impl Fn(u64) + Sync) ->
             .into_iter()
             .filter_map(|(number, case)| Some((number, case.fault?)))
             .collect(),
-    }
-}
-
-/// What a thread keeps from case to case.
-enum Worker {
-    /// Nothing: each case has a process and a folder of its own.
-    Files(fn(&mut Source) -> Ended),
-    /// The page.
-    Page(requests::Page),
-}
-
-impl Worker {
-    fn new(kind: Kind) -> Self {
-        match kind {
-            Kind::Record => Self::Files(records::case),
-            Kind::Model => Self::Files(models::case),
-            Kind::Stream => Self::Files(streams::case),
-            Kind::State => Self::Files(states::case),
-            Kind::Request => Self::Page(requests::Page::default()),
-        }
-    }
-
-    fn case(&mut self, number: u64) -> Ended {
-        let mut source = Source::new(number);
-        match self {
-            Self::Files(case) => case(&mut source),
-            Self::Page(page) => page.case(&mut source),
-        }
     }
 }

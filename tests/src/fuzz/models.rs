@@ -236,5 +236,27 @@ fn edited(source: &mut Source, folder: &Folder) -> Ended {
         let fault = Some(format!("what add {id} wrote cannot be read again"));
         return Ended { fault, ..removed };
     }
-    removed
+    if removed.fault.is_none() && id_is_gone(&folder.read("model.toml"), id) {
+        return removed;
+    }
+    let fault = removed
+        .fault
+        .clone()
+        .unwrap_or(format!("remove {id} leaves it in effects"));
+    Ended {
+        fault: Some(fault),
+        ..removed
+    }
+}
+
+/// Whether no line `effects` names it.
+fn id_is_gone(text: &[u8], id: &str) -> bool {
+    let text = String::from_utf8_lossy(text);
+    let mut lines = text.lines().filter(|line| line.starts_with("effects"));
+    !lines.any(|line| {
+        line.split('#')
+            .next()
+            .unwrap_or_default()
+            .contains(&format!("\"{id}\""))
+    })
 }

@@ -5,11 +5,12 @@ use std::env;
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{self, Child, Command, ExitCode, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use ct_signals::escaped;
 use serde_json::Value;
 use tempfile::TempDir;
 use wait4::Wait4;
@@ -44,7 +45,11 @@ pub fn as_program() -> Option<ExitCode> {
 }
 
 /// A folder with files, to run the program in.
-pub(super) struct Folder(TempDir);
+pub(super) struct Folder {
+    folder: TempDir,
+    /// Threads that the program may use.
+    threads: usize,
+}
 
 /// Files by name.
 type Files = BTreeMap<PathBuf, Vec<u8>>;
@@ -59,11 +64,18 @@ fn must<T, E: std::fmt::Display>(result: Result<T, E>, what: &str) -> T {
 
 impl Folder {
     pub fn new() -> Self {
-        Self(must(tempfile::tempdir(), "no folder for a case"))
+        Self::with_threads(1)
+    }
+
+    pub fn with_threads(threads: usize) -> Self {
+        Self {
+            folder: must(tempfile::tempdir(), "no folder for a case"),
+            threads,
+        }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
+        self.folder.path().join(name)
     }
 
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
@@ -75,7 +87,7 @@ impl Folder {
     }
 
     fn files(&self) -> Files {
-        let entries = must(fs::read_dir(self.0.path()), "no folder for a case");
+        let entries = must(fs::read_dir(self.folder.path()), "no folder for a case");
         let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
         paths
             .map(|path| (path.clone(), fs::read(path).unwrap_or_default()))
@@ -88,8 +100,8 @@ impl Folder {
         command
             .arg(AS_PROGRAM)
             .args(words)
-            .current_dir(self.0.path())
-            .env("RAYON_NUM_THREADS", "1")
+            .current_dir(self.folder.path())
+            .env("RAYON_NUM_THREADS", self.threads.to_string())
             .stdin(Stdio::null());
         command
     }
@@ -108,20 +120,20 @@ impl Folder {
             child.stdout.take().map(|pipe| drained(pipe)),
             child.stderr.take().map(|pipe| drained(pipe)),
         ];
-        let (code, seconds, megabytes) = waited(child);
+        let (code, seconds, megabytes) = waited(&mut child);
         let [out, err] =
             printed.map(|pipe| pipe.and_then(|pipe| pipe.join().ok()).unwrap_or_default());
         let mut ended = Ended {
             accepted: code == Some(0),
             seconds,
             megabytes,
-            refusal: err.lines().last().unwrap_or_default().to_string(),
+            refusal: shortened(err.lines().last().unwrap_or_default()),
             fault: None,
         };
         let after = self.files();
         let may_write = ended.accepted || input.is_some();
         ended.fault = (|| {
-            said(code, &out, &err)?;
+            said(code, &out, &err, input.is_some())?;
             kept(&ended)?;
             for (path, bytes) in &before {
                 let named = |name: &&str| path.ends_with(name);
@@ -135,12 +147,7 @@ impl Folder {
                 if !may_write || !outputs.iter().any(|name| path.ends_with(name)) {
                     return Err(format!("{} was written", path.display()));
                 }
-                if path
-                    .extension()
-                    .is_some_and(|extension| extension == "json")
-                {
-                    result(path, &after[path])?;
-                }
+                result(&path.to_string_lossy(), &after[path])?;
             }
             Ok(())
         })()
@@ -150,8 +157,13 @@ impl Folder {
     }
 }
 
+/// As much of a refusal as is kept.
+pub(super) fn shortened(text: &str) -> String {
+    text.chars().take(LONGEST_ERROR).collect()
+}
+
 /// A pipe that nobody empties would stop the program.
-fn drained(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
+pub(super) fn drained(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
     thread::spawn(move || {
         let mut bytes = Vec::new();
         let _ = pipe.read_to_end(&mut bytes);
@@ -160,7 +172,7 @@ fn drained(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
 }
 
 /// Exit code, processor time \[s\], memory \[MB\].
-pub(super) fn waited(mut child: Child) -> (Option<i32>, f64, f64) {
+pub(super) fn waited(child: &mut Child) -> (Option<i32>, f64, f64) {
     let used = must(child.wait4(), "the program cannot be waited for");
     let seconds = (used.rusage.utime + used.rusage.stime).as_secs_f64();
     (
@@ -171,7 +183,7 @@ pub(super) fn waited(mut child: Child) -> (Option<i32>, f64, f64) {
 }
 
 /// What every process keeps.
-fn kept(ended: &Ended) -> Result<(), String> {
+pub(super) fn kept(ended: &Ended) -> Result<(), String> {
     if ended.seconds > MOST_SECONDS {
         return Err(format!("{:.0} s of processor time", ended.seconds));
     }
@@ -181,24 +193,13 @@ fn kept(ended: &Ended) -> Result<(), String> {
     Ok(())
 }
 
-/// What it may print.
-fn said(code: Option<i32>, out: &str, err: &str) -> Result<(), String> {
+/// What it may print; of a stream the monitor also says what it did before an error, and notes on standard error.
+fn said(code: Option<i32>, out: &str, err: &str, stream: bool) -> Result<(), String> {
     if err.contains("panicked") {
         return Err(err.to_string());
     }
     match code {
-        Some(0) => {
-            // The numbers of a table or of a line of JSON, and not the names of columns.
-            let not_finite = |word: &str| {
-                ["NaN", "inf", "-inf"].contains(&word.trim_matches([',', ';', '(', ')']))
-            };
-            if let Some(line) = out
-                .lines()
-                .find(|line| line.split_whitespace().any(not_finite))
-            {
-                return Err(format!("it prints: {line}"));
-            }
-        }
+        Some(0) if stream || err.is_empty() => {}
         Some(2) => {
             let Some(line) = err
                 .lines()
@@ -208,44 +209,70 @@ fn said(code: Option<i32>, out: &str, err: &str) -> Result<(), String> {
                 return Err(format!("it ends with code 2 and says {err:?}"));
             };
             message(line)?;
+            if !stream && (err.lines().count() > 1 || !out.is_empty()) {
+                return Err(format!("it says more than its error: {out:?} {err:?}"));
+            }
         }
         _ => return Err(format!("it ends with {code:?} and says {err:?}")),
     }
-    let unclean = out
-        .chars()
-        .chain(err.chars())
-        .find(|&c| c != '\n' && unprintable(c));
-    unclean.map_or(Ok(()), |c| Err(format!("it prints {c:?}")))
-}
-
-/// A message for people is short, and shows no character that moves the others.
-pub(super) fn message(text: &str) -> Result<(), String> {
-    if let Some(c) = text.chars().find(|&c| unprintable(c)) {
-        return Err(format!("{c:?} in a message: {text:?}"));
+    if stream {
+        for line in out.lines() {
+            let json: Value =
+                serde_json::from_str(line).map_err(|error| format!("{error}: {line}"))?;
+            numbers(&json).map_err(|key| format!("{key} is no number: {line}"))?;
+        }
+    } else if let Some(line) = out.lines().find(|line| not_finite(line)) {
+        return Err(format!("it prints: {line}"));
     }
-    if text.chars().count() > LONGEST_ERROR {
-        return Err(format!(
-            "a message of {} characters: {text}",
-            text.chars().count()
-        ));
+    for line in out.lines().chain(err.lines()) {
+        if escaped(line) != line {
+            return Err(format!("it prints {line:?}"));
+        }
     }
     Ok(())
 }
 
-/// Control characters, and those that turn the direction of a text.
-fn unprintable(c: char) -> bool {
-    c.is_control()
-        || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+/// Whether a number of a text is none.
+fn not_finite(line: &str) -> bool {
+    let mut words = line.split(|c: char| !c.is_alphanumeric());
+    words.any(|word| ["NaN", "inf"].contains(&word))
+}
+
+/// A message for people is short, and shows no character that steers the terminal or cannot be seen.
+pub(super) fn message(text: &str) -> Result<(), String> {
+    if escaped(text) != text {
+        return Err(format!("a character that cannot be seen in {text:?}"));
+    }
+    match text.chars().count() {
+        count if count > LONGEST_ERROR => Err(format!("a message of {count} characters: {text}")),
+        _ => Ok(()),
+    }
 }
 
 /// Keys of results that hold a number wherever they are.
-const NUMBERS: [&str; 3] = ["rmse", "value", "noise_floor"];
+const NUMBERS: [&str; 17] = [
+    "rmse",
+    "value",
+    "noise_floor",
+    "bic",
+    "power",
+    "decides",
+    "low",
+    "high",
+    "level",
+    "innovation",
+    "share",
+    "time",
+    "score",
+    "from",
+    "to",
+    "seconds",
+    "bic_ahead",
+];
 
-/// A result in JSON holds numbers where it has to.
-fn result(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    let name = path.display();
-    let json: Value = serde_json::from_slice(bytes).map_err(|error| format!("{name}: {error}"))?;
-    let mut rest = vec![&json];
+/// Whether keys that hold numbers hold them: what is NaN is written as null. The key that does not.
+fn numbers(json: &Value) -> Result<(), &'static str> {
+    let mut rest = vec![json];
     while let Some(value) = rest.pop() {
         match value {
             Value::Array(items) => rest.extend(items),
@@ -254,11 +281,27 @@ fn result(path: &Path, bytes: &[u8]) -> Result<(), String> {
                     .iter()
                     .find(|key| entries.get(**key).is_some_and(Value::is_null))
                 {
-                    return Err(format!("{name}: {key} is no number: {value}"));
+                    return Err(key);
                 }
                 rest.extend(entries.values());
             }
             _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// A file that was written holds numbers where it has to.
+pub(super) fn result(name: &str, bytes: &[u8]) -> Result<(), String> {
+    if name.ends_with(".json") {
+        let json: Value =
+            serde_json::from_slice(bytes).map_err(|error| format!("{name}: {error}"))?;
+        numbers(&json).map_err(|key| format!("{name}: {key} is no number"))?;
+    }
+    if name.ends_with(".csv") {
+        let text = String::from_utf8_lossy(bytes);
+        if let Some(line) = text.lines().find(|line| not_finite(line)) {
+            return Err(format!("{name}: {line}"));
         }
     }
     Ok(())

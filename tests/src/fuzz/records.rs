@@ -200,7 +200,9 @@ pub(super) fn text(source: &mut Source) -> Vec<u8> {
 pub(super) fn command(source: &mut Source) -> String {
     let with_model = "data.csv --model model.toml";
     match source.below(12) {
-        0 => format!("diagnose {with_model} --max-effects 1 --json out.json --report out.html"),
+        0 => format!(
+            "diagnose {with_model} --effort quick --max-effects 1 --json out.json --report out.html"
+        ),
         1 | 2 => {
             let methods = ["ct-rls", "stabilized-oe", "ls", "iv", "fcloe", "refine"];
             let method = source.pick(&methods);
@@ -209,7 +211,7 @@ pub(super) fn command(source: &mut Source) -> String {
         }
         3 => {
             let mut words = format!(
-                "design {with_model} --between overflow leak_at_height --out out.csv --json out.json"
+                "design {with_model} --effort quick --between overflow leak_at_height --out out.csv --json out.json"
             );
             for option in ["--duration", "--slew"] {
                 if source.chance(0.3) {
@@ -233,7 +235,7 @@ pub(super) const OUTPUTS: [&str; 3] = ["out.json", "out.html", "out.csv"];
 
 /// A run on a record.
 pub(super) fn case(source: &mut Source) -> Ended {
-    let folder = Folder::new();
+    let folder = Folder::with_threads(1 + source.below(2));
     folder.write("data.csv", text(source));
     folder.write("other.csv", models::record(source));
     folder.write("model.toml", models::plain(source));

@@ -2,46 +2,39 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, ChildStderr, Stdio};
+use std::process::{Child, Stdio};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::process::{Folder, message, waited};
+use super::process::{Folder, drained, kept, message, result, shortened, waited};
 use super::source::Source;
 use super::{Ended, models, records};
 
 /// Within this another request is answered, whatever was sent before.
 const AT_ONCE: Duration = Duration::from_secs(2);
-/// An answer that has not come by then does not come.
-const PATIENCE: Duration = Duration::from_secs(20);
-/// Requests that one page gets.
-const REQUESTS: usize = 500;
-/// Memory of the page at most \[MB\]; it keeps up to eight tabs.
-const MOST_MEGABYTES: f64 = 500.0;
+/// A request that is not answered by then is not answered.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// A computation ends within this.
+const COMPUTED: Duration = Duration::from_secs(30);
+/// Requests of a case.
+const REQUESTS: usize = 12;
 
-/// A page that runs, and the requests that it has got.
-#[derive(Default)]
-pub(super) struct Page {
-    running: Option<Running>,
-}
-
+/// A page that runs.
 struct Running {
     child: Child,
-    folder: Folder,
+    /// Of its model file.
+    _folder: Folder,
     address: String,
     secret: String,
     session: String,
-    err: Option<ChildStderr>,
-    sent: usize,
+    err: Option<JoinHandle<String>>,
 }
 
-impl Drop for Page {
+impl Drop for Running {
     fn drop(&mut self) {
-        if let Some(mut running) = self.running.take() {
-            let _ = running.child.kill();
-            let _ = running.child.wait();
-        }
+        let _ = self.child.kill();
     }
 }
 
@@ -64,13 +57,12 @@ impl Running {
             parts.next().unwrap_or_default(),
         );
         let mut running = Self {
-            err: child.stderr.take(),
+            err: child.stderr.take().map(drained),
             child,
-            folder,
+            _folder: folder,
             address: address.to_string(),
             secret: secret.to_string(),
             session: String::new(),
-            sent: 0,
         };
         running.open()?;
         let path = format!("/api/record?session={}&name=data.csv", running.session);
@@ -129,30 +121,88 @@ impl Running {
         })
     }
 
-    /// What is seen of it after a request: it runs, it answers, and its memory is bounded.
-    fn lives(&mut self) -> Result<(), String> {
-        let began = Instant::now();
-        let answer = self.exchange(&self.request("GET", "/", b""), PATIENCE)?;
-        if answer.status != Some(200) {
-            return Err(format!(
-                "the page itself is answered with {:?}",
-                answer.status
-            ));
+    /// Another request is answered, and soon; on a machine that is busy for a moment at the second time.
+    fn answers(&self) -> Result<(), String> {
+        let mut took = Duration::ZERO;
+        for _ in 0..2 {
+            let began = Instant::now();
+            let answer = self.exchange(&self.request("GET", "/", b""), PATIENCE)?;
+            if answer.status != Some(200) {
+                return Err(format!(
+                    "the page itself is answered with {:?}",
+                    answer.status
+                ));
+            }
+            took = began.elapsed();
+            if took <= AT_ONCE {
+                return Ok(());
+            }
         }
-        if began.elapsed() > AT_ONCE {
-            return Err(format!(
-                "the page itself is answered after {:?}",
-                began.elapsed()
-            ));
+        Err(format!("the page itself is answered after {took:?}"))
+    }
+
+    fn get(&self, path: &str) -> Result<Answer, String> {
+        let path = format!("{path}session={}", self.session);
+        self.exchange(&self.request("GET", &path, b""), PATIENCE)
+    }
+
+    /// Lets a computation end, and looks at what it gives.
+    fn computed(&self) -> Result<(), String> {
+        let body = [
+            r#"{"what": "compare"}"#,
+            r#"{"what": "diagnose", "max_effects": 1, "effort": "quick"}"#,
+        ];
+        for body in body {
+            let path = format!("/api/run?session={}", self.session);
+            let answer = self.exchange(&self.request("POST", &path, body.as_bytes()), PATIENCE)?;
+            if answer.status != Some(200) {
+                return Ok(());
+            }
+            let began = Instant::now();
+            loop {
+                let answer = self.get("/api/state?")?;
+                let state: Value = serde_json::from_str(&answer.body)
+                    .map_err(|error| format!("{error}: {answer:?}"))?;
+                if state["job"].is_null() {
+                    break;
+                }
+                if began.elapsed() > COMPUTED {
+                    return Err(format!("{body} computes for more than {COMPUTED:?}"));
+                }
+                thread::sleep(Duration::from_millis(20));
+            }
         }
-        let path = format!("/proc/{}/status", self.child.id());
-        let status = std::fs::read_to_string(path).unwrap_or_default();
-        let line = status.lines().find(|line| line.starts_with("VmHWM:"));
-        let kilobytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse::<f64>().ok());
-        match kilobytes.unwrap_or(0.0) / 1024.0 {
-            megabytes if megabytes > MOST_MEGABYTES => Err(format!("{megabytes:.0} MB")),
-            _ => Ok(()),
+        for of in ["json", "report", "model"] {
+            let answer = self.get(&format!("/api/file?of={of}&"))?;
+            answered(&answer)?;
+            if answer.status == Some(200) && of == "json" {
+                result("the page's out.json", answer.body.as_bytes())?;
+            }
         }
+        Ok(())
+    }
+
+    /// Ends the page: what it has used, and what of it must not be.
+    fn end(mut self) -> Ended {
+        let gone = self.child.try_wait().ok().flatten();
+        let _ = self.child.kill();
+        let (_, seconds, megabytes) = waited(&mut self.child);
+        let said = self
+            .err
+            .take()
+            .and_then(|err| err.join().ok())
+            .unwrap_or_default();
+        let mut ended = Ended {
+            seconds,
+            megabytes,
+            ..Ended::without_process(true, String::new(), None)
+        };
+        ended.fault = match gone {
+            Some(status) => Some(format!("the page ended: {status}: {said}")),
+            None if !said.is_empty() => Some(format!("the page says {said}")),
+            None => kept(&ended).err(),
+        };
+        ended
     }
 }
 
@@ -335,86 +385,69 @@ fn read(source: &mut Source, running: &Running) -> (&'static str, String, Vec<u8
     )
 }
 
-impl Page {
-    /// A request, and one after it that has to be answered.
-    pub fn case(&mut self, source: &mut Source) -> Ended {
-        let running = match self.running.take().map_or_else(Running::begin, Ok) {
-            Ok(running) => self.running.insert(running),
-            Err(fault) => return Ended::without_process(false, String::new(), Some(fault)),
-        };
-        running.sent += 1;
-        let (method, path, mut body) = if source.chance(0.15) {
-            read(source, running)
-        } else {
-            asked(source, running)
-        };
-        if source.chance(0.15) {
-            body = source.damaged(&body, ',');
+/// A request, damaged or not; whether it was answered with a result.
+fn asks(source: &mut Source, running: &Running) -> Result<bool, String> {
+    let (method, path, mut body) = if source.chance(0.15) {
+        read(source, running)
+    } else {
+        asked(source, running)
+    };
+    if source.chance(0.15) {
+        body = source.damaged(&body, ',');
+    }
+    let mut bytes = running.request(method, &path, &body);
+    // A damaged head may promise more than comes: the page waits for it, and this does not.
+    let damaged = source.chance(0.1);
+    let mut patience = PATIENCE;
+    if damaged {
+        bytes = source.damaged(&bytes, ' ');
+        patience = AT_ONCE / 10;
+    }
+    let checked = running.exchange(&bytes, patience).and_then(|answer| {
+        if answer.status.is_none() && !damaged && method != "HEAD" {
+            return Err("no answer".to_string());
         }
-        let mut bytes = running.request(method, &path, &body);
-        // A damaged head may promise more than comes: the page waits for it, and this does not.
-        let mut patience = PATIENCE;
-        if source.chance(0.1) {
-            bytes = source.damaged(&bytes, ' ');
-            patience = AT_ONCE / 10;
+        answered(&answer)?;
+        running.answers()?;
+        Ok(answer.status.is_some_and(|status| status < 300))
+    });
+    checked.map_err(|fault| {
+        let body = String::from_utf8_lossy(&body);
+        format!("{method} {path} {}: {fault}", shortened(&body))
+    })
+}
+
+/// A page from its begin to its end: some requests, and now and then a computation.
+pub(super) fn case(source: &mut Source) -> Ended {
+    let running = match Running::begin() {
+        Ok(running) => running,
+        Err(fault) => return Ended::without_process(false, String::new(), Some(fault)),
+    };
+    let mut accepted = false;
+    let mut fault = None;
+    for _ in 0..REQUESTS {
+        match asks(source, &running) {
+            Ok(result) => accepted = result,
+            Err(found) => fault = Some(found),
         }
-        let what = format!(
-            "{method} {path} {}",
-            String::from_utf8_lossy(&body)
-                .chars()
-                .take(300)
-                .collect::<String>()
-        );
-        let checked = running.exchange(&bytes, patience).and_then(|answer| {
-            answered(&answer)?;
-            running.lives()?;
-            // The session that was begun last is the one that is asked on.
-            if running.sent.is_multiple_of(50) {
-                running.open()?;
-            }
-            Ok(answer)
-        });
-        match checked {
-            Ok(answer) => {
-                let accepted = answer.status.is_some_and(|status| status < 300);
-                let last = running.sent >= REQUESTS;
-                let fault = if last { self.end().err() } else { None };
-                let fault = fault.map(|fault| format!("{what}: {fault}"));
-                Ended::without_process(accepted, answer.body, fault)
-            }
-            Err(fault) => {
-                let died = self.end().err().unwrap_or_default();
-                let fault = format!("{what}: {fault} {died}");
-                Ended::without_process(false, String::new(), Some(fault))
-            }
+        if fault.is_some() {
+            break;
         }
     }
-
-    /// Ends the page, which has to run still and to have said nothing on standard error.
-    fn end(&mut self) -> Result<(), String> {
-        let Some(mut running) = self.running.take() else {
-            return Ok(());
-        };
-        let gone = running.child.try_wait().ok().flatten();
-        let _ = running.child.kill();
-        let mut said = String::new();
-        if let Some(mut err) = running.err.take() {
-            let _ = err.read_to_string(&mut said);
-        }
-        let _ = waited(running.child);
-        drop(running.folder);
-        if let Some(status) = gone {
-            return Err(format!("the page ended: {status}: {said}"));
-        }
-        if said.is_empty() {
-            Ok(())
-        } else {
-            Err(format!("the page says {said}"))
-        }
+    if fault.is_none() && source.chance(0.2) {
+        fault = running.computed().err();
+    }
+    let ended = running.end();
+    let both = fault.into_iter().chain(ended.fault);
+    let fault = both.collect::<Vec<_>>().join("; ");
+    Ended {
+        accepted,
+        fault: Some(fault).filter(|fault| !fault.is_empty()),
+        ..ended
     }
 }
 
-/// Every answer is one that was thought of.
+/// Every answer is one of those that the page is made to give.
 fn answered(answer: &Answer) -> Result<(), String> {
     match answer.status {
         Some(status) if status >= 500 => Err(format!("{answer:?}")),

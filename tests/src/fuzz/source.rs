@@ -60,6 +60,26 @@ const WORDS: &[&str] = &[
     "--1",
 ];
 
+/// Lines that people type into a model file.
+const LINES: &[&str] = &[
+    "[",
+    "]",
+    "[[",
+    "{",
+    "[known]",
+    "[effect]\noverflow = 1",
+    "[effect.overflow]",
+    "[effect.transport_delay]\nwhere = \"lower\"",
+    "[start]\nalpha = 1e300",
+    "[start]\npump_gain = 1e-300",
+    "tank_height = 1e-9",
+    "input_range = 1e300",
+    "reference = \"y [cm]\"",
+    "plant.x = 1",
+    "hold = \"first\"",
+    "[controller]\ntype = \"PI\"\ngain = 1e300\nintegral_time = 1e-300",
+];
+
 impl Source {
     pub fn new(number: u64) -> Self {
         Self(ChaCha8Rng::seed_from_u64(number))
@@ -191,7 +211,11 @@ impl Source {
         let text = String::from_utf8_lossy(bytes);
         let mut lines: Vec<String> = text.split('\n').map(str::to_string).collect();
         let at = self.below(lines.len());
-        let word = self.word();
+        let word = if separator == '=' && self.chance(0.4) {
+            self.pick(LINES).to_string()
+        } else {
+            self.word()
+        };
         let column = self.below(3);
         match self.below(16) {
             0..4 => lines.insert(at, word),

@@ -11,13 +11,16 @@ use super::{Ended, streams};
 const MODEL: &str = "plant = \"single-tank\"\n[known]\narea = 154.0\n";
 const HEADER: &str = "t [s],u [V],y [cm]\n";
 
+/// Rows after which a state is saved: while it learns, shortly after, and later.
+const ROWS: [usize; 3] = [60, 140, 400];
+
 /// A state that the monitor has written.
-fn written() -> Result<&'static [u8], String> {
-    static STATE: OnceLock<Result<Vec<u8>, String>> = OnceLock::new();
-    let state = STATE.get_or_init(|| {
+fn written(which: usize) -> Result<&'static [u8], String> {
+    static STATES: [OnceLock<Result<Vec<u8>, String>>; 3] = [const { OnceLock::new() }; 3];
+    let state = STATES[which].get_or_init(|| {
         let folder = Folder::new();
         folder.write("model.toml", MODEL);
-        let rows = streams::rows(&mut Source::new(0), 400, 0.0);
+        let rows = streams::rows(&mut Source::new(0), ROWS[which], 0.0);
         folder.write("rows.csv", HEADER.to_string() + &rows.join("\n") + "\n");
         let ended = folder.run(
             "monitor --model model.toml --learn 100 --state state.json",
@@ -25,8 +28,8 @@ fn written() -> Result<&'static [u8], String> {
             &["state.json"],
         );
         match ended.fault {
-            Some(fault) => Err(fault),
-            None => Ok(folder.read("state.json")),
+            None if ended.accepted => Ok(folder.read("state.json")),
+            fault => Err(fault.unwrap_or(ended.refusal)),
         }
     });
     state.as_deref().map_err(Clone::clone)
@@ -106,7 +109,7 @@ fn forged(source: &mut Source, state: &[u8]) -> Vec<u8> {
 
 /// A run that goes on from a state.
 pub(super) fn case(source: &mut Source) -> Ended {
-    let state = match written() {
+    let state = match written(source.below(ROWS.len())) {
         Ok(state) => state,
         Err(fault) => {
             return Ended::without_process(false, String::new(), Some(fault));

@@ -149,6 +149,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
         begun: Instant::now(),
         limit: match task {
             Task::Diagnose { effort, .. } => Some(effort.limit()),
+            Task::Design { .. } => Some(missing_effect::TIME_LIMIT),
             _ => None,
         },
         stop: stop.clone(),

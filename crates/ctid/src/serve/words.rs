@@ -215,7 +215,7 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
             "range": range(candidate.low, candidate.high, unit),
             "held": (candidate.kind != Kind::Again).then(|| numbers::duration(candidate.clock)),
             "level": candidate.reaches.last().map(|reach| range(reach.low, reach.high, &design.output_unit)),
-            "power": numbers::significant(candidate.power.power, 2),
+            "power": format!("{}{}", if candidate.refitted { "" } else { "~" }, numbers::significant(candidate.power.power, 2)),
             "decides": format!("{:.0} %", 100.0 * candidate.power.decides),
         })
     };

@@ -298,10 +298,10 @@ impl<'a> Setup<'a> {
             || self.time_limit.as_ref().is_some_and(|limit| limit.passed())
     }
 
-    /// Whether a part of a search has to be left out for want of time; it is noted then.
+    /// Whether a part of a search has to be left out for want of time, or because the computation was cancelled; it is noted then.
     #[must_use]
     pub fn leaves_out(&self, part: &str) -> bool {
-        let out = self.out_of_time();
+        let out = self.stopped() || self.out_of_time();
         if out && let Some(limit) = &self.time_limit {
             limit.leave_out(part);
         }

@@ -45,6 +45,8 @@ impl Search<'_, '_> {
         let best = promised
             .first()
             .and_then(|best| self.confirmed(best, &wider, before));
+        // The best of a few that were drawn at random is not what the range would give.
+        let best = best.filter(|_| !self.leaves_out("a wider range"));
         Ok(best.map(|best| Wider {
             low: wider.low,
             high: wider.high,

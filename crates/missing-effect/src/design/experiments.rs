@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::{
-    CONFIRMED, INSTEAD,
+    INSTEAD, REFITS,
     limits::{Bounds, Refused},
     plan::{Candidate, Reach, SecondSensor, Wider},
     play::{Loop, Played, play},
@@ -84,11 +84,10 @@ impl Search<'_, '_> {
 
     /// Whether a part has to be left out for want of time, or because the user gave up.
     pub fn leaves_out(&self, part: &str) -> bool {
-        let setup = &self.nodes[0].setup;
-        setup.stopped() || setup.leaves_out(part)
+        self.nodes[0].setup.leaves_out(part)
     }
 
-    fn before(&self) -> Result<Before, Error> {
+    pub fn before(&self) -> Result<Before, Error> {
         let [a, b] = self.nodes;
         let imagined = [imagined(a)?, imagined(b)?];
         let misfit = [
@@ -215,7 +214,7 @@ impl Search<'_, '_> {
             .ok()
         };
         let if_true = [of(0)?, of(1)?];
-        if self.leaves_out("refits that confirm experiments") {
+        if self.leaves_out("refits of experiments") {
             return Some(candidate.clone());
         }
         Some(Candidate {
@@ -243,7 +242,7 @@ impl Search<'_, '_> {
             .into_iter()
             .enumerate()
             .collect();
-        // Of each kind some, where the time does not suffice for all.
+        // Where the time does not suffice for all, those that are tried are drawn at random.
         all.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
         let (total, begun, done) = (all.len(), AtomicUsize::new(0), AtomicUsize::new(0));
         let mut tried: Vec<(usize, Tried)> = all
@@ -278,12 +277,12 @@ impl Search<'_, '_> {
         Ok((tried, [overfull, limited]))
     }
 
-    /// Refits in rounds until a refit leads, so that no promise is above what a refit has shown.
-    fn refit(&self, tried: &mut Vec<Tried>, bounds: &Bounds, before: &Before) {
+    /// Refits in rounds until a refit leads, so that no promise is above what a refit has shown; as far as the time suffices.
+    pub fn refit(&self, tried: &mut Vec<Tried>, bounds: &Bounds, before: &Before) {
         let mut done = 0;
         while done < MOST_REFITS
             && tried.first().is_some_and(|(first, _)| !first.refitted)
-            && !self.leaves_out("refits that confirm experiments")
+            && !self.leaves_out("refits of experiments")
         {
             let wanted: Vec<usize> = (0..tried.len())
                 .filter(|&i| !tried[i].0.refitted)
@@ -314,14 +313,22 @@ impl Search<'_, '_> {
 
     pub fn run(&self, bounds: &Bounds, seed: u64) -> Result<Found, Error> {
         let before = self.before()?;
+        // A misfit that is too large before the experiment would make the experiment's too small.
+        if self.nodes[0].setup.out_of_time() {
+            return Err(Refused::OutOfTime.into());
+        }
         let (mut tried, [overfull, limited]) = self.promises(bounds, seed, &before)?;
-        allow(&self.nodes[0], CONFIRMED);
+        let all_tried = !self.nodes[0].setup.out_of_time();
+        allow(&self.nodes[0], REFITS);
         self.refit(&mut tried, bounds, &before);
         allow(&self.nodes[0], INSTEAD);
         if self.nodes[0].setup.stopped() {
             return Err(greybox::Error::Stopped.into());
         }
         let Some((best, sequence)) = tried.first().cloned() else {
+            if !all_tried {
+                return Err(Refused::OutOfTime.into());
+            }
             return Err(Refused::Overfull {
                 low: bounds.low,
                 high: bounds.high,

@@ -158,6 +158,11 @@ pub enum Refused {
         /// The range's width.
         span: f64,
     },
+    /// The limit on the time has passed before anything could be said.
+    #[error(
+        "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
+    )]
+    OutOfTime,
     /// Everything that was tried would overfill a tank.
     #[error(
         "every experiment between {} and {} would lead above the tank_height of {}; give a --range that stays lower",

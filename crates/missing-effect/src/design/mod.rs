@@ -58,13 +58,15 @@ impl Candidacy {
     }
 }
 
-/// Shares of the time limit until which both effects are fitted, ...
-const BOTH: f64 = 0.25;
-/// ... experiments are tried, ...
-const TRIED: f64 = 0.5;
-/// ... the best of them are confirmed, ...
-pub(crate) const CONFIRMED: f64 = 0.7;
-/// ... and what could be done instead is looked at.
+/// Shares of the time limit after which the phases end: the fit of the believed model, ...
+const BELIEVED: f64 = 0.15;
+/// ... the fits of both effects, ...
+const BOTH: f64 = 0.3;
+/// ... the trial of experiments, ...
+const TRIALS: f64 = 0.5;
+/// ... the refits of the best of them, ...
+pub(crate) const REFITS: f64 = 0.7;
+/// ... and the look at what could be done instead.
 pub(crate) const INSTEAD: f64 = 0.8;
 
 /// Both rivals on the records, and the metric in which they are compared.
@@ -110,7 +112,7 @@ pub fn design(
         total: 1,
     });
     let fitted = fitted(problem, between, options)?;
-    allow(&fitted.base, TRIED);
+    allow(&fitted.base, TRIALS);
     let in_loop = !fitted.base.setup.replays().is_empty();
     let parameters = fitted.nodes.iter().map(|node| node.setup.free().len());
     let bounds = Bounds::new(problem, limits, in_loop, parameters.max().unwrap_or(0))?;
@@ -134,7 +136,11 @@ pub fn design(
         schema: 1,
         between: [0, 1].map(|i| rival(&fitted, i)),
         bic_ahead: search.ahead(),
-        prospect: power::prospect(&found.best.power),
+        prospect: match power::prospect(&found.best.power) {
+            // A power that no refit has confirmed is a promise.
+            Prospect::Decides if !found.best.refitted => Prospect::May,
+            prospect => prospect,
+        },
         in_loop,
         candidates: found.candidates,
         overfull: found.overfull,
@@ -178,7 +184,8 @@ fn fitted<'a>(
     between: [Candidacy; 2],
     options: &Options<'a>,
 ) -> Result<Fitted<'a>, Error> {
-    let (base, _) = base(problem, options, BOTH)?;
+    let (base, _) = base(problem, options, BELIEVED)?;
+    allow(&base, BOTH);
     for Candidacy { effect, vessel } in between {
         let vessel = vessel.unwrap_or_else(|| effect.usual_site(problem.plant));
         base.setup.structure.with(Placed { effect, vessel })?;
@@ -220,9 +227,14 @@ fn fitted<'a>(
     } else {
         nodes[0].fit.variance()
     };
+    let base = refine(&base, &noise, &[])?;
+    // What was fitted in part would seem to be a twin of the model without it.
+    if base.setup.out_of_time() {
+        return Err(Refused::OutOfTime.into());
+    }
     Ok(Fitted {
         nodes,
-        base: refine(&base, &noise, &[])?,
+        base,
         metric: Metric { noise, variance },
     })
 }

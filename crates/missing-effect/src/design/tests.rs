@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use ct_signals::{ArModel, Record, excitation, noise};
 use greybox::{Triangle, fit_from};
@@ -9,12 +10,13 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 
 use super::{
-    Bounds, Candidacy, Fitted, Limits, Metric, Prospect, Refused, design, fitted,
+    Bounds, Candidacy, Fitted, Limits, Metric, Prospect, Refused, Search, design, fitted,
     play::{Loop, play},
     separation::{imagined, information, linear, misfit_before, refitted, unlooped, vector},
 };
 use crate::{
     Error, Options, Problem, Progress,
+    diagnose::allow,
     node::FINE,
     simulated::{self, INTERVAL, NOISE},
 };
@@ -61,6 +63,55 @@ fn leak_or_curve(problem: &Problem) -> Fitted<'_> {
         variance: NOISE * NOISE,
     };
     fitted
+}
+
+/// Where the time limit has passed nothing is claimed that was not computed.
+#[test]
+fn what_there_is_no_time_for_is_not_claimed() {
+    let problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);
+    let two = between("const_leak", "pump_nonlinearity");
+    let limited = |limit| Options {
+        time_limit: Some(limit),
+        ..Options::default()
+    };
+    let at_once = limited(Duration::ZERO);
+    let none = design(&problem, two, &Limits::default(), &at_once, &|_| {});
+    assert!(
+        matches!(none, Err(Error::Design(Refused::OutOfTime))),
+        "{none:?}"
+    );
+    let hour = limited(Duration::from_secs(3600));
+    let fitted = fitted(&problem, two, &hour).unwrap();
+    let search = Search {
+        problem: &problem,
+        nodes: &fitted.nodes,
+        metric: &fitted.metric,
+        into: Loop::Open,
+        time_constant: 100.0,
+        progress: &|_| {},
+    };
+    let bounds = Bounds::new(&problem, &Limits::default(), false, 4).unwrap();
+    allow(&fitted.base, 1.0);
+    let before = search.before().unwrap();
+    let (all, _) = search.promises(&bounds, 1, &before).unwrap();
+    allow(&fitted.base, 0.0);
+    let (mut few, _) = search.promises(&bounds, 1, &before).unwrap();
+    assert!(
+        (1..=4).contains(&few.len()) && few.len() < all.len(),
+        "{} of {}",
+        few.len(),
+        all.len()
+    );
+    search.refit(&mut few, &bounds, &before);
+    assert!(few.iter().all(|(candidate, _)| !candidate.refitted));
+    allow(&fitted.base, 1.0);
+    search.refit(&mut few, &bounds, &before);
+    assert!(few[0].0.refitted);
+    let left_out = fitted.base.setup.time_limit.as_ref().unwrap().left_out();
+    assert_eq!(
+        left_out,
+        ["some of the experiments", "refits of experiments"]
+    );
 }
 
 fn noisy(records: &[Record], seed: u64) -> Vec<Record> {

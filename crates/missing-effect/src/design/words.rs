@@ -49,6 +49,20 @@ fn with_power(power: &Power) -> String {
     )
 }
 
+/// The same of an experiment, with what is to be known of it.
+fn promised(candidate: &Candidate) -> String {
+    format!("{}{}", with_power(&candidate.power), reservation(candidate))
+}
+
+/// What a power that is not confirmed is followed by.
+fn reservation(candidate: &Candidate) -> &'static str {
+    if candidate.refitted {
+        ""
+    } else {
+        ", not confirmed by a refit"
+    }
+}
+
 /// A kind of sequence with its settings.
 #[must_use]
 pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
@@ -144,7 +158,12 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     };
     if design.twins() {
         said.push(format!(
-            "No experiment within these limits tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters shows what {} would show.",
+            "{} tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters shows what {} would show.",
+            if design.effort.left_out.is_empty() {
+                "No experiment within these limits"
+            } else {
+                "No experiment that was tried"
+            },
             design.candidates.len(),
             significant(best.power.power, 1),
             if best.power.if_true[0] < best.power.if_true[1] { named(b) } else { named(a) },
@@ -173,9 +192,10 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             .collect();
         said.push(format!("In it {}.", levels.join(", ")));
         said.push(format!(
-            "All records together then decide for the true one with a probability {} (power {}): {}.",
+            "All records together then decide for the true one with a probability {} (power {}{}): {}.",
             of_probability(best.power.decides),
             significant(best.power.power, 2),
+            reservation(best),
             match design.prospect {
                 _ if design.bic_ahead.abs() > GROUP_MARGIN => "it is not needed to tell them apart",
                 Prospect::Decides => "play it",
@@ -208,7 +228,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     if let Some(again) = &design.again {
         said.push(format!(
             "The same as before once more would give {}.",
-            with_power(&again.power)
+            promised(again)
         ));
     }
     let wider = design.wider.as_ref();
@@ -217,7 +237,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             "With --range {} {} the best would give {}.",
             significant(wider.low, 3),
             significant(wider.high, 3),
-            with_power(&wider.best.power)
+            promised(&wider.best)
         ));
     }
     if let Some(second) = &design.second_sensor {

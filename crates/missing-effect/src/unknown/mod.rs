@@ -119,8 +119,8 @@ fn place_name(plant: Plant, spot: Spot) -> String {
 /// What is left out where the time limit has passed.
 pub(crate) const PART: &str = "the shape of what is not explained";
 
-/// The missing term beside a fitted node; `None` where nothing moves. Where the time limit of its setup passes, places and variables
-/// that were not looked at by then are left out.
+/// The missing term beside a fitted node; `None` where nothing moves, and where the time limit of its setup passes: what was looked at by
+/// then says nothing of the other places and variables.
 pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     let plant = node.setup.structure.plant;
     let mut spots = vec![Spot {
@@ -175,6 +175,9 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .into_iter()
         .flatten()
         .collect();
+    if node.setup.leaves_out(PART) {
+        return Ok(None);
+    }
     shapes.sort_by(|a, b| b.share.total_cmp(&a.share));
     let shares = shapes
         .iter()

@@ -86,7 +86,9 @@ impl Place {
             // Two cores shared by many runs: one thread each, unless a test is about threads.
             .env("RAYON_NUM_THREADS", "1");
         // Nor may a result hang on how busy the machine is.
-        let searches = words.starts_with("compare ") || words.starts_with("diagnose ");
+        let searches = ["compare ", "diagnose ", "design "]
+            .iter()
+            .any(|command| words.starts_with(command));
         if searches && !words.contains("--effort") {
             command.args(["--effort", "thorough"]);
         }

@@ -226,7 +226,7 @@ impl Controller {
                 short(*gain),
                 short(*integral_time)
             ),
-            Kind::Sampled { r, s, .. } => format!("r = {}, s = {} (sampled)", list(r), list(s)),
+            Kind::Sampled { r, s, .. } => format!("r = {}, s = {}", list(r), list(s)),
         }
     }
 
@@ -310,7 +310,7 @@ fn list(coefficients: &[f64]) -> String {
     };
     let mut shown: Vec<String> = coefficients.iter().take(MOST_SHOWN).map(digits).collect();
     if coefficients.len() > MOST_SHOWN {
-        shown.push(format!("... ({} in all)", coefficients.len()));
+        shown.push("...".to_string());
     }
     format!("[{}]", shown.join(", "))
 }

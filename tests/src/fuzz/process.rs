@@ -117,8 +117,8 @@ impl Folder {
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = must(command.spawn(), "the program cannot be started");
         let printed = [
-            child.stdout.take().map(|pipe| drained(pipe)),
-            child.stderr.take().map(|pipe| drained(pipe)),
+            child.stdout.take().map(drained),
+            child.stderr.take().map(drained),
         ];
         let (code, seconds, megabytes) = waited(&mut child);
         let [out, err] =
@@ -137,7 +137,7 @@ impl Folder {
             kept(&ended)?;
             for (path, bytes) in &before {
                 let named = |name: &&str| path.ends_with(name);
-                let may = may_write && outputs.iter().any(|name| named(name));
+                let may = may_write && outputs.iter().any(named);
                 if !may && after.get(path) != Some(bytes) {
                     return Err(format!("{} was changed", path.display()));
                 }
@@ -250,7 +250,7 @@ pub(super) fn message(text: &str) -> Result<(), String> {
 }
 
 /// Keys of results that hold a number wherever they are.
-const NUMBERS: [&str; 17] = [
+const NUMBERS: [&str; 16] = [
     "rmse",
     "value",
     "noise_floor",
@@ -261,7 +261,6 @@ const NUMBERS: [&str; 17] = [
     "high",
     "level",
     "innovation",
-    "share",
     "time",
     "score",
     "from",

@@ -1,6 +1,6 @@
 //! The file being read: what is wrong in it is said with its line.
 
-use ct_signals::{Columns, quoted};
+use ct_signals::{Columns, quoted, shown};
 use plants::{Known, MAX_VESSELS, Plant};
 use toml::Spanned;
 
@@ -112,7 +112,10 @@ impl Source<'_> {
         }
         Err(self.at(
             number.span().start,
-            format!("{key} = {value} is not a finite number; give one, or delete the line"),
+            format!(
+                "{key} = {} is not a finite number; give one, or delete the line",
+                shown(value)
+            ),
         ))
     }
 
@@ -124,7 +127,7 @@ impl Source<'_> {
         }
         Err(self.at(
             number.span().start,
-            format!("{key} = {value} has to be above zero; correct it, or delete the line where it is not known"),
+            format!("{key} = {} has to be above zero; correct it, or delete the line where it is not known", shown(value)),
         ))
     }
 

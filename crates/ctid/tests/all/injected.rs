@@ -3,6 +3,7 @@
 //!
 //! The calls fail by `strace`; where it cannot be used the tests say so and pass.
 #![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

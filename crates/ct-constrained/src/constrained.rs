@@ -26,8 +26,8 @@
 //!
 //! Cost per update: `2 p^2` multiplications for the data and for each row that acts.
 //!
-//! Reference: A. J. Udink ten Cate, *On optimal and suboptimal least squares identification in continuous time*, WP-85-54,
-//! IIASA, Laxenburg, 1985, section 3.
+//! Reference: A. J. Udink ten Cate, *Continuous-time constrained least-squares algorithms for recursive parameter estimation of stochastic
+//! linear systems by a stabilized output error method*, WP-85-54, IIASA, Laxenburg, 1985, section 3.
 
 use ct_rls::{ContinuousRls, Health, Innovation, Outcome, RecursiveEstimator, Sample, Weights};
 use nalgebra::{SMatrix, SVector};

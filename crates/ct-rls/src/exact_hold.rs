@@ -26,8 +26,8 @@
 //!
 //! Cost per update: `2 p^2` multiplications and `p` divisions, on the factors `P = U D U'`, which cannot lose definiteness.
 //!
-//! Reference: A. J. Udink ten Cate, *On optimal and suboptimal least squares identification in continuous time*, WP-85-54,
-//! IIASA, Laxenburg, 1985.
+//! Reference: A. J. Udink ten Cate, *Continuous-time constrained least-squares algorithms for recursive parameter estimation of stochastic
+//! linear systems by a stabilized output error method*, WP-85-54, IIASA, Laxenburg, 1985, section 2.
 
 use nalgebra::{SMatrix, SVector};
 

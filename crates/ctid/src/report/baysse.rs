@@ -5,7 +5,7 @@ use super::page::{self, NOTICES, Page, figure, items, large, section};
 use super::tables::table;
 use super::text::{escape, significant};
 use crate::tables::baysse::{Cell, Study, TRUTH};
-use crate::tables::baysse_text::{band, figure_of, notes, printed};
+use crate::tables::baysse_text::{band, figure_of, notes, of_the_paper, printed};
 
 /// The page as a complete HTML file. The same study gives the same bytes.
 pub fn html(study: &Study) -> String {
@@ -56,7 +56,7 @@ fn headline(study: &Study) -> String {
     };
     format!(
         "<header>\n<p class=\"kicker\">ctid report · A. Baysse, F. J. Carrillo, A. Habbadi: output error in closed loop</p>\n\
-         <h1>Tables I and II: {} of {} cells inside their bands</h1>\n\
+         <h1>Tables I and II: {} of {} figures of the runs inside the bands of a reproduction</h1>\n\
          <div class=\"verdict\"><p>A tank level in a loop, identified by least squares, by instruments, and by output error of the loop itself. \
          {} runs of each table, each with another noise.</p></div>\n\
          <ol class=\"trail apart\">\n\
@@ -72,7 +72,7 @@ fn headline(study: &Study) -> String {
             "F-CLOE delta",
             &format!("by closed-loop output error; the truth is {} s", TRUTH[1])
         ),
-        items(notes(study)),
+        items([of_the_paper(study)].into_iter().chain(notes(study))),
         items(&study.assumptions),
     )
 }
@@ -109,6 +109,10 @@ fn row(cell: &Cell) -> String {
         Some(true) => ("", "inside"),
         Some(false) => (" class=\"chosen\"", "outside"),
         None => ("", ""),
+    };
+    let word = match cell.paper_outside {
+        Some(off) if off > 0.0 => format!("{word}; the paper's is outside"),
+        _ => word.to_string(),
     };
     let numbers = [
         printed(cell),

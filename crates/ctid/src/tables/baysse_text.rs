@@ -13,7 +13,7 @@ pub fn text(study: &Study, look: Look) -> String {
     let mut text = format!("{}\n", look.heading(title));
     let lead = format!(
         "The printed figures beside {} runs, each with another noise. The band is where the figure of the runs has to be; * marks one outside. \
-         The standard deviation is that of the figure from one such set of runs to the next.",
+         + a printed figure outside the same band, which then is that of a reproduction and not of the paper. The standard deviation is that of the figure from one such set of runs to the next.",
         study.runs
     );
     text += &look.paragraph("  ", &lead);
@@ -62,7 +62,7 @@ fn cells(study: &Study, look: Look) -> String {
         rows.push(vec![
             format!("  {name}"),
             cell.of.to_owned(),
-            printed(cell),
+            printed(cell) + paper_mark(cell),
             figure_of(cell),
             numbers::significant(cell.sd, 2),
             band(cell, " .. ") + &mark,
@@ -87,6 +87,40 @@ pub(crate) fn printed(cell: &Cell) -> String {
         Some(paper) => format!("{paper:.*}", cell.decimals),
         None => "-".to_owned(),
     }
+}
+
+/// What a printed figure outside the band is marked by.
+pub(crate) fn paper_mark(cell: &Cell) -> &'static str {
+    match cell.paper_outside {
+        Some(off) if off > 0.0 => "+",
+        _ => " ",
+    }
+}
+
+/// Of the printed figures, how many lie inside the bands, and which do not.
+pub(crate) fn of_the_paper(study: &Study) -> String {
+    let of = study.printed().count();
+    let outside: Vec<String> = study
+        .printed()
+        .filter(|(_, off)| *off > 0.0)
+        .map(|(cell, off)| {
+            let share = numbers::significant(100.0 * off, 2);
+            format!(
+                "{} {} (by {share} % of the band's width)",
+                cell.cell,
+                printed(cell)
+            )
+        })
+        .collect();
+    let inside = of - outside.len();
+    let mut said = format!("Of the {of} printed figures that have a band {inside} lie inside it");
+    if !outside.is_empty() {
+        said += &format!(
+            "; outside are {}: the paper's noises were others, and its bands are not known",
+            outside.join(", ")
+        );
+    }
+    said + "."
 }
 
 /// Below this, powers of ten.
@@ -133,8 +167,11 @@ fn short(number: &str) -> String {
 
 fn summary(study: &Study, look: Look) -> String {
     let Study { inside, of, .. } = study;
-    let verdict = look.strong(format!("{inside} of {of} cells inside their bands"));
+    let verdict = look.strong(format!(
+        "{inside} of {of} figures of the runs inside the bands of a reproduction"
+    ));
     let mut text = format!("{verdict}\n");
+    text += &look.paragraph("  ", &of_the_paper(study));
     for cell in study.outside() {
         let line = format!("table {}, {}: {}", cell.table, cell.cell, figure_of(cell));
         text += &look.paragraph("    - ", &line);

@@ -58,6 +58,9 @@ pub struct Cell {
     pub band: Option<[f64; 2]>,
     /// Whether it is; nothing without a band.
     pub inside: Option<bool>,
+    /// By how much of the band's width the printed figure lies outside the same band, 0 where it is inside; nothing where it or a band with
+    /// two ends is missing. What is printed may be off by half of its last digit.
+    pub paper_outside: Option<f64>,
 }
 
 /// What is asked of a cell.
@@ -86,8 +89,19 @@ impl Cell {
             sd: jackknife(runs, statistic),
             band: asked.band,
             inside,
+            paper_outside: asked
+                .paper
+                .zip(asked.band)
+                .and_then(|(paper, band)| beyond(paper, band)),
         }
     }
+}
+
+/// By how much of its width a printed figure lies outside a band.
+fn beyond(paper: Printed, [low, high]: [f64; 2]) -> Option<f64> {
+    let off = (low - paper.value).max(paper.value - high) - paper.rounding;
+    let width = high - low;
+    width.is_finite().then(|| off.max(0.0) / width)
 }
 
 /// Standard deviation of a statistic: each run is left out once.
@@ -175,6 +189,12 @@ pub struct Study {
 }
 
 impl Study {
+    /// Cells whose printed figure can be held against a band.
+    pub fn printed(&self) -> impl Iterator<Item = (&Cell, f64)> {
+        let cells = self.tables.iter();
+        cells.filter_map(|cell| Some((cell, cell.paper_outside?)))
+    }
+
     /// Cells that have a band and lie outside.
     pub fn outside(&self) -> impl Iterator<Item = &Cell> {
         self.tables.iter().filter(|cell| cell.inside == Some(false))
@@ -274,6 +294,17 @@ mod tests {
         let values = [3.0, 1.0, 4.0, 1.0, 5.0, 9.0, 2.0, 6.0];
         let error = (variance(&values) / 8.0).sqrt();
         assert!((jackknife(&values, mean) / error - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_printed_figure_is_outside_by_a_share_of_the_band() {
+        let outside = |value, decimals, band| beyond(Printed::new(value, decimals), band);
+        assert_eq!(outside(5.9, 2, [5.8, 6.0]), Some(0.0));
+        let above = outside(6.1, 2, [5.8, 6.0]).unwrap();
+        assert!((above - 0.095 / 0.2).abs() < 1e-9, "{above}");
+        // Its last digit reaches the band.
+        assert_eq!(outside(6.004, 2, [5.8, 6.0]), Some(0.0));
+        assert_eq!(outside(3.0, 1, [7.5, f64::INFINITY]), None);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod draw;
 pub mod fuzz;
+pub mod http;
 pub mod measured;
 pub mod onset;
 pub mod outside;

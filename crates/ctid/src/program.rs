@@ -1,4 +1,4 @@
-//! The program from its words to its exit code: 0 on any verdict, 2 with one line on standard error where something is wrong.
+//! The program from its arguments to its exit code: 0 on any verdict, 2 with one line on standard error where something is wrong.
 
 use std::ffi::OsString;
 use std::io::{self, Write};
@@ -11,9 +11,9 @@ use nix::sys::signal::{SigSet, Signal};
 use crate::look::Look;
 use crate::{Cli, one_line, run};
 
-/// Runs the program on its words, of which the first is its name. It starts the threads of the whole process: call it once.
-pub fn program(words: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let message = match Cli::try_parse_from(words) {
+/// Runs the program on its arguments, of which the first is its name. It starts the threads of the whole process: call it once.
+pub fn program(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let message = match Cli::try_parse_from(arguments) {
         Ok(cli) => match start_threads().and_then(|()| done(cli)) {
             Ok(()) => return ExitCode::SUCCESS,
             Err(error) => format!("error: {error}"),
@@ -36,7 +36,7 @@ fn done(cli: Cli) -> Result<(), String> {
     run(cli, &mut io::stdout().lock(), Look::of_stdout()).map_err(|error| error.to_string())
 }
 
-/// Starts those that compute. Left to the first computation, a failed start ends the program with a panic. All threads keep back the
+/// Starts the threads that compute. Left to the first computation, a failed start ends the program with a panic. All threads keep back the
 /// signal that a file larger than allowed sends, which would end the program: the write then fails with an error.
 fn start_threads() -> Result<(), String> {
     #[cfg(unix)]

@@ -10,7 +10,7 @@
 //! | model files | `models` |
 //! | rows for the monitor, and its saved states | `streams`, `states` |
 //! | requests to the page | `requests` |
-//! | the process and what it must keep | `process` |
+//! | the process, and the checks | `process` |
 
 mod models;
 mod process;

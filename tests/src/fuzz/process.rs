@@ -1,4 +1,4 @@
-//! The program as a process: this executable, called again. What it must keep, whatever it is given.
+//! The program as a process: this executable, called again; and the checks of what it prints, writes and uses.
 
 use std::collections::BTreeMap;
 use std::env;
@@ -25,14 +25,14 @@ const MOST_SECONDS: f64 = 20.0;
 const MOST_MEGABYTES: f64 = 500.0;
 /// Characters of an error at most.
 const LONGEST_ERROR: usize = 300;
-/// A process that still runs then stands still: the longest run has ended long before, also on a busy machine.
+/// A process that still runs then hangs: the longest run ends long before, on a busy machine too.
 const PATIENCE: Duration = Duration::from_secs(150);
 
 /// Where this executable was called as the program, runs it to its exit code. Call it first.
 #[must_use]
 pub fn as_program() -> Option<ExitCode> {
-    let mut words = env::args_os().skip(1);
-    if words.next()? != AS_PROGRAM {
+    let mut arguments = env::args_os().skip(1);
+    if arguments.next()? != AS_PROGRAM {
         return None;
     }
     thread::spawn(|| {
@@ -40,7 +40,7 @@ pub fn as_program() -> Option<ExitCode> {
         process::abort();
     });
     Some(ctid::program(
-        [OsString::from("ctid")].into_iter().chain(words),
+        [OsString::from("ctid")].into_iter().chain(arguments),
     ))
 }
 
@@ -133,8 +133,8 @@ impl Folder {
         let after = self.files();
         let may_write = ended.accepted || input.is_some();
         ended.fault = (|| {
-            said(code, &out, &err, input.is_some())?;
-            kept(&ended)?;
+            check_output(code, &out, &err, input.is_some())?;
+            check_limits(&ended)?;
             for (path, bytes) in &before {
                 let named = |name: &&str| path.ends_with(name);
                 let may = may_write && outputs.iter().any(named);
@@ -182,8 +182,8 @@ pub(super) fn waited(child: &mut Child) -> (Option<i32>, f64, f64) {
     )
 }
 
-/// What every process keeps.
-pub(super) fn kept(ended: &Ended) -> Result<(), String> {
+/// The limits on processor time and memory.
+pub(super) fn check_limits(ended: &Ended) -> Result<(), String> {
     if ended.seconds > MOST_SECONDS {
         return Err(format!("{:.0} s of processor time", ended.seconds));
     }
@@ -194,7 +194,7 @@ pub(super) fn kept(ended: &Ended) -> Result<(), String> {
 }
 
 /// What it may print; of a stream the monitor also says what it did before an error, and notes on standard error.
-fn said(code: Option<i32>, out: &str, err: &str, stream: bool) -> Result<(), String> {
+fn check_output(code: Option<i32>, out: &str, err: &str, stream: bool) -> Result<(), String> {
     if err.contains("panicked") {
         return Err(err.to_string());
     }

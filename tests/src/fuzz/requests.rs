@@ -1,16 +1,16 @@
 //! Requests to the page.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
+use std::io::{BufRead, BufReader};
 use std::process::{Child, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::process::{Folder, drained, kept, message, result, shortened, waited};
+use super::process::{Folder, check_limits, drained, message, result, shortened, waited};
 use super::source::Source;
 use super::{Ended, models, records};
+use crate::http::{self, Answer};
 
 /// Within this another request is answered, whatever was sent before.
 const AT_ONCE: Duration = Duration::from_secs(2);
@@ -98,27 +98,8 @@ impl Running {
     }
 
     fn exchange(&self, bytes: &[u8], patience: Duration) -> Result<Answer, String> {
-        let mut stream =
-            TcpStream::connect(&self.address).map_err(|error| format!("no connection: {error}"))?;
-        stream
-            .set_read_timeout(Some(patience))
-            .map_err(|error| error.to_string())?;
-        // A server that has refused already does not take the rest.
-        let _ = stream.write_all(bytes);
-        let mut answer = Vec::new();
-        let mut part = [0; 1 << 16];
-        while let Ok(count @ 1..) = stream.read(&mut part) {
-            answer.extend_from_slice(&part[..count]);
-        }
-        let text = String::from_utf8_lossy(&answer).into_owned();
-        let (head, body) = text.split_once("\r\n\r\n").unwrap_or_default();
-        Ok(Answer {
-            status: head
-                .split(' ')
-                .nth(1)
-                .and_then(|status| status.parse().ok()),
-            body: body.to_string(),
-        })
+        http::exchange(self.address.as_str(), bytes, patience)
+            .map_err(|error| format!("no connection: {error}"))
     }
 
     /// Another request is answered, and soon; on a machine that is busy for a moment at the second time.
@@ -200,17 +181,10 @@ impl Running {
         ended.fault = match gone {
             Some(status) => Some(format!("the page ended: {status}: {said}")),
             None if !said.is_empty() => Some(format!("the page says {said}")),
-            None => kept(&ended).err(),
+            None => check_limits(&ended).err(),
         };
         ended
     }
-}
-
-/// An answer; without a status where the connection was closed instead.
-#[derive(Debug)]
-struct Answer {
-    status: Option<u16>,
-    body: String,
 }
 
 /// A value for a key of a request.
@@ -423,17 +397,9 @@ pub(super) fn case(source: &mut Source) -> Ended {
         Ok(running) => running,
         Err(fault) => return Ended::without_process(false, String::new(), Some(fault)),
     };
-    let mut accepted = false;
-    let mut fault = None;
-    for _ in 0..REQUESTS {
-        match asks(source, &running) {
-            Ok(result) => accepted = result,
-            Err(found) => fault = Some(found),
-        }
-        if fault.is_some() {
-            break;
-        }
-    }
+    let asked = (0..REQUESTS).try_fold(false, |_, _| asks(source, &running));
+    let accepted = asked == Ok(true);
+    let mut fault = asked.err();
     if fault.is_none() && source.chance(0.2) {
         fault = running.computed().err();
     }

@@ -1,8 +1,8 @@
 //! The program's server on a thread of its own, and requests to it as bytes.
 
 use std::fmt::{Display, Formatter};
-use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::io::Write;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
 use std::thread;
@@ -12,6 +12,7 @@ use clap::Parser;
 use ct_signals::{Record, Signal};
 use ctid::look::Look;
 use ctid::{Cli, run};
+use ctid_tests::http;
 use serde_json::Value;
 
 /// One test after the other where something is computed: what one looks at is the whole process.
@@ -138,26 +139,14 @@ impl Answer {
 
 /// Sends bytes and reads to the end.
 pub fn exchange(address: SocketAddr, bytes: &[u8]) -> Answer {
-    let mut stream = TcpStream::connect(address).unwrap();
-    stream
-        .set_read_timeout(Some(Duration::from_secs(60)))
-        .unwrap();
-    // A server that has refused already does not take the rest.
-    let _ = stream.write_all(bytes);
-    let mut answer = Vec::new();
-    let mut part = [0; 1 << 16];
-    while let Ok(count @ 1..) = stream.read(&mut part) {
-        answer.extend_from_slice(&part[..count]);
-    }
-    let text = String::from_utf8_lossy(&answer).into_owned();
-    let (head, body) = text
-        .split_once("\r\n\r\n")
-        .unwrap_or_else(|| panic!("no answer: {text:?}"));
-    let status = head.split(' ').nth(1).unwrap().parse().unwrap();
+    let answer = http::exchange(address, bytes, Duration::from_secs(60)).unwrap();
+    let status = answer
+        .status
+        .unwrap_or_else(|| panic!("no answer: {answer:?}"));
     Answer {
         status,
-        head: head.to_lowercase(),
-        body: body.to_string(),
+        head: answer.head.to_lowercase(),
+        body: answer.body,
     }
 }
 

@@ -6,6 +6,8 @@ use super::tables::table;
 use super::text::{escape, significant};
 use crate::tables::gains::{Gains, Kind, Limits, Row, TRUTH};
 use crate::tables::udink::{LargerP, Rule, Study};
+use crate::tables::udink_contrasts::{self, Contrast};
+use crate::tables::udink_power::{self, Changed, ConstantGain};
 use crate::tables::{Cell, Comparison};
 
 /// The page as a complete HTML file. The same study gives the same bytes.
@@ -15,6 +17,9 @@ pub fn html(study: &Study) -> String {
         "<main>".to_owned(),
         responses(),
         cells(study),
+        contrasts(&study.contrasts),
+        power(&study.power),
+        constant_gains(&study.constant_gains),
         larger_p(&study.larger_p),
         gains(&study.gains),
         "</main>".to_owned(),
@@ -48,12 +53,13 @@ fn headline(study: &Study) -> String {
          <h1>Tables 1 to 4: {}</h1>\n\
          <div class=\"verdict\"><p>The paper prints one run of each table. Here are {} runs, each with another noise, \
          the same in every table. A cell is inside where the printed figure, give or take its rounding, lies in the \
-         5 to 95 % range of the runs; of cells that agree, one in ten lies outside by chance.</p></div>\n\
+         5 to 95 % range of the runs; of cells that agree, one in ten lies outside by chance.</p><p>{}</p></div>\n\
          <ol class=\"trail apart\">\n{trail}</ol>\n\
          <details><summary>What the paper does not print, and is assumed</summary><ul>\n{assumptions}</ul></details>\n<p>The paper\u{2019}s own bounds on c^: {}.</p>\n\
          {NOTICES}</header>\n",
         study.verdict(),
         study.runs,
+        escape(&study.beside_the_verdict()),
         escape(&study.filter_bounds)
     )
 }
@@ -144,6 +150,104 @@ fn outside(study: &Study) -> String {
         format!("<h3>Outside with {name}</h3>\n<ul>\n{cells}</ul>\n")
     };
     list("Euler's rule", &study.euler) + &list("the exact step", &study.exact)
+}
+
+fn contrasts(contrasts: &[Contrast]) -> String {
+    let tables: String = contrasts
+        .iter()
+        .map(|contrast| {
+            let rows: String = contrast
+                .cells
+                .iter()
+                .map(|cell| {
+                    format!(
+                        "<tr><th scope=\"row\">{}</th><td class=\"number\">{:.*}</td>{}</tr>\n",
+                        cell.cell,
+                        cell.decimals,
+                        cell.paper,
+                        of_rule(cell)
+                    )
+                })
+                .collect();
+            let [first, second] = contrast.between;
+            table(
+                &format!("Table {second} minus table {first}"),
+                "<tr><th scope=\"col\">Cell</th><th scope=\"col\" class=\"number\">Paper</th>\
+                 <th scope=\"col\" class=\"number\">Median</th><th scope=\"col\" class=\"number\">5 to 95 %</th><th scope=\"col\"></th></tr>",
+                &rows,
+                &contrast.sentence(),
+            )
+        })
+        .collect();
+    section(
+        "contrasts",
+        udink_contrasts::TITLE,
+        udink_contrasts::MEANING,
+        &tables,
+    )
+}
+
+fn power(changed: &[Changed]) -> String {
+    let rows: String = changed
+        .iter()
+        .map(|changed| {
+            let (class, noticed) = if changed.noticed {
+                ("", "yes")
+            } else {
+                (" class=\"chosen\"", "no")
+            };
+            format!(
+                "<tr><th scope=\"row\">{}</th><td class=\"number\">{} of {}</td><td{class}>{noticed}</td></tr>\n",
+                escape(changed.setting),
+                changed.inside,
+                changed.of
+            )
+        })
+        .collect();
+    section(
+        "power",
+        udink_power::TITLE,
+        &escape(&udink_power::sentence(changed)),
+        &table(
+            "Tables 1 to 4 with other settings",
+            "<tr><th scope=\"col\">Changed</th><th scope=\"col\" class=\"number\">Cells inside</th><th scope=\"col\">Noticed</th></tr>",
+            &rows,
+            "Noticed: the tables are no longer called consistent.",
+        ),
+    )
+}
+
+fn constant_gains(gains: &[ConstantGain]) -> String {
+    let rows: String = gains
+        .iter()
+        .map(|gain| {
+            let figures: String = gain
+                .criterion
+                .into_iter()
+                .chain([gain.gain_average, gain.time_constant_average])
+                .map(|value| format!("<td class=\"number\">{}</td>", significant(value, 4)))
+                .collect();
+            format!(
+                "<tr><th scope=\"row\">{}</th><td>{}</td>{figures}</tr>\n",
+                gain.gain,
+                gain.rule.name()
+            )
+        })
+        .collect();
+    section(
+        "constant",
+        udink_power::SLOW,
+        "The paper prints no figures of the diagonal one. Medians of the runs; E is the criterion, s.",
+        &table(
+            "Constant gains",
+            "<tr><th scope=\"col\">Gain</th><th scope=\"col\">Rule</th><th scope=\"col\" class=\"number\">E250</th>\
+             <th scope=\"col\" class=\"number\">E500</th><th scope=\"col\" class=\"number\">E750</th>\
+             <th scope=\"col\" class=\"number\">E1000</th><th scope=\"col\" class=\"number\">K, average</th>\
+             <th scope=\"col\" class=\"number\">tau, average (s)</th></tr>",
+            &rows,
+            "",
+        ),
+    )
 }
 
 fn larger_p(rows: &[LargerP]) -> String {

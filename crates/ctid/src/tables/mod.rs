@@ -10,6 +10,8 @@ pub mod gains;
 pub mod paper_baysse;
 pub mod paper_udink;
 pub mod udink;
+pub mod udink_contrasts;
+pub mod udink_power;
 mod udink_run;
 pub mod udink_text;
 

@@ -2,6 +2,8 @@
 
 use super::gains::Gains;
 use super::udink::{LargerP, Study};
+use super::udink_contrasts::{self, Contrast};
+use super::udink_power::{self, Changed, ConstantGain};
 use super::{Cell, Comparison};
 use crate::look::{Look, Side, table};
 use crate::numbers;
@@ -32,7 +34,11 @@ pub fn text(study: &Study, look: Look) -> String {
     let checked = format!("Its own bounds on c^: {}.", study.filter_bounds);
     text += &look.paragraph("  ", &checked);
     text.push('\n');
-    text + &larger_p(&study.larger_p, look) + &gains(&study.gains, look)
+    text + &contrasts(&study.contrasts, look)
+        + &power(&study.power, look)
+        + &constant_gains(&study.constant_gains, look)
+        + &larger_p(&study.larger_p, look)
+        + &gains(&study.gains, look)
 }
 
 fn cells(study: &Study, look: Look) -> String {
@@ -88,6 +94,7 @@ fn summary(study: &Study, look: Look) -> String {
         "{}\n",
         look.strong(format!("Against the paper: {}", study.verdict()))
     );
+    text += &look.paragraph("  ", &study.beside_the_verdict());
     for (name, comparison) in [
         ("Euler's rule", &study.euler),
         ("the exact step", &study.exact),
@@ -107,6 +114,84 @@ fn summary(study: &Study, look: Look) -> String {
             let line = format!("table {}, {}: {}", cell.table, cell.cell, cell.why);
             text += &look.paragraph("    - ", &line);
         }
+    }
+    text.push('\n');
+    text
+}
+
+fn contrasts(contrasts: &[Contrast], look: Look) -> String {
+    let mut text = format!("{}\n", look.heading(udink_contrasts::TITLE));
+    text += &look.paragraph("  ", udink_contrasts::MEANING);
+    let [left, right] = [Side::Left, Side::Right];
+    for contrast in contrasts {
+        let [first, second] = contrast.between;
+        let mut rows = vec![
+            [
+                look.strong(format!("Table {second} - {first}")),
+                look.faint("paper"),
+                look.faint("median"),
+                look.faint("5 to 95 % "),
+            ]
+            .to_vec(),
+        ];
+        for cell in &contrast.cells {
+            let mut row = vec![format!("  {}", cell.cell), printed(cell)];
+            row.extend(of_rule(cell, look));
+            rows.push(row);
+        }
+        text.push('\n');
+        for line in table(&[left, right, right, right], &rows) {
+            text += &format!("{line}\n");
+        }
+        text += &look.paragraph("  ", &contrast.sentence());
+    }
+    text.push('\n');
+    text
+}
+
+fn power(changed: &[Changed], look: Look) -> String {
+    let mut text = format!("{}\n", look.heading(udink_power::TITLE));
+    text += &look.paragraph("  ", &udink_power::sentence(changed));
+    let mut rows = vec![
+        ["other setting", "cells inside", "noticed"]
+            .map(|name| look.faint(name))
+            .to_vec(),
+    ];
+    for changed in changed {
+        let noticed = if changed.noticed {
+            "yes".to_owned()
+        } else {
+            look.warning("no")
+        };
+        rows.push(vec![
+            changed.setting.to_owned(),
+            format!("{} of {}", changed.inside, changed.of),
+            noticed,
+        ]);
+    }
+    for line in table(&[Side::Left, Side::Right, Side::Right], &rows) {
+        text += &format!("  {line}\n");
+    }
+    text.push('\n');
+    text
+}
+
+fn constant_gains(gains: &[ConstantGain], look: Look) -> String {
+    let heading = [
+        "gain", "rule", "E250", "E500", "E750", "E1000", "K avg", "tau avg",
+    ];
+    let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
+    for gain in gains {
+        let mut row = vec![gain.gain.to_owned(), gain.rule.name().to_owned()];
+        row.extend(gain.criterion.map(figure));
+        row.extend([gain.gain_average, gain.time_constant_average].map(figure));
+        rows.push(row);
+    }
+    let [left, right] = [Side::Left, Side::Right];
+    let sides = [left, left, right, right, right, right, right, right];
+    let mut text = format!("{}\n", look.heading(udink_power::SLOW));
+    for line in table(&sides, &rows) {
+        text += &format!("  {line}\n");
     }
     text.push('\n');
     text

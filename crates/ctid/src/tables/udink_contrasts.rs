@@ -1,0 +1,135 @@
+//! What the paper's tables say of each other: differences of the same cell in two of them.
+//!
+//! Tables with the same noise differ by their settings alone, so that a difference of two cells varies much less from noise to noise than
+//! either of them: it tells far more than the cells do one by one.
+//!
+//! Reference: [`paper_udink`](super::paper_udink).
+
+use serde::Serialize;
+
+use super::Cell;
+use super::paper_udink::{CELLS, TABLES};
+use super::udink_run::Cells;
+
+/// What the differences are called.
+pub const TITLE: &str = "Differences between tables, each run of both with one noise";
+
+/// What they tell.
+pub const MEANING: &str = "By Euler's rule. Two tables with one noise differ by their settings alone: that their cells lie inside one \
+     by one does not say that their differences do.";
+
+/// Pairs of tables, and what is known of their noises.
+const PAIRS: [([usize; 2], &str); 3] = [
+    (
+        [2, 3],
+        "the paper prints the same c^ for both, average and relative variance: they have one noise",
+    ),
+    (
+        [1, 2],
+        "if they have one noise, which the paper does not say",
+    ),
+    (
+        [3, 4],
+        "if they have one noise, which the paper does not say",
+    ),
+];
+
+/// The second table minus the first, cell by cell, each run of both with the same noise.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Contrast {
+    /// Numbers of the two tables.
+    pub between: [usize; 2],
+    /// What is known of their noises.
+    pub noise: &'static str,
+    /// The differences; the table of each is the second one.
+    pub cells: Vec<Cell>,
+    /// How many printed differences lie inside.
+    pub inside: usize,
+}
+
+impl Contrast {
+    /// How many of the differences lie inside, and what is known of the noises.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let [first, second] = self.between;
+        format!(
+            "{} of {} differences inside; tables {first} and {second}: {}.",
+            self.inside,
+            self.cells.len(),
+            self.noise
+        )
+    }
+}
+
+/// Cells that are neither made of others nor differences themselves.
+fn told_apart(name: &str) -> bool {
+    !name.ends_with("rel.err") && !name.contains('-')
+}
+
+/// All pairs; `runs` holds the cells of every table, run by run.
+pub(super) fn contrasts(runs: &[&[Option<Cells>; TABLES.len()]]) -> Vec<Contrast> {
+    PAIRS
+        .into_iter()
+        .map(|([first, second], noise)| {
+            let printed = [first, second].map(|number| TABLES[number - 1].cells());
+            let cells: Vec<Cell> = (0..printed[0].len().min(printed[1].len()))
+                .filter(|&place| told_apart(CELLS[place]))
+                .map(|place| {
+                    let differences = runs.iter().map(|run| {
+                        let [a, b] = [first, second]
+                            .map(|number| run[number - 1].map_or(f64::NAN, |cells| cells[place]));
+                        b - a
+                    });
+                    let difference = printed[1][place].minus(printed[0][place]);
+                    Cell::new(second, CELLS[place], difference, differences)
+                })
+                .collect();
+            Contrast {
+                between: [first, second],
+                noise,
+                inside: cells.iter().filter(|cell| cell.inside).count(),
+                cells,
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_contrast_is_the_second_table_minus_the_first_of_the_same_run() {
+        let runs: Vec<[Option<Cells>; 4]> = (0..40)
+            .map(|run| {
+                let noise = f64::from(run);
+                [1.0, 2.0, 4.0, 8.0].map(|of_table| Some([of_table + noise; CELLS.len()]))
+            })
+            .collect();
+        let runs: Vec<&[Option<Cells>; 4]> = runs.iter().collect();
+        let found = contrasts(&runs);
+        // What both have in common is gone: the differences do not vary.
+        for (contrast, difference) in found.iter().zip([2.0, 1.0, 4.0]) {
+            for cell in &contrast.cells {
+                assert_eq!((cell.q05, cell.q95), (difference, difference));
+                assert!(!cell.inside, "{cell:?}");
+            }
+        }
+        let names: Vec<&str> = found[0].cells.iter().map(|cell| cell.cell).collect();
+        assert!(names.contains(&"P11") && names.contains(&"E250"));
+        assert!(!names.contains(&"K rel.err") && !names.contains(&"E500-E250"));
+        assert!(!found[2].cells.iter().any(|cell| cell.cell == "P11"));
+        let k = &found[0].cells[0];
+        assert!((k.paper - (0.986 - 0.987)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_lost_run_has_no_difference() {
+        let whole = [Some([1.0; CELLS.len()]); 4];
+        let mut lost = whole;
+        lost[2] = None;
+        let found = contrasts(&[&whole, &lost, &whole]);
+        assert_eq!(found[0].cells[0].median, 0.0);
+        assert!(contrasts(&[&lost])[0].cells[0].median.is_nan());
+    }
+}

@@ -13,7 +13,7 @@ use crate::{
     node::{FINE, Node, ROUGH, best_first, fitted, refine, without, without_clock},
     noise_floor::NOISE_ORDER,
     problem::STOPPING,
-    random_walk::beyond_random_walk,
+    random_walk::{Begin, beyond_random_walk},
     remains::remains,
     search::by_clock,
 };
@@ -58,13 +58,17 @@ pub(crate) fn doubt<'a>(
     if jumped.is_some() {
         confirmed = found.base.clone();
     }
+    // Noise that wanders bends to gains and saturations too, as their inputs are slow.
+    if !confirmed.added.is_empty() && !beyond_random_walk(&confirmed, base, Begin::AtZero)? {
+        confirmed = found.base.clone();
+    }
     // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
     // explain as much, and where the other effects of the set are called for without them: what only corrects an imitation is not. Where
     // white noise is left this is not asked, since an imitation hardly ever leaves white noise.
     if by_clock(&confirmed) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();
-        let by_walk = !beyond_random_walk(&confirmed, &others)?;
+        let by_walk = !beyond_random_walk(&confirmed, &others, Begin::Anywhere)?;
         let white = own_last.noise.order() == 0;
         let others = confirm(others, noise)?;
         if by_walk

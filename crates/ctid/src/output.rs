@@ -8,6 +8,7 @@ use missing_effect::Diagnosis;
 use serde::{Deserialize, Serialize};
 
 use crate::identify::Identification;
+use crate::identify::side_by_side::SideBySide;
 use crate::tables::{baysse, udink};
 use crate::{Error, atomic, report, term_file};
 
@@ -110,6 +111,12 @@ pub struct Output {
     path: PathBuf,
     /// A file of ctid's, or an empty one, stood there when the command began.
     replaces: bool,
+}
+
+impl Found for SideBySide {
+    fn page(&self) -> String {
+        report::side_by_side(self)
+    }
 }
 
 impl Found for Identification {

@@ -13,7 +13,7 @@ use crate::{
     node::{FINE, Node, ROUGH, best_first, fitted, refine, without, without_clock},
     noise_floor::NOISE_ORDER,
     problem::STOPPING,
-    random_walk::{Begin, beyond_random_walk},
+    random_walk::{Walk, beyond_random_walk},
     remains::remains,
     search::by_clock,
 };
@@ -59,7 +59,8 @@ pub(crate) fn doubt<'a>(
         confirmed = found.base.clone();
     }
     // Noise that wanders bends to gains and saturations too, as their inputs are slow.
-    if !confirmed.added.is_empty() && !beyond_random_walk(&confirmed, base, Begin::AtZero)? {
+    if !confirmed.added.is_empty() && !beyond_random_walk(&confirmed, base, Walk::SMALL_FROM_ZERO)?
+    {
         confirmed = found.base.clone();
     }
     // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
@@ -68,7 +69,8 @@ pub(crate) fn doubt<'a>(
     if by_clock(&confirmed) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();
-        let by_walk = !beyond_random_walk(&confirmed, &others, Begin::Anywhere)?;
+        let by_walk = !(beyond_random_walk(&confirmed, &others, Walk::ANY)?
+            && beyond_random_walk(&confirmed, &others, Walk::SMALL)?);
         let white = own_last.noise.order() == 0;
         let others = confirm(others, noise)?;
         if by_walk

@@ -26,7 +26,7 @@ use crate::{
     jump::jump,
     node::{FINE, Node, ROUGH, STICTION, refine, without_clock},
     noise_floor::in_own_noise,
-    random_walk::{Begin, beyond_random_walk},
+    random_walk::{Walk, beyond_random_walk},
     step::held_out_rmse,
     sticking::sticks,
 };
@@ -261,7 +261,7 @@ fn test<'a>(
             "with an effect that follows time alone a set bends to any disturbance".to_string(),
         );
     }
-    if required > PART && !beyond_random_walk(&node, &timeless, Begin::Anywhere)? {
+    if required > PART && !beyond_random_walk(&node, &timeless, Walk::ANY)? {
         reasons.push("a random walk explains as much".to_string());
     }
     if !node.plausible() {

@@ -30,13 +30,42 @@ use crate::{
 const DECADES: std::ops::Range<i32> = -9..2;
 const EACH: i32 = 6;
 
-/// What is known of a walk's first value.
+/// The chi-square law holds roughly here, as the walk's size is chosen and the fit is one step: so many times less risk is taken.
+const STRICTER: f64 = 3.0;
+
+/// A walk bends the parameters by moves of the output of about this rms, over that of the noise, at most: that of a walk which ends at half
+/// the size of the noise.
+const BENDING: f64 = 0.35;
+
+/// The random walks that may stand in the place of effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Begin {
-    /// It is zero: an offset that stays is no walk.
-    AtZero,
-    /// Nothing (diffuse start).
-    Anywhere,
+pub(crate) struct Walk {
+    /// Its first value is unknown (diffuse start); otherwise zero, so that an offset which stays is no walk.
+    pub anywhere: bool,
+    /// Standard deviation at the end of a record over that of the white noise, at most.
+    pub largest: f64,
+    /// Whether the parameters are fitted again beside it.
+    pub fitted_again: bool,
+}
+
+impl Walk {
+    /// Of any size; the models are as they were fitted.
+    pub const ANY: Self = Self {
+        anywhere: true,
+        largest: f64::INFINITY,
+        fitted_again: false,
+    };
+    /// No larger than the noise, which bends the parameters too.
+    pub const SMALL: Self = Self {
+        anywhere: true,
+        largest: 1.0,
+        fitted_again: true,
+    };
+    /// The same from zero, against which effects may be held that are hardly more than an offset.
+    pub const SMALL_FROM_ZERO: Self = Self {
+        anywhere: false,
+        ..Self::SMALL
+    };
 }
 
 /// Residuals whitened by a noise model beside their derivatives by the free parameters, row by row, a series for each record; the
@@ -62,34 +91,34 @@ impl Whitened {
     }
 
     /// Minus twice the logarithm of the likelihood under white noise and a random walk, at its best over the parameters (one step of
-    /// Gauss-Newton in the metric of this noise) and over `q`.
-    fn deviance(&self, begin: Begin) -> f64 {
+    /// Gauss-Newton in the metric of this noise, within [`BENDING`]) and over `q`.
+    fn deviance(&self, walk: Walk) -> f64 {
+        let rows = |values: &Vec<f64>| values.len() / self.columns;
+        let longest = self.records.iter().map(rows).max().unwrap_or(1);
+        let largest = walk.largest.powi(2) / longest as f64;
         (DECADES.start * EACH..DECADES.end * EACH)
             .map(|step| 10_f64.powf(f64::from(step) / f64::from(EACH)))
-            .map(|q| self.at(q, begin))
-            .fold(self.at(0.0, begin), f64::min)
+            .filter(|q| *q <= largest)
+            .map(|q| self.at(q, walk.anywhere))
+            .fold(self.at(0.0, walk.anywhere), f64::min)
     }
 
-    fn at(&self, q: f64, begin: Begin) -> f64 {
+    fn at(&self, q: f64, anywhere: bool) -> f64 {
         let last = self.columns - 1;
         let (mut triangle, mut log_det) = (Triangle::new(self.columns), 0.0);
         let (mut level, mut innovation) = (vec![0.0; self.columns], vec![0.0; self.columns]);
         for rows in &self.records {
             let mut rows = rows.chunks_exact(self.columns);
-            let mut variance = match begin {
-                Begin::AtZero => {
-                    level.fill(0.0);
-                    0.0
-                }
-                // The first sample tells it.
-                Begin::Anywhere => {
-                    let Some(first) = rows.next() else {
-                        continue;
-                    };
-                    level.copy_from_slice(first);
-                    1.0 + q
-                }
-            };
+            let mut variance = 0.0;
+            level.fill(0.0);
+            // The first sample tells where it begins.
+            if anywhere {
+                let Some(first) = rows.next() else {
+                    continue;
+                };
+                level.copy_from_slice(first);
+                variance = 1.0 + q;
+            }
             for row in rows {
                 let whole = variance + 1.0;
                 let gain = variance / whole;
@@ -104,8 +133,21 @@ impl Whitened {
                 variance = variance * (1.0 - gain) + q;
             }
         }
-        triangle.finish();
         let count = triangle.rows() as f64;
+        // A walk bends the parameters by no more than moves the output as far as the walk goes.
+        let bend = (BENDING.powi(2) * count / last.max(1) as f64).sqrt();
+        for row in self
+            .records
+            .iter()
+            .flat_map(|rows| rows.chunks_exact(self.columns))
+        {
+            for (to, value) in innovation.iter_mut().zip(&row[..last]) {
+                *to = value / bend;
+            }
+            innovation[last] = 0.0;
+            triangle.push(&innovation);
+        }
+        triangle.finish();
         let squares = triangle.at(last, last).powi(2);
         count * f64::ln((squares / count).max(f64::MIN_POSITIVE)) + log_det
     }
@@ -113,28 +155,36 @@ impl Whitened {
 
 /// Whether a set lowers the deviance beyond chance against one that lacks some of its effects, where the residual of either may hold a
 /// random walk.
-pub(crate) fn beyond_random_walk(
-    gained: &Node,
-    lacking: &Node,
-    begin: Begin,
-) -> Result<bool, Error> {
+pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node, walk: Walk) -> Result<bool, Error> {
     let noise = colour(gained)?;
     // A model that cannot be simulated any more is beyond nothing.
-    let (Some(with), Some(without)) = (of_node(gained, &noise), of_node(lacking, &noise)) else {
+    let (Some(with), Some(without)) = (
+        of_node(gained, &noise, walk),
+        of_node(lacking, &noise, walk),
+    ) else {
         return Ok(false);
     };
     let free = |node: &Node| node.setup.free().len();
-    let fall = without.deviance(begin) - with.deviance(begin);
+    let fall = without.deviance(walk) - with.deviance(walk);
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);
     let penalty = gained.setup.price(0) - lacking.setup.price(0);
     let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
-    Ok(fall > penalty + BIC_MARGIN && chance_of(gained, lacking, chance))
+    Ok(fall > penalty + BIC_MARGIN && chance_of(gained, lacking, STRICTER * chance))
 }
 
-fn of_node(node: &Node, noise: &ArModel) -> Option<Whitened> {
+fn of_node(node: &Node, noise: &ArModel, walk: Walk) -> Option<Whitened> {
     let rows = node.setup.rows(&node.fit.x)?;
-    let records = rows.records().map(<[f64]>::to_vec);
-    Some(Whitened::of(rows.columns, records, noise))
+    let last = rows.columns - 1;
+    let (columns, from) = if walk.fitted_again {
+        (rows.columns, 0)
+    } else {
+        (1, last)
+    };
+    let records = rows.records().map(|record| {
+        let rows = record.chunks_exact(rows.columns);
+        rows.flat_map(|row| &row[from..]).copied().collect()
+    });
+    Some(Whitened::of(columns, records, noise))
 }
 
 #[cfg(test)]
@@ -187,7 +237,7 @@ mod tests {
             let gained = without_line(&series);
             let noise = ArModel::fit(&[&gained], NOISE_ORDER).unwrap();
             let of = |residual: Vec<f64>| {
-                Whitened::of(1, std::iter::once(residual), &noise).deviance(Begin::Anywhere)
+                Whitened::of(1, std::iter::once(residual), &noise).deviance(Walk::ANY)
             };
             of(centred) - of(gained)
         };
@@ -207,40 +257,52 @@ mod tests {
     }
 
     #[test]
-    fn parameters_are_fitted_again_beside_the_walk() {
-        let walk = series(0.0, 3.0, 2.0, 5);
-        let t = |k: usize| k as f64 / N as f64;
-        let rows: Vec<f64> = (0..N).flat_map(|k| [t(k), walk[k]]).collect();
-        let of = |columns: usize, rows: Vec<f64>| {
-            Whitened::of(columns, std::iter::once(rows), &ArModel::white(1.0))
-                .deviance(Begin::AtZero)
+    fn parameters_are_fitted_again_beside_the_walk_as_far_as_it_bends_them() {
+        // The parameter's derivative is a line; the line in the series is one that the parameter should follow, or a much steeper one.
+        let fits = |rise: f64| {
+            let series = series(0.0, 0.1, rise, 5);
+            let t = |k: usize| k as f64 / N as f64;
+            let of = |columns: usize, rows: Vec<f64>| {
+                Whitened::of(columns, std::iter::once(rows), &ArModel::white(1.0))
+                    .deviance(Walk::SMALL_FROM_ZERO)
+            };
+            let fitted = of(2, (0..N).flat_map(|k| [t(k), series[k]]).collect());
+            let with_slope = |slope: f64| {
+                let left = (0..N).map(|k| series[k] - slope * t(k)).collect();
+                of(1, left)
+            };
+            let least = (-100..=300)
+                .map(|part| with_slope(f64::from(part) / 20.0))
+                .fold(f64::INFINITY, f64::min);
+            [fitted - least, with_slope(0.0) - fitted]
         };
-        let fitted = of(2, rows);
-        let with_slope = |slope: f64| {
-            let left = (0..N).map(|k| walk[k] - slope * t(k)).collect();
-            of(1, left)
-        };
-        let least = (-400..=400)
-            .map(|tenth| with_slope(f64::from(tenth) / 20.0))
-            .fold(f64::INFINITY, f64::min);
-        assert!((fitted - least).abs() < 1e-3, "{fitted} and {least}");
-        assert!(with_slope(0.0) > fitted + 0.1);
+        let [behind, before] = fits(0.6);
+        assert!(
+            (-0.1..2.0).contains(&behind) && before > 3.0,
+            "{behind} {before}"
+        );
+        let [behind, _] = fits(10.0);
+        assert!(behind > 50.0, "{behind}");
     }
 
     #[test]
     fn an_offset_is_a_walk_only_where_it_may_begin_anywhere() {
         let white = series(0.0, 0.0, 0.0, 7);
         let offset: Vec<f64> = white.iter().map(|e| e + 1.0).collect();
-        let fall = |begin: Begin| {
+        let fall = |anywhere: bool| {
             let of = |rows: &[f64]| {
-                Whitened::of(1, std::iter::once(rows.to_vec()), &ArModel::white(1.0))
-                    .deviance(begin)
+                Whitened::of(1, std::iter::once(rows.to_vec()), &ArModel::white(1.0)).deviance(
+                    Walk {
+                        anywhere,
+                        ..Walk::ANY
+                    },
+                )
             };
             of(&offset) - of(&white)
         };
         // A jump of one standard deviation in the first sample is what a walk would need.
-        assert!(fall(Begin::AtZero) > 20.0, "{}", fall(Begin::AtZero));
-        assert!(fall(Begin::Anywhere).abs() < 1e-6);
+        assert!(fall(false) > 20.0, "{}", fall(false));
+        assert!(fall(true).abs() < 1e-6);
     }
 
     #[test]
@@ -250,8 +312,7 @@ mod tests {
         // An unknown mean costs the logarithm of the samples.
         let plain = N as f64 * (squares / N as f64).ln() + (N as f64).ln();
         assert!(
-            (Whitened::of(1, std::iter::once(white), &ArModel::white(1.0))
-                .deviance(Begin::Anywhere)
+            (Whitened::of(1, std::iter::once(white), &ArModel::white(1.0)).deviance(Walk::ANY)
                 - plain)
                 .abs()
                 < 3.0

@@ -2,14 +2,17 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, builder::PossibleValue};
 use ct_signals::{Columns, Hold, read_csv};
+use missing_effect::Progress;
 
 use super::{Results, finish};
 use crate::Error;
 use crate::column_errors::of_option;
-use crate::identify::{self, LevelChoice, Method, Order, Request};
+use crate::identify::side_by_side::{self, Orders};
+use crate::identify::{self, LevelChoice, Method, Request, side_by_side_text};
 use crate::look::Look;
 use crate::model_file::{self, ControllerSettings};
 use crate::progress::Bar;
@@ -19,17 +22,20 @@ pub(super) struct Identify {
     /// Record (CSV), one
     #[arg(required = true, value_name = "DATA.csv")]
     data: Vec<PathBuf>,
-    /// How the parameters are found
-    #[arg(long, value_enum)]
-    method: Method,
-    /// Orders n of A and m of B in A y = B u + d
+    /// How the parameters are found; several, with commas between them, or all, are set side by side
+    #[arg(long, value_enum, value_delimiter = ',', required = true)]
+    method: Vec<Choice>,
+    /// Orders n of A and m of B in A y = B u + d; N..N tries all from one n to another with m below n
     #[arg(
         long,
         value_name = "N,M",
         default_value = "1,0",
         allow_hyphen_values = true
     )]
-    order: Order,
+    order: Orders,
+    /// Records that are not fitted, on which the models are tried
+    #[arg(long, value_name = "TEST.csv", num_args = 1..)]
+    test: Vec<PathBuf>,
     /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
@@ -105,33 +111,60 @@ impl Identify {
         Ok((self.columns.clone().unwrap_or_default(), hold, None))
     }
 
-    /// What was asked, if it goes together.
-    fn request(&self, controller: Option<ControllerSettings>) -> Result<Request, Error> {
-        let method = self.method.id();
+    /// The methods, each once, in the order in which they were given.
+    fn methods(&self) -> Vec<Method> {
+        let mut methods = Vec::new();
+        for choice in &self.method {
+            let more: &[Method] = match choice {
+                Choice::All => Method::value_variants(),
+                Choice::One(method) => &[*method],
+            };
+            for method in more {
+                if !methods.contains(method) {
+                    methods.push(*method);
+                }
+            }
+        }
+        methods
+    }
+
+    /// What was asked, if it goes together; of several methods each takes the options that concern it.
+    fn request(
+        &self,
+        method: Method,
+        alone: bool,
+        controller: Option<&ControllerSettings>,
+    ) -> Result<Request, Error> {
         let wrong = |what: String| Err(Error::Usage(what));
-        let of_loop = self.method.is_of_loop();
-        if !of_loop && self.levels != LevelChoice::Auto {
+        let of_loop = method.is_of_loop();
+        let whole = of_loop && method != Method::RecursiveFcloe;
+        if alone && !of_loop && self.levels != LevelChoice::Auto {
             return wrong(format!(
-                "--levels does not go with --method {method}, which estimates an offset; leave it out"
+                "--levels does not go with --method {}, which estimates an offset; leave it out",
+                method.id()
             ));
         }
-        if of_loop && self.method != Method::RecursiveFcloe && self.memory.is_some() {
+        if alone && whole && self.memory.is_some() {
             return wrong(format!(
-                "--memory does not go with --method {method}, which weighs the whole record alike; leave it out"
+                "--memory does not go with --method {}, which weighs the whole record alike; leave it out",
+                method.id()
             ));
         }
+        let Some(&order) = self.order.0.first() else {
+            return wrong("--order names no order".to_owned());
+        };
         let mut request = Request {
-            memory: self.memory,
+            memory: self.memory.filter(|_| !whole),
             bandwidth: self.bandwidth,
             levels: self.levels,
-            ..Request::new(self.method, self.order)
+            ..Request::new(method, order)
         };
         let controller = controller.filter(|_| of_loop);
         if let Some(settings) = controller {
             request.controller = Some(settings.linear()?);
             request.limits = (settings.u_min, settings.u_max);
         }
-        if let Some(zeta) = self.sensor_filter {
+        if let Some(zeta) = self.sensor_filter.filter(|_| alone || of_loop) {
             let Some(controller) = request.controller else {
                 return wrong("--sensor-filter is of a loop: give --model with a [controller], and a method that uses it".to_owned());
             };
@@ -148,30 +181,89 @@ impl Identify {
             )));
         };
         let (columns, hold, controller) = self.layout()?;
-        let request = self.request(controller)?;
+        let methods = self.methods();
+        let alone = methods.len() == 1;
+        let requests = methods
+            .into_iter()
+            .map(|method| self.request(method, alone, controller.as_ref()))
+            .collect::<Result<Vec<_>, _>>()?;
         let named_by = if self.model.is_some() {
             Error::from
         } else {
             of_option
         };
-        let record = read_csv(data, &columns, hold).map_err(named_by)?;
-        let inputs: Vec<&Path> = [Some(data), self.model.as_ref()]
-            .into_iter()
-            .flatten()
+        let read = |path: &PathBuf| read_csv(path, &columns, hold).map_err(named_by);
+        let record = read(data)?;
+        let test = self.test.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let inputs: Vec<&Path> = std::iter::once(data)
+            .chain(&self.test)
+            .chain(&self.model)
             .map(PathBuf::as_path)
             .collect();
         let outputs = self.results.plan(&inputs, None)?;
         let bar = Bar::new();
-        bar.phase("identifying");
-        let found = identify::identify(&record, &request);
+        if let ([request], [_], []) = (&requests[..], &self.order.0[..], &test[..]) {
+            bar.phase("identifying");
+            let found = identify::identify(&record, request);
+            bar.clear();
+            let found = found?;
+            let text = identify::text::text(&found, look);
+            return finish(&found, &text, &outputs, out, look);
+        }
+        let total = requests.len() * self.order.0.len();
+        let done = AtomicUsize::new(0);
+        let tell = || {
+            bar.show(Progress {
+                phase: "identifying",
+                done: done.fetch_add(1, Ordering::Relaxed) + 1,
+                total,
+            });
+        };
+        let found = side_by_side::compare(&record, &test, &requests, &self.order.0, &tell);
         bar.clear();
         let found = found?;
-        finish(
-            &found,
-            &identify::text::text(&found, look),
-            &outputs,
-            out,
-            look,
-        )
+        let text = side_by_side_text::text(&found, look);
+        finish(&found, &text, &outputs, out, look)
+    }
+}
+
+/// A method, or all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Choice {
+    One(Method),
+    All,
+}
+
+impl ValueEnum for Choice {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[
+            Self::All,
+            Self::One(Method::StabilizedOe),
+            Self::One(Method::CtRls),
+            Self::One(Method::Ls),
+            Self::One(Method::Iv),
+            Self::One(Method::Fcloe),
+            Self::One(Method::RecursiveFcloe),
+        ]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::All => Some(PossibleValue::new("all").help("Every method, side by side")),
+            Self::One(method) => method.to_possible_value(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_method_can_be_chosen() {
+        let choices = Choice::value_variants();
+        for method in Method::value_variants() {
+            assert!(choices.contains(&Choice::One(*method)), "{}", method.id());
+        }
     }
 }

@@ -35,6 +35,8 @@ mod drift;
 mod looped;
 mod recursion;
 mod scaled;
+pub mod side_by_side;
+pub mod side_by_side_text;
 mod simulation;
 pub mod text;
 

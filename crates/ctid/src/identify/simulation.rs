@@ -1,6 +1,7 @@
-//! What the final model says from the input alone.
+//! What a linear model says from the input alone.
 
-use ct_lti::{Simulator, StateSpace, TransferFunction};
+use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
+use ct_signals::Record;
 use nalgebra::{DMatrix, DVector};
 
 use super::Order;
@@ -18,59 +19,147 @@ pub(super) fn simulate(
 ) -> Result<(Vec<f64>, Option<String>), Error> {
     let (a, rest) = theta.as_slice().split_at(order.n);
     let (b, offset) = rest.split_at(order.m + 1);
-    let denominator: Vec<f64> = std::iter::once(1.0).chain(a.iter().copied()).collect();
-    let model = StateSpace::controllable(&TransferFunction::from_coefficients(b, &denominator)?)?;
-    let first = scaled.u.first().copied().unwrap_or(0.0);
-    let rest = b[0] * first + offset.first().copied().unwrap_or(0.0);
-    let forced = response(scaled, &model, |k| scaled.u[k] - first, None)?;
-    let free: Vec<Vec<f64>> = (0..order.n)
-        .map(|state| response(scaled, &model, |_| 0.0, Some(state)))
-        .collect::<Result<_, _>>()?;
-    let count = scaled.y.len();
-    // each of size 1, so that none is lost beside another
-    let sizes: Vec<f64> = free
-        .iter()
-        .map(|f| {
-            f.iter()
-                .map(|x| x * x)
-                .sum::<f64>()
-                .sqrt()
-                .max(f64::MIN_POSITIVE)
-        })
-        .collect();
-    let columns = DMatrix::from_fn(count, order.n, |k, state| free[state][k] / sizes[state]);
-    let left = DVector::from_fn(count, |k, _| scaled.y[k] - rest - forced[k]);
-    let normal = columns.tr_mul(&columns);
-    let initial = normal
-        .pseudo_inverse(1e-9)
-        .map(|inverse| inverse * columns.tr_mul(&left))
-        .unwrap_or_else(|_| DVector::zeros(order.n));
-    let fading = &columns * initial;
-    let lasting = fading.iter().rev().take(count.div_ceil(10));
+    let driven = Driven {
+        time: scaled.time.clone(),
+        hold: scaled.hold,
+        u: &scaled.u,
+        y: &scaled.y,
+    };
+    let offset = offset.first().copied().unwrap_or(0.0);
+    let Response { forced, fading } = driven.respond(a, b, Level::Known(offset))?;
+    let lasting = fading.iter().rev().take(fading.len().div_ceil(10));
     let at_end = lasting.fold(0.0_f64, |most, x| most.max(x.abs()));
     let warning = (at_end > LASTING).then(|| {
         "the model is so slow that its initial state is still seen at the end of the record: record longer".to_owned()
     });
-    let simulated = (0..count).map(|k| scaled.output(rest + forced[k] + fading[k]));
+    let simulated = forced
+        .iter()
+        .zip(&fading)
+        .map(|(a, b)| scaled.output(a + b));
     Ok((simulated.collect(), warning))
 }
 
-/// Output of the model, from rest or from one state.
-fn response(
-    scaled: &Scaled,
-    model: &StateSpace,
-    input: impl Fn(usize) -> f64,
-    state: Option<usize>,
-) -> Result<Vec<f64>, Error> {
-    let mut simulator = Simulator::new(model.clone(), scaled.hold);
-    if let Some(state) = state {
-        let mut start = vec![0.0; model.order()];
-        start[state] = 1.0;
-        simulator.set_state(&start)?;
+/// A record of one input and one output.
+pub(super) struct Driven<'a> {
+    pub time: Vec<f64>,
+    pub hold: Hold,
+    pub u: &'a [f64],
+    pub y: &'a [f64],
+}
+
+/// The offset of the output.
+#[derive(Clone, Copy, PartialEq)]
+enum Level {
+    Known(f64),
+    /// Fitted with the initial state.
+    Fitted,
+}
+
+/// A simulated output: what the input does, and what the initial state does.
+struct Response {
+    forced: Vec<f64>,
+    fading: Vec<f64>,
+}
+
+impl<'a> Driven<'a> {
+    pub fn of(record: &'a Record) -> Self {
+        Self {
+            time: record.time.clone(),
+            hold: match record.hold {
+                ct_signals::Hold::Zero => Hold::Zero,
+                ct_signals::Hold::First => Hold::First,
+            },
+            u: &record.input.values,
+            y: &record.output.values,
+        }
     }
-    let mut output = Vec::with_capacity(scaled.time.len());
-    for (k, step) in scaled.steps().enumerate() {
-        output.push(simulator.update(input(k), step)?);
+
+    /// The output of `(1 + a_1 s + ..) y = (b_0 + ..) u + d`, from an initial state and with an offset that are fitted to the output.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where the model runs away.
+    pub fn fitted(&self, a: &[f64], b: &[f64]) -> Result<Vec<f64>, Error> {
+        // In a time in which the coefficients are about 1.
+        let unit = a
+            .last()
+            .map_or(1.0, |last| last.abs().powf(1.0 / a.len() as f64));
+        let unit = if unit > 0.0 && unit.is_finite() {
+            unit
+        } else {
+            1.0
+        };
+        let power = |from: usize| move |(i, c): (usize, &f64)| c / unit.powi((i + from) as i32);
+        let scaled = Self {
+            time: self.time.iter().map(|t| t / unit).collect(),
+            ..*self
+        };
+        let a: Vec<f64> = a.iter().enumerate().map(power(1)).collect();
+        let b: Vec<f64> = b.iter().enumerate().map(power(0)).collect();
+        let Response { forced, fading } = scaled.respond(&a, &b, Level::Fitted)?;
+        let simulated: Vec<f64> = forced.iter().zip(&fading).map(|(a, b)| a + b).collect();
+        if simulated.iter().any(|y| !y.is_finite()) {
+            return Err(Error::Usage(
+                "the model runs away when it is simulated on the input alone".to_owned(),
+            ));
+        }
+        Ok(simulated)
     }
-    Ok(output)
+
+    fn respond(&self, a: &[f64], b: &[f64], level: Level) -> Result<Response, Error> {
+        let denominator: Vec<f64> = std::iter::once(1.0).chain(a.iter().copied()).collect();
+        let model =
+            StateSpace::controllable(&TransferFunction::from_coefficients(b, &denominator)?)?;
+        let first = self.u.first().copied().unwrap_or(0.0);
+        let offset = match level {
+            Level::Known(offset) => offset,
+            Level::Fitted => 0.0,
+        };
+        let rest = b[0] * first + offset;
+        let mut forced = self.response(&model, |k| self.u[k] - first, None)?;
+        forced.iter_mut().for_each(|y| *y += rest);
+        let mut free: Vec<Vec<f64>> = (0..a.len())
+            .map(|state| self.response(&model, |_| 0.0, Some(state)))
+            .collect::<Result<_, _>>()?;
+        if level == Level::Fitted {
+            free.push(vec![1.0; self.y.len()]);
+        }
+        let count = self.y.len();
+        // each of size 1, so that none is lost beside another
+        let sizes: Vec<f64> = free
+            .iter()
+            .map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt())
+            .map(|size| size.max(f64::MIN_POSITIVE))
+            .collect();
+        let columns = DMatrix::from_fn(count, free.len(), |k, i| free[i][k] / sizes[i]);
+        let left = DVector::from_fn(count, |k, _| self.y[k] - forced[k]);
+        let normal = columns.tr_mul(&columns);
+        let initial = normal
+            .pseudo_inverse(1e-9)
+            .map(|inverse| inverse * columns.tr_mul(&left))
+            .unwrap_or_else(|_| DVector::zeros(free.len()));
+        let fading = (&columns * initial).as_slice().to_vec();
+        Ok(Response { forced, fading })
+    }
+
+    /// Output of the model, from rest or from one state.
+    fn response(
+        &self,
+        model: &StateSpace,
+        input: impl Fn(usize) -> f64,
+        state: Option<usize>,
+    ) -> Result<Vec<f64>, Error> {
+        let mut simulator = Simulator::new(model.clone(), self.hold);
+        if let Some(state) = state {
+            let mut start = vec![0.0; model.order()];
+            start[state] = 1.0;
+            simulator.set_state(&start)?;
+        }
+        let mut output = Vec::with_capacity(self.time.len());
+        let mut before = self.time.first().copied().unwrap_or(0.0);
+        for (k, &t) in self.time.iter().enumerate() {
+            output.push(simulator.update(input(k), t - before)?);
+            before = t;
+        }
+        Ok(output)
+    }
 }

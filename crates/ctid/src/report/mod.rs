@@ -15,6 +15,7 @@ mod identification;
 mod page;
 #[cfg(test)]
 pub(crate) mod sample;
+mod side_by_side;
 mod tables;
 mod text;
 mod udink;
@@ -27,6 +28,7 @@ pub use self::identification::html as identification;
 pub use self::page::head;
 use self::page::{NOTICES, Page, figure, figure_with, items, large, section};
 pub(crate) use self::page::{PLOTLY, PLOTS, STYLE};
+pub use self::side_by_side::html as side_by_side;
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
 use crate::findings::{self, Reader};

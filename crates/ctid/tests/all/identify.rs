@@ -13,18 +13,18 @@ const STEP: f64 = 1.0;
 
 /// A plant, its operating point, and the noise on its output.
 #[derive(Clone, Copy)]
-struct Plant {
-    a: &'static [f64],
-    b: &'static [f64],
+pub struct Plant {
+    pub a: &'static [f64],
+    pub b: &'static [f64],
     /// Input and output at rest, about which both move.
-    rest: (f64, f64),
-    noise: f64,
+    pub rest: (f64, f64),
+    pub noise: f64,
     /// Correlation of the noise from sample to sample.
-    colour: f64,
-    hold: Hold,
+    pub colour: f64,
+    pub hold: Hold,
 }
 
-const FIRST: Plant = Plant {
+pub const FIRST: Plant = Plant {
     a: &[1.0, 20.0],
     b: &[3.0],
     rest: (5.0, 40.0),
@@ -33,13 +33,13 @@ const FIRST: Plant = Plant {
     hold: Hold::Zero,
 };
 
-const SECOND: Plant = Plant {
+pub const SECOND: Plant = Plant {
     a: &[1.0, 25.0, 150.0],
     ..FIRST
 };
 
 impl Plant {
-    fn record(&self, rows: usize, seed: u64) -> Record {
+    pub fn record(&self, rows: usize, seed: u64) -> Record {
         self.sampled(rows, seed, |_| STEP)
     }
 

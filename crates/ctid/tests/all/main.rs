@@ -13,6 +13,7 @@ mod monitor;
 mod own_term;
 mod program;
 mod results;
+mod side_by_side;
 mod system_limits;
 mod tables;
 mod udink_reference;

@@ -1,0 +1,354 @@
+//! Several methods and orders on one record, by the same measures.
+//!
+//! Each method fits what it fits; they are compared by one error: the model runs on the input alone, from an initial state and a level
+//! that are fitted to the record (`n + 1` numbers, least squares), on the record it was identified on and on others. A method that the
+//! record does not allow has a reason instead of a row.
+//!
+//! Orders are chosen by
+//! - BIC: `N log sigma^2 + k log N`, `sigma` of the innovations of an autoregressive model of the simulation error, `k` its coefficients and
+//!   the parameters;
+//! - YIC (Young 1989): `log(sigma_e^2/sigma_y^2) + log(mean_i(se_i^2/theta_i^2))`, small where the fit is good and all parameters are
+//!   known; only where the method says standard errors.
+//!
+//! The order that is shown of a method has the least BIC of those whose parameters are all told from zero, and whose time constants are no
+//! shorter than a step; where there is none, of all.
+//!
+//! Reference: P. C. Young, Recursive estimation, forecasting and adaptive control, in C. T. Leondes (ed.), Control and Dynamic Systems 30,
+//! Academic Press 1989.
+
+use std::time::Instant;
+
+use ct_signals::{ArModel, Record, Signal, residual_tests};
+use missing_effect::Parameter;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::simulation::Driven;
+use super::{Identification, MAX_ORDER, Method, Order, Request, Shown, identify, rms};
+use crate::Error;
+
+/// Order of the noise model of a simulation error, at most.
+const NOISE_ORDER: usize = 6;
+/// A test with a smaller probability says that an assumption does not hold.
+const UNLIKELY: f64 = 0.01;
+/// A parameter whose squared relative standard error is larger cannot be told from zero.
+const UNTOLD: f64 = 0.25;
+/// A simulation error so many times the least one says that the method is biased here.
+const WORSE: f64 = 1.05;
+
+/// One order, or all of n from one number to another with m below n.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Orders(pub Vec<Order>);
+
+impl std::str::FromStr for Orders {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let Some((first, last)) = text.split_once("..") else {
+            return Ok(Self(vec![text.parse()?]));
+        };
+        let number = |part: &str| part.trim().parse::<usize>().ok();
+        match (number(first), number(last)) {
+            (Some(first), Some(last)) if 1 <= first && first <= last && last <= MAX_ORDER => {
+                let all = (first..=last).flat_map(|n| (0..n).map(move |m| Order { n, m }));
+                Ok(Self(all.collect()))
+            }
+            _ => Err(format!(
+                "a range of orders is n..n with both from 1 to {MAX_ORDER}, as in 1..3; found {text}"
+            )),
+        }
+    }
+}
+
+/// What came of all methods.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SideBySide {
+    /// Version of this record.
+    pub schema: u32,
+    /// Name of the record.
+    pub record: String,
+    /// Names of the records that were not fitted.
+    pub test: Vec<String>,
+    /// One for each method, of the order with the least BIC; best simulation first, then those that were refused.
+    pub methods: Vec<Row>,
+    /// All methods with all orders, where there are several orders.
+    pub orders: Vec<Row>,
+    /// The record.
+    #[serde(skip)]
+    pub shown: Shown,
+}
+
+/// A method with an order.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// The method.
+    pub method: Method,
+    /// The order.
+    pub order: Order,
+    /// Wall time beside the others, s.
+    pub seconds: f64,
+    /// What the method assumes.
+    pub assumes: &'static str,
+    /// What it found.
+    pub found: Option<Outcome>,
+    /// Why it found nothing.
+    pub refused: Option<String>,
+}
+
+/// What a method found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    /// a_1 to a_n, b_0 to b_m, and an offset where the method estimates one.
+    pub parameters: Vec<Parameter>,
+    /// Time constants of the real poles, s.
+    pub time_constants: Vec<f64>,
+    /// Simulation error on the record, root mean square, output unit.
+    pub rmse: f64,
+    /// 100 (1 - rmse over the standard deviation of the output), %.
+    pub fit_percent: f64,
+    /// The same on the records that were not fitted, all together.
+    pub test_rmse: Option<f64>,
+    /// %
+    pub test_fit_percent: Option<f64>,
+    /// Whether all parameters are told from zero, as far as standard errors are known, and no time constant is shorter than a step.
+    pub determined: bool,
+    /// See the module.
+    pub bic: f64,
+    /// See the module.
+    pub yic: Option<f64>,
+    /// p-value of the Ljung-Box test of the simulation error.
+    pub whiteness_p: f64,
+    /// p-value of the test that the simulation error holds nothing of the input.
+    pub input_p: f64,
+    /// Which assumptions the record violates, in words.
+    pub violated: Vec<String>,
+    /// What the method itself says of doubts.
+    pub warnings: Vec<String>,
+    /// The simulated output.
+    #[serde(skip)]
+    pub simulated: Vec<f64>,
+}
+
+impl Method {
+    /// What has to hold for its estimates to be right.
+    pub(crate) fn assumes(self) -> &'static str {
+        match self {
+            Self::CtRls | Self::Ls => "hardly any noise: it is in the regressor",
+            Self::StabilizedOe => "noise that the input does not answer to",
+            Self::Iv => "instruments that the noise does not reach: in a loop its controller",
+            Self::Fcloe => "one plant over the record; in a loop its controller",
+            Self::RecursiveFcloe => {
+                "a plant that drifts slower than the memory; in a loop its controller"
+            }
+        }
+    }
+}
+
+/// Identifies by each of the methods with each of the orders, in parallel; `requests` holds what is asked of each method, its order aside.
+///
+/// # Errors
+/// [`Error::Usage`] where every method refuses, with the reason of the first.
+pub fn compare(
+    record: &Record,
+    test: &[Record],
+    requests: &[Request],
+    orders: &[Order],
+    done: &(dyn Fn() + Sync),
+) -> Result<SideBySide, Error> {
+    let jobs: Vec<Request> = requests
+        .iter()
+        .flat_map(|request| {
+            orders.iter().map(|order| Request {
+                order: *order,
+                ..request.clone()
+            })
+        })
+        .collect();
+    let mut rows: Vec<Row> = jobs
+        .par_iter()
+        .map(|request| {
+            let row = row(record, test, request);
+            done();
+            row
+        })
+        .collect();
+    if let Some(reason) = rows.first().and_then(|row| row.refused.clone())
+        && rows.iter().all(|row| row.found.is_none())
+    {
+        return Err(Error::Usage(reason));
+    }
+    let found = || rows.iter().filter_map(|row| row.found.as_ref());
+    let any = !found().any(|found| found.determined);
+    let least = found()
+        .filter(|found| any || found.determined)
+        .map(|found| found.rmse)
+        .fold(f64::INFINITY, f64::min);
+    let in_loop = requests.iter().any(|request| request.controller.is_some());
+    for row in &mut rows {
+        if let Some(found) = &mut row.found {
+            found.violated = violated(row.method, found, least, in_loop);
+        }
+    }
+    let mut methods: Vec<Row> = requests
+        .iter()
+        .filter_map(|request| {
+            let of_method = rows.iter().filter(|row| row.method == request.method);
+            of_method.min_by(|a, b| {
+                a.key()
+                    .0
+                    .cmp(&b.key().0)
+                    .then(a.key().1.total_cmp(&b.key().1))
+            })
+        })
+        .cloned()
+        .collect();
+    methods.sort_by(|a, b| a.rmse().total_cmp(&b.rmse()));
+    Ok(SideBySide {
+        schema: 1,
+        record: record.name.clone(),
+        test: test.iter().map(|record| record.name.clone()).collect(),
+        methods,
+        orders: if orders.len() > 1 { rows } else { Vec::new() },
+        shown: Shown {
+            time: record.time.clone(),
+            input: record.input.clone(),
+            output: record.output.clone(),
+            simulated: Vec::new(),
+        },
+    })
+}
+
+impl Row {
+    /// What makes one order better than another: less is better.
+    fn key(&self) -> (bool, f64) {
+        let found = self.found.as_ref();
+        found.map_or((true, f64::INFINITY), |found| {
+            (!found.determined, found.bic)
+        })
+    }
+
+    fn rmse(&self) -> f64 {
+        let found = self.found.as_ref();
+        found.map_or(f64::INFINITY, |found| found.rmse)
+    }
+}
+
+fn row(record: &Record, test: &[Record], request: &Request) -> Row {
+    let begun = Instant::now();
+    let found = identify(record, request)
+        .and_then(|found| outcome(record, test, &found))
+        .map_err(|error| error.to_string());
+    let (found, refused) = match found {
+        Ok(found) => (Some(found), None),
+        Err(reason) => (None, Some(reason)),
+    };
+    Row {
+        method: request.method,
+        order: request.order,
+        seconds: begun.elapsed().as_secs_f64(),
+        assumes: request.method.assumes(),
+        found,
+        refused,
+    }
+}
+
+fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<Outcome, Error> {
+    let Order { n, m } = found.order;
+    let theta: Vec<f64> = found.parameters.iter().map(|p| p.value).collect();
+    let (a, b) = (&theta[..n], &theta[n..=n + m]);
+    let on = |record: &Record| -> Result<(Vec<f64>, Vec<f64>), Error> {
+        let simulated = Driven::of(record).fitted(a, b)?;
+        let output = record.output.values.iter();
+        let error = output.zip(&simulated).map(|(y, model)| y - model);
+        Ok((error.collect(), simulated))
+    };
+    let (error, simulated) = on(record)?;
+    let tested: Vec<Vec<f64>> = test
+        .iter()
+        .map(|record| Ok(on(record)?.0))
+        .collect::<Result<_, Error>>()?;
+    let rmse = rms(error.iter().copied());
+    let spread = spread(std::slice::from_ref(record));
+    let test_rmse = (!test.is_empty()).then(|| rms(tested.iter().flatten().copied()));
+    let known: Option<Vec<f64>> = found.parameters[..=n + m]
+        .iter()
+        .map(|p| {
+            let error = p.std_error.filter(|error| *error > 0.0);
+            error.map(|error| (error / p.value).powi(2))
+        })
+        .collect();
+    let told = known
+        .as_ref()
+        .is_none_or(|parts| parts.iter().all(|part| *part < UNTOLD));
+    let step = record
+        .time
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .fold(0.0, f64::max);
+    let seen = found
+        .time_constants
+        .iter()
+        .all(|constant| *constant >= step);
+    let yic = known.map(|parts| {
+        let mean = parts.iter().sum::<f64>() / parts.len() as f64;
+        2.0 * (rmse / spread).ln() + mean.ln()
+    });
+    let lags = (error.len() / 10).clamp(2, 25);
+    let (_, input_p) = residual_tests::prewhitened_input_test(&record.input.values, &error, lags)?;
+    let noise = ArModel::fit(&[&error], NOISE_ORDER.min(error.len() / 10))?;
+    let samples = error.len() as f64;
+    let fitted = (2 * n + m + 2 + noise.order()) as f64;
+    Ok(Outcome {
+        parameters: found.parameters.clone(),
+        time_constants: found.time_constants.clone(),
+        rmse,
+        fit_percent: 100.0 * (1.0 - rmse / spread),
+        test_rmse,
+        test_fit_percent: test_rmse.map(|rmse| 100.0 * (1.0 - rmse / self::spread(test))),
+        determined: told && seen,
+        bic: 2.0 * samples * noise.sigma().max(f64::MIN_POSITIVE).ln() + fitted * samples.ln(),
+        yic,
+        whiteness_p: residual_tests::ljung_box(&error, lags, 0)?,
+        input_p,
+        violated: Vec::new(),
+        warnings: found.warnings.clone(),
+        simulated,
+    })
+}
+
+/// Standard deviation of the outputs, each record about its own mean.
+fn spread(records: &[Record]) -> f64 {
+    let about_mean = |output: &Signal| {
+        let mean = output.values.iter().sum::<f64>() / output.values.len().max(1) as f64;
+        let values = output.values.iter();
+        values.map(|y| y - mean).collect::<Vec<f64>>()
+    };
+    rms(records.iter().flat_map(|record| about_mean(&record.output)))
+}
+
+fn violated(method: Method, found: &Outcome, least: f64, in_loop: bool) -> Vec<String> {
+    let mut violated = Vec::new();
+    if in_loop && !method.is_of_loop() {
+        violated.push("the input answers to the noise, through the controller".to_owned());
+    }
+    if found.input_p < UNLIKELY {
+        violated.push(
+            "the input shows in its error: the order is too low, or the plant is not linear"
+                .to_owned(),
+        );
+    }
+    if found.rmse > WORSE * least {
+        let why = match method {
+            Method::CtRls | Method::Ls => "noise biases it",
+            Method::StabilizedOe | Method::RecursiveFcloe => {
+                "the plant changed, or it has not converged"
+            }
+            Method::Iv | Method::Fcloe => "the loop is another than it is told, or not linear",
+        };
+        violated.push(format!(
+            "its error is {:.0} % above the least: {why}",
+            100.0 * (found.rmse / least - 1.0)
+        ));
+    }
+    violated
+}

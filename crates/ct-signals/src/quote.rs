@@ -43,7 +43,12 @@ pub fn escaped(text: &str) -> Cow<'_, str> {
 
 fn misleading(c: char) -> bool {
     c.is_control()
-        || matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}')
+        || matches!(
+            c,
+            '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{17b4}' | '\u{17b5}' | '\u{180b}'..='\u{180f}'
+                | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}'
+                | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{ffa0}' | '\u{fff0}'..='\u{fffb}' | '\u{e0000}'..='\u{e0fff}'
+        )
 }
 
 #[cfg(test)]
@@ -70,6 +75,10 @@ mod tests {
     fn a_quotation_is_short_and_steers_nothing() {
         assert_eq!(quoted("y [°C]"), "y [°C]");
         assert_eq!(quoted("a\u{202e}b\u{1b}[1m\t"), "a\\u{202e}b\\u{1b}[1m\\t");
+        assert_eq!(
+            quoted("a\u{ad}\u{e0041}\u{206a}b"),
+            "a\\u{ad}\\u{e0041}\\u{206a}b"
+        );
         assert_eq!(quoted(&"é".repeat(60)), "é".repeat(60));
         assert_eq!(quoted(&"é".repeat(3000)), "é".repeat(60) + "...");
     }

@@ -24,13 +24,9 @@ const PREFIX: &str = ".ctid-";
 const SUFFIX: &str = ".part";
 const LETTERS: usize = 12;
 
-/// Puts `content` where `path` says. An existing file keeps its owner, permissions and extended attributes, a link stays a link; a
-/// file with several hard links, or whose owner or attributes the user cannot give to a new file, is written in place.
-pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
-    write_if(path, content, || true).map(|_| ())
-}
-
-/// The same, but only where `still` holds at the last moment before; whether it did.
+/// Puts `content` where `path` says, where `still` holds at the last moment before; whether it did. An existing file keeps its owner,
+/// permissions and extended attributes, a link stays a link; a file with several hard links, or whose owner or attributes the user cannot
+/// give to a new file, is written in place.
 pub(crate) fn write_if(
     path: &Path,
     content: &[u8],

@@ -1,7 +1,7 @@
 //! `--json` and `--report`: checked before anything is computed, written at the end, whole or not at all.
 
 use std::fs;
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use missing_effect::Diagnosis;
@@ -282,7 +282,7 @@ fn standing(kind: Kind, path: &Path) -> Standing {
 
 /// ctid wrote it: a page that begins as its pages do, JSON with the mark, or the header of a shape with all its columns.
 fn is_ours(kind: Kind, path: &Path) -> bool {
-    let Ok(mut file) = fs::File::open(path) else {
+    let Ok(file) = fs::File::open(path) else {
         return false;
     };
     match kind {
@@ -299,10 +299,9 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
             read.is_ok() && term_file::is_own(&String::from_utf8_lossy(&head))
         }
         Kind::Json => {
-            let mut text = String::new();
-            let read = file.read_to_string(&mut text);
-            let mark = serde_json::from_str::<Mark>(&text);
-            read.is_ok() && mark.is_ok_and(|mark| mark.written_by == WRITTEN_BY)
+            // As a stream: it may be of any size.
+            let mark = serde_json::from_reader::<_, Mark>(BufReader::new(file));
+            mark.is_ok_and(|mark| mark.written_by == WRITTEN_BY)
         }
     }
 }

@@ -11,6 +11,10 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
+fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
+    write_if(path, content, || true).map(|_| ())
+}
+
 /// What a killed run has left goes with the next one; what lives, and what is somebody else's, stays.
 #[test]
 fn what_a_killed_run_has_left_is_removed() {

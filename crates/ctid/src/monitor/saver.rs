@@ -73,6 +73,38 @@ mod tests {
     use plants::{Known, Plant};
 
     #[test]
+    fn what_somebody_else_has_put_there_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.json");
+        let model = Model::new(Plant::SingleTank, Known::default());
+        let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
+        let mut saver = Saver::new(Some(path.clone()), 0);
+        let mut next = |saver: &mut Saver, time: f64| {
+            let row = Row {
+                time,
+                input: 5.0,
+                output: 16.0,
+            };
+            monitor.update(&row).unwrap();
+            saver.save(&monitor)
+        };
+        assert_eq!(next(&mut saver, 1.0), None);
+        // Its own state is renewed.
+        assert_eq!(next(&mut saver, 2.0), None);
+        std::fs::write(&path, "{\"written_by\": \"another program\"}").unwrap();
+        let said = next(&mut saver, 3.0).unwrap();
+        assert!(said.contains("somebody else"), "{said}");
+        assert!(std::fs::read_to_string(&path).unwrap().contains("another"));
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(next(&mut saver, 4.0).unwrap(), "the state is saved again");
+        // One that came before the first was written.
+        std::fs::write(&path, "mine").unwrap();
+        let mut first = Saver::new(Some(path.clone()), 0);
+        assert!(next(&mut first, 5.0).unwrap().contains("somebody else"));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+    }
+
+    #[test]
     fn a_folder_that_goes_and_comes_back_is_said_twice() {
         let folder = tempfile::tempdir().unwrap();
         let model = Model::new(Plant::SingleTank, Known::default());

@@ -1,7 +1,7 @@
 //! The saved state: written whole or not at all, and nothing else is overwritten. A checksum of its numbers tells a damaged one.
 
 use std::fs;
-use std::io;
+use std::io::{self, BufReader};
 use std::path::Path;
 
 use ::monitor::State;
@@ -107,7 +107,16 @@ fn checksum(state: &State) -> serde_json::Result<u32> {
     Ok(crc32fast::hash(&serde_json::to_vec(state)?))
 }
 
-/// Saves a state.
+/// Whether a state of ours stands there, in whatever version.
+fn is_ours(path: &Path) -> bool {
+    let Ok(file) = fs::File::open(path) else {
+        return false;
+    };
+    let head = serde_json::from_reader::<_, Head>(BufReader::new(file));
+    head.is_ok_and(|head| head.written_by == WRITTEN_BY)
+}
+
+/// Saves a state, where none is yet or one of ours: what somebody else has put there since the program began stays.
 pub(super) fn write(path: &Path, state: &State) -> Result<(), Error> {
     let text = checksum(state)
         .and_then(|checksum| {
@@ -118,5 +127,16 @@ pub(super) fn write(path: &Path, state: &State) -> Result<(), Error> {
             })
         })
         .map_err(|error| Error::file(path, format!("the state cannot be written: {error}")))?;
-    atomic::write(path, text.as_bytes())
+    let written = if fs::symlink_metadata(path).is_ok() {
+        atomic::write_if(path, text.as_bytes(), || is_ours(path))?
+    } else {
+        atomic::create(path, text.as_bytes())?
+    };
+    if written {
+        return Ok(());
+    }
+    Err(Error::file(
+        path,
+        "somebody else has written it since, so that the state was not saved; move it away",
+    ))
 }

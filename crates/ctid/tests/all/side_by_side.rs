@@ -161,6 +161,6 @@ fn what_cannot_be_is_refused() {
     );
     // Every method refuses a record that stands still: one line.
     let rows: String = (0..60).map(|k| format!("{k},1.0,{}\n", k % 3)).collect();
-    place.write("still.csv", &format!("t [s],u [V],y [cm]\n{rows}"));
+    place.write("still.csv", format!("t [s],u [V],y [cm]\n{rows}"));
     place.refuses("identify still.csv --method all", &["still.csv"]);
 }

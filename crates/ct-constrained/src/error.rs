@@ -73,6 +73,14 @@ pub enum Error {
         /// The value that was given.
         weight: f64,
     },
+    /// A time constant or a step of a filter that is not above 0.
+    #[error("{what} of the filter is {value} s, but must be above 0 and finite")]
+    FilterTime {
+        /// `the time constant` or `the step`.
+        what: &'static str,
+        /// The value that was given.
+        value: f64,
+    },
     /// There is no such row.
     #[error("row {index} does not exist: there are {rows} rows, counted from 0")]
     NoSuchRow {

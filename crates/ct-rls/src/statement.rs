@@ -12,8 +12,8 @@
 
 use nalgebra::SVector;
 
-use crate::integrator::sealed::Refusal;
-use crate::settings::{MAX_PHI_SQUARED, Step, Weights};
+use crate::integrator::sealed::{Covariance, Refusal};
+use crate::settings::{MAX_EPSILON, MAX_PHI_SQUARED, Step, Weights};
 use crate::{BlockIntegrator, ContinuousRls, Integrator};
 
 impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
@@ -63,7 +63,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
 /// - `epsilon`: `chi - f1' theta1 - f2' theta2`, which the caller knows.
 /// - `information`, `ratio`: of either block, as of [`ContinuousRls::absorb_with`].
 ///
-/// The two share the error, as in [`update_blocks`](crate::update_blocks). `None`, and nothing is done, where a number is out of range or a
+/// The two share the error, as in [`update_blocks`](crate::update_blocks). With both ratios 0 the step is exact whatever the rule. `None`, and nothing is done, where a number is out of range or a
 /// run has stopped.
 pub fn absorb_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     (first, f1): (&mut ContinuousRls<A, I>, &SVector<f64, A>),
@@ -72,6 +72,14 @@ pub fn absorb_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     information: [f64; 2],
     ratio: [f64; 2],
 ) -> Option<f64> {
+    // NaN passes, and is refused below
+    let information = information.map(|x| {
+        if x > MAX_PHI_SQUARED {
+            MAX_PHI_SQUARED
+        } else {
+            x
+        }
+    });
     let most = information[0].max(information[1]);
     let weights = |i: usize| {
         let c = information[i] / most;
@@ -81,6 +89,10 @@ pub fn absorb_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     let step = length_of(most, f1.norm_squared().max(f2.norm_squared()))?;
     first.guard.running().ok()?;
     second.guard.running().ok()?;
+    if ratio == [0.0; 2] {
+        let rates = [w1.c(), w2.c()];
+        return relax_blocks((first, f1), (second, f2), epsilon, rates, step.length);
+    }
     let ([theta1], [theta2]) = (&mut first.theta.data.0, &mut second.theta.data.0);
     let ([f1], [f2]) = (&f1.data.0, &f2.data.0);
     let made = I::blocks(
@@ -96,6 +108,30 @@ pub fn absorb_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
             None
         }
     }
+}
+
+/// The exact solution where `P` stays: both blocks move by what is left of the error, `1 - e^{-(c_1 s_1 + c_2 s_2) length}`.
+fn relax_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
+    (first, f1): (&mut ContinuousRls<A, I>, &SVector<f64, A>),
+    (second, f2): (&mut ContinuousRls<B, I>, &SVector<f64, B>),
+    epsilon: f64,
+    [c1, c2]: [f64; 2],
+    length: f64,
+) -> Option<f64> {
+    let ((k1, s1), (k2, s2)) = (first.state.times(f1), second.state.times(f2));
+    let rate = c1 * s1 + c2 * s2;
+    if !(epsilon.abs() <= MAX_EPSILON && rate * length < f64::INFINITY) {
+        return None;
+    }
+    // below that, the error does not change, and the rate may be subnormal
+    let share = if rate * length < f64::EPSILON {
+        length
+    } else {
+        -libm::expm1(-rate * length) / rate
+    };
+    first.theta += k1 * (epsilon * c1 * share);
+    second.theta += k2 * (epsilon * c2 * share);
+    Some(epsilon)
 }
 
 /// A step that is as long as the information, where it and the coefficients are in range.

@@ -22,6 +22,14 @@ pub enum Error {
         /// The highest coefficient that was given.
         highest: f64,
     },
+    /// A row that says nothing of any parameter.
+    #[error(
+        "all coefficients of the row with chi = {chi} are 0, in theta and in c; give one that is not, or weight 0 to switch a row off"
+    )]
+    ZeroRow {
+        /// Its right-hand side.
+        chi: f64,
+    },
     /// The estimates to start from lie outside their bounds.
     #[error("{what}(0)[{index}] is {value}, outside its bounds {lower} to {upper}; start inside")]
     StartOutside {

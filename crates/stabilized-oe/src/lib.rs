@@ -11,6 +11,7 @@
 //! | The signals are not measured from their point of rest | [`StabilizedOe::with_offset`] |
 //! | How do I keep the model stable? | it is; closer bounds with [`StabilizedOe::with_theta_bounds`] |
 //! | How do I bound `c^`, and are my bounds of use? | [`StabilizedOe::with_filter_bounds_for`] |
+//! | A balance, a ratio or a bound that couples `theta` and `c^` | [`StabilizedOe::with_rows`] |
 //! | How does Euler's rule compare? | `BlockDiagonal::<N, P, Euler>` |
 //!
 //! The equations stand at the head of `estimator.rs`. With `default-features = false` an allocator is not needed either; the filters and
@@ -87,7 +88,9 @@ mod filters;
 mod gain;
 mod hurwitz;
 mod integrator;
+mod limits;
 mod model;
+mod rows;
 #[cfg(feature = "alloc")]
 mod spr;
 
@@ -98,5 +101,6 @@ pub use estimator::{Bounded, StabilizedOe};
 pub use filters::StateVariableFilters;
 pub use gain::{BlockDiagonal, Full, Gain, UNGUARDED};
 pub use integrator::Integrator;
+pub use rows::CoupledRow;
 #[cfg(feature = "alloc")]
 pub use spr::{FilterBounds, check_filter_bounds};

@@ -101,7 +101,7 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
     }
 
     /// As [`new`](Self::new), for data and rows whose `gamma` is not their weight: [`Weights::new`] and [`Row::with_gamma`] hold them to
-    /// `gamma_i < 2 w_i`, where `dV/dt = -eta V - eps' (2 W - Gamma) eps` is negative, [U] 3.8.
+    /// `gamma_i < 2 w_i`, where `dV/dt = -eta V - eps' (2 W - Gamma) eps` is negative, (3.8) of the paper.
     ///
     /// The estimates are then **not** the minimum of (3.5), and depend on the order in which rows act, to first order in the step.
     pub fn with_free_gamma(rls: ContinuousRls<P>, rows: [Row<P>; R]) -> Self {

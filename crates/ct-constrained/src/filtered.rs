@@ -31,7 +31,7 @@ pub enum Filter {
     Integral,
 }
 
-/// An equality row of the filtered regressor and output, `(G phi)' theta = G y`; [U] section 3, remark 3.
+/// An equality row of the filtered regressor and output, `(G phi)' theta = G y`; remark 3 of the paper's section 3.
 ///
 /// For disturbances of `phi` and `y` that `G` takes away. Under white noise on `y` alone the data's own weight is the best one, and such
 /// a row makes the estimates worse.

@@ -82,7 +82,7 @@ impl<const P: usize> Row<P> {
         }
     }
 
-    /// The same equality with another entry `gamma` of `Gamma` ([U] 3.9b), how fast the row makes `Q` shrink; a new row has
+    /// The same equality with another entry `gamma` of `Gamma` (3.9b of the paper), how fast the row makes `Q` shrink; a new row has
     /// `gamma = w`. Unit of the weight; at least 0, below `2 w`, and 0 where `w` is: then `V` falls, (3.8).
     ///
     /// With a `gamma` other than `w` nothing is minimised, least of all (3.5), and the row needs

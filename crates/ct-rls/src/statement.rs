@@ -58,7 +58,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     }
 }
 
-/// Takes in the statement `f1' theta1 + f2' theta2 = chi` over two blocks with no covariance between them; [U] 4.18 for one row.
+/// Takes in the statement `f1' theta1 + f2' theta2 = chi` over two blocks with no covariance between them; (4.18) of the paper for one row.
 ///
 /// - `epsilon`: `chi - f1' theta1 - f2' theta2`, which the caller knows.
 /// - `information`, `ratio`: of either block, as of [`ContinuousRls::absorb_with`].

@@ -145,8 +145,8 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
 impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: usize>
     StabilizedOe<N, P, G, D, R>
 {
-    /// Rows `F theta + F_c c` that act after each sample that is used, equalities first, in the place of those before; [U] 4.14 to
-    /// 4.18. Bounds come after them. Cost per row that acts: that of the gain's step.
+    /// Rows `F theta + F_c c` that act after each sample that is used, equalities first, in the place of those before; (4.14) to (4.18)
+    /// of the paper. Bounds come after them. Cost per row that acts: that of the gain's step.
     ///
     /// # Errors
     /// [`ct_constrained::Error::NoCommonPoint`] for rows that contradict each other; those of weight 0 do not count.

@@ -1,4 +1,4 @@
-//! The three gains: what multiplies the regressor and the filtered error.
+//! The gains: what multiplies the regressor and the filtered error.
 
 use ct_constrained::{Bounds, Relation};
 use ct_rls::{
@@ -10,7 +10,8 @@ use nalgebra::{SMatrix, SVector};
 use crate::rows::window;
 use crate::{CoupledRow, Error, Integrator};
 
-/// A gain over the `P` parameters of the model and the `N` of the error filter: [`BlockDiagonal`], [`Full`].
+/// A gain over the `P` parameters of the model and the `N` of the error filter: [`BlockDiagonal`], [`Full`],
+/// [`AdaptivePlusConstant`](crate::AdaptivePlusConstant).
 pub trait Gain<const N: usize, const P: usize> {
     /// What carries the estimates, and the model's states, over a step.
     type Integrator: Integrator;

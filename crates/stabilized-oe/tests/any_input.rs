@@ -6,8 +6,8 @@ use ct_rls::{ContinuousRls, Euler, ExactHold, Outcome, RecursiveEstimator, Weigh
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 use stabilized_oe::{
-    BlockDiagonal, CoupledRow, Derivatives, Error, Full, Gain, Integrator, IoSample,
-    LateDifference, StabilizedOe, StateVariableFilters,
+    AdaptivePlusConstant, BlockDiagonal, CoupledRow, Derivatives, Error, Full, Gain, Integrator,
+    IoSample, LateDifference, StabilizedOe, StateVariableFilters,
 };
 
 fn any_number() -> impl Strategy<Value = f64> {
@@ -77,6 +77,12 @@ proptest! {
         survives::<1, 2, _>(
             BlockDiagonal::new(block::<2, ExactHold>([2.0, 1.0], p), block([2.0], p)),
             LateDifference::<3>::new(),
+            &record,
+        )?;
+        let sum = BlockDiagonal::new(block::<3, ExactHold>([2.0, 1.0, 0.5], p), block([2.0, 1.0], p));
+        survives::<2, 3, _>(
+            AdaptivePlusConstant::new(sum, SVector::from([p, 0.0, 1e40]), SVector::from([1.0, p])).unwrap(),
+            filters(),
             &record,
         )?;
         survives::<3, 5, _>(

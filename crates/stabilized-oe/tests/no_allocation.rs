@@ -5,7 +5,8 @@ use ct_constrained::{Bounds, Keep, Relation};
 use ct_rls::{ContinuousRls, RecursiveEstimator, Weights};
 use nalgebra::{SMatrix, SVector};
 use stabilized_oe::{
-    BlockDiagonal, CoupledRow, Full, Gain, IoSample, StabilizedOe, StateVariableFilters,
+    AdaptivePlusConstant, BlockDiagonal, CoupledRow, Full, Gain, IoSample, StabilizedOe,
+    StateVariableFilters,
 };
 
 /// Allocations of 2000 updates that follow the first; and how often bounds acted.
@@ -63,6 +64,10 @@ fn per_sample() {
             ContinuousRls::with_integrator(theta, SMatrix::identity(), weights).unwrap(),
             ContinuousRls::with_integrator(c, SMatrix::identity(), weights).unwrap(),
         );
+        let sum = AdaptivePlusConstant::new(gain.clone(), theta * 0.01, c * 0.01).unwrap();
+        let (count, bounded) = allocations(sum, keep);
+        assert_eq!(count, 0);
+        assert!(bounded > 0);
         let (count, bounded) = allocations(gain, keep);
         assert_eq!(count, 0);
         assert!(bounded > 0);

@@ -19,7 +19,7 @@ impl<const N: usize, const U: usize> Plant<N, U> {
         let mut whole = vec![1.0];
         for _ in 0..N {
             let time = rng.random_range(0.3..2.0);
-            whole.push(0.0);
+            whole.resize(whole.len() + 1, 0.0);
             for i in (1..whole.len()).rev() {
                 whole[i] += time * whole[i - 1];
             }

@@ -22,6 +22,13 @@
 //! `w h`. Where `theta` obeys the rows, `V = delta' Q^-1 delta` falls at least as `e^{-eta t}`:
 //! `dV/dt <= -eta V - eps' (2 W - Gamma) eps`.
 //!
+//! [`ConstrainedRls::with_free_gamma`] takes data and rows with `gamma_i < 2 w_i` apart from `w_i`. `V` still falls, by (3.8) term by
+//! term; but nothing is minimised, neither (3.5) nor, as the paper has it, for `Gamma = I`. Each row is then exact alone,
+//! ```text
+//! equality row i:  Q^-1 += gamma_i b f_i f_i',   f_i'(theta - theta^) shrinks by (1 + gamma_i b f_i'Q f_i)^(-w_i/gamma_i)
+//! ```
+//! and one after the other a splitting of first order in `h`, stable for any step.
+//!
 //! Convergence: as without constraints, with the equality rows' part in the excitation: they need not be excited.
 //!
 //! Cost per update: `2 p^2` multiplications for the data and for each row that acts.
@@ -55,6 +62,8 @@ pub struct ConstrainedRls<const P: usize, const R: usize> {
     rls: ContinuousRls<P>,
     rows: [Row<P>; R],
     window: Window,
+    /// Whether `Gamma` may differ from `W`.
+    free_gamma: bool,
 }
 
 /// `b` of the last step, kept while `eta` and `h` stay as they are.
@@ -81,18 +90,36 @@ impl Window {
 }
 
 impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
-    /// Puts rows on an estimator, whose weights have `gamma = c`.
+    /// Puts rows on an estimator: least squares, `gamma = c` for the data and `Gamma = W` for the equality rows.
     ///
     /// # Errors
-    /// [`Error::GammaNotWeight`].
+    /// [`Error::GammaNotWeight`], [`Error::RowGammaNotWeight`].
     pub fn new(rls: ContinuousRls<P>, rows: [Row<P>; R]) -> Result<Self, Error> {
         check_weights(&rls.weights())?;
+        rows.iter().try_for_each(check_row)?;
+        Ok(Self::made(rls, rows, false))
+    }
+
+    /// As [`new`](Self::new), for data and rows whose `gamma` is not their weight: [`Weights::new`] and [`Row::with_gamma`] hold them to
+    /// `gamma_i < 2 w_i`, where `dV/dt = -eta V - eps' (2 W - Gamma) eps` is negative, (3.8) of the paper.
+    ///
+    /// The estimates are then **not** the minimum of (3.5), and depend on the order in which rows act, to first order in the step.
+    pub fn with_free_gamma(rls: ContinuousRls<P>, rows: [Row<P>; R]) -> Self {
+        Self::made(rls, rows, true)
+    }
+
+    fn made(rls: ContinuousRls<P>, rows: [Row<P>; R], free_gamma: bool) -> Self {
         let window = Window {
             eta: f64::NAN,
             dt: f64::NAN,
             length: 0.0,
         };
-        Ok(Self { rls, rows, window })
+        Self {
+            rls,
+            rows,
+            window,
+            free_gamma,
+        }
     }
 
     /// The rows.
@@ -103,8 +130,11 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
     /// Replaces row `index`, counted from 0: where `F` or `chi` vary in time.
     ///
     /// # Errors
-    /// [`Error::NoSuchRow`].
+    /// [`Error::NoSuchRow`]; [`Error::RowGammaNotWeight`] unless [`with_free_gamma`](Self::with_free_gamma) made this one.
     pub fn set_row(&mut self, index: usize, row: Row<P>) -> Result<(), Error> {
+        if !self.free_gamma {
+            check_row(&row)?;
+        }
         match self.rows.get_mut(index) {
             Some(place) => {
                 *place = row;
@@ -131,17 +161,19 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
         &mut self.rls
     }
 
-    /// [`update`](RecursiveEstimator::update) with weights for this step alone, `gamma = c`.
+    /// [`update`](RecursiveEstimator::update) with weights for this step alone.
     ///
     /// # Errors
-    /// [`Error::GammaNotWeight`]; nothing is done then.
+    /// [`Error::GammaNotWeight`] unless [`with_free_gamma`](Self::with_free_gamma) made this one; nothing is done then.
     pub fn update_with(
         &mut self,
         sample: &Sample<P>,
         dt: f64,
         weights: &Weights,
     ) -> Result<Innovation, Error> {
-        check_weights(weights)?;
+        if !self.free_gamma {
+            check_weights(weights)?;
+        }
         Ok(self.step(sample, dt, weights))
     }
 
@@ -155,7 +187,9 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
         };
         for row in &self.rows {
             if row.relation() == Relation::Equal && row.weight() > 0.0 {
-                self.rls.absorb(row.f(), row.chi(), row.weight() * length);
+                let ratio = row.gamma() / row.weight();
+                let information = row.weight() * length;
+                self.rls.absorb_with(row.f(), row.chi(), information, ratio);
             }
         }
         for row in &self.rows {
@@ -165,6 +199,16 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
         }
         innovation
     }
+}
+
+fn check_row<const P: usize>(row: &Row<P>) -> Result<(), Error> {
+    if row.is_least_squares() {
+        return Ok(());
+    }
+    Err(Error::RowGammaNotWeight {
+        gamma: row.gamma(),
+        weight: row.weight(),
+    })
 }
 
 fn check_weights(weights: &Weights) -> Result<(), Error> {

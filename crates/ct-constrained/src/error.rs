@@ -9,13 +9,41 @@ pub enum Error {
     Rls(#[from] ct_rls::Error),
     /// The weights of the data are no least squares, so that constraints would bias the estimates.
     #[error(
-        "gamma is {gamma} with c = {c}, but with constraints the criterion is minimised only for gamma = c; take gamma = {c}"
+        "gamma is {gamma} with c = {c}, but with constraints the criterion is minimised only for gamma = c; take gamma = {c}, or with_free_gamma, which minimises nothing"
     )]
     GammaNotWeight {
         /// Gain of the Riccati equation.
         gamma: f64,
         /// Weight of the output error.
         c: f64,
+    },
+    /// A row's gamma is not its weight, so that the criterion would not be minimised.
+    #[error(
+        "gamma of the row is {gamma} with the weight {weight}, but the criterion is minimised only for gamma = {weight}; take that, or with_free_gamma, which minimises nothing"
+    )]
+    RowGammaNotWeight {
+        /// The row's entry of Gamma.
+        gamma: f64,
+        /// Its weight.
+        weight: f64,
+    },
+    /// A row's gamma with which the Lyapunov function could grow.
+    #[error(
+        "gamma of the row is {gamma} with the weight {weight}, but must be at least 0 and below twice the weight, {}, or the Lyapunov function can grow", 2.0 * weight
+    )]
+    Gamma {
+        /// The value that was given.
+        gamma: f64,
+        /// The row's weight.
+        weight: f64,
+    },
+    /// An inequality row with a gamma.
+    #[error(
+        "gamma of an inequality row is {gamma}, but must be 0: with another the Lyapunov function can grow, and dQ/dt jumps at every crossing"
+    )]
+    PenaltyGamma {
+        /// The value that was given.
+        gamma: f64,
     },
     /// A coefficient, the right-hand side or the violation of a row is not finite.
     #[error("{what} of the row is {value}, but must be finite")]
@@ -44,6 +72,14 @@ pub enum Error {
     Weight {
         /// The value that was given.
         weight: f64,
+    },
+    /// A time constant or a step of a filter that is not above 0.
+    #[error("{what} of the filter is {value} s, but must be above 0 and finite")]
+    FilterTime {
+        /// `the time constant` or `the step`.
+        what: &'static str,
+        /// The value that was given.
+        value: f64,
     },
     /// There is no such row.
     #[error("row {index} does not exist: there are {rows} rows, counted from 0")]

@@ -31,6 +31,7 @@ pub struct Row<const P: usize> {
     f: SVector<f64, P>,
     chi: f64,
     weight: f64,
+    gamma: f64,
     relation: Relation,
 }
 
@@ -68,8 +69,37 @@ impl<const P: usize> Row<P> {
             f,
             chi,
             weight,
+            gamma: Self::least_squares_gamma(relation, weight),
             relation,
         })
+    }
+
+    /// `w` of an equality, 0 of a penalty: with these the criterion (3.5) is minimised.
+    fn least_squares_gamma(relation: Relation, weight: f64) -> f64 {
+        match relation {
+            Relation::Equal => weight,
+            Relation::AtMost | Relation::AtLeast => 0.0,
+        }
+    }
+
+    /// The same equality with another entry `gamma` of `Gamma` (3.9b of the paper), how fast the row makes `Q` shrink; a new row has
+    /// `gamma = w`. Unit of the weight; at least 0, below `2 w`, and 0 where `w` is: then `V` falls, (3.8).
+    ///
+    /// With a `gamma` other than `w` nothing is minimised, least of all (3.5), and the row needs
+    /// [`ConstrainedRls::with_free_gamma`](crate::ConstrainedRls::with_free_gamma). Below `w` it goes on to pull where `Q` would have
+    /// shrunk already, as a row whose `chi` varies may want; above `w` it counts for more than it pulls.
+    ///
+    /// # Errors
+    /// [`Error::Gamma`] out of this range; [`Error::PenaltyGamma`] for an inequality and a `gamma` other than 0.
+    pub fn with_gamma(self, gamma: f64) -> Result<Self, Error> {
+        let weight = self.weight;
+        if self.relation != Relation::Equal && gamma != 0.0 {
+            return Err(Error::PenaltyGamma { gamma });
+        }
+        if !(gamma == 0.0 || (gamma > 0.0 && gamma < 2.0 * weight)) {
+            return Err(Error::Gamma { gamma, weight });
+        }
+        Ok(Self { gamma, ..self })
     }
 
     /// `f' theta = chi` with a weight: see [`Row::new`].
@@ -109,6 +139,16 @@ impl<const P: usize> Row<P> {
     /// Weight.
     pub fn weight(&self) -> f64 {
         self.weight
+    }
+
+    /// Its entry of `Gamma`: the weight of an equality, unless [`with_gamma`](Self::with_gamma) says otherwise; 0 of a penalty.
+    pub fn gamma(&self) -> f64 {
+        self.gamma
+    }
+
+    /// Whether the row's `gamma` is that of the minimum of (3.5).
+    pub(crate) fn is_least_squares(&self) -> bool {
+        self.gamma == Self::least_squares_gamma(self.relation, self.weight)
     }
 
     /// What the row says.

@@ -44,6 +44,7 @@ mod integrator;
 mod rk4;
 mod rls;
 mod settings;
+mod statement;
 
 #[cfg(feature = "alloc")]
 mod dynamic;
@@ -60,3 +61,4 @@ pub use integrator::Integrator;
 pub use rk4::Rk4;
 pub use rls::{ContinuousRls, Sample};
 pub use settings::{Guards, MAX_REGRESSOR, Weights};
+pub use statement::absorb_blocks;

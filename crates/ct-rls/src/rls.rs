@@ -89,34 +89,6 @@ impl<const P: usize> ContinuousRls<P> {
     pub fn distance(&self, theta: &SVector<f64, P>) -> f64 {
         self.state.information_norm(&(theta - self.theta))
     }
-
-    /// Takes in the statement `f' theta = chi` at once, with the weight `information` (1/unit(chi)^2, at least 0):
-    /// `P^-1` grows by `information f f'`. Above 1e60 it counts as 1e60, which is exact. Not counted, not guarded.
-    ///
-    /// Returns `chi - f' theta` before; `None`, and nothing is done, where a number is out of range or the run has stopped.
-    pub fn absorb(&mut self, f: &SVector<f64, P>, chi: f64, information: f64) -> Option<f64> {
-        // with c = gamma, the product of weight and length is all that counts
-        let weights = Weights::new(1.0, 1.0, 0.0).ok()?;
-        if !(information >= 0.0 && f.norm_squared() <= MAX_PHI_SQUARED) {
-            return None;
-        }
-        let information = information.min(MAX_PHI_SQUARED);
-        let epsilon = chi - f.dot(&self.theta);
-        let (mut scratch, mut k) = ([0.0; P], [0.0; P]);
-        factor::exact_step(
-            (
-                self.state.u.as_flattened_mut(),
-                &mut self.state.d,
-                self.theta.as_mut_slice(),
-            ),
-            (&mut scratch, &mut k),
-            f.as_slice(),
-            epsilon,
-            &weights,
-            (1.0, information),
-        )
-        .map(|_| epsilon)
-    }
 }
 
 impl<const P: usize, I: Integrator> ContinuousRls<P, I> {

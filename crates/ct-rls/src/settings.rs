@@ -209,11 +209,16 @@ impl Step {
 
     /// The same step without forgetting.
     pub fn remembering(&self) -> Self {
+        Self::remembering_for(self.dt)
+    }
+
+    /// A step of `dt` seconds without forgetting.
+    pub fn remembering_for(dt: f64) -> Self {
         Self {
             eta: 0.0,
-            dt: self.dt,
+            dt,
             growth: 1.0,
-            length: self.dt,
+            length: dt,
         }
     }
 

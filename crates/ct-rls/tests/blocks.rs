@@ -4,7 +4,8 @@
 mod support;
 
 use ct_rls::{
-    ContinuousRls, Euler, ExactHold, Outcome, RecursiveEstimator, Weights, update_blocks,
+    ContinuousRls, Euler, ExactHold, Outcome, RecursiveEstimator, Weights, absorb_blocks,
+    update_blocks,
 };
 use nalgebra::{SMatrix, SVector};
 use ode_solvers::dop853::Dop853;
@@ -184,4 +185,64 @@ fn where_one_block_cannot_neither_does() {
     assert_eq!(one.theta().amax() + two.theta().amax(), 0.0);
     assert_eq!(one.health().unwrap().unused, 5);
     assert_eq!(two.health().unwrap().unused, 5);
+}
+
+/// A row over both blocks, with informations and ratios of their own, is a sample of the same weights.
+#[test]
+fn a_row_over_two_blocks_agrees_with_an_adaptive_solver() {
+    let mut rng = rng(3);
+    for (information, ratio) in [
+        ([0.5, 0.5], [1.0, 1.0]),
+        ([2.0, 0.4], [1.0, 1.0]),
+        ([3.0, 3.0], [0.0, 0.0]),
+        ([3.0, 1.0], [0.0, 1.5]),
+    ] {
+        let weights = [0, 1]
+            .map(|i: usize| Weights::new(information[i], ratio[i] * information[i], 0.0).unwrap());
+        let (f1, f2): (SVector<f64, 3>, SVector<f64, 2>) = (normals(&mut rng), normals(&mut rng));
+        let (p1, p2) = (spd::<3>(&mut rng), spd::<2>(&mut rng));
+        let mut one = ContinuousRls::<3>::new(SVector::zeros(), p1, weights[0]).unwrap();
+        let mut two = ContinuousRls::<2>::new(SVector::zeros(), p2, weights[1]).unwrap();
+        let sizes = [f1.dot(&(p1 * f1)), f2.dot(&(p2 * f2))];
+        absorb_blocks((&mut one, &f1), (&mut two, &f2), 0.8, information, ratio).unwrap();
+        let shares = reference(weights, sizes, 0.8, 1.0);
+        let moved = [
+            one.theta().dot(&f1) / sizes[0],
+            two.theta().dot(&f2) / sizes[1],
+        ];
+        for i in 0..2 {
+            let off = (moved[i] / shares[i] - 1.0).abs();
+            assert!(off < 1e-6, "{off:e}: {information:?} {ratio:?}");
+        }
+        let grown = information[0] * ratio[0] * sizes[0];
+        let left = f1.dot(&(one.covariance() * f1)) * (1.0 + grown) / sizes[0];
+        assert!((left - 1.0).abs() < 1e-12, "{left}");
+        // a row is not a sample
+        assert_eq!(one.health().unwrap().used, 0);
+    }
+    let (mut one, mut two) = (
+        ContinuousRls::<1>::new(
+            SVector::zeros(),
+            SMatrix::identity(),
+            Weights::least_squares(0.0).unwrap(),
+        )
+        .unwrap(),
+        ContinuousRls::<1>::new(
+            SVector::zeros(),
+            SMatrix::identity(),
+            Weights::least_squares(0.0).unwrap(),
+        )
+        .unwrap(),
+    );
+    let f = SVector::from([1.0]);
+    for (epsilon, information, ratio) in [
+        (f64::NAN, [1.0; 2], [1.0; 2]),
+        (1.0, [-1.0; 2], [1.0; 2]),
+        (1.0, [f64::NAN; 2], [1.0; 2]),
+        (1.0, [1.0; 2], [2.0; 2]),
+    ] {
+        let taken = absorb_blocks((&mut one, &f), (&mut two, &f), epsilon, information, ratio);
+        assert_eq!(taken, None);
+        assert_eq!((one.theta()[0], two.theta()[0]), (0.0, 0.0));
+    }
 }

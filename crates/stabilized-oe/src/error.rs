@@ -22,6 +22,32 @@ pub enum Error {
         /// The highest coefficient that was given.
         highest: f64,
     },
+    /// An entry of a constant gain is out of range.
+    #[error("c_lambda lambda[{index}] is {value}, but must be 0 to 1e40; 0 for none")]
+    Lambda {
+        /// Which entry of `(theta, c)`, from 0.
+        index: usize,
+        /// The value that was given.
+        value: f64,
+    },
+    /// The blocks of a sum of gains have two values of `c_p`.
+    #[error(
+        "c is {theta} for theta and {filter} for the error filter, but a sum of gains has one c_p; put the ratio into P(0) and lambda"
+    )]
+    TwoGains {
+        /// Of theta's block.
+        theta: f64,
+        /// Of the filter's block.
+        filter: f64,
+    },
+    /// A row that says nothing of any parameter.
+    #[error(
+        "all coefficients of the row with chi = {chi} are 0, in theta and in c; give one that is not, or weight 0 to switch a row off"
+    )]
+    ZeroRow {
+        /// Its right-hand side.
+        chi: f64,
+    },
     /// The estimates to start from lie outside their bounds.
     #[error("{what}(0)[{index}] is {value}, outside its bounds {lower} to {upper}; start inside")]
     StartOutside {

@@ -9,7 +9,7 @@
 //! dc^/dt     = -c_p P2 e1 eps~          dP2/dt = eta2 P2 - gamma2 P2 e1 e1' P2
 //! ```
 //! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run of its experiment ends at the bound of `c^`
-//! (`cargo test -p stabilized-oe --test printed_sign`).
+//! (`cargo test -p stabilized-oe --test printed_sign`). Rows `F theta + F_c c = chi` or `<= chi` add their errors, [U] 4.14 to 4.18: [`CoupledRow`].
 //!
 //! Assumptions: the gain's step holds `phi_m`, `e` and `e1` over a sample, the model's runs the input as the scheme of derivatives says.
 //! `u` excites persistently. Noise on `y` is independent of `u`.
@@ -19,22 +19,21 @@
 //! Reference: A. J. Udink ten Cate, *Continuous-time constrained least-squares algorithms for recursive parameter estimation of stochastic
 //! linear systems by a stabilized output error method*, WP-85-54, IIASA, Laxenburg, 1985, sections 4 and 5.
 
-use ct_constrained::Bounds;
+use ct_constrained::{Bounds, Relation};
 use ct_rls::{Health, Innovation, Outcome, RecursiveEstimator};
 use nalgebra::{SMatrix, SVector};
 
 use crate::hurwitz::is_hurwitz;
 use crate::integrator::sealed::ModelRule;
+use crate::limits::{default_bounds, inside};
 use crate::model::Model;
-use crate::{Derivatives, Error, Gain};
+use crate::rows::check_rows;
+use crate::{CoupledRow, Derivatives, Error, Gain};
 
 /// Halvings of a step that would lose the stability of the model, before it is not made at all.
 const HALVINGS: u32 = 10;
 
-/// By default `a_i`, `i < n`, is kept above this times `dt^i`.
-const FLOOR: f64 = 1e-3;
-
-/// And the shortest lag, beside the others of the start, above this times `dt`.
+/// By default the shortest lag, beside the others of the start, is kept above this times `dt`.
 const SHORTEST_LAG: f64 = 0.05;
 
 /// An output of the model beyond this has left any sense.
@@ -43,7 +42,7 @@ const LARGEST: f64 = 1e100;
 /// Recursive output error for a model of order `N` with `P = n + m + 1` parameters `theta = (a_1, .., a_n, b_0, .., b_m)`, no
 /// allocation per sample. With [`with_offset`](Self::with_offset), `P = n + m + 2` and the last one is the offset.
 ///
-/// `G` is the [`Gain`], `D` the source of the [`Derivatives`].
+/// `G` is the [`Gain`], `D` the source of the [`Derivatives`], `R` the number of [rows](Self::with_rows).
 ///
 /// ```
 /// use ct_rls::{ContinuousRls, RecursiveEstimator, Weights};
@@ -70,7 +69,7 @@ const LARGEST: f64 = 1e100;
 /// # Ok::<(), stabilized_oe::Error>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct StabilizedOe<const N: usize, const P: usize, G, D> {
+pub struct StabilizedOe<const N: usize, const P: usize, G, D, const R: usize = 0> {
     gain: G,
     derivatives: D,
     model: Model<N, P>,
@@ -84,6 +83,7 @@ pub struct StabilizedOe<const N: usize, const P: usize, G, D> {
     /// `a_{n-1}` of the start, 1 for n = 1.
     slower: f64,
     filter_bounds: Bounds<N>,
+    rows: [CoupledRow<N, P>; R],
     offset: bool,
     failure: Option<Error>,
     bounded: Bounded,
@@ -134,10 +134,68 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
             shortest: f64::INFINITY,
             slower: if N > 1 { theta[N - 2] } else { 1.0 },
             filter_bounds: Bounds::none(),
+            rows: [],
             offset: false,
             failure: None,
             bounded: Bounded::default(),
         })
+    }
+}
+
+impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: usize>
+    StabilizedOe<N, P, G, D, R>
+{
+    /// Rows `F theta + F_c c` that act after each sample that is used, equalities first, in the place of those before; (4.14) to (4.18)
+    /// of the paper. Bounds come after them. Cost per row that acts: that of the gain's step.
+    ///
+    /// # Errors
+    /// [`ct_constrained::Error::NoCommonPoint`] for rows that contradict each other; those of weight 0 do not count.
+    pub fn with_rows<const K: usize>(
+        self,
+        rows: [CoupledRow<N, P>; K],
+    ) -> Result<StabilizedOe<N, P, G, D, K>, Error> {
+        check_rows(&rows)?;
+        Ok(StabilizedOe {
+            gain: self.gain,
+            derivatives: self.derivatives,
+            model: self.model,
+            theta: self.theta,
+            theta_bounds: self.theta_bounds,
+            default_bounds: self.default_bounds,
+            shortest: self.shortest,
+            slower: self.slower,
+            filter_bounds: self.filter_bounds,
+            rows,
+            offset: self.offset,
+            failure: self.failure,
+            bounded: self.bounded,
+        })
+    }
+
+    /// Replaces row `index`, counted from 0: where `F`, `F_c`, `chi` or the weight vary in time. All rows are checked again.
+    ///
+    /// # Errors
+    /// [`ct_constrained::Error::NoSuchRow`], and as of [`with_rows`](Self::with_rows); nothing is changed then.
+    pub fn set_row(&mut self, index: usize, row: CoupledRow<N, P>) -> Result<(), Error> {
+        let mut rows = self.rows;
+        match rows.get_mut(index) {
+            Some(place) => *place = row,
+            None => return Err(ct_constrained::Error::NoSuchRow { index, rows: R }.into()),
+        }
+        check_rows(&rows)?;
+        self.rows = rows;
+        Ok(())
+    }
+
+    /// The rows.
+    pub fn rows(&self) -> &[CoupledRow<N, P>; R] {
+        &self.rows
+    }
+
+    /// By how much the estimates violate each row; unit of its `chi`.
+    pub fn violations(&self) -> [f64; R] {
+        let filter = self.gain.filter();
+        self.rows.map(|row| row.violation(&self.theta, &filter))
     }
 
     /// The last parameter is an offset: `A y = B u + d`. For signals that are not measured from their point of rest.
@@ -227,6 +285,18 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
         }
     }
 
+    /// Equalities, then penalties.
+    #[inline]
+    fn take_rows(&mut self, dt: f64) {
+        for equality in [true, false] {
+            for row in &self.rows {
+                if (row.relation() == Relation::Equal) == equality && row.weight() > 0.0 {
+                    self.gain.take_row(row, dt);
+                }
+            }
+        }
+    }
+
     /// Brings the estimates back to their bounds, and the model to stability.
     #[inline]
     fn keep(&mut self, dt: f64) -> Result<(), Error> {
@@ -275,46 +345,8 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
     }
 }
 
-fn inside<const K: usize>(
-    what: &'static str,
-    bounds: &Bounds<K>,
-    value: &SVector<f64, K>,
-) -> Result<(), Error> {
-    for (index, &value) in value.iter().enumerate() {
-        let (lower, upper) = (bounds.lower()[index], bounds.upper()[index]);
-        if !(lower..=upper).contains(&value) {
-            return Err(Error::StartOutside {
-                what,
-                index,
-                value,
-                lower,
-                upper,
-            });
-        }
-    }
-    Ok(())
-}
-
-/// `a_i` above [`FLOOR`] times `dt^i`, and `a_n` above `dt^n`, or `highest` where that is less.
-fn default_bounds<const N: usize, const P: usize>(
-    dt: f64,
-    highest: f64,
-) -> Result<Bounds<P>, Error> {
-    let mut lower = [f64::NEG_INFINITY; P];
-    let mut power = 1.0;
-    for (i, lower) in lower.iter_mut().take(N).enumerate() {
-        power *= dt;
-        *lower = if i + 1 == N {
-            power.min(highest)
-        } else {
-            FLOOR * power
-        };
-    }
-    Ok(Bounds::new(lower, [f64::INFINITY; P])?)
-}
-
-impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> RecursiveEstimator
-    for StabilizedOe<N, P, G, D>
+impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: usize>
+    RecursiveEstimator for StabilizedOe<N, P, G, D, R>
 {
     type Sample = D::Sample;
     type Theta = SVector<f64, P>;
@@ -359,6 +391,9 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Recursive
         let epsilon = e + self.gain.filter().dot(&e1);
         self.model.hold(*theta, inputs, dt);
         let innovation = self.gain.advance(&phi, &e1, epsilon, dt);
+        if innovation.outcome.used() {
+            self.take_rows(dt);
+        }
         if let Err(error) = self.keep(dt) {
             self.failure = Some(error);
         }

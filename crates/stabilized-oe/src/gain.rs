@@ -1,15 +1,17 @@
-//! The three gains: what multiplies the regressor and the filtered error.
+//! The gains: what multiplies the regressor and the filtered error.
 
-use ct_constrained::Bounds;
+use ct_constrained::{Bounds, Relation};
 use ct_rls::{
     ContinuousRls, ExactHold, Guards, Health, Innovation, RecursiveEstimator, Sample, Weights,
-    update_blocks,
+    absorb_blocks, update_blocks,
 };
 use nalgebra::{SMatrix, SVector};
 
-use crate::{Error, Integrator};
+use crate::rows::window;
+use crate::{CoupledRow, Error, Integrator};
 
-/// A gain over the `P` parameters of the model and the `N` of the error filter: [`BlockDiagonal`], [`Full`].
+/// A gain over the `P` parameters of the model and the `N` of the error filter: [`BlockDiagonal`], [`Full`],
+/// [`AdaptivePlusConstant`](crate::AdaptivePlusConstant).
 pub trait Gain<const N: usize, const P: usize> {
     /// What carries the estimates, and the model's states, over a step.
     type Integrator: Integrator;
@@ -40,6 +42,12 @@ pub trait Gain<const N: usize, const P: usize> {
     /// # Errors
     /// As of [`Bounds::enforce`].
     fn keep(&mut self, theta: &Bounds<P>, filter: &Bounds<N>, dt: f64) -> Result<[bool; 2], Error>;
+
+    /// Lets a row act for `dt` seconds, exactly and alone; an inequality only where it is violated. Nothing is done where a number
+    /// would leave the range of the estimators.
+    ///
+    /// Euler's rule takes equality rows by Euler's rule, and stops where `gamma h f'P f` is too large.
+    fn take_row(&mut self, row: &CoupledRow<N, P>, dt: f64);
 
     /// Replaces `theta^` and keeps the rest.
     ///
@@ -147,6 +155,22 @@ impl<const N: usize, const P: usize, I: Integrator> Gain<N, P> for BlockDiagonal
             theta.enforce(&mut self.theta, dt)?,
             filter.enforce(&mut self.filter, dt)?,
         ])
+    }
+
+    fn take_row(&mut self, row: &CoupledRow<N, P>, dt: f64) {
+        let r = row.violation(self.theta.theta(), self.filter.theta());
+        if r == 0.0 && row.relation() != Relation::Equal {
+            return;
+        }
+        let weights = [self.theta.weights(), self.filter.weights()];
+        let (information, ratio) = row_step(row, weights, dt);
+        absorb_blocks(
+            (&mut self.theta, row.f()),
+            (&mut self.filter, row.f_c()),
+            -r,
+            information,
+            ratio,
+        );
     }
 
     fn set_theta(&mut self, theta: SVector<f64, P>) -> Result<(), Error> {
@@ -257,6 +281,22 @@ impl<const N: usize, const P: usize, const T: usize, I: Integrator> Gain<N, P>
         Ok(outside)
     }
 
+    fn take_row(&mut self, row: &CoupledRow<N, P>, dt: f64) {
+        if row.relation() != Relation::Equal
+            && row.violation(&Gain::theta(self), &self.filter()) == 0.0
+        {
+            return;
+        }
+        let f = SVector::from(Self::joined(row.f(), row.f_c()));
+        let ([information, _], [ratio, _]) = row_step(row, [self.rls.weights(); 2], dt);
+        if ratio == 0.0 {
+            // exact whatever the rule
+            self.rls.relax(&f, row.chi(), information);
+        } else {
+            self.rls.absorb_with(&f, row.chi(), information, ratio);
+        }
+    }
+
     fn set_theta(&mut self, theta: SVector<f64, P>) -> Result<(), Error> {
         let both = SVector::from(Self::joined(&theta, &self.filter()));
         Ok(self.rls.set_theta(both)?)
@@ -268,6 +308,21 @@ impl<const N: usize, const P: usize, const T: usize, I: Integrator> Gain<N, P>
 
     fn health(&self) -> Result<Health, Error> {
         Ok(self.rls.health()?)
+    }
+}
+
+/// A row's weight times the time it acts for, and its `gamma/w`, for either block: the data's for an equality, 0 for a penalty.
+fn row_step<const N: usize, const P: usize>(
+    row: &CoupledRow<N, P>,
+    weights: [Weights; 2],
+    dt: f64,
+) -> ([f64; 2], [f64; 2]) {
+    match row.relation() {
+        Relation::Equal => (
+            weights.map(|w| row.weight() * window(w, dt)),
+            weights.map(|w| w.gamma() / w.c()),
+        ),
+        Relation::AtMost | Relation::AtLeast => ([row.weight() * dt; 2], [0.0; 2]),
     }
 }
 

@@ -11,6 +11,7 @@
 //! | The signals are not measured from their point of rest | [`StabilizedOe::with_offset`] |
 //! | How do I keep the model stable? | it is; closer bounds with [`StabilizedOe::with_theta_bounds`] |
 //! | How do I bound `c^`, and are my bounds of use? | [`StabilizedOe::with_filter_bounds_for`] |
+//! | A balance, a ratio or a bound that couples `theta` and `c^` | [`StabilizedOe::with_rows`] |
 //! | How does Euler's rule compare? | `BlockDiagonal::<N, P, Euler>` |
 //!
 //! The equations stand at the head of `estimator.rs`. With `default-features = false` an allocator is not needed either; the filters and
@@ -21,6 +22,7 @@
 //! |---|---|---|
 //! | [`BlockDiagonal`], adaptive | **no proof, and counterexamples** | unbiased where `C^/A0 - gamma/(2 c)` is strictly positive real |
 //! | [`Full`], adaptive | converges: `dV/dt = -eta V - (2 c - gamma) eps~^2` | `eps~` and `e1` are correlated: expect bias |
+//! | [`AdaptivePlusConstant`], (4.11a) | **no proof, and counterexamples**; the constant part has to outweigh `P` | as [`BlockDiagonal`] |
 //! | [`BlockDiagonal::constant`] | converges: `dV/dt = -2 c eps~^2` | unbiased where `C^/A0` is strictly positive real |
 //!
 //! # The claim of global convergence is false
@@ -40,6 +42,10 @@
 //!
 //! The truth is (1, 1, 1). An adaptive solver of the equations, at a tolerance of 1e-6 and with no code in common, ends at the same place:
 //! `cargo test -p stabilized-oe --test convergence`.
+//!
+//! Nor does a constant gain beside the adaptive one, (4.11a), make (4.13) and (C.2) true: `delta' Lambda^-1 P phi phi' delta` has no sign, as
+//! `Lambda^-1 P` is not symmetric. In this example `c_lambda Lambda = 0.001 I` ends at (2.29, 2.09, 2.25), with the paper's `V` 2.5 times its
+//! start: `cargo test -p stabilized-oe --test summed`.
 //!
 //! # Bounds on `c^`
 //! With noise `c^` does not go to the plant's `a`: for n = 1 to 0, for n = 2 to `(0, E v'^2/E v''^2)`, wherever that is. What is wanted is
@@ -87,9 +93,13 @@ mod filters;
 mod gain;
 mod hurwitz;
 mod integrator;
+mod limits;
 mod model;
+mod quadrature;
+mod rows;
 #[cfg(feature = "alloc")]
 mod spr;
+mod summed;
 
 pub use derivatives::{Derivatives, IoSample, Known, KnownSample, LateDifference};
 pub use error::Error;
@@ -98,5 +108,7 @@ pub use estimator::{Bounded, StabilizedOe};
 pub use filters::StateVariableFilters;
 pub use gain::{BlockDiagonal, Full, Gain, UNGUARDED};
 pub use integrator::Integrator;
+pub use rows::CoupledRow;
 #[cfg(feature = "alloc")]
 pub use spr::{FilterBounds, check_filter_bounds};
+pub use summed::AdaptivePlusConstant;

@@ -160,7 +160,9 @@ fn polynomial<const N: usize>(c: &[f64; N]) -> Result<Polynomial, Error> {
     Ok(Polynomial::new(coefficients)?)
 }
 
-impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> StabilizedOe<N, P, G, D> {
+impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: usize>
+    StabilizedOe<N, P, G, D, R>
+{
     /// [`check_filter_bounds`] of this estimator's bounds on `c^` and its gain's `gamma/(2 c)`, for plants that are plausible.
     ///
     /// # Errors

@@ -1,12 +1,13 @@
 //! Whatever comes in, nothing panics and the estimates stay numbers.
 #![allow(clippy::unwrap_used)]
 
+use ct_constrained::Relation;
 use ct_rls::{ContinuousRls, Euler, ExactHold, Outcome, RecursiveEstimator, Weights};
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 use stabilized_oe::{
-    BlockDiagonal, Derivatives, Error, Full, Gain, Integrator, IoSample, LateDifference,
-    StabilizedOe, StateVariableFilters,
+    AdaptivePlusConstant, BlockDiagonal, CoupledRow, Derivatives, Error, Full, Gain, Integrator,
+    IoSample, LateDifference, StabilizedOe, StateVariableFilters,
 };
 
 fn any_number() -> impl Strategy<Value = f64> {
@@ -37,7 +38,17 @@ fn survives<const N: usize, const P: usize, D: Derivatives<N, Sample = IoSample>
     derivatives: D,
     record: &[(f64, f64, f64)],
 ) -> Result<(), TestCaseError> {
-    let mut estimator = StabilizedOe::new(gain, derivatives).unwrap();
+    let mut f = [0.0; P];
+    f[N] = 1.0;
+    let rows = [
+        (Relation::Equal, f, [0.1; N], 2.0),
+        (Relation::AtLeast, [0.0; P], [1.0; N], f64::MAX),
+    ];
+    let rows = rows.map(|(relation, f, f_c, w)| CoupledRow::new(relation, f, f_c, 1.0, w).unwrap());
+    let mut estimator = StabilizedOe::new(gain, derivatives)
+        .unwrap()
+        .with_rows(rows)
+        .unwrap();
     for &(u, y, dt) in record {
         estimator.update(&IoSample { u, y }, dt);
         let theta: SVector<f64, P> = *estimator.theta();
@@ -66,6 +77,12 @@ proptest! {
         survives::<1, 2, _>(
             BlockDiagonal::new(block::<2, ExactHold>([2.0, 1.0], p), block([2.0], p)),
             LateDifference::<3>::new(),
+            &record,
+        )?;
+        let sum = BlockDiagonal::new(block::<3, ExactHold>([2.0, 1.0, 0.5], p), block([2.0, 1.0], p));
+        survives::<2, 3, _>(
+            AdaptivePlusConstant::new(sum, SVector::from([p, 0.0, 1e40]), SVector::from([1.0, p])).unwrap(),
+            filters(),
             &record,
         )?;
         survives::<3, 5, _>(

@@ -1,10 +1,13 @@
-//! A sample costs no allocation, with either gain, filters, and bounds that act.
+//! A sample costs no allocation, with any gain, filters, and rows and bounds that act.
 #![allow(clippy::unwrap_used)]
 
-use ct_constrained::{Bounds, Keep};
+use ct_constrained::{Bounds, Keep, Relation};
 use ct_rls::{ContinuousRls, RecursiveEstimator, Weights};
 use nalgebra::{SMatrix, SVector};
-use stabilized_oe::{BlockDiagonal, Full, Gain, IoSample, StabilizedOe, StateVariableFilters};
+use stabilized_oe::{
+    AdaptivePlusConstant, BlockDiagonal, CoupledRow, Full, Gain, IoSample, StabilizedOe,
+    StateVariableFilters,
+};
 
 /// Allocations of 2000 updates that follow the first; and how often bounds acted.
 fn allocations(gain: impl Gain<3, 5>, keep: Keep) -> (u64, u64) {
@@ -13,6 +16,18 @@ fn allocations(gain: impl Gain<3, 5>, keep: Keep) -> (u64, u64) {
         .unwrap()
         .with_offset()
         .with_filter_bounds(bounds.kept_by(keep).unwrap())
+        .unwrap()
+        .with_rows([
+            CoupledRow::new(
+                Relation::Equal,
+                [0.0, 0.0, 0.0, 1.0, 0.0],
+                [0.1; 3],
+                1.5,
+                0.1,
+            )
+            .unwrap(),
+            CoupledRow::new(Relation::AtMost, [0.0; 5], [1.0, 0.0, 0.0], 2.8, 10.0).unwrap(),
+        ])
         .unwrap();
     let mut update = |k: u32| {
         let t = 0.1 * f64::from(k);
@@ -49,6 +64,10 @@ fn per_sample() {
             ContinuousRls::with_integrator(theta, SMatrix::identity(), weights).unwrap(),
             ContinuousRls::with_integrator(c, SMatrix::identity(), weights).unwrap(),
         );
+        let sum = AdaptivePlusConstant::new(gain.clone(), theta * 0.01, c * 0.01).unwrap();
+        let (count, bounded) = allocations(sum, keep);
+        assert_eq!(count, 0);
+        assert!(bounded > 0);
         let (count, bounded) = allocations(gain, keep);
         assert_eq!(count, 0);
         assert!(bounded > 0);

@@ -8,7 +8,9 @@ use nalgebra::{SMatrix, SVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use stabilized_oe::{BlockDiagonal, Error, Gain, IoSample, LateDifference, StabilizedOe};
+use stabilized_oe::{
+    BlockDiagonal, CoupledRow, Error, Gain, IoSample, LateDifference, StabilizedOe,
+};
 
 const LIMIT: f64 = 20.0;
 
@@ -47,6 +49,10 @@ impl Gain<1, 2> for Printed {
 
     fn keep(&mut self, theta: &Bounds<2>, filter: &Bounds<1>, dt: f64) -> Result<[bool; 2], Error> {
         self.0.keep(theta, filter, dt)
+    }
+
+    fn take_row(&mut self, row: &CoupledRow<1, 2>, dt: f64) {
+        self.0.take_row(row, dt);
     }
 
     fn set_theta(&mut self, theta: SVector<f64, 2>) -> Result<(), Error> {

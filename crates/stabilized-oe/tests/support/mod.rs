@@ -1,4 +1,6 @@
 //! What several tests share.
 #![allow(dead_code, clippy::unwrap_used)]
 
+pub mod plant;
+pub mod reference;
 pub mod second_order;

@@ -35,12 +35,15 @@
 #![no_std]
 
 mod blocks;
+mod directional;
 mod error;
 mod estimator;
 mod euler;
 mod exact_hold;
 mod factor;
+mod guard;
 mod integrator;
+mod random_walk;
 mod rk4;
 mod rls;
 mod settings;
@@ -49,6 +52,7 @@ mod settings;
 mod dynamic;
 
 pub use blocks::{BlockIntegrator, update_blocks};
+pub use directional::Directional;
 #[cfg(feature = "alloc")]
 pub use dynamic::{DynamicRls, DynamicSample};
 pub use error::Error;
@@ -56,7 +60,8 @@ pub use estimator::{Health, Innovation, Outcome, RecursiveEstimator};
 pub use euler::Euler;
 pub use exact_hold::ExactHold;
 pub use factor::UdFactor;
-pub use integrator::Integrator;
+pub use integrator::{FactoredIntegrator, Integrator};
+pub use random_walk::RandomWalk;
 pub use rk4::Rk4;
 pub use rls::{ContinuousRls, Sample};
 pub use settings::{Guards, MAX_REGRESSOR, Weights};

@@ -184,9 +184,10 @@ fn raise(u: &mut [f64], d: &mut [f64], j: usize, more: f64, left: &mut [f64]) {
         // in this order no product leaves the floating-point range
         let gain = weight * own;
         let raised = d[m] + gain * own;
-        let (share, kept) = (gain / raised, d[m] / raised);
+        let inverse = 1.0 / raised;
+        let share = gain * inverse;
+        weight *= d[m] * inverse;
         d[m] = raised;
-        weight *= kept;
         let column = &mut u[m * p..m * p + m];
         for i in 0..m {
             left[i] -= own * column[i];

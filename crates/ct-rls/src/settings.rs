@@ -97,7 +97,8 @@ impl Weights {
 /// What keeps `P` from growing without end where the regressor says nothing (wind-up).
 ///
 /// Both only ever forget less than `eta` asks for, so the Lyapunov function still decreases. They act on all parameters at once;
-/// [`Directional`](crate::Directional) forgets by directions, and [`RandomWalk`](crate::RandomWalk) without `eta` by parameters.
+/// [`Directional`](crate::Directional) forgets by directions, and [`RandomWalk`](crate::RandomWalk) without `eta` by parameters;
+/// a walk at the cap is the exception, where the function may grow by the share that `P` is scaled down by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Guards {

@@ -151,6 +151,28 @@ fn hostile() -> impl Strategy<Value = Hostile> {
     )
 }
 
+/// Rules that raise `P` before they learn decide first whether they can: what would overflow changes nothing.
+#[test]
+fn a_step_that_would_overflow_is_refused_whole() {
+    fn check<I: Integrator>(mut rls: ContinuousRls<3, I>, dt: f64) {
+        let before = state(&rls);
+        let outcome = rls.update(&Sample::new([9e29, 0.0, 1.0], 1.0), dt).outcome;
+        assert_eq!(outcome, Outcome::NotFinite);
+        assert_eq!(state(&rls), before);
+        assert!(
+            rls.update(&Sample::new([1.0, 0.0, 1.0], 1.0), 1.0)
+                .outcome
+                .used()
+        );
+    }
+    let weights = Weights::new(1e40, 1e40, 1.0).unwrap();
+    check(estimator::<3, Directional>(1e99, weights, 0.0), 290.0);
+    // 290 memories too, so long that the walk is larger than P(0)
+    let weights = Weights::new(1e40, 1e40, 2.9e-28).unwrap();
+    let walk = estimator::<3, RandomWalk>(1.0, weights, 0.0);
+    check(walk.with_intensity([1e60; 3].into()).unwrap(), 1e30);
+}
+
 /// The range of `P(0)` that is documented.
 fn spread() -> impl Strategy<Value = f64> {
     (-99.0..99.0).prop_map(|x: f64| 10_f64.powf(x))

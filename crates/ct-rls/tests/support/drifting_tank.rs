@@ -42,7 +42,7 @@ impl Tank {
             0.7
         ];
         let moves = |period: u64| {
-            if (self.k / period) % 2 == 0 {
+            if (self.k / period).is_multiple_of(2) {
                 1.0
             } else {
                 -1.0
@@ -66,7 +66,7 @@ impl Tank {
 /// What a run of one estimator showed, after its first `OPEN` samples.
 #[derive(Debug)]
 pub struct Run {
-    /// Largest relative error of `b` and of `a` so far, in each tenth of the run.
+    /// Largest relative error of `b` and of `a` in each tenth of the run; infinite where an estimate was no number.
     pub drifting: [f64; 10],
     /// Largest relative error of `g`, the constant parameter.
     pub constant: f64,
@@ -92,13 +92,16 @@ pub fn run<I: Integrator>(mut rls: ContinuousRls<3, I>, samples: u64) -> Result<
         if k >= OPEN {
             let off = (rls.theta() - theta).component_div(&theta).abs();
             let tenth = &mut run.drifting[(10 * k / samples) as usize];
-            // a NaN has to show
-            if !(off[0].max(off[1]) <= *tenth) || off.sum().is_nan() {
-                *tenth = off[0].max(off[1]) + 0.0 * off.sum();
-            }
+            // max() would pass over a NaN
+            let worst = if off.sum().is_nan() {
+                f64::INFINITY
+            } else {
+                off[0].max(off[1])
+            };
+            *tenth = tenth.max(worst);
             run.constant = run.constant.max(off[2]);
         }
-        if k >= OPEN && (k % LOOK == 0 || k + 1 == samples) {
+        if k >= OPEN && (k.is_multiple_of(LOOK) || k + 1 == samples) {
             let health = rls.health()?;
             run.largest = run.largest.max(rls.covariance().diagonal().max());
             run.smallest_pivot = run.smallest_pivot.min(health.smallest_pivot);

@@ -30,9 +30,11 @@
 //! ```text
 //! min(r_min, gamma |phi|^2/eta) <= eigenvalues of R+ <= max(r_max, gamma |phi|^2/eta)
 //! ```
-//! and `P` stays between two multiples of the identity for ever, whatever is excited, if each `|phi|` with which something is forgotten
-//! lies in a range `[phi_min, phi_max]`. The lower end is [`Guards`](crate::Guards): with a regressor at most `silent_below`, or
-//! so weak that `gamma |phi|^2 trace_limit < eta`, nothing is forgotten. Hence no eigenvalue of `P` exceeds `trace_limit`.
+//! and `P` stays between two multiples of the identity for ever, whatever is excited, if each `|phi|` lies in a range
+//! `[phi_min, phi_max]`, or is 0. The lower end is [`Guards`](crate::Guards): with a regressor at most `silent_below`, or so weak that
+//! `gamma |phi|^2 trace_limit < eta`, nothing is forgotten. Hence no eigenvalue of `P` exceeds `trace_limit`. Such a regressor is
+//! still learnt from, so while all are weak, or with `eta = 0`, `P` shrinks as in least squares without forgetting: above 0, but
+//! with no other lower bound.
 //!
 //! Convergence: `V = delta' R delta` decreases for every step where `0 <= gamma < 2 c`: forgetting takes `E (phi' R delta)^2/rho`,
 //! learning as for the exact step. Each sample forgets one direction: where `p` directions are excited in turn, each has a memory of

@@ -22,6 +22,12 @@ fn updates<const P: usize>(criterion: &mut Criterion) {
     group.bench_function("ct-rls, run-time size", |b| {
         b.iter(|| Dynamic::new(P).run(&samples))
     });
+    group.bench_function("directional", |b| {
+        b.iter(|| Factored::directional().run(&samples))
+    });
+    group.bench_function("random walk of all", |b| {
+        b.iter(|| Factored::walk(P).run(&samples))
+    });
     group.bench_function("nalgebra operators", |b| {
         b.iter(|| Operators::<P>::new().run(&samples))
     });
@@ -90,6 +96,30 @@ fn ratios<const P: usize>(target: f64) {
     }
 }
 
+/// Ways to forget, against exponential forgetting by the exact step.
+fn forgetting<const P: usize>() {
+    let samples = samples::<P>();
+    let mut exponential = || Factored::<P>::new().run(&samples);
+    let mut directional = || Factored::<P, _>::directional().run(&samples);
+    let mut walk_of_one = || Factored::<P, _>::walk(1).run(&samples);
+    let mut walk_of_two = || Factored::<P, _>::walk(2).run(&samples);
+    let mut walk_of_all = || Factored::<P, _>::walk(P).run(&samples);
+    let mut runs: [(Duration, &mut dyn FnMut() -> f64); 5] = [
+        (Duration::MAX, &mut exponential),
+        (Duration::MAX, &mut directional),
+        (Duration::MAX, &mut walk_of_one),
+        (Duration::MAX, &mut walk_of_two),
+        (Duration::MAX, &mut walk_of_all),
+    ];
+    shortest(&mut runs, 2000);
+    let ns = runs.map(|(best, _)| best.as_nanos() as f64 / SAMPLES as f64);
+    let [exponential, others @ ..] = ns;
+    let others = others
+        .map(|other| format!("{other:.1} ({:.2})", other / exponential))
+        .join(" | ");
+    println!("| {P} | {exponential:.1} | {others} |");
+}
+
 criterion_group!(benches, all);
 
 fn main() {
@@ -103,4 +133,12 @@ fn main() {
     ratios::<2>(0.85);
     ratios::<5>(0.65);
     ratios::<10>(0.55);
+    println!("ns per update by what is forgotten, and the ratio to exponential forgetting:");
+    println!(
+        "| p | exponential | directional | random walk of 1 | random walk of 2 | random walk of all |"
+    );
+    println!("|---|---|---|---|---|---|");
+    forgetting::<2>();
+    forgetting::<5>();
+    forgetting::<10>();
 }

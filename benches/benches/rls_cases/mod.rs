@@ -2,7 +2,10 @@
 
 use std::hint::black_box;
 
-use ct_rls::{ContinuousRls, DynamicRls, RecursiveEstimator, Sample, Weights};
+use ct_rls::{
+    ContinuousRls, Directional, DynamicRls, ExactHold, Integrator, RandomWalk, RecursiveEstimator,
+    Sample, Weights,
+};
 use dsmc::system_identification::kalman_filter::arx::KalmanFilter;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
@@ -27,14 +30,35 @@ fn weights() -> Weights {
 }
 
 /// This crate, the number of parameters known when it is built.
-pub struct Factored<const P: usize>(ContinuousRls<P>);
+pub struct Factored<const P: usize, I: Integrator = ExactHold>(ContinuousRls<P, I>);
+
+fn estimator<const P: usize, I: Integrator>(weights: Weights) -> ContinuousRls<P, I> {
+    let p0 = SMatrix::identity() * P0;
+    ContinuousRls::with_integrator(SVector::zeros(), p0, weights).expect("valid")
+}
 
 impl<const P: usize> Factored<P> {
     pub fn new() -> Self {
-        let p0 = SMatrix::identity() * P0;
-        Self(ContinuousRls::new(SVector::zeros(), p0, weights()).expect("valid"))
+        Self(estimator(weights()))
     }
+}
 
+impl<const P: usize> Factored<P, Directional> {
+    pub fn directional() -> Self {
+        Self(estimator(weights()))
+    }
+}
+
+impl<const P: usize> Factored<P, RandomWalk> {
+    /// The first `drifting` parameters drift, the others are constant.
+    pub fn walk(drifting: usize) -> Self {
+        let q = SVector::from_fn(|i, _| if i < drifting { 1e-3 } else { 0.0 });
+        let rls = estimator(Weights::least_squares(0.0).expect("valid"));
+        Self(rls.with_intensity(q).expect("valid"))
+    }
+}
+
+impl<const P: usize, I: Integrator> Factored<P, I> {
     #[inline(never)]
     pub fn run(&mut self, samples: &[Sample<P>]) -> f64 {
         for sample in samples {

@@ -47,8 +47,8 @@ pub fn update_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
 ) -> Innovation {
     let (w1, w2) = (first.weights, second.weights);
     let begun = (
-        first.guard.begin(phi1.as_slice(), dt, w1.eta()),
-        second.guard.begin(phi2.as_slice(), dt, w2.eta()),
+        first.guard.begin::<I>(phi1.as_slice(), dt, &w1),
+        second.guard.begin::<I>(phi2.as_slice(), dt, &w2),
     );
     let ((step1, outcome1), (step2, outcome2)) = match begun {
         (Ok(one), Ok(two)) => (one, two),
@@ -74,10 +74,12 @@ pub fn update_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
             return Innovation::unused(epsilon, first.guard.refused(refusal));
         }
     };
-    let one = first.guard.grown(step1.growth, outcome1, &mut first.state);
+    let one = first
+        .guard
+        .grown::<I, _>(&step1, outcome1, &mut first.state);
     let two = second
         .guard
-        .grown(step2.growth, outcome2, &mut second.state);
+        .grown::<I, _>(&step2, outcome2, &mut second.state);
     let outcome = match (one, two) {
         (Outcome::Capped, _) | (_, Outcome::Capped) => Outcome::Capped,
         // the second block may be silent for long, as where the model is right

@@ -1,17 +1,20 @@
-//! The estimator for a number of parameters that is known only at run time: [`ExactHold`](crate::ExactHold) on factors
-//! in vectors. The same code does the step, so the numbers are the same to the bit.
+//! The estimator for a number of parameters that is known only at run time, on factors in vectors. The same code does the step
+//! as for [`ContinuousRls`](crate::ContinuousRls), so the numbers are the same to the bit.
 
 extern crate alloc;
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::marker::PhantomData;
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimator::{Health, Innovation, Outcome, RecursiveEstimator};
+use crate::guard::Guard;
 use crate::integrator::sealed::{Capped, Refusal};
-use crate::rls::{Guard, check_theta};
-use crate::{Error, Guards, Weights, factor};
+use crate::random_walk::check_intensity;
+use crate::rls::check_theta;
+use crate::{Error, ExactHold, FactoredIntegrator, Guards, RandomWalk, Weights, factor};
 
 /// One sample for a [`DynamicRls`].
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +29,8 @@ pub struct DynamicSample {
 struct Factors {
     u: Vec<f64>,
     d: Vec<f64>,
+    /// Intensities of the random walk; empty without one.
+    q: Vec<f64>,
 }
 
 impl Capped for Factors {
@@ -38,16 +43,22 @@ impl Capped for Factors {
             *d *= by;
         }
     }
+
+    fn intensity(&self) -> &[f64] {
+        &self.q
+    }
 }
 
-/// Recursive least squares in continuous time with the exact step, for any number of parameters; allocates when it is made.
+/// Recursive least squares in continuous time, for any number of parameters; allocates when it is made. The exact step with
+/// exponential forgetting, unless another [`FactoredIntegrator`] is named.
 #[derive(Clone, Debug)]
-pub struct DynamicRls {
+pub struct DynamicRls<I: FactoredIntegrator = ExactHold> {
     theta: DVector<f64>,
     state: Factors,
     scratch: [Vec<f64>; 2],
     weights: Weights,
     guard: Guard,
+    integrator: PhantomData<I>,
 }
 
 impl DynamicRls {
@@ -57,6 +68,40 @@ impl DynamicRls {
     /// [`Error::Size`], [`Error::Theta`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`],
     /// [`Error::TraceAboveLimit`] beyond 1e100.
     pub fn new(theta: DVector<f64>, p: &DMatrix<f64>, weights: Weights) -> Result<Self, Error> {
+        Self::with_integrator(theta, p, weights)
+    }
+}
+
+impl DynamicRls<RandomWalk> {
+    /// As [`ContinuousRls::with_intensity`](crate::ContinuousRls::with_intensity), one intensity for each parameter.
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::Intensity`].
+    pub fn with_intensity(mut self, q: &[f64]) -> Result<Self, Error> {
+        let (found, expected) = (q.len(), self.theta.len());
+        if found != expected {
+            return Err(Error::Size {
+                what: "the intensity",
+                found,
+                expected,
+            });
+        }
+        check_intensity(q)?;
+        self.state.q = q.to_vec();
+        Ok(self)
+    }
+}
+
+impl<I: FactoredIntegrator> DynamicRls<I> {
+    /// An estimator with a named integrator: `DynamicRls::<Directional>::with_integrator(...)`.
+    ///
+    /// # Errors
+    /// As of [`DynamicRls::new`].
+    pub fn with_integrator(
+        theta: DVector<f64>,
+        p: &DMatrix<f64>,
+        weights: Weights,
+    ) -> Result<Self, Error> {
         check_theta(theta.as_slice())?;
         let state = factors(p, theta.len())?;
         let guard = Guard::new(state.trace())?;
@@ -67,6 +112,7 @@ impl DynamicRls {
             scratch,
             weights,
             guard,
+            integrator: PhantomData,
         })
     }
 
@@ -85,8 +131,9 @@ impl DynamicRls {
     /// [`Error::Size`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`], [`Error::TraceAboveLimit`]; nothing is
     /// changed then.
     pub fn reset_covariance(&mut self, p: &DMatrix<f64>) -> Result<(), Error> {
-        let state = factors(p, self.theta.len())?;
+        let mut state = factors(p, self.theta.len())?;
         self.guard.restart(state.trace())?;
+        core::mem::swap(&mut state.q, &mut self.state.q);
         self.state = state;
         Ok(())
     }
@@ -115,12 +162,12 @@ impl DynamicRls {
             return Innovation::unused(f64::NAN, self.guard.skip(Outcome::BadSize));
         }
         let epsilon = y - factor::dot(phi, self.theta.as_slice());
-        let (step, outcome) = match self.guard.begin(phi, dt, weights.eta()) {
+        let (step, outcome) = match self.guard.begin::<I>(phi, dt, weights) {
             Ok(begun) => begun,
             Err(outcome) => return Innovation::unused(epsilon, outcome),
         };
         let [f, k] = &mut self.scratch;
-        let made = factor::exact_step(
+        let made = I::advance(
             (
                 &mut self.state.u,
                 &mut self.state.d,
@@ -130,12 +177,13 @@ impl DynamicRls {
             phi,
             epsilon,
             weights,
-            (step.growth, step.length),
+            &step,
+            &self.state.q,
         );
         let Some(s) = made else {
             return Innovation::unused(epsilon, self.guard.refused(Refusal::NotFinite));
         };
-        let outcome = self.guard.grown(step.growth, outcome, &mut self.state);
+        let outcome = self.guard.grown::<I, _>(&step, outcome, &mut self.state);
         Innovation {
             epsilon,
             s,
@@ -156,10 +204,11 @@ fn factors(p: &DMatrix<f64>, n: usize) -> Result<Factors, Error> {
     }
     let (mut u, mut d) = (p.as_slice().to_vec(), vec![0.0; n]);
     factor::factorise(&mut u, &mut d)?;
-    Ok(Factors { u, d })
+    let q = Vec::new();
+    Ok(Factors { u, d, q })
 }
 
-impl RecursiveEstimator for DynamicRls {
+impl<I: FactoredIntegrator> RecursiveEstimator for DynamicRls<I> {
     type Sample = DynamicSample;
     type Theta = DVector<f64>;
     type Covariance = DMatrix<f64>;

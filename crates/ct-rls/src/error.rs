@@ -76,6 +76,16 @@ pub enum Error {
         /// The value that was given.
         value: f64,
     },
+    /// An intensity of the random walk is negative, not finite, or above 1e60.
+    #[error(
+        "the intensity of parameter {index} is {value}, but must be at least 0 and at most 1e60, in its unit squared per second; take 0 for a constant parameter"
+    )]
+    Intensity {
+        /// Which parameter, from 0.
+        index: usize,
+        /// The value that was given.
+        value: f64,
+    },
     /// A guard's setting is not a number in its range.
     #[error("{guard} is {value}, but must be {range}")]
     Guard {

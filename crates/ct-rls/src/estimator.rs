@@ -75,12 +75,13 @@ impl Innovation {
 pub enum Outcome {
     /// The sample was used.
     Updated,
-    /// The sample was used; the trace of `P` is at its cap, so less was forgotten.
+    /// The sample was used; the trace of `P` is at its cap, so less was forgotten. With [`Directional`](crate::Directional): the
+    /// regressor is too weak for the cap, so nothing was forgotten.
     Capped,
     /// The regressor is silent: nothing was forgotten.
     Silent,
     /// A signal is not finite, or beyond any sense: a regressor above 1e30, an output error above 1e100; or a step of
-    /// [`Euler`](crate::Euler) or [`Rk4`](crate::Rk4) would lead beyond the floating-point range. Nothing was done.
+    /// any rule but [`ExactHold`](crate::ExactHold) would, or might, lead beyond the floating-point range. Nothing was done.
     NotFinite,
     /// `dt` is not above 0 and at most 1e30 s, or `eta dt` is above 300: nothing was done.
     BadStep,

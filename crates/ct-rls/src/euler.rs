@@ -12,13 +12,15 @@
 
 use crate::Error;
 use crate::factor::dot;
-use crate::integrator::sealed::{Refusal, Rule};
+use crate::integrator::sealed::{Memory, Refusal, Rule};
 use crate::integrator::{Plain, take};
 use crate::settings::{MAX_EPSILON, Step, Weights};
 
 /// Euler's rule, on `P` as it stands. Stops where its step is too long.
 #[derive(Clone, Copy, Debug)]
 pub struct Euler;
+
+impl Memory for Euler {}
 
 impl Rule for Euler {
     const NAME: &'static str = "Euler's rule";

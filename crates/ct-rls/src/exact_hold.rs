@@ -31,13 +31,15 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::integrator::sealed::{Capped, Covariance, Refusal, Rule};
+use crate::integrator::sealed::{Capped, Covariance, FactorRule, Memory, Refusal, Rule};
 use crate::settings::{Step, Weights};
 use crate::{Error, UdFactor, factor};
 
 /// The exact solution for held signals, on `P = U D U'`: the default. Positive definite whatever the step.
 #[derive(Clone, Copy, Debug)]
 pub struct ExactHold;
+
+impl Memory for ExactHold {}
 
 impl Rule for ExactHold {
     const NAME: &'static str = "ExactHold";
@@ -53,15 +55,37 @@ impl Rule for ExactHold {
         step: &Step,
     ) -> Result<f64, Refusal> {
         let (mut f, mut k) = ([0.0; P], [0.0; P]);
-        factor::exact_step(
-            (state.u.as_flattened_mut(), &mut state.d, theta),
-            (&mut f, &mut k),
-            phi,
-            epsilon,
-            weights,
-            (step.growth, step.length),
-        )
-        .ok_or(Refusal::NotFinite)
+        let parts = (
+            state.u.as_flattened_mut(),
+            state.d.as_mut_slice(),
+            theta.as_mut_slice(),
+        );
+        Self::advance(parts, (&mut f, &mut k), phi, epsilon, weights, step, &[])
+            .ok_or(Refusal::NotFinite)
+    }
+}
+
+impl FactorRule for ExactHold {
+    fn factor<const P: usize>(state: &UdFactor<P>) -> &UdFactor<P> {
+        state
+    }
+
+    fn factor_mut<const P: usize>(state: &mut UdFactor<P>) -> &mut UdFactor<P> {
+        state
+    }
+
+    #[inline(always)]
+    fn advance(
+        parts: (&mut [f64], &mut [f64], &mut [f64]),
+        scratch: (&mut [f64], &mut [f64]),
+        phi: &[f64],
+        epsilon: f64,
+        weights: &Weights,
+        step: &Step,
+        _intensity: &[f64],
+    ) -> Option<f64> {
+        let hold = (step.growth, step.length);
+        factor::exact_step(parts, scratch, phi, epsilon, weights, hold)
     }
 }
 

@@ -1,34 +1,66 @@
-//! How `theta` and `P` are carried over a step: the exact solution, or one of two rules to compare it with.
+//! How `theta` and `P` are carried over a step, and what is forgotten over it.
 
 use core::fmt::Debug;
 
-use crate::{Euler, ExactHold, Rk4};
+use crate::{Directional, Euler, ExactHold, RandomWalk, Rk4};
 
-/// A rule that carries `theta` and `P` over a step: [`ExactHold`], [`Euler`] or [`Rk4`].
+/// A rule that carries `theta` and `P` over a step: [`ExactHold`], [`Directional`] or [`RandomWalk`]; [`Euler`] and [`Rk4`] to compare.
 pub trait Integrator: sealed::Rule + Copy + Debug {}
 
 impl Integrator for ExactHold {}
+impl Integrator for Directional {}
+impl Integrator for RandomWalk {}
 impl Integrator for Euler {}
 impl Integrator for Rk4 {}
+
+/// An integrator on the factors of `P`, which stay positive definite: [`ExactHold`], [`Directional`] or [`RandomWalk`].
+pub trait FactoredIntegrator: Integrator + sealed::FactorRule {}
+
+impl FactoredIntegrator for ExactHold {}
+impl FactoredIntegrator for Directional {}
+impl FactoredIntegrator for RandomWalk {}
 
 pub(crate) mod sealed {
     use core::fmt::Debug;
 
     use nalgebra::{SMatrix, SVector};
 
-    use crate::Error;
     use crate::blocks::Block;
     use crate::settings::{Step, Weights};
+    use crate::{Error, UdFactor};
 
     /// What the cap on the trace needs.
     pub trait Capped {
         fn trace(&self) -> f64;
         fn scale(&mut self, factor: f64);
+        /// Intensity of the parameters' random walk, where the rule has one.
+        fn intensity(&self) -> &[f64] {
+            &[]
+        }
+    }
+
+    /// What the guards have to know of a rule.
+    pub trait Memory {
+        /// Whether a regressor of this squared length is too weak to forget with, under the cap.
+        #[inline(always)]
+        fn weak(_squared: f64, _weights: &Weights, _cap: f64) -> bool {
+            false
+        }
+
+        /// A bound of the trace of `P` after the step, from one before it.
+        #[inline(always)]
+        fn raised(bound: f64, step: &Step, _intensity: &[f64]) -> f64 {
+            bound * step.growth
+        }
     }
 
     /// `P` in the form that a rule keeps it in.
     pub trait Covariance<const P: usize>: Capped + Clone + Debug {
         fn from_matrix(matrix: &SMatrix<f64, P, P>) -> Result<Self, Error>;
+        /// Another `P`, all else as it is.
+        fn restarted(&self, matrix: &SMatrix<f64, P, P>) -> Result<Self, Error> {
+            Self::from_matrix(matrix)
+        }
         fn to_matrix(&self) -> SMatrix<f64, P, P>;
         /// Smallest pivot, or the place and the value of the first one that is not above 0.
         fn smallest_pivot(&self) -> Result<f64, (usize, f64)>;
@@ -47,7 +79,7 @@ pub(crate) mod sealed {
         Stop(Error),
     }
 
-    pub trait Rule {
+    pub trait Rule: Memory {
         const NAME: &'static str;
         type State<const P: usize>: Covariance<P>;
 
@@ -60,6 +92,36 @@ pub(crate) mod sealed {
             weights: &Weights,
             step: &Step,
         ) -> Result<f64, Refusal>;
+
+        /// The same for a statement beside the data: nothing is forgotten, and no parameter walks, since the data's step does that.
+        fn statement<const P: usize>(
+            theta: &mut [f64; P],
+            state: &mut Self::State<P>,
+            f: &[f64; P],
+            epsilon: f64,
+            weights: &Weights,
+            step: &Step,
+        ) -> Result<f64, Refusal> {
+            Self::step(theta, state, f, epsilon, weights, step)
+        }
+    }
+
+    /// A rule on `P = U D U'`, by slices: one code for both kinds of size.
+    pub trait FactorRule: Rule {
+        fn factor<const P: usize>(state: &Self::State<P>) -> &UdFactor<P>;
+        fn factor_mut<const P: usize>(state: &mut Self::State<P>) -> &mut UdFactor<P>;
+
+        /// One step of `(u, d, theta)`; `phi' P phi` at its start, or at the start of its second half where it forgets first.
+        /// `None`, and nothing changed, where a number leaves the range.
+        fn advance(
+            parts: (&mut [f64], &mut [f64], &mut [f64]),
+            scratch: (&mut [f64], &mut [f64]),
+            phi: &[f64],
+            epsilon: f64,
+            weights: &Weights,
+            step: &Step,
+            intensity: &[f64],
+        ) -> Option<f64>;
     }
 
     pub trait BlockRule: Rule {

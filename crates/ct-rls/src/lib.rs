@@ -7,12 +7,27 @@
 //! | The number of parameters is known only at run time | `DynamicRls`, with the feature `alloc` |
 //! | Which `eta`, `c`, `gamma`? | [`Weights`]: `least_squares(eta)`, `1/eta` 5 to 10 dominant time constants |
 //! | The signals are silent for hours | [`Guards`]: forgetting stops at a cap, or while the regressor is silent |
+//! | Some parameters are not excited for long, the others drift | [`Directional`], or [`RandomWalk`] with a rate for each: [below](#which-way-to-forget) |
 //! | The parameters have jumped | [`ContinuousRls::reset_covariance`] |
 //! | A reading is missing | hand in the NaN: it is [refused](Innovation::accepted) and changes nothing |
 //! | Can I trust the estimates? | [`health`](RecursiveEstimator::health): excitation, definiteness, trace |
 //! | Parameters that are related, or bounded | the crate `ct-constrained` |
 //! | Two blocks of parameters, one output, no covariance between them | [`update_blocks`] |
 //! | How does Euler's rule compare? | [`ContinuousRls::with_integrator`] with [`Euler`] or [`Rk4`] |
+//!
+//! # Which way to forget
+//!
+//! | | [`ExactHold`] | [`Directional`] | [`RandomWalk`] |
+//! |---|---|---|---|
+//! | What is forgotten | all, at the rate `eta` | what the present regressor sees, at the rate `eta` | of each parameter, its intensity `q_i` a second |
+//! | Where a direction is silent | `P` grows as `e^{eta t}` to the cap; then forgetting stops for all | nothing happens to it | `P` grows as `q t` to the cap; the others go on |
+//! | Bounds of `P` | the cap, with excitation also better ones | for every step, from `eta`, `gamma` and the lengths of the regressors | the cap, with excitation also better ones |
+//! | The step | exact | exact, or of first order | of first order; the Kalman filter for a walk between samples |
+//! | Independent of the parameters' units | yes | no: scale them | yes |
+//! | Time per update, p = 2, 5, 10 | 1 | 1.8, 2.3, 2.2 | 1.3, 4.8, 7.7 if all drift; 1.5, 1.5, 1.1 if only the first does |
+//!
+//! `cargo run --release -p ct-rls --example tracking`: ten million samples of a tank of which two parameters drift and the third is
+//! silent. Largest error of the two: 2.2 %, 1.9 % and, exponential under its cap, 41 to 50 %.
 //!
 //! # Why not a plain covariance matrix
 //! `P = (P - k g')/lambda`, with `g = P phi` and the gain `k = g/(lambda + phi'g)`, dies for every `lambda < 1` when the whole
@@ -35,12 +50,15 @@
 #![no_std]
 
 mod blocks;
+mod directional;
 mod error;
 mod estimator;
 mod euler;
 mod exact_hold;
 mod factor;
+mod guard;
 mod integrator;
+mod random_walk;
 mod rk4;
 mod rls;
 mod settings;
@@ -50,6 +68,7 @@ mod statement;
 mod dynamic;
 
 pub use blocks::{BlockIntegrator, update_blocks};
+pub use directional::Directional;
 #[cfg(feature = "alloc")]
 pub use dynamic::{DynamicRls, DynamicSample};
 pub use error::Error;
@@ -57,7 +76,8 @@ pub use estimator::{Health, Innovation, Outcome, RecursiveEstimator};
 pub use euler::Euler;
 pub use exact_hold::ExactHold;
 pub use factor::UdFactor;
-pub use integrator::Integrator;
+pub use integrator::{FactoredIntegrator, Integrator};
+pub use random_walk::RandomWalk;
 pub use rk4::Rk4;
 pub use rls::{ContinuousRls, Sample};
 pub use settings::{Guards, MAX_REGRESSOR, Weights};

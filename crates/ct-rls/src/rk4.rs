@@ -8,13 +8,15 @@
 
 use crate::Error;
 use crate::factor::dot;
-use crate::integrator::sealed::{Covariance, Refusal, Rule};
+use crate::integrator::sealed::{Covariance, Memory, Refusal, Rule};
 use crate::integrator::{Plain, take};
 use crate::settings::{MAX_EPSILON, Step, Weights};
 
 /// Runge-Kutta of fourth order, on `P` as it stands. Stops where `P` is no longer positive definite.
 #[derive(Clone, Copy, Debug)]
 pub struct Rk4;
+
+impl Memory for Rk4 {}
 
 impl Rule for Rk4 {
     const NAME: &'static str = "The Runge-Kutta rule";

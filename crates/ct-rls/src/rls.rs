@@ -2,10 +2,11 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::estimator::{Health, Innovation, Outcome, RecursiveEstimator};
-use crate::integrator::sealed::{Capped, Covariance, Refusal};
-use crate::settings::{Guards, MAX_EPSILON, MAX_PHI_SQUARED, Step, Weights};
-use crate::{Error, ExactHold, Integrator, UdFactor, factor};
+use crate::estimator::{Health, Innovation, RecursiveEstimator};
+use crate::guard::Guard;
+use crate::integrator::sealed::{Capped, Covariance};
+use crate::settings::{Guards, MAX_EPSILON, MAX_PHI_SQUARED, Weights};
+use crate::{Error, ExactHold, FactoredIntegrator, Integrator, UdFactor, factor};
 
 /// One sample: the output `y` and the regressor `phi`, held over the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +40,7 @@ impl<const P: usize> Sample<P> {
 
 /// Recursive least squares in continuous time, `P` parameters, no allocation.
 ///
-/// Equations, assumptions and convergence: those of the integrator, [`ExactHold`] unless you compare.
+/// Equations, assumptions and convergence: those of the integrator, [`ExactHold`] unless another is named, which also says what is forgotten.
 ///
 /// ```
 /// use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};
@@ -79,20 +80,22 @@ impl<const P: usize> ContinuousRls<P> {
     ) -> Result<Self, Error> {
         Self::with_integrator(theta, p, weights)
     }
+}
 
+impl<const P: usize, I: FactoredIntegrator> ContinuousRls<P, I> {
     /// The factors of `P`.
     pub fn factor(&self) -> &UdFactor<P> {
-        &self.state
+        I::factor(&self.state)
     }
 
     /// `V = delta' P^-1 delta`, with `delta` from `theta` to the estimates: how far the estimates say it is away.
     pub fn distance(&self, theta: &SVector<f64, P>) -> f64 {
-        self.state.information_norm(&(theta - self.theta))
+        self.factor().information_norm(&(theta - self.theta))
     }
 }
 
 impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
-    /// An estimator with a named integrator: `ContinuousRls::<2, Euler>::with_integrator(...)`.
+    /// An estimator with a named integrator: `ContinuousRls::<2, Directional>::with_integrator(...)`.
     ///
     /// # Errors
     /// As of [`ContinuousRls::new`].
@@ -171,7 +174,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     /// # Errors
     /// [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`], [`Error::TraceAboveLimit`]; nothing is changed then.
     pub fn reset_covariance(&mut self, p: &SMatrix<f64, P, P>) -> Result<(), Error> {
-        let state = I::State::<P>::from_matrix(p)?;
+        let state = self.state.restarted(p)?;
         self.guard.restart(state.trace())?;
         self.state = state;
         Ok(())
@@ -191,7 +194,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     #[inline]
     pub fn update_with(&mut self, sample: &Sample<P>, dt: f64, weights: &Weights) -> Innovation {
         let epsilon = sample.y - factor::dot(sample.phi.as_slice(), self.theta.as_slice());
-        let (step, outcome) = match self.guard.begin(sample.phi.as_slice(), dt, weights.eta()) {
+        let (step, outcome) = match self.guard.begin::<I>(sample.phi.as_slice(), dt, weights) {
             Ok(begun) => begun,
             Err(outcome) => return Innovation::unused(epsilon, outcome),
         };
@@ -203,7 +206,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
                 return Innovation::unused(epsilon, self.guard.refused(refusal));
             }
         };
-        let outcome = self.guard.grown(step.growth, outcome, &mut self.state);
+        let outcome = self.guard.grown::<I, _>(&step, outcome, &mut self.state);
         Innovation {
             epsilon,
             s,
@@ -250,149 +253,9 @@ impl<const P: usize, I: Integrator> RecursiveEstimator for ContinuousRls<P, I> {
 /// With a smaller `f'P f` a step along `P f` may leave the floating-point range.
 const MIN_RELAXED: f64 = 1e-200;
 
-/// The start of the cap on the trace, times the trace of `P(0)`.
-const TRACE_LIMIT: f64 = 1e6;
-
 pub(crate) fn check_theta(theta: &[f64]) -> Result<(), Error> {
     match theta.iter().enumerate().find(|(_, x)| !x.is_finite()) {
         Some((index, &value)) => Err(Error::Theta { index, value }),
         None => Ok(()),
-    }
-}
-
-/// Everything around the step that does not depend on how `P` is kept: guards, counts, and why the run stopped.
-#[derive(Clone, Debug)]
-pub(crate) struct Guard {
-    pub guards: Guards,
-    /// At least the trace of `P`: only `eta` raises it, so the trace itself is seldom needed.
-    bound: f64,
-    /// The cap in force.
-    limit: f64,
-    silent_below_squared: f64,
-    pub step: Step,
-    failure: Option<Error>,
-    used: u64,
-    unused: u64,
-    capped: u64,
-    silent: u64,
-}
-
-impl Guard {
-    pub fn new(trace: f64) -> Result<Self, Error> {
-        let guards = Guards {
-            trace_limit: TRACE_LIMIT * trace,
-            silent_below: 0.0,
-        };
-        guards.check(trace)?;
-        Ok(Self {
-            guards,
-            bound: trace,
-            limit: guards.cap(),
-            silent_below_squared: 0.0,
-            step: Step::none(),
-            failure: None,
-            used: 0,
-            unused: 0,
-            capped: 0,
-            silent: 0,
-        })
-    }
-
-    pub fn set(&mut self, guards: Guards, trace: f64) -> Result<(), Error> {
-        guards.check(trace)?;
-        self.guards = guards;
-        self.limit = guards.cap();
-        let squared = guards.silent_below * guards.silent_below.abs();
-        self.silent_below_squared = squared.min(MAX_PHI_SQUARED);
-        Ok(())
-    }
-
-    pub fn restart(&mut self, trace: f64) -> Result<(), Error> {
-        self.guards.check(trace)?;
-        self.bound = trace;
-        self.failure = None;
-        Ok(())
-    }
-
-    pub fn running(&self) -> Result<(), Error> {
-        self.failure.map_or(Ok(()), Err)
-    }
-
-    pub fn skip(&mut self, outcome: Outcome) -> Outcome {
-        self.unused += 1;
-        outcome
-    }
-
-    /// The step to make, or why there is none.
-    #[inline(always)]
-    pub fn begin(&mut self, phi: &[f64], dt: f64, eta: f64) -> Result<(Step, Outcome), Outcome> {
-        if self.failure.is_some() {
-            return Err(self.skip(Outcome::Stopped));
-        }
-        if !self.step.matches(eta, dt) {
-            match Step::new(eta, dt) {
-                Some(step) => self.step = step,
-                None => return Err(self.skip(Outcome::BadStep)),
-            }
-        }
-        let squared: f64 = phi.iter().map(|x| x * x).sum();
-        if squared <= self.silent_below_squared {
-            Ok((self.step.remembering(), Outcome::Silent))
-        } else if squared <= MAX_PHI_SQUARED {
-            Ok((self.step, Outcome::Updated))
-        } else {
-            Err(self.skip(Outcome::NotFinite))
-        }
-    }
-
-    #[cold]
-    pub fn refused(&mut self, refusal: Refusal) -> Outcome {
-        match refusal {
-            Refusal::NotFinite => self.skip(Outcome::NotFinite),
-            Refusal::Stop(error) => {
-                self.failure = Some(error);
-                self.skip(Outcome::Stopped)
-            }
-        }
-    }
-
-    /// Counts a step that was made, and caps the trace. A `P` below the cap before the step and scaled down to it after
-    /// has grown by less than `e^{eta h}`, as if less had been forgotten.
-    #[inline(always)]
-    pub fn grown<S: Capped>(&mut self, growth: f64, outcome: Outcome, state: &mut S) -> Outcome {
-        self.used += 1;
-        self.silent += u64::from(outcome == Outcome::Silent);
-        self.bound *= growth;
-        if self.bound > self.limit && self.capped(state) {
-            Outcome::Capped
-        } else {
-            outcome
-        }
-    }
-
-    #[cold]
-    fn capped<S: Capped>(&mut self, state: &mut S) -> bool {
-        let (trace, limit) = (state.trace(), self.limit);
-        if trace > limit {
-            state.scale(limit / trace);
-            self.bound = limit;
-            self.capped += 1;
-            true
-        } else {
-            self.bound = trace;
-            false
-        }
-    }
-
-    pub fn health(&self, largest: f64, smallest_pivot: f64, trace: f64) -> Health {
-        Health {
-            excitation: 1.0 / largest,
-            smallest_pivot,
-            trace,
-            used: self.used,
-            unused: self.unused,
-            capped: self.capped,
-            silent: self.silent,
-        }
     }
 }

@@ -96,7 +96,9 @@ impl Weights {
 
 /// What keeps `P` from growing without end where the regressor says nothing (wind-up).
 ///
-/// Both only ever forget less than `eta` asks for, so the Lyapunov function still decreases.
+/// Both only ever forget less than `eta` asks for, so the Lyapunov function still decreases. They act on all parameters at once;
+/// [`Directional`](crate::Directional) forgets by directions, and [`RandomWalk`](crate::RandomWalk) without `eta` by parameters;
+/// a walk at the cap is the exception, where the function may grow by the share that `P` is scaled down by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Guards {
@@ -104,11 +106,12 @@ pub struct Guards {
     /// `f64::INFINITY` for none below 1e100. An estimator starts with 1e6 times the trace of its `P(0)`.
     ///
     /// A regressor that stays in a subspace for long makes the other directions reach the cap; while they are
-    /// there, forgetting is nearly off in all directions.
+    /// there, forgetting is nearly off in all directions. With [`Directional`](crate::Directional) it is not: no eigenvalue of `P`
+    /// is raised above the cap, by not forgetting with a regressor too weak for it, `gamma |phi|^2 trace_limit < eta`.
     pub trace_limit: f64,
     /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`.
     /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's. Above 1e30 it
-    /// is 1e30, the limit of a regressor.
+    /// is 1e30, the limit of a regressor. The intensity of a [`RandomWalk`](crate::RandomWalk) goes on.
     pub silent_below: f64,
 }
 
@@ -225,6 +228,14 @@ impl Step {
     pub fn eta(&self) -> f64 {
         self.eta
     }
+}
+
+/// Whether a step that first raises `P` stays in the floating-point range, decided before anything is changed: with a trace of at
+/// most [`MAX_TRACE`] before, `gamma b phi' P phi` is below 1e300.
+#[inline(always)]
+pub(crate) fn in_range(w: &Weights, step: &Step, phi: &[f64]) -> bool {
+    let squared: f64 = phi.iter().map(|x| x * x).sum();
+    w.gamma * step.length * squared <= 1e300 / MAX_TRACE
 }
 
 /// `(1 - D^{-c/gamma})/s` with `D = 1 + gamma b s`: what multiplies `P phi eps` in the exact step.

@@ -42,7 +42,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
         self.guard.running().ok()?;
         let epsilon = chi - f.dot(&self.theta);
         let ([theta], [f]) = (&mut self.theta.data.0, &f.data.0);
-        match I::step(theta, &mut self.state, f, epsilon, &weights, &step) {
+        match I::statement(theta, &mut self.state, f, epsilon, &weights, &step) {
             Ok(_) => Some(epsilon),
             Err(refusal) => {
                 self.stopped_by(refusal);

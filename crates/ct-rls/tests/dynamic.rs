@@ -4,8 +4,8 @@
 mod support;
 
 use ct_rls::{
-    ContinuousRls, DynamicRls, DynamicSample, Error, Guards, Outcome, RecursiveEstimator, Sample,
-    Weights,
+    ContinuousRls, Directional, DynamicRls, DynamicSample, Error, ExactHold, FactoredIntegrator,
+    Guards, Outcome, RandomWalk, RecursiveEstimator, Sample, Weights,
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use support::{normal, normals, rng, spd};
@@ -26,6 +26,19 @@ fn the_same_numbers_for_any_size() {
 }
 
 fn same_numbers<const P: usize>() {
+    let q = SVector::<f64, P>::from_fn(|i, _| 0.1 * (i % 3) as f64);
+    same::<P, ExactHold>(|rls| rls, |rls| rls);
+    same::<P, Directional>(|rls| rls, |rls| rls);
+    same::<P, RandomWalk>(
+        |rls| rls.with_intensity(q).unwrap(),
+        |rls| rls.with_intensity(q.as_slice()).unwrap(),
+    );
+}
+
+fn same<const P: usize, I: FactoredIntegrator>(
+    prepare: impl Fn(ContinuousRls<P, I>) -> ContinuousRls<P, I>,
+    prepare_dynamic: impl Fn(DynamicRls<I>) -> DynamicRls<I>,
+) {
     let mut rng = rng(8);
     let weights = Weights::new(1.0, 0.7, 0.05).unwrap();
     let p0: SMatrix<f64, P, P> = spd::<P>(&mut rng) * 1e4;
@@ -33,16 +46,18 @@ fn same_numbers<const P: usize>() {
         trace_limit: 1e6,
         silent_below: 0.1,
     };
-    let mut fixed = ContinuousRls::<P>::new(SVector::zeros(), p0, weights)
-        .unwrap()
-        .with_guards(guards)
+    let mut fixed = ContinuousRls::<P, I>::with_integrator(SVector::zeros(), p0, weights)
+        .and_then(|rls| prepare(rls).with_guards(guards))
         .unwrap();
     let dynamic_p0 = DMatrix::from_column_slice(P, P, p0.as_slice());
-    let mut dynamic = DynamicRls::new(DVector::zeros(P), &dynamic_p0, weights)
-        .unwrap()
-        .with_guards(guards)
+    let mut dynamic = DynamicRls::<I>::with_integrator(DVector::zeros(P), &dynamic_p0, weights)
+        .and_then(|rls| prepare_dynamic(rls).with_guards(guards))
         .unwrap();
     for k in 0..5000 {
+        if k == 4000 {
+            fixed.reset_covariance(&p0).unwrap();
+            dynamic.reset_covariance(&dynamic_p0).unwrap();
+        }
         let size = if (2000..3000).contains(&k) { 0.01 } else { 1.0 };
         let phi = normals::<P>(&mut rng) * size;
         let y = if k == 77 { f64::NAN } else { normal(&mut rng) };
@@ -97,6 +112,26 @@ fn sizes_that_do_not_fit() {
         Err(Error::Size { .. })
     ));
     assert!(rls.reset_covariance(&DMatrix::identity(3, 3)).is_ok());
+    let walk = || {
+        DynamicRls::<RandomWalk>::with_integrator(
+            DVector::zeros(2),
+            &DMatrix::identity(2, 2),
+            weights,
+        )
+        .unwrap()
+    };
+    assert!(matches!(
+        walk().with_intensity(&[1.0]),
+        Err(Error::Size {
+            found: 1,
+            expected: 2,
+            ..
+        })
+    ));
+    assert!(matches!(
+        walk().with_intensity(&[1.0, -1.0]),
+        Err(Error::Intensity { index: 1, .. })
+    ));
 }
 
 #[test]

@@ -24,4 +24,5 @@ pub fn spd<const P: usize>(rng: &mut ChaCha8Rng) -> SMatrix<f64, P, P> {
     a * a.transpose() + SMatrix::identity() * 0.5
 }
 
+pub mod drifting_tank;
 pub mod textbook;

@@ -246,3 +246,30 @@ fn a_row_over_two_blocks_agrees_with_an_adaptive_solver() {
         assert_eq!((one.theta()[0], two.theta()[0]), (0.0, 0.0));
     }
 }
+
+#[test]
+fn a_statement_adds_information_alone_whatever_the_rule() {
+    use ct_rls::{Directional, FactoredIntegrator, RandomWalk};
+    use nalgebra::{SMatrix, SVector};
+
+    fn taken<I: FactoredIntegrator>(mut rls: ContinuousRls<2, I>) {
+        let f = SVector::from([1.0, 1.0]);
+        let before = rls.covariance().try_inverse().unwrap();
+        rls.absorb(&f, 2.0, 50.0).unwrap();
+        let grown = rls.covariance().try_inverse().unwrap() - before;
+        let wanted = 50.0 * f * f.transpose();
+        assert!((grown - wanted).amax() < 1e-9, "{grown}");
+        assert!((f.dot(rls.theta()) - 2.0).abs() < 0.02);
+    }
+    let start = (SVector::zeros(), SMatrix::<f64, 2, 2>::identity());
+    let weights = Weights::least_squares(0.5).unwrap();
+    taken(ContinuousRls::<2>::new(start.0, start.1, weights).unwrap());
+    taken(ContinuousRls::<2, Directional>::with_integrator(start.0, start.1, weights).unwrap());
+    let walking = ContinuousRls::<2, RandomWalk>::with_integrator(start.0, start.1, weights);
+    taken(
+        walking
+            .unwrap()
+            .with_intensity(SVector::from([3.0, 4.0]))
+            .unwrap(),
+    );
+}

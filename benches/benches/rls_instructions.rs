@@ -24,6 +24,16 @@ mod counted {
         Box::new(move || who.run(&samples))
     }
 
+    fn directional<const P: usize>() -> Run {
+        let (samples, mut who) = (samples::<P>(), Factored::<P, _>::directional());
+        Box::new(move || who.run(&samples))
+    }
+
+    fn walk_of_one<const P: usize>() -> Run {
+        let (samples, mut who) = (samples::<P>(), Factored::<P, _>::walk(1));
+        Box::new(move || who.run(&samples))
+    }
+
     fn run_time_size<const P: usize>() -> Run {
         let (samples, mut who) = (samples::<P>(), Dynamic::new(P));
         Box::new(move || who.run(&samples))
@@ -43,6 +53,12 @@ mod counted {
     #[bench::ct_rls_2(ct_rls::<2>())]
     #[bench::ct_rls_5(ct_rls::<5>())]
     #[bench::ct_rls_10(ct_rls::<10>())]
+    #[bench::directional_2(directional::<2>())]
+    #[bench::directional_5(directional::<5>())]
+    #[bench::directional_10(directional::<10>())]
+    #[bench::walk_of_one_2(walk_of_one::<2>())]
+    #[bench::walk_of_one_5(walk_of_one::<5>())]
+    #[bench::walk_of_one_10(walk_of_one::<10>())]
     #[bench::run_time_size_2(run_time_size::<2>())]
     #[bench::run_time_size_5(run_time_size::<5>())]
     #[bench::run_time_size_10(run_time_size::<10>())]

@@ -61,7 +61,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
 /// Takes in the statement `f1' theta1 + f2' theta2 = chi` over two blocks with no covariance between them; (4.18) of the paper for one row.
 ///
 /// - `epsilon`: `chi - f1' theta1 - f2' theta2`, which the caller knows.
-/// - `information`, `ratio`: of either block, as of [`ContinuousRls::absorb_with`].
+/// - `information`, `ratio`: of either block, as of [`ContinuousRls::absorb_with`]; both informations above 0.
 ///
 /// The two share the error, as in [`update_blocks`](crate::update_blocks). With both ratios 0 the step is exact whatever the rule. `None`, and nothing is done, where a number is out of range or a
 /// run has stopped.

@@ -5,13 +5,19 @@ use std::borrow::Cow;
 /// The most characters that are quoted.
 const LONGEST: usize = 60;
 
-/// A text from a file or a stream as messages quote it: its first 60 characters, escaped as by [`escaped`].
+/// A text from a file or a stream as messages quote it: escaped as by [`escaped`], and no more than 60 characters of that.
 #[must_use]
 pub fn quoted(text: &str) -> String {
-    match text.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}...", escaped(&text[..end])),
-        None => escaped(text).into_owned(),
+    let (mut quotation, mut length) = (String::new(), 0);
+    for c in text.chars() {
+        let shown = escaped(c.encode_utf8(&mut [0; 4])).into_owned();
+        length += shown.chars().count();
+        if length > LONGEST {
+            return quotation + "...";
+        }
+        quotation += &shown;
     }
+    quotation
 }
 
 /// A number as messages show it: as it was written, or with a power of ten where its digits would fill a line.
@@ -81,5 +87,6 @@ mod tests {
         );
         assert_eq!(quoted(&"é".repeat(60)), "é".repeat(60));
         assert_eq!(quoted(&"é".repeat(3000)), "é".repeat(60) + "...");
+        assert_eq!(quoted(&"\u{ad}".repeat(3000)), "\\u{ad}".repeat(10) + "...");
     }
 }

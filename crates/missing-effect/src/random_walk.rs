@@ -55,7 +55,7 @@ impl Walk {
         largest: f64::INFINITY,
         fitted_again: false,
     };
-    /// No larger than the noise, which bends the parameters too.
+    /// No larger than the innovations of the noise; it bends the parameters too.
     pub const SMALL: Self = Self {
         anywhere: true,
         largest: 1.0,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use ct_signals::{Columns, Hold, read_csv};
+use ct_signals::{Columns, Hold, Record, quoted, read_csv, read_csv_any_input};
 use missing_effect::Progress;
 
 use super::{Results, finish};
@@ -128,33 +128,41 @@ impl Identify {
         methods
     }
 
-    /// What was asked, if it goes together; of several methods each takes the options that concern it.
+    /// Refuses an option that concerns none of the methods.
+    fn check_options(&self, methods: &[Method]) -> Result<(), Error> {
+        let names: Vec<&str> = methods.iter().map(|method| method.id()).collect();
+        let names = names.join(",");
+        let refuse = |option: &str, why: &str| {
+            Err(Error::Usage(format!(
+                "{option} does not go with --method {names}, {why}; leave it out"
+            )))
+        };
+        let any_of_loop = methods.iter().any(|method| method.is_of_loop());
+        if self.levels != LevelChoice::Auto && !any_of_loop {
+            return refuse("--levels", "which estimates an offset");
+        }
+        if self.sensor_filter.is_some() && !any_of_loop {
+            return refuse("--sensor-filter", "which has nothing to do with a loop");
+        }
+        if self.memory.is_some() && methods.iter().all(|method| weighs_all_alike(*method)) {
+            return refuse("--memory", "which weighs the whole record alike");
+        }
+        Ok(())
+    }
+
+    /// What was asked of a method: the options that concern it.
     fn request(
         &self,
         method: Method,
-        alone: bool,
         controller: Option<&ControllerSettings>,
     ) -> Result<Request, Error> {
         let wrong = |what: String| Err(Error::Usage(what));
         let of_loop = method.is_of_loop();
-        let whole = of_loop && method != Method::RecursiveFcloe;
-        if alone && !of_loop && self.levels != LevelChoice::Auto {
-            return wrong(format!(
-                "--levels does not go with --method {}, which estimates an offset; leave it out",
-                method.id()
-            ));
-        }
-        if alone && whole && self.memory.is_some() {
-            return wrong(format!(
-                "--memory does not go with --method {}, which weighs the whole record alike; leave it out",
-                method.id()
-            ));
-        }
         let Some(&order) = self.order.0.first() else {
             return wrong("--order names no order".to_owned());
         };
         let mut request = Request {
-            memory: self.memory.filter(|_| !whole),
+            memory: self.memory.filter(|_| !weighs_all_alike(method)),
             bandwidth: self.bandwidth,
             levels: self.levels,
             ..Request::new(method, order)
@@ -164,13 +172,46 @@ impl Identify {
             request.controller = Some(settings.linear()?);
             request.limits = (settings.u_min, settings.u_max);
         }
-        if let Some(zeta) = self.sensor_filter.filter(|_| alone || of_loop) {
+        if let Some(zeta) = self.sensor_filter.filter(|_| of_loop) {
             let Some(controller) = request.controller else {
                 return wrong("--sensor-filter is of a loop: give --model with a [controller], and a method that uses it".to_owned());
             };
             request.controller = Some(controller.with_sensor_filter(zeta)?);
         }
         Ok(request)
+    }
+
+    /// A record that is simulated only, in the units of the one that is fitted.
+    fn read_test(
+        &self,
+        path: &Path,
+        (columns, hold): (&Columns, Hold),
+        fitted: &Record,
+    ) -> Result<Record, Error> {
+        let named_by = if self.model.is_some() {
+            Error::from
+        } else {
+            of_option
+        };
+        let record = read_csv_any_input(path, columns, hold).map_err(named_by)?;
+        let pairs = [
+            (&record.input, &fitted.input),
+            (&record.output, &fitted.output),
+        ];
+        for (test, fitted) in pairs {
+            if test.unit != fitted.unit {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "\"{}\" is in [{}], and in the record that is fitted in [{}]; convert one of them",
+                        quoted(&test.name),
+                        quoted(&test.unit),
+                        quoted(&fitted.unit)
+                    ),
+                ));
+            }
+        }
+        Ok(record)
     }
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
@@ -182,19 +223,22 @@ impl Identify {
         };
         let (columns, hold, controller) = self.layout()?;
         let methods = self.methods();
-        let alone = methods.len() == 1;
+        self.check_options(&methods)?;
         let requests = methods
             .into_iter()
-            .map(|method| self.request(method, alone, controller.as_ref()))
+            .map(|method| self.request(method, controller.as_ref()))
             .collect::<Result<Vec<_>, _>>()?;
         let named_by = if self.model.is_some() {
             Error::from
         } else {
             of_option
         };
-        let read = |path: &PathBuf| read_csv(path, &columns, hold).map_err(named_by);
-        let record = read(data)?;
-        let test = self.test.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let record = read_csv(data, &columns, hold).map_err(named_by)?;
+        let test = self
+            .test
+            .iter()
+            .map(|path| self.read_test(path, (&columns, hold), &record))
+            .collect::<Result<Vec<_>, _>>()?;
         let inputs: Vec<&Path> = std::iter::once(data)
             .chain(&self.test)
             .chain(&self.model)
@@ -219,12 +263,18 @@ impl Identify {
                 total,
             });
         };
-        let found = side_by_side::compare(&record, &test, &requests, &self.order.0, &tell);
+        let records = (&record, &test[..], controller.is_some());
+        let found = side_by_side::compare(records, &requests, &self.order.0, &tell);
         bar.clear();
         let found = found?;
         let text = side_by_side_text::text(&found, look);
         finish(&found, &text, &outputs, out, look)
     }
+}
+
+/// Whether a method has no memory that could fade.
+fn weighs_all_alike(method: Method) -> bool {
+    method.is_of_loop() && method != Method::RecursiveFcloe
 }
 
 /// A method, or all of them.

@@ -4,9 +4,12 @@
 //! that are fitted to the record (`n + 1` numbers, least squares), on the record it was identified on and on others. A method that the
 //! record does not allow has a reason instead of a row.
 //!
+//! In a loop the command answers to the noise, and a model that takes this answer for the plant simulates better on the measured command
+//! than the plant does: there no method is called worse for its error, and that is said.
+//!
 //! Orders are chosen by
-//! - BIC: `N log sigma^2 + k log N`, `sigma` of the innovations of an autoregressive model of the simulation error, `k` its coefficients and
-//!   the parameters;
+//! - BIC: `N log sigma^2 + k log N`, `sigma` of the innovations of an autoregressive model of the simulation error, `k` its coefficients,
+//!   the `n + m + 1` parameters, and the initial state and level;
 //! - YIC (Young 1989): `log(sigma_e^2/sigma_y^2) + log(mean_i(se_i^2/theta_i^2))`, small where the fit is good and all parameters are
 //!   known; only where the method says standard errors.
 //!
@@ -33,8 +36,10 @@ const NOISE_ORDER: usize = 6;
 const UNLIKELY: f64 = 0.01;
 /// A parameter whose squared relative standard error is larger cannot be told from zero.
 const UNTOLD: f64 = 0.25;
-/// A simulation error so many times the least one says that the method is biased here.
+/// A simulation error so many times the least one of its order says that something is wrong ...
 const WORSE: f64 = 1.05;
+/// ... where the difference is this part of the output's deviation too.
+const SEEN: f64 = 0.01;
 
 /// One order, or all of n from one number to another with m below n.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,6 +72,8 @@ pub struct SideBySide {
     pub schema: u32,
     /// Name of the record.
     pub record: String,
+    /// The record comes from a loop with a known controller: errors on the measured command do not rank the methods.
+    pub in_loop: bool,
     /// Names of the records that were not fitted.
     pub test: Vec<String>,
     /// One for each method, of the order with the least BIC; best simulation first, then those that were refused.
@@ -108,7 +115,7 @@ pub struct Outcome {
     pub fit_percent: f64,
     /// The same on the records that were not fitted, all together.
     pub test_rmse: Option<f64>,
-    /// %
+    /// %; nothing where the outputs stand still.
     pub test_fit_percent: Option<f64>,
     /// Whether all parameters are told from zero, as far as standard errors are known, and no time constant is shorter than a step.
     pub determined: bool,
@@ -145,12 +152,12 @@ impl Method {
 }
 
 /// Identifies by each of the methods with each of the orders, in parallel; `requests` holds what is asked of each method, its order aside.
+/// The record comes with others that are not fitted, and with whether it is of a loop.
 ///
 /// # Errors
 /// [`Error::Usage`] where every method refuses, with the reason of the first.
 pub fn compare(
-    record: &Record,
-    test: &[Record],
+    (record, test, in_loop): (&Record, &[Record], bool),
     requests: &[Request],
     orders: &[Order],
     done: &(dyn Fn() + Sync),
@@ -177,16 +184,15 @@ pub fn compare(
     {
         return Err(Error::Usage(reason));
     }
-    let found = || rows.iter().filter_map(|row| row.found.as_ref());
-    let any = !found().any(|found| found.determined);
-    let least = found()
-        .filter(|found| any || found.determined)
-        .map(|found| found.rmse)
-        .fold(f64::INFINITY, f64::min);
-    let in_loop = requests.iter().any(|request| request.controller.is_some());
-    for row in &mut rows {
+    let spread = spread(std::slice::from_ref(record));
+    let least = |order: Order| {
+        let of_order = rows.iter().filter(|row| row.order == order);
+        of_order.map(Row::rmse).fold(f64::INFINITY, f64::min)
+    };
+    let least: Vec<f64> = rows.iter().map(|row| least(row.order)).collect();
+    for (row, least) in rows.iter_mut().zip(least) {
         if let Some(found) = &mut row.found {
-            found.violated = violated(row.method, found, least, in_loop);
+            found.violated = violated(row.method, found, (least, spread), in_loop);
         }
     }
     let mut methods: Vec<Row> = requests
@@ -206,6 +212,7 @@ pub fn compare(
     Ok(SideBySide {
         schema: 1,
         record: record.name.clone(),
+        in_loop,
         test: test.iter().map(|record| record.name.clone()).collect(),
         methods,
         orders: if orders.len() > 1 { rows } else { Vec::new() },
@@ -270,21 +277,21 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
     let rmse = rms(error.iter().copied());
     let spread = spread(std::slice::from_ref(record));
     let test_rmse = (!test.is_empty()).then(|| rms(tested.iter().flatten().copied()));
-    let known: Option<Vec<f64>> = found.parameters[..=n + m]
+    let parts: Vec<Option<f64>> = found.parameters[..=n + m]
         .iter()
         .map(|p| {
             let error = p.std_error.filter(|error| *error > 0.0);
             error.map(|error| (error / p.value).powi(2))
         })
         .collect();
-    let told = known
-        .as_ref()
-        .is_none_or(|parts| parts.iter().all(|part| *part < UNTOLD));
-    let step = record
-        .time
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .fold(0.0, f64::max);
+    // A regression says no standard errors; of the other methods one that is not known says that the parameter is not.
+    let silent = matches!(found.method, Method::Ls | Method::Iv);
+    let told = silent
+        || parts
+            .iter()
+            .all(|part| part.is_some_and(|part| part < UNTOLD));
+    let known: Option<Vec<f64>> = parts.into_iter().collect();
+    let step = record.sample_interval();
     let seen = found
         .time_constants
         .iter()
@@ -304,7 +311,9 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
         rmse,
         fit_percent: 100.0 * (1.0 - rmse / spread),
         test_rmse,
-        test_fit_percent: test_rmse.map(|rmse| 100.0 * (1.0 - rmse / self::spread(test))),
+        test_fit_percent: test_rmse
+            .map(|rmse| 100.0 * (1.0 - rmse / self::spread(test)))
+            .filter(|percent| percent.is_finite()),
         determined: told && seen,
         bic: 2.0 * samples * noise.sigma().max(f64::MIN_POSITIVE).ln() + fitted * samples.ln(),
         yic,
@@ -326,7 +335,12 @@ fn spread(records: &[Record]) -> f64 {
     rms(records.iter().flat_map(|record| about_mean(&record.output)))
 }
 
-fn violated(method: Method, found: &Outcome, least: f64, in_loop: bool) -> Vec<String> {
+fn violated(
+    method: Method,
+    found: &Outcome,
+    (least, spread): (f64, f64),
+    in_loop: bool,
+) -> Vec<String> {
     let mut violated = Vec::new();
     if in_loop && !method.is_of_loop() {
         violated.push("the input answers to the noise, through the controller".to_owned());
@@ -337,17 +351,18 @@ fn violated(method: Method, found: &Outcome, least: f64, in_loop: bool) -> Vec<S
                 .to_owned(),
         );
     }
-    if found.rmse > WORSE * least {
+    let worse = found.rmse > WORSE * least && found.rmse - least > SEEN * spread;
+    if worse && !in_loop {
         let why = match method {
-            Method::CtRls | Method::Ls => "noise biases it",
+            Method::CtRls | Method::Ls => "noise may bias it",
             Method::StabilizedOe | Method::RecursiveFcloe => {
-                "the plant changed, or it has not converged"
+                "the plant may have changed, or it has not converged"
             }
-            Method::Iv | Method::Fcloe => "the loop is another than it is told, or not linear",
+            Method::Iv | Method::Fcloe => "the plant may not be linear, or of this order",
         };
+        let percent = 100.0 * (found.rmse / least - 1.0);
         violated.push(format!(
-            "its error is {:.0} % above the least: {why}",
-            100.0 * (found.rmse / least - 1.0)
+            "its error is {percent:.0} % above the least of this order: {why}"
         ));
     }
     violated

@@ -26,9 +26,15 @@ pub(crate) fn measure(found: &SideBySide) -> String {
         [] => String::new(),
         names => format!(", and on {}, which was not fitted", names.join(", ")),
     };
+    let in_loop = if found.in_loop {
+        " The input answers to the noise through the controller, and a model that takes this for the plant fits better: here the fit does \
+         not say which method is right."
+    } else {
+        ""
+    };
     format!(
         "Fit: each model runs on the input alone, from an initial state and a level that are fitted, on the record{test}; it is not a \
-         prediction error."
+         prediction error.{in_loop}"
     )
 }
 

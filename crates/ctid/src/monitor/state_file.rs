@@ -137,6 +137,6 @@ pub(super) fn write(path: &Path, state: &State) -> Result<(), Error> {
     }
     Err(Error::file(
         path,
-        "somebody else has written it since, so that the state was not saved; move it away",
+        "it is no state of `ctid monitor` any more, or cannot be read, so that the state was not saved; move it away",
     ))
 }

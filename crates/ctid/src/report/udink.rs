@@ -197,10 +197,11 @@ fn power(changed: &[Changed]) -> String {
                 (" class=\"chosen\"", "no")
             };
             format!(
-                "<tr><th scope=\"row\">{}</th><td class=\"number\">{} of {}</td><td{class}>{noticed}</td></tr>\n",
+                "<tr><th scope=\"row\">{}</th><td class=\"number\">{} of {}</td><td class=\"number\">{}</td><td{class}>{noticed}</td></tr>\n",
                 escape(changed.setting),
                 changed.inside,
-                changed.of
+                changed.of,
+                changed.failed
             )
         })
         .collect();
@@ -210,7 +211,7 @@ fn power(changed: &[Changed]) -> String {
         &escape(&udink_power::sentence(changed)),
         &table(
             "Tables 1 to 4 with other settings",
-            "<tr><th scope=\"col\">Changed</th><th scope=\"col\" class=\"number\">Cells inside</th><th scope=\"col\">Noticed</th></tr>",
+            "<tr><th scope=\"col\">Changed</th><th scope=\"col\" class=\"number\">Cells inside</th><th scope=\"col\" class=\"number\">Runs lost</th><th scope=\"col\">Noticed</th></tr>",
             &rows,
             "Noticed: the tables are no longer called consistent.",
         ),

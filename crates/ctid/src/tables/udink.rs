@@ -80,20 +80,16 @@ impl Study {
     /// What the verdict on the cells leaves out.
     #[must_use]
     pub fn beside_the_verdict(&self) -> String {
-        let differences: Vec<String> = self
-            .contrasts
-            .iter()
-            .map(|contrast| {
-                let [first, second] = contrast.between;
-                let (inside, of) = (contrast.inside, contrast.cells.len());
-                format!("{inside} of {of} between tables {first} and {second}")
-            })
-            .collect();
-        format!(
-            "Differences between tables with the same noise are told more sharply: {} are inside. The assumed experiment is not the paper's \
-             in every respect.",
-            differences.join(", ")
-        )
+        let sentence = |contrast: &Contrast| {
+            let [first, second] = contrast.between;
+            format!(
+                "Tables {first} and {second} have one noise, so that their differences say more than the cells: {} of {} are inside. The \
+                 assumed experiment is not the paper's in every respect.",
+                contrast.inside,
+                contrast.cells.len()
+            )
+        };
+        self.contrasts.first().map(sentence).unwrap_or_default()
     }
 }
 

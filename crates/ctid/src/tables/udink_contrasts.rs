@@ -12,13 +12,13 @@ use super::paper_udink::{CELLS, TABLES};
 use super::udink_run::Cells;
 
 /// What the differences are called.
-pub const TITLE: &str = "Differences between tables, each run of both with one noise";
+pub const TITLE: &str = "Differences between tables, run by run";
 
 /// What they tell.
 pub const MEANING: &str = "By Euler's rule. Two tables with one noise differ by their settings alone: that their cells lie inside one \
      by one does not say that their differences do.";
 
-/// Pairs of tables, and what is known of their noises.
+/// Pairs of tables, and what is known of their noises; first the one that surely shares it.
 const PAIRS: [([usize; 2], &str); 3] = [
     (
         [2, 3],

@@ -153,7 +153,7 @@ fn power(changed: &[Changed], look: Look) -> String {
     let mut text = format!("{}\n", look.heading(udink_power::TITLE));
     text += &look.paragraph("  ", &udink_power::sentence(changed));
     let mut rows = vec![
-        ["other setting", "cells inside", "noticed"]
+        ["other setting", "cells inside", "lost", "noticed"]
             .map(|name| look.faint(name))
             .to_vec(),
     ];
@@ -166,10 +166,11 @@ fn power(changed: &[Changed], look: Look) -> String {
         rows.push(vec![
             changed.setting.to_owned(),
             format!("{} of {}", changed.inside, changed.of),
+            changed.failed.to_string(),
             noticed,
         ]);
     }
-    for line in table(&[Side::Left, Side::Right, Side::Right], &rows) {
+    for line in table(&[Side::Left, Side::Right, Side::Right, Side::Right], &rows) {
         text += &format!("  {line}\n");
     }
     text.push('\n');

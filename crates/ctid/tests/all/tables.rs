@@ -109,6 +109,8 @@ fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
         let found = shared.cells.iter().find(|found| found.cell == cell);
         assert!(!found.unwrap().inside, "{cell}");
     }
+    assert_eq!((shared.inside, shared.cells.len()), (10, 14));
+    assert_eq!(study.power.iter().filter(|it| !it.noticed).count(), 7);
     // Settings that are far off are noticed; some that are near are not, which the tables say.
     let noticed = |name: &str| {
         let mut found = study.power.iter().filter(|it| it.setting.contains(name));

@@ -134,8 +134,8 @@ fn the_program_sets_them_side_by_side() {
     let page = place.read("a.html");
     assert!(page.contains("id=\"plot-fit\"") && page.contains("id=\"orders\""));
     // Named twice is once; what is of one alone is no error among others.
-    let text =
-        place.succeeds("identify tour.csv --model tour.toml --method ls,fcloe,ls,ct-rls --memory 300");
+    let text = place
+        .succeeds("identify tour.csv --model tour.toml --method ls,fcloe,ls,ct-rls --memory 300");
     assert_eq!(
         text.matches("  ls assumes").count() + text.matches("- ls assumes").count(),
         1,

@@ -46,7 +46,7 @@
 //! Automatica 36, 2000, in discrete time; R. Kulhavy, *Restricted exponential forgetting in real-time identification*, Automatica 23,
 //! 1987, for the idea.
 
-use crate::integrator::sealed::{FactorRule, Memory, Refusal, Rule};
+use crate::integrator::sealed::{FactorRule, Memory, Refusal, Rule, step_on_factors};
 use crate::settings::{MAX_EPSILON, Step, Weights, in_range};
 use crate::{UdFactor, factor};
 
@@ -94,14 +94,7 @@ impl Rule for Directional {
         weights: &Weights,
         step: &Step,
     ) -> Result<f64, Refusal> {
-        let (mut w, mut k) = ([0.0; P], [0.0; P]);
-        let parts = (
-            state.u.as_flattened_mut(),
-            state.d.as_mut_slice(),
-            theta.as_mut_slice(),
-        );
-        Self::advance(parts, (&mut w, &mut k), phi, epsilon, weights, step, &[])
-            .ok_or(Refusal::NotFinite)
+        step_on_factors::<Self, P>(theta, state, phi, epsilon, weights, step, &[])
     }
 }
 

@@ -31,7 +31,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::integrator::sealed::{Capped, Covariance, FactorRule, Memory, Refusal, Rule};
+use crate::integrator::sealed::{
+    Capped, Covariance, FactorRule, Memory, Refusal, Rule, step_on_factors,
+};
 use crate::settings::{Step, Weights};
 use crate::{Error, UdFactor, factor};
 
@@ -54,14 +56,7 @@ impl Rule for ExactHold {
         weights: &Weights,
         step: &Step,
     ) -> Result<f64, Refusal> {
-        let (mut f, mut k) = ([0.0; P], [0.0; P]);
-        let parts = (
-            state.u.as_flattened_mut(),
-            state.d.as_mut_slice(),
-            theta.as_mut_slice(),
-        );
-        Self::advance(parts, (&mut f, &mut k), phi, epsilon, weights, step, &[])
-            .ok_or(Refusal::NotFinite)
+        step_on_factors::<Self, P>(theta, state, phi, epsilon, weights, step, &[])
     }
 }
 

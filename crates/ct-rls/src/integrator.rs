@@ -124,6 +124,24 @@ pub(crate) mod sealed {
         ) -> Option<f64>;
     }
 
+    /// One step of a rule on factors whose number of parameters is known when the program is built; the scratch lies on the stack.
+    #[inline(always)]
+    pub fn step_on_factors<R: FactorRule, const P: usize>(
+        theta: &mut [f64; P],
+        factor: &mut UdFactor<P>,
+        phi: &[f64; P],
+        epsilon: f64,
+        weights: &Weights,
+        step: &Step,
+        intensity: &[f64],
+    ) -> Result<f64, Refusal> {
+        let (mut product, mut gain) = ([0.0; P], [0.0; P]);
+        let UdFactor { u, d } = factor;
+        let parts = (u.as_flattened_mut(), d.as_mut_slice(), theta.as_mut_slice());
+        let scratch = (product.as_mut_slice(), gain.as_mut_slice());
+        R::advance(parts, scratch, phi, epsilon, weights, step, intensity).ok_or(Refusal::NotFinite)
+    }
+
     pub trait BlockRule: Rule {
         /// One step of two blocks, given `eps` at its start; returns the sum of `phi'P phi` at its start.
         fn blocks<const A: usize, const B: usize>(

@@ -34,7 +34,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::integrator::sealed::{Capped, Covariance, FactorRule, Memory, Refusal, Rule};
+use crate::integrator::sealed::{
+    Capped, Covariance, FactorRule, Memory, Refusal, Rule, step_on_factors,
+};
 use crate::settings::{MAX_EPSILON, Step, Weights, in_range};
 use crate::{ContinuousRls, Error, UdFactor, factor};
 
@@ -124,12 +126,8 @@ impl Rule for RandomWalk {
         weights: &Weights,
         step: &Step,
     ) -> Result<f64, Refusal> {
-        let (mut f, mut k) = ([0.0; P], [0.0; P]);
-        let UdFactor { u, d } = &mut state.factor;
-        let parts = (u.as_flattened_mut(), d.as_mut_slice(), theta.as_mut_slice());
-        let scratch = (f.as_mut_slice(), k.as_mut_slice());
-        Self::advance(parts, scratch, phi, epsilon, weights, step, &state.q)
-            .ok_or(Refusal::NotFinite)
+        let WalkState { factor, q } = state;
+        step_on_factors::<Self, P>(theta, factor, phi, epsilon, weights, step, q)
     }
 
     fn statement<const P: usize>(
@@ -140,12 +138,8 @@ impl Rule for RandomWalk {
         weights: &Weights,
         step: &Step,
     ) -> Result<f64, Refusal> {
-        let (mut product, mut k) = ([0.0; P], [0.0; P]);
-        let UdFactor { u, d } = &mut state.factor;
-        let parts = (u.as_flattened_mut(), d.as_mut_slice(), theta.as_mut_slice());
-        let scratch = (product.as_mut_slice(), k.as_mut_slice());
-        Self::advance(parts, scratch, f, epsilon, weights, step, &[0.0; P])
-            .ok_or(Refusal::NotFinite)
+        let factor = &mut state.factor;
+        step_on_factors::<Self, P>(theta, factor, f, epsilon, weights, step, &[])
     }
 }
 

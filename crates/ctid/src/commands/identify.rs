@@ -181,6 +181,15 @@ impl Identify {
         Ok(request)
     }
 
+    /// What a column that is not there is blamed on: the model file, or the option.
+    fn named_by(&self) -> fn(ct_signals::Error) -> Error {
+        if self.model.is_some() {
+            Error::from
+        } else {
+            of_option
+        }
+    }
+
     /// A record that is simulated only, in the units of the one that is fitted.
     fn read_test(
         &self,
@@ -188,12 +197,7 @@ impl Identify {
         (columns, hold): (&Columns, Hold),
         fitted: &Record,
     ) -> Result<Record, Error> {
-        let named_by = if self.model.is_some() {
-            Error::from
-        } else {
-            of_option
-        };
-        let record = read_csv_any_input(path, columns, hold).map_err(named_by)?;
+        let record = read_csv_any_input(path, columns, hold).map_err(self.named_by())?;
         let pairs = [
             (&record.input, &fitted.input),
             (&record.output, &fitted.output),
@@ -228,12 +232,7 @@ impl Identify {
             .into_iter()
             .map(|method| self.request(method, controller.as_ref()))
             .collect::<Result<Vec<_>, _>>()?;
-        let named_by = if self.model.is_some() {
-            Error::from
-        } else {
-            of_option
-        };
-        let record = read_csv(data, &columns, hold).map_err(named_by)?;
+        let record = read_csv(data, &columns, hold).map_err(self.named_by())?;
         let test = self
             .test
             .iter()

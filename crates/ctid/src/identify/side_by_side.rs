@@ -13,7 +13,7 @@
 //! - YIC (Young 1989): `log(sigma_e^2/sigma_y^2) + log(mean_i(se_i^2/theta_i^2))`, small where the fit is good and all parameters are
 //!   known; only where the method says standard errors.
 //!
-//! The order that is shown of a method has the least BIC of those whose parameters are all told from zero, and whose time constants are no
+//! The order that is shown of a method has the least BIC of those whose parameters all differ significantly from zero, and whose time constants are no
 //! shorter than a step; where there is none, of all.
 //!
 //! Reference: P. C. Young, Recursive estimation, forecasting and adaptive control, in C. T. Leondes (ed.), Control and Dynamic Systems 30,
@@ -34,8 +34,8 @@ use crate::Error;
 const NOISE_ORDER: usize = 6;
 /// A test with a smaller probability says that an assumption does not hold.
 const UNLIKELY: f64 = 0.01;
-/// A parameter whose squared relative standard error is larger cannot be told from zero.
-const UNTOLD: f64 = 0.25;
+/// A parameter whose squared relative standard error is larger does not differ significantly from zero.
+const INSIGNIFICANT: f64 = 0.25;
 /// A simulation error so many times the least one of its order says that something is wrong ...
 const WORSE: f64 = 1.05;
 /// ... where the difference is this part of the output's deviation too.
@@ -117,7 +117,7 @@ pub struct Outcome {
     pub test_rmse: Option<f64>,
     /// %; nothing where the outputs stand still.
     pub test_fit_percent: Option<f64>,
-    /// Whether all parameters are told from zero, as far as standard errors are known, and no time constant is shorter than a step.
+    /// Whether all parameters differ significantly from zero, as far as standard errors are known, and no time constant is shorter than a step.
     pub determined: bool,
     /// See the module.
     pub bic: f64,
@@ -286,10 +286,10 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
         .collect();
     // A regression says no standard errors; of the other methods one that is not known says that the parameter is not.
     let silent = matches!(found.method, Method::Ls | Method::Iv);
-    let told = silent
+    let significant = silent
         || parts
             .iter()
-            .all(|part| part.is_some_and(|part| part < UNTOLD));
+            .all(|part| part.is_some_and(|part| part < INSIGNIFICANT));
     let known: Option<Vec<f64>> = parts.into_iter().collect();
     let step = record.sample_interval();
     let seen = found
@@ -314,7 +314,7 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
         test_fit_percent: test_rmse
             .map(|rmse| 100.0 * (1.0 - rmse / self::spread(test)))
             .filter(|percent| percent.is_finite()),
-        determined: told && seen,
+        determined: significant && seen,
         bic: 2.0 * samples * noise.sigma().max(f64::MIN_POSITIVE).ln() + fitted * samples.ln(),
         yic,
         whiteness_p: residual_tests::ljung_box(&error, lags, 0)?,

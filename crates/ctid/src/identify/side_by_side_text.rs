@@ -175,8 +175,8 @@ fn orders(found: &SideBySide, look: Look) -> String {
 }
 
 /// What the table of orders says.
-pub(crate) const ORDERS: &str = "BIC of the simulation error beside an autoregressive noise model: shown above is the least of a method whose parameters are told from \
-     zero. \
+pub(crate) const ORDERS: &str = "BIC of the simulation error beside an autoregressive noise model: shown above is the least of a method whose parameters differ \
+     significantly from zero. \
      YIC: the lower, the better known are the parameters of a model that fits; it needs standard errors.";
 
 /// The largest standard error of a parameter over its size.

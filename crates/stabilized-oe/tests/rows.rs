@@ -12,28 +12,10 @@ use rand_distr::{Distribution, StandardNormal};
 use stabilized_oe::{
     BlockDiagonal, CoupledRow, Error, Full, Gain, IoSample, Known, LateDifference, StabilizedOe,
 };
-use support::reference::{Entry, Equations, State, differ, random, start};
+use support::reference::{Entry, Equations, State, blocks, differ, random, start, state};
 use support::second_order;
 
 const UNGUARDED: Guards = stabilized_oe::UNGUARDED;
-
-fn blocks(at: &State, weights: [Weights; 2]) -> BlockDiagonal<2, 3> {
-    let theta = ContinuousRls::new(at.theta, at.p1, weights[0]).unwrap();
-    let filter = ContinuousRls::new(at.c, at.p2, weights[1]).unwrap();
-    BlockDiagonal::new(
-        theta.with_guards(UNGUARDED).unwrap(),
-        filter.with_guards(UNGUARDED).unwrap(),
-    )
-}
-
-fn state(gain: &impl Gain<2, 3>) -> State {
-    State {
-        theta: gain.theta(),
-        c: gain.filter(),
-        p1: gain.covariance(),
-        p2: gain.filter_covariance(),
-    }
-}
 
 /// A row and its entry in the equations, where data have the ratios `Gamma/W` of `weights`.
 fn row(rng: &mut ChaCha8Rng, w: f64, weights: [Weights; 2]) -> (CoupledRow<2, 3>, Entry) {

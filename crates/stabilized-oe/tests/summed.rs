@@ -11,26 +11,8 @@ use rand_chacha::ChaCha8Rng;
 use stabilized_oe::{
     AdaptivePlusConstant, BlockDiagonal, CoupledRow, Error, Gain, Known, StabilizedOe, UNGUARDED,
 };
-use support::reference::{Entry, Equations, Filter, State, Theta, differ, random, start};
+use support::reference::{Entry, Equations, Filter, Theta, blocks, differ, random, start, state};
 use support::second_order;
-
-fn blocks(at: &State, weights: [Weights; 2]) -> BlockDiagonal<2, 3> {
-    let theta = ContinuousRls::new(at.theta, at.p1, weights[0]).unwrap();
-    let filter = ContinuousRls::new(at.c, at.p2, weights[1]).unwrap();
-    BlockDiagonal::new(
-        theta.with_guards(UNGUARDED).unwrap(),
-        filter.with_guards(UNGUARDED).unwrap(),
-    )
-}
-
-fn state(gain: &impl Gain<2, 3>) -> State {
-    State {
-        theta: gain.theta(),
-        c: gain.filter(),
-        p1: gain.covariance(),
-        p2: gain.filter_covariance(),
-    }
-}
 
 fn pair(c: f64, gamma: f64, eta: [f64; 2]) -> [Weights; 2] {
     eta.map(|eta| Weights::new(c, gamma, eta).unwrap())

@@ -1,9 +1,11 @@
 //! [U] 4.18 with rows and the constant gain beside the adaptive one, integrated by Runge and Kutta's rule in small steps: order 2 with
 //! three parameters.
 
+use ct_rls::{ContinuousRls, Weights};
 use nalgebra::{SMatrix, SVector};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use stabilized_oe::{BlockDiagonal, Gain, UNGUARDED};
 
 pub type Theta = SVector<f64, 3>;
 pub type Filter = SVector<f64, 2>;
@@ -105,4 +107,24 @@ pub fn start(rng: &mut ChaCha8Rng) -> State {
 
 pub fn random<const A: usize, const B: usize>(rng: &mut ChaCha8Rng) -> SMatrix<f64, A, B> {
     SMatrix::from_fn(|_, _| rng.random_range(-1.0..1.0))
+}
+
+/// The block-diagonal gain at a state, without guards.
+pub fn blocks(at: &State, weights: [Weights; 2]) -> BlockDiagonal<2, 3> {
+    let theta = ContinuousRls::new(at.theta, at.p1, weights[0]).unwrap();
+    let filter = ContinuousRls::new(at.c, at.p2, weights[1]).unwrap();
+    BlockDiagonal::new(
+        theta.with_guards(UNGUARDED).unwrap(),
+        filter.with_guards(UNGUARDED).unwrap(),
+    )
+}
+
+/// The state that a gain is in.
+pub fn state(gain: &impl Gain<2, 3>) -> State {
+    State {
+        theta: gain.theta(),
+        c: gain.filter(),
+        p1: gain.covariance(),
+        p2: gain.filter_covariance(),
+    }
 }

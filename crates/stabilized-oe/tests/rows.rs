@@ -4,7 +4,7 @@
 mod support;
 
 use ct_constrained::Relation::{AtLeast, AtMost, Equal};
-use ct_rls::{ContinuousRls, ExactHold, Guards, RecursiveEstimator, Weights};
+use ct_rls::{ContinuousRls, ExactHold, RecursiveEstimator, Weights};
 use nalgebra::{SMatrix, SVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,10 +12,8 @@ use rand_distr::{Distribution, StandardNormal};
 use stabilized_oe::{
     BlockDiagonal, CoupledRow, Error, Full, Gain, IoSample, Known, LateDifference, StabilizedOe,
 };
-use support::reference::{Entry, Equations, State, blocks, differ, random, start, state};
+use support::reference::{Entry, Equations, blocks, differ, random, start, state};
 use support::second_order;
-
-const UNGUARDED: Guards = stabilized_oe::UNGUARDED;
 
 /// A row and its entry in the equations, where data have the ratios `Gamma/W` of `weights`.
 fn row(rng: &mut ChaCha8Rng, w: f64, weights: [Weights; 2]) -> (CoupledRow<2, 3>, Entry) {

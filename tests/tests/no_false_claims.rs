@@ -5,13 +5,14 @@ use missing_effect::{Options, diagnose};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Open and closed loop, white and coloured noise, three kinds of plant: 60 records, of which at most one may be
-/// said to miss something of the catalogue.
+/// Open and closed loop, white and coloured noise, three kinds of plant: of 24 records (`RECORDS=60`: of so many) at most one may
+/// be said to miss something of the catalogue.
 #[test]
-fn at_most_one_of_sixty_adequate_models_is_blamed() {
+fn at_most_one_adequate_model_is_blamed() {
+    let records = std::env::var("RECORDS").map_or(24, |records| records.parse().unwrap());
     let mut blamed = Vec::new();
     let mut verdicts = std::collections::BTreeMap::new();
-    for run in 0..60u64 {
+    for run in 0..records {
         let rig = match run % 3 {
             0 => Rig::single_tank(),
             1 => Rig::cascaded_tanks(),

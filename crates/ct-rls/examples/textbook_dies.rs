@@ -1,7 +1,7 @@
 //! Prints after how many samples the textbook's covariance update dies, for the table in the crate's documentation.
 #![allow(missing_docs)]
 
-#[path = "../tests/support/mod.rs"]
+#[path = "../tests/all/support/mod.rs"]
 mod support;
 
 use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};

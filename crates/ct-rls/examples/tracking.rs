@@ -1,7 +1,7 @@
 //! A drifting tank with an inlet that stays closed for ten million samples: what each way to forget makes of it.
 #![allow(missing_docs)]
 
-#[path = "../tests/support/mod.rs"]
+#[path = "../tests/all/support/mod.rs"]
 mod support;
 
 use std::time::Instant;

@@ -4,7 +4,7 @@
 //! `cargo run --release -p fcloe --example coverage [-- RUNS]`
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-#[path = "../tests/support/rig.rs"]
+#[path = "../tests/all/support/rig.rs"]
 mod rig;
 
 use rig::Rig;

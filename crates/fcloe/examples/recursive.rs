@@ -3,7 +3,7 @@
 //! `cargo run --release -p fcloe --example recursive`; `-- 5` takes 5 starts and records of each kind.
 #![allow(clippy::unwrap_used)]
 
-#[path = "../tests/support/online.rs"]
+#[path = "../tests/all/support/online.rs"]
 mod online;
 
 use fcloe::Filter;

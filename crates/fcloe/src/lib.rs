@@ -57,15 +57,15 @@
 //! | | | command |
 //! |---|---|---|
 //! | 95 % intervals hold the truth, 4000 runs for each of eleven settings | in 94.2 to 96.0 % for every parameter | `cargo run --release -p fcloe --example coverage` |
-//! | sensitivities against central differences of an adaptive integration | within 1e-7 | `cargo test -p fcloe --test sensitivities` |
-//! | noise-free recovery, n = 1 to 3, PI and filtered PID | within 1e-8 | `cargo test -p fcloe --test recovery` |
+//! | sensitivities against central differences of an adaptive integration | within 1e-7 | `cargo test -p fcloe --test all sensitivities::` |
+//! | noise-free recovery, n = 1 to 3, PI and filtered PID | within 1e-8 | `cargo test -p fcloe --test all recovery::` |
 //! | recursion, n = 1, 20 dB: 60 starts within a factor of 5 | 60 end within 3 %; 37 with the filter of the start | `cargo run --release -p fcloe --example recursive` |
 //! | n = 2, m = 1: 40 starts by regressions on the first samples, of which 40 (30 dB) and 25 to 32 (20 dB) are within 10 % | 40 and 39 end within 10 % in all parameters | the same |
 //! | the same from each parameter off by up to 1.3: **start it from a regression instead** | 27 of 40; 35 with the filter of the start | the same |
 //! | from regressions at 10 dB, of which 6 to 14 starts are within 10 % | 23 to 27 of 40 | the same |
 //! | tau growing by 30 % over 25 400 samples, 20 dB, 200 records | off by at most 3.9 % at any sample after three memories of 1200 s | the same |
 //! | over 12 700 samples | at most 5.2 % with a memory of 800 s; within 5 % on 198 of 200 records | the same |
-//! | condition (14) against fine grids, 3000 random pairs of orders 1 to 6 | no disagreement | `cargo test -p fcloe --test convergence` |
+//! | condition (14) against fine grids, 3000 random pairs of orders 1 to 6 | no disagreement | `cargo test -p fcloe --test all convergence::` |
 //! | 363 starts, filter of the start: those where (14) holds | 110 of 110 converge; where `Re (P^/P) < 0` 47 of 118 | `cargo run --release -p ctid-examples --bin table_of_starts` |
 //! | the same, adaptive filter, a fifth of the samples | 363 of 363 | the same |
 //! | speed | see `benches/README.md` | `cargo bench -p ctid-benches --bench fcloe`, `--bench fcloe_runs` |

@@ -55,8 +55,7 @@ pub(crate) fn model(
     at_rest: f64,
 ) -> Result<Box<dyn Model>, plants::Error> {
     match lanes(theta.len()) {
-        0..=3 => in_lanes::<3>(structure, substeps, theta, levels, at_rest),
-        4 => in_lanes::<4>(structure, substeps, theta, levels, at_rest),
+        0..=4 => in_lanes::<4>(structure, substeps, theta, levels, at_rest),
         5..=8 => in_lanes::<8>(structure, substeps, theta, levels, at_rest),
         _ => in_lanes::<MOST_LANES>(structure, substeps, theta, levels, at_rest),
     }

@@ -9,7 +9,7 @@
 //! dc^/dt     = -c_p P2 e1 eps~          dP2/dt = eta2 P2 - gamma2 P2 e1 e1' P2
 //! ```
 //! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run of its experiment ends at the bound of `c^`
-//! (`cargo test -p stabilized-oe --test printed_sign`). Rows `F theta + F_c c = chi` or `<= chi` add their errors, [U] 4.14 to 4.18: [`CoupledRow`].
+//! (`cargo test -p stabilized-oe --test all printed_sign::`). Rows `F theta + F_c c = chi` or `<= chi` add their errors, [U] 4.14 to 4.18: [`CoupledRow`].
 //!
 //! Assumptions: the gain's step holds `phi_m`, `e` and `e1` over a sample, the model's runs the input as the scheme of derivatives says.
 //! `u` excites persistently. Noise on `y` is independent of `u`.

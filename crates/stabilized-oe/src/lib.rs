@@ -41,17 +41,17 @@
 //! | 2000 | (2.67, 2.41, 2.62) | (1.00, 1.00, 1.00) |
 //!
 //! The truth is (1, 1, 1). An adaptive solver of the equations, at a tolerance of 1e-6 and with no code in common, ends at the same place:
-//! `cargo test -p stabilized-oe --test convergence`.
+//! `cargo test -p stabilized-oe --test all convergence::`.
 //!
 //! Nor does a constant gain beside the adaptive one, (4.11a), make (4.13) and (C.2) true: `delta' Lambda^-1 P phi phi' delta` has no sign, as
 //! `Lambda^-1 P` is not symmetric. In this example `c_lambda Lambda = 0.001 I` ends at (2.29, 2.09, 2.25), with the paper's `V` 2.5 times its
-//! start: `cargo test -p stabilized-oe --test summed`.
+//! start: `cargo test -p stabilized-oe --test all summed::`.
 //!
 //! # Bounds on `c^`
 //! With noise `c^` does not go to the plant's `a`: for n = 1 to 0, for n = 2 to `(0, E v'^2/E v''^2)`, wherever that is. What is wanted is
 //! that it stays where `C^/A0 - gamma/(2 c)` is strictly positive real. The same plant with noise of a hundredth of the output's power, largest
 //! error of `theta^` over the last quarter of 1000 s, median (smallest to largest) of 20 seeds,
-//! `cargo test -p stabilized-oe --test bounding -- --nocapture`:
+//! `cargo test -p stabilized-oe --test all bounding:: -- --nocapture`:
 //!
 //! | bounds on `c^` | error |
 //! |---|---|

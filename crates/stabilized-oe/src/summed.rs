@@ -47,7 +47,7 @@ const MAX_INFORMATION: f64 = 1e60;
 /// `c_p P~ + c_lambda Lambda`, an adaptive block-diagonal gain and a constant diagonal one; the paper's (4.11a), (4.18a,b).
 ///
 /// The constant part goes on to learn where `P` has become small, for little: it has **no proof of convergence**. The paper's,
-/// (4.13) and (C.2), is wrong: its `V = delta' Lambda^-1 delta/2` may grow, with examples in `cargo test -p stabilized-oe --test summed`.
+/// (4.13) and (C.2), is wrong: its `V = delta' Lambda^-1 delta/2` may grow, with examples in `cargo test -p stabilized-oe --test all summed::`.
 /// With a proof: [`Full`](crate::Full) and [`BlockDiagonal::constant`].
 ///
 /// Bounds act through `P` alone; rows through `P_i + (c_lambda/c_p) Lambda_i`.

@@ -130,8 +130,7 @@ impl Setup<'_> {
             0..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
             5..=6 => self.each_row_in_lanes::<6>(x, &self.free, each),
             7..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
-            9..=10 => self.each_row_in_lanes::<10>(x, &self.free, each),
-            11..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
+            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
             // One lane more, and a compiler copies a dual by a call instead of in registers.
             13..=15 => self.each_row_in_lanes::<15>(x, &self.free, each),
             _ => self.each_row_in_lanes::<8>(x, &self.free, each),

@@ -1,0 +1,9 @@
+//! One program for all tests: each of its own would link the crate again.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod any_input;
+mod positive_real;
+mod roots;
+mod sampling;
+mod state_variable_filters;
+mod transfer_functions;

@@ -1,0 +1,7 @@
+//! One program for all tests: each of its own would link the crate again.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod ar;
+mod csv_file;
+mod residual_tests;
+mod signals;

@@ -1,0 +1,188 @@
+//! The residual tests over many records: right size where nothing is left, power where something is.
+
+use approx::assert_relative_eq;
+use ct_signals::residual_tests::{
+    autocorrelation, cross_correlation, ljung_box, prewhitened_input_test,
+};
+use ct_signals::{ArModel, Error, excitation, noise};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+const RUNS: u64 = 1000;
+const N: usize = 500;
+
+fn rng(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+/// Probabilities are spread evenly: each share within its band.
+fn assert_uniform(p: &[f64], context: &str) {
+    for (level, low, high) in [
+        (0.01, 0.0, 0.025),
+        (0.1, 0.06, 0.14),
+        (0.5, 0.42, 0.58),
+        (0.9, 0.85, 0.95),
+    ] {
+        let share = p.iter().filter(|p| **p < level).count() as f64 / p.len() as f64;
+        assert!(
+            (low..=high).contains(&share),
+            "{context}: share of p < {level} is {share}"
+        );
+    }
+}
+
+fn share_below(p: &[f64], level: f64) -> f64 {
+    p.iter().filter(|p| **p < level).count() as f64 / p.len() as f64
+}
+
+fn steps(rng: &mut ChaCha8Rng) -> Vec<f64> {
+    excitation::steps(N, 5..=30, 2.0, 8.0, rng).unwrap()
+}
+
+#[test]
+fn correlations_by_hand() {
+    // x - mean = -1.5, -0.5, 0.5, 1.5; sum of squares 5.
+    let r = autocorrelation(&[1.0, 2.0, 3.0, 4.0], 4);
+    let expected = [1.0, 1.25 / 5.0, -1.5 / 5.0, -2.25 / 5.0, 0.0];
+    for (r, expected) in r.iter().zip(expected) {
+        assert_relative_eq!(*r, expected, max_relative = 1e-12);
+    }
+    assert_eq!(autocorrelation(&[3.0; 5], 2), [1.0, 0.0, 0.0]);
+    assert_eq!(autocorrelation(&[], 2), [1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn the_input_leads() {
+    let u = noise::white(5000, 1.0, &mut rng(1));
+    let e: Vec<f64> = (0..5000)
+        .map(|k| if k < 3 { 0.0 } else { -u[k - 3] })
+        .collect();
+    let r = cross_correlation(&u, &e, 6);
+    assert!(r[3] < -0.99);
+    for (lag, r) in r.iter().enumerate().filter(|(lag, _)| *lag != 3) {
+        assert!(r.abs() < 0.06, "lag {lag}: {r}");
+    }
+}
+
+#[test]
+fn ljung_box_against_a_worked_value() {
+    // rho = 1/4, -3/10 at n = 4: Q = 4*6*(0.0625/3 + 0.09/2) = 1.58; chi-square of 2: exp(-Q/2).
+    let p = ljung_box(&[1.0, 2.0, 3.0, 4.0], 2, 0).unwrap();
+    assert_relative_eq!(p, (-0.79_f64).exp(), max_relative = 1e-9);
+}
+
+#[test]
+fn ljung_box_is_even_on_white_noise_and_small_on_coloured() {
+    let p: Vec<f64> = (0..RUNS)
+        .map(|seed| ljung_box(&noise::white(N, 3.0, &mut rng(seed)), 20, 0).unwrap())
+        .collect();
+    assert_uniform(&p, "white");
+    let p: Vec<f64> = (0..RUNS)
+        .map(|seed| ljung_box(&noise::ar1(N, 3.0, 0.3, &mut rng(seed)), 20, 0).unwrap())
+        .collect();
+    assert!(share_below(&p, 0.01) > 0.95, "{}", share_below(&p, 0.01));
+}
+
+#[test]
+fn ljung_box_counts_fitted_coefficients() {
+    let p: Vec<f64> = (0..RUNS)
+        .map(|seed| {
+            let v = noise::ar1(N, 1.0, 0.6, &mut rng(seed));
+            let model = ArModel::fit(&[&v], 6).unwrap();
+            ljung_box(&model.whiten(&v), 12, model.order()).unwrap()
+        })
+        .collect();
+    assert_uniform(&p, "whitened by its own model");
+}
+
+#[test]
+fn input_test_is_even_where_nothing_is_left() {
+    type Input = fn(&mut ChaCha8Rng) -> Vec<f64>;
+    let inputs: [(&str, Input); 3] = [
+        ("steps", steps),
+        ("smooth", |rng| noise::ar1(N, 1.0, 0.95, rng)),
+        ("binary", |_| excitation::prbs(N, 4, 0.0, 5.0, 9).unwrap()),
+    ];
+    for (name, input) in inputs {
+        for rho in [0.0, 0.9] {
+            let p: Vec<f64> = (0..RUNS)
+                .map(|seed| {
+                    let mut rng = rng(seed);
+                    let u = input(&mut rng);
+                    let e = noise::ar1(N, 0.2, rho, &mut rng);
+                    prewhitened_input_test(&u, &e, 20).unwrap().1
+                })
+                .collect();
+            assert_uniform(&p, &format!("{name}, noise of rho = {rho}"));
+        }
+    }
+}
+
+#[test]
+fn input_test_is_even_in_a_closed_loop() {
+    // A proportional controller on an integrating process: the residual is pure noise, but the
+    // input answers to it.
+    let p: Vec<f64> = (0..RUNS)
+        .map(|seed| {
+            let mut rng = rng(seed);
+            let r = steps(&mut rng);
+            let e = noise::ar1(N, 0.3, 0.7, &mut rng);
+            let mut level = 5.0;
+            let u: Vec<f64> = (0..N)
+                .map(|k| {
+                    let u = 0.5 * (r[k] - (level + e[k]));
+                    level += 0.2 * u;
+                    u
+                })
+                .collect();
+            prewhitened_input_test(&u, &e, 20).unwrap().1
+        })
+        .collect();
+    assert_uniform(&p, "closed loop");
+}
+
+#[test]
+fn input_test_sees_what_the_model_lacks() {
+    // The residual holds a first-order response of half the noise's size.
+    let p: Vec<f64> = (0..RUNS)
+        .map(|seed| {
+            let mut rng = rng(seed);
+            let u = steps(&mut rng);
+            let mut e = noise::white(N, 0.4, &mut rng);
+            let mut x = 0.0;
+            for k in 1..N {
+                x = 0.8 * x + 0.2 * 0.12 * (u[k - 1] - 5.0);
+                e[k] += x;
+            }
+            prewhitened_input_test(&u, &e, 20).unwrap().1
+        })
+        .collect();
+    assert!(share_below(&p, 0.01) > 0.8, "{}", share_below(&p, 0.01));
+}
+
+#[test]
+fn tests_that_make_no_sense_are_refused() {
+    let x = noise::white(30, 1.0, &mut rng(1));
+    assert!(matches!(
+        ljung_box(&x, 5, 5),
+        Err(Error::InvalidSetting { .. })
+    ));
+    assert!(matches!(
+        ljung_box(&x, 0, 0),
+        Err(Error::InvalidSetting { .. })
+    ));
+    assert!(matches!(
+        ljung_box(&x, 30, 0),
+        Err(Error::TooFewSamples { needed: 31, .. })
+    ));
+    assert!(matches!(
+        ljung_box(&[1.0, f64::NAN, 2.0], 1, 0),
+        Err(Error::ValueNotFinite { .. })
+    ));
+    let error = prewhitened_input_test(&x, &x[1..], 5);
+    assert!(matches!(error, Err(Error::SeriesMismatch { .. })));
+    assert!(prewhitened_input_test(&x, &x, 0).is_err());
+    // A still input explains nothing: no correlation.
+    let (correlation, p) = prewhitened_input_test(&[1.0; 30], &x, 5).unwrap();
+    assert_eq!((correlation, p), (vec![0.0; 6], 1.0));
+}

@@ -1,0 +1,411 @@
+//! The simulated loop: derivatives, a fine reference, replay, and what coloured noise does with and without it.
+
+use std::collections::BTreeMap;
+
+use crate::support::Rig;
+use ct_signals::{ArModel, Record, Signal, excitation, noise};
+use greybox::{Error, FitOptions, Setup, coloured, fit_from, replay, robust};
+use plants::controller::Controller;
+use plants::{Command, Plant, Scales, Simulator, Structure};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+const LIMITS: (f64, f64) = (0.0, 10.0);
+
+fn pi() -> Controller {
+    Controller::pi(0.6, 60.0, LIMITS).unwrap()
+}
+
+/// A PI with a filter on the error, as R/S, and one without an integral, which needs an operating point.
+fn others() -> [Controller; 2] {
+    [
+        Controller::continuous(&[18.0, 0.3], &[120.0, 60.0, 0.0], 4.0, LIMITS).unwrap(),
+        Controller::sampled(&[0.9, -0.5], &[1.0, -0.4], LIMITS).unwrap(),
+    ]
+}
+
+/// Runs the rig in a loop; the controller's command begins at 5 V.
+fn in_loop(rig: &Rig, controller: &Controller, r: &[f64], noise: &[f64]) -> Record {
+    let scales = Scales::from_ranges(
+        LIMITS,
+        (5.0, 25.0),
+        rig.interval,
+        rig.interval * r.len() as f64,
+    );
+    let mut structure = Structure::new(rig.plant, rig.known(), scales);
+    for placed in rig.placed() {
+        structure = structure.with(placed).unwrap();
+    }
+    let mut simulator = Simulator::new(&structure, &rig.truth(0), &rig.levels, 5.0).unwrap();
+    let linear = controller.linear(rig.interval);
+    // The last state that the command sees: the integral, or the operating point.
+    let mut states = vec![0.0; controller.states()];
+    let seen = linear.c.iter().rposition(|c| *c != 0.0).unwrap();
+    states[seen] = 5.0;
+    let mut regulator = controller.start(&states);
+    let (mut u, mut y) = (Vec::new(), Vec::new());
+    for k in 0..r.len() {
+        let reading = simulator.read() + noise[k];
+        let command = regulator.command(r[k], reading, rig.interval);
+        simulator.advance(Command::held(command), rig.interval);
+        y.push(reading);
+        u.push(command);
+    }
+    Record {
+        name: "loop.csv".into(),
+        time: (0..r.len()).map(|k| k as f64 * rig.interval).collect(),
+        input: Signal::new("u", "V", u),
+        output: Signal::new("y", "cm", y),
+        input_2: None,
+        reference: Some(Signal::new("r", "cm", r.to_vec())),
+        hold: ct_signals::Hold::Zero,
+    }
+}
+
+/// Steps of the set point around the level at which the rig begins, and noise.
+fn record(
+    rig: &Rig,
+    controller: &Controller,
+    sigma: f64,
+    rho: f64,
+    seed: u64,
+) -> (Record, Vec<f64>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let level = *rig.levels.last().unwrap();
+    let r = excitation::steps(rig.samples, 20..=60, 0.9 * level, 1.15 * level, &mut rng).unwrap();
+    let e = if rho > 0.0 {
+        noise::ar1(rig.samples, sigma, rho, &mut rng)
+    } else {
+        noise::white(rig.samples, sigma, &mut rng)
+    };
+    (in_loop(rig, controller, &r, &e), e)
+}
+
+/// The filtered rows against central differences of the disturbance, for every plant and controller, the controller's
+/// initial states among them.
+#[test]
+fn derivatives_in_the_loop_agree_with_central_differences() {
+    for rig in Rig::all() {
+        for effects in [
+            vec![],
+            vec![("pump_deadzone", 0, vec![0.5]), ("pump_lag", 0, vec![6.0])],
+            vec![("sensor_lag", 0, vec![5.0])],
+        ] {
+            let rig = Rig {
+                effects,
+                ..rig.clone()
+            };
+            for controller in [pi()].into_iter().chain(others()) {
+                let (record, _) = record(&rig, &controller, 0.05, 0.0, 1);
+                let records = [record];
+                let setup = rig.setup(&records);
+                let (setup, x) = setup.in_loop(&controller, &rig.truth(1)).unwrap();
+                let setup = setup.with_unknown_controller_states().unwrap();
+                assert_eq!(setup.free().len(), x.len());
+                let rows = setup.rows(&x).unwrap();
+                let residual = &setup.disturbance(&x).unwrap()[0];
+                let scale = |j: usize| {
+                    let column = rows.values.iter().skip(j).step_by(rows.columns);
+                    column.fold(0.0, |most: f64, value| most.max(value.abs()))
+                };
+                for (j, &i) in setup.free().iter().enumerate() {
+                    let h = 1e-6 * x[i].abs().max(1.0);
+                    let at = |by: f64| {
+                        let mut x = x.clone();
+                        x[i] += by;
+                        setup.disturbance(&x).unwrap().remove(0)
+                    };
+                    let (above, below) = (at(h), at(-h));
+                    for k in 0..residual.len() {
+                        let exact = rows.values[k * rows.columns + j];
+                        let difference = -(above[k] - below[k]) / (2.0 * h);
+                        assert!(
+                            (exact - difference).abs() < 2e-5 * scale(j) + 1e-8,
+                            "{} {:?} {}, sample {k}: {exact} {difference}",
+                            rig.plant.id(),
+                            rig.effects,
+                            setup.names()[i]
+                        );
+                    }
+                }
+                let last = rows
+                    .values
+                    .iter()
+                    .skip(rows.columns - 1)
+                    .step_by(rows.columns);
+                assert!(last.zip(residual).all(|(a, b)| (a - b).abs() < 1e-10));
+            }
+        }
+    }
+}
+
+/// The loop against one that is integrated in a thousand parts of an interval, with a PI written out, through a limit.
+#[test]
+fn the_loop_agrees_with_a_fine_reference() {
+    let rig = Rig {
+        samples: 200,
+        ..Rig::single_tank()
+    };
+    let r: Vec<f64> = (0..rig.samples)
+        .map(|k| if (k / 50) % 2 == 0 { 14.0 } else { 26.0 })
+        .collect();
+    let records = [in_loop(&rig, &pi(), &r, &vec![0.0; rig.samples])];
+    let (setup, x) = rig.setup(&records).in_loop(&pi(), &rig.truth(1)).unwrap();
+    let run = setup.simulate_loop(&x).unwrap().unwrap();
+    let (mut level, mut integral, mut most) = (14.0_f64, 0.0, 0.0_f64);
+    let mut at_limit = 0;
+    for (k, r) in r.iter().enumerate() {
+        let e = r - level;
+        let wanted: f64 = 5.0 + 0.6 * (e + integral / 60.0);
+        let u = wanted.clamp(0.0, 10.0);
+        at_limit += usize::from(u != wanted);
+        if (wanted - u) * e <= 0.0 {
+            integral += 4.0 * e;
+        }
+        most = most
+            .max((run.output[0][k] - level).abs())
+            .max((run.command[0][k] - u).abs());
+        for _ in 0..1000 {
+            let rate = |h: f64| (10.0 * u - 12.5 * h.sqrt()) / 154.0;
+            let half = level + 0.002 * rate(level);
+            level += 0.004 * rate(half);
+        }
+    }
+    assert!(at_limit > 5);
+    assert!(most < 1e-6, "{most}");
+}
+
+#[test]
+fn a_replay_finds_the_controller_states_and_what_is_not_the_controller() {
+    let rig = Rig::single_tank();
+    for controller in [pi()].into_iter().chain(others()) {
+        let (mut record, _) = record(&rig, &controller, 0.1, 0.8, 3);
+        let exact = replay(&controller, &record).unwrap();
+        assert!(exact.rms < 1e-10 && exact.moves > 0.1, "{exact:?}");
+        // A converter of 10 bits does not matter, an operator's hand does and is found.
+        for u in &mut record.input.values {
+            *u = (*u * 102.3).round() / 102.3;
+        }
+        let rounded = replay(&controller, &record).unwrap();
+        assert!(rounded.rms < 0.02 * rounded.moves, "{}", rounded.rms);
+        for u in &mut record.input.values[100..200] {
+            *u += 1.0;
+        }
+        let moved = replay(&controller, &record).unwrap();
+        assert!(moved.rms > 0.3, "{}", moved.rms);
+        let strong = Controller::pi(1.2, 60.0, LIMITS).unwrap();
+        let other = replay(&strong, &record).unwrap();
+        assert!(other.rms > 0.1 * other.moves, "{}", other.rms);
+    }
+}
+
+#[test]
+fn a_loop_that_cannot_be_simulated_says_why() {
+    let rig = Rig::single_tank();
+    let (good, _) = record(&rig, &pi(), 0.1, 0.0, 3);
+    let said = |record: Record| -> Error {
+        let records = [record];
+        let error = rig
+            .setup(&records)
+            .in_loop(&pi(), &rig.truth(1))
+            .unwrap_err();
+        assert!(!error.to_string().contains('\n'));
+        error
+    };
+    let error = said(Record {
+        reference: None,
+        ..good.clone()
+    });
+    assert!(matches!(error, Error::NoReference { .. }));
+    assert!(error.to_string().contains("[columns]"), "{error}");
+    let constant = Signal::new("r", "cm", vec![14.0; good.len()]);
+    let error = said(Record {
+        reference: Some(constant),
+        ..good.clone()
+    });
+    assert!(matches!(
+        error,
+        Error::ConstantReference { value: 14.0, .. }
+    ));
+    let error = said(Record {
+        hold: ct_signals::Hold::First,
+        ..good
+    });
+    assert!(matches!(error, Error::CommandNotHeld { .. }));
+}
+
+/// In a linear loop that meets no limit the disturbance at the true parameters is the noise itself, to the last digits.
+#[test]
+fn the_disturbance_of_a_linear_loop_is_the_noise() {
+    let rig = Rig::linear_tank();
+    for controller in [pi()].into_iter().chain(others()) {
+        let (record, e) = record(&rig, &controller, 0.05, 0.9, 5);
+        let records = [record];
+        let (setup, x) = rig
+            .setup(&records)
+            .in_loop(&controller, &rig.truth(1))
+            .unwrap();
+        let found = setup.disturbance(&x).unwrap();
+        let simulated = &setup.simulate_loop(&x).unwrap().unwrap().output[0];
+        let most = |a: &[f64]| {
+            a.iter()
+                .zip(&e)
+                .map(|(a, e)| (a - e).abs())
+                .fold(0.0, f64::max)
+        };
+        assert!(most(&found[0]) < 1e-9, "{}", most(&found[0]));
+        // Without the filter it is not.
+        let bare: Vec<f64> = records[0]
+            .output
+            .values
+            .iter()
+            .zip(simulated)
+            .map(|(y, m)| y - m)
+            .collect();
+        assert!(most(&bare) > 0.02);
+    }
+}
+
+/// Where the controller's command is not all of it, the rest is simulated with the loop.
+#[test]
+fn what_is_added_to_the_command_is_simulated_with_the_loop() {
+    let rig = Rig::linear_tank();
+    let (record, _) = record(&rig, &pi(), 0.0, 0.0, 5);
+    let mut by_hand = record.clone();
+    // The plant ran on the command with the hand's part, which is played to it anew.
+    for (k, u) in by_hand.input.values.iter_mut().enumerate() {
+        *u += if (100..140).contains(&k) { 0.2 } else { 0.0 };
+    }
+    let records = [by_hand];
+    let setup = rig.setup(&records);
+    let truth = rig.truth(1);
+    let open = setup.simulate(&truth).unwrap().output;
+    let records = [Record {
+        output: Signal::new("y", "cm", open[0].clone()),
+        ..records[0].clone()
+    }];
+    let (setup, x) = rig.setup(&records).in_loop(&pi(), &truth).unwrap();
+    let run = setup.simulate_loop(&x).unwrap().unwrap();
+    for (model, measured) in run.output[0].iter().zip(&records[0].output.values) {
+        assert!((model - measured).abs() < 1e-9);
+    }
+}
+
+/// What one way of fitting says over many records: bias over spread, and how often its interval holds the truth.
+fn over_records(rig: &Rig, rho: f64, simulate: bool, metric: bool) -> Vec<(f64, f64)> {
+    const RECORDS: u64 = 200;
+    let estimates: Vec<Vec<(f64, bool)>> = (0..RECORDS)
+        .into_par_iter()
+        .map(|seed| {
+            let records = [record(rig, &pi(), 0.3, rho, 100 + seed).0];
+            let setup = Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new());
+            let setup = setup.unwrap();
+            let stopping = FitOptions::default().stopping;
+            let white = ArModel::white(1.0);
+            let first = fit_from(&setup, &[rig.truth(1)], &white, stopping).unwrap();
+            let (setup, x) = if simulate {
+                setup.in_loop(&pi(), &first.x).unwrap()
+            } else {
+                (setup, first.x)
+            };
+            let fit = fit_from(&setup, &[x], &white, stopping).unwrap();
+            let (x, half) = if metric {
+                let fit = coloured(&setup, fit, 6, stopping).unwrap();
+                let half = fit.half_widths(0.95);
+                (fit.x, half)
+            } else {
+                let half = robust(&setup, &fit, 6).unwrap().half_widths(0.95);
+                (fit.x, half)
+            };
+            rig.theta
+                .iter()
+                .zip(x.iter().zip(half))
+                .map(|(truth, (x, half))| (x - truth, (x - truth).abs() <= half.unwrap()))
+                .collect()
+        })
+        .collect();
+    (0..rig.theta.len())
+        .map(|i| {
+            let n = RECORDS as f64;
+            let mean = estimates.iter().map(|e| e[i].0).sum::<f64>() / n;
+            let square = estimates.iter().map(|e| e[i].0.powi(2)).sum::<f64>() / n;
+            let hits = estimates.iter().filter(|e| e[i].1).count() as f64 / n;
+            (mean / (square - mean * mean).sqrt(), hits)
+        })
+        .collect()
+}
+
+/// Coloured noise in a loop: a fit by simulation error on the measured command is biased and its intervals are not to be
+/// trusted; the same fit of the simulated loop is not and they are.
+#[test]
+fn coloured_noise_biases_the_measured_command_and_not_the_loop() {
+    let rig = Rig {
+        interval: 2.0,
+        samples: 600,
+        ..Rig::single_tank()
+    };
+    assert_eq!(rig.plant, Plant::SingleTank);
+    let measured = over_records(&rig, 0.9, false, false);
+    let simulated = over_records(&rig, 0.9, true, false);
+    let in_colour = over_records(&rig, 0.9, true, true);
+    println!(
+        "measured {measured:.3?}, loop {simulated:.3?}, loop in the noise's metric {in_colour:.3?}"
+    );
+    assert!(
+        measured
+            .iter()
+            .all(|(bias, hits)| bias.abs() > 0.8 && *hits < 0.9)
+    );
+    for (bias, hits) in simulated.iter().chain(&in_colour) {
+        assert!(bias.abs() < 0.35 && *hits > 0.91, "{bias} {hits}");
+    }
+    // White noise that is read before the command acts does no harm either way.
+    for (bias, hits) in over_records(&rig, 0.0, false, false) {
+        assert!(bias.abs() < 0.35 && hits > 0.91, "{bias} {hits}");
+    }
+}
+
+/// A start-up and steps that drive the command from one limit to the other, for long: the disturbance is still the noise that was
+/// added, and a fit finds the truth.
+#[test]
+fn a_command_at_its_limits_is_no_disturbance() {
+    let rig = Rig {
+        samples: 800,
+        ..Rig::linear_tank()
+    };
+    let controller = Controller::pi(2.0, 60.0, LIMITS).unwrap();
+    let r: Vec<f64> = (0..rig.samples)
+        .map(|k| [16.0, 38.0, 3.0, 30.0][k / 100 % 4])
+        .collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let e = noise::ar1(rig.samples, 0.05, 0.8, &mut rng);
+    let record = in_loop(&rig, &controller, &r, &e);
+    let limited = |u: &&f64| **u <= LIMITS.0 || **u >= LIMITS.1;
+    let at_limit = record.input.values.iter().filter(limited).count();
+    assert!(at_limit > rig.samples / 10, "{at_limit}");
+    let records = [record];
+    let (setup, x) = rig
+        .setup(&records)
+        .in_loop(&controller, &rig.truth(1))
+        .unwrap();
+    let found = &setup.disturbance(&x).unwrap()[0];
+    let worst = |found: &[f64]| {
+        let apart = found.iter().zip(&e).map(|(v, e)| (v - e).abs());
+        apart.fold(0.0, f64::max)
+    };
+    assert!(worst(found) < 1e-8, "{}", worst(found));
+    let away: Vec<f64> = x.iter().map(|value| 1.1 * value).collect();
+    let white = ArModel::white(1.0);
+    let fit = fit_from(&setup, &[away], &white, FitOptions::default().stopping).unwrap();
+    let fit = coloured(&setup, fit, 6, FitOptions::default().stopping).unwrap();
+    for (i, truth) in rig.theta.iter().enumerate() {
+        let half = fit.half_widths(0.9999)[i].unwrap();
+        assert!(
+            (fit.x[i] - truth).abs() < half,
+            "{i}: {} ± {half}",
+            fit.x[i]
+        );
+        assert!(half < 0.02 * truth.abs(), "{i}: {half}");
+    }
+}

@@ -1,0 +1,15 @@
+//! One program for all tests: each of its own would link the crate again.
+#![allow(clippy::unwrap_used)]
+
+mod closed_loop;
+mod coverage;
+mod effects;
+mod lag_states;
+mod linearise;
+mod minima;
+mod minimise;
+mod parts;
+mod records;
+mod sandwich;
+mod support;
+mod three_tank;

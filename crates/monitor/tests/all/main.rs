@@ -1,0 +1,6 @@
+//! One program for all tests: each of its own would link the crate again.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod dead_time;
+mod monitor;
+mod play;

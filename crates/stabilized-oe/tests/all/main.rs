@@ -1,0 +1,15 @@
+//! One program for all tests: each of its own would link the crate again.
+#![allow(clippy::unwrap_used)]
+
+mod any_input;
+mod bounding;
+mod convergence;
+mod lyapunov;
+mod lyapunov_strict;
+mod orders;
+mod positive_real;
+mod printed_sign;
+mod rows;
+mod summed;
+mod support;
+mod uneven_steps;

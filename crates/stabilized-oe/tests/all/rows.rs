@@ -1,0 +1,353 @@
+//! Rows over `theta` and `c^`, [U] 4.14 to 4.18: against a fine integration of the equations, and what is refused.
+
+use crate::support::reference::{Entry, Equations, blocks, differ, random, start, state};
+use crate::support::second_order;
+use ct_constrained::Relation::{AtLeast, AtMost, Equal};
+use ct_rls::{ContinuousRls, ExactHold, RecursiveEstimator, Weights};
+use nalgebra::{SMatrix, SVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use stabilized_oe::{
+    BlockDiagonal, CoupledRow, Error, Full, Gain, IoSample, Known, LateDifference, StabilizedOe,
+};
+
+/// A row and its entry in the equations, where data have the ratios `Gamma/W` of `weights`.
+fn row(rng: &mut ChaCha8Rng, w: f64, weights: [Weights; 2]) -> (CoupledRow<2, 3>, Entry) {
+    let (f, f_c) = (random::<3, 1>(rng), random::<2, 1>(rng));
+    let z = rng.random_range(-2.0..2.0);
+    let entry = Entry {
+        f,
+        f_c,
+        z,
+        w,
+        gamma: weights.map(|d| w * d.gamma() / d.c()),
+    };
+    let row = CoupledRow::new(Equal, f.data.0[0], f_c.data.0[0], z, w).unwrap();
+    (row, entry)
+}
+
+/// Data that are held, and their entry for the estimates `at`.
+fn data(rng: &mut ChaCha8Rng, weights: [Weights; 2]) -> (SVector<f64, 3>, SVector<f64, 2>, Entry) {
+    let (phi, e1) = (random::<3, 1>(rng), random::<2, 1>(rng));
+    let entry = Entry {
+        f: phi,
+        f_c: -e1,
+        z: rng.random_range(-2.0..2.0),
+        // 4.18 has one weight; the blocks' gains may differ only in their forgetting here
+        w: weights[0].c(),
+        gamma: weights.map(|w| w.gamma()),
+    };
+    (phi, e1, entry)
+}
+
+/// `eps~` of held data at the estimates of the gain.
+fn error(gain: &impl Gain<2, 3>, entry: &Entry) -> f64 {
+    entry.z - entry.f.dot(&gain.theta()) - entry.f_c.dot(&gain.filter())
+}
+
+fn pair(c: f64, gamma: f64, eta: [f64; 2]) -> [Weights; 2] {
+    eta.map(|eta| Weights::new(c, gamma, eta).unwrap())
+}
+
+/// The difference after a row alone over 0.8 s, in `steps`; forgetting is in the data's step, which is without data here.
+fn row_alone(rng: &mut ChaCha8Rng, weights: [Weights; 2], w: f64, steps: &[u32]) -> Vec<f64> {
+    let begin = start(rng);
+    let (row, entry) = row(rng, w, weights);
+    let equations = Equations {
+        entries: &[entry],
+        eta: weights.map(|w| w.eta()),
+        lambda: Default::default(),
+    };
+    let exact = equations.after(&begin, 0.8, 4000);
+    let run = |&steps: &u32| {
+        let (mut gain, dt) = (blocks(&begin, weights), 0.8 / f64::from(steps));
+        for _ in 0..steps {
+            gain.advance(&SVector::zeros(), &SVector::zeros(), 0.0, dt);
+            gain.take_row(&row, dt);
+        }
+        differ(&state(&gain), &exact, &begin)
+    };
+    steps.iter().map(run).collect()
+}
+
+#[test]
+fn a_row_alone_is_exact_over_a_step() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut worst = 0.0_f64;
+    for _ in 0..20 {
+        for weights in [
+            pair(1.0, 1.0, [0.0, 0.0]),
+            pair(0.5, 0.5, [0.3, 0.3]),
+            pair(1.0, 0.4, [0.2, 0.2]),
+            pair(0.7, 0.0, [0.0, 0.0]),
+        ] {
+            let w = 10f64.powf(rng.random_range(-2.0..1.5));
+            worst = worst.max(row_alone(&mut rng, weights, w, &[1])[0]);
+        }
+    }
+    println!("largest relative difference: {worst:.1e}");
+    assert!(worst < 1e-6, "{worst:e}");
+}
+
+/// The two blocks have no common clock then.
+#[test]
+fn with_two_memories_a_row_is_of_second_order() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    for _ in 0..5 {
+        let off = row_alone(&mut rng, pair(1.0, 1.0, [0.6, 0.0]), 3.0, &[1, 100, 200]);
+        println!(
+            "off by {:.1e}, {:.1e} in 100 steps, {:.1e} in 200",
+            off[0], off[1], off[2]
+        );
+        assert!((3.8..4.2).contains(&(off[1] / off[2])), "{off:?}");
+        assert!(off[2] < 1e-4, "{off:?}");
+    }
+}
+
+#[test]
+fn rows_after_data_are_of_first_order() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    for weights in [pair(1.0, 1.0, [0.2, 0.1]), pair(0.7, 0.0, [0.0, 0.0])] {
+        let begin = start(&mut rng);
+        let (phi, e1, entry) = data(&mut rng, weights);
+        let rows = [row(&mut rng, 3.0, weights), row(&mut rng, 0.5, weights)];
+        let equations = Equations {
+            entries: &[entry, rows[0].1, rows[1].1],
+            eta: weights.map(|w| w.eta()),
+            lambda: Default::default(),
+        };
+        let exact = equations.after(&begin, 1.0, 4000);
+        let off = |steps: u32| {
+            let mut gain = blocks(&begin, weights);
+            let dt = 1.0 / f64::from(steps);
+            for _ in 0..steps {
+                let epsilon = error(&gain, &entry);
+                gain.advance(&phi, &e1, epsilon, dt);
+                rows.iter().for_each(|(row, _)| gain.take_row(row, dt));
+            }
+            differ(&state(&gain), &exact, &begin)
+        };
+        let (coarse, fine) = (off(200), off(400));
+        println!("off by {coarse:.1e} in 200 steps, {fine:.1e} in 400");
+        assert!((1.9..2.1).contains(&(coarse / fine)), "{coarse:e} {fine:e}");
+        assert!(fine < 1e-2, "{fine:e}");
+    }
+}
+
+/// One step of data and rows with the full gain is the minimum of the quadratic criterion, by a direct inverse.
+#[test]
+fn data_and_equalities_together_are_exact_for_the_full_gain() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let (eta, dt, c) = (0.3, 1.5, 0.8);
+    for _ in 0..50 {
+        let weights = pair(c, c, [eta; 2]);
+        let root = random::<5, 5>(&mut rng);
+        let p = root * root.transpose() + SMatrix::identity() * 0.2;
+        let begin: SVector<f64, 5> = random(&mut rng);
+        let rls = ContinuousRls::<5, ExactHold>::new(begin, p, weights[0]).unwrap();
+        let mut gain = Full::<2, 3, 5>::new(rls);
+        let (phi, e1, entry) = data(&mut rng, weights);
+        let rows = [row(&mut rng, 3.0, weights), row(&mut rng, 100.0, weights)];
+        let epsilon = error(&gain, &entry);
+        gain.advance(&phi, &e1, epsilon, dt);
+        rows.iter().for_each(|(row, _)| gain.take_row(row, dt));
+
+        let mut information = p.try_inverse().unwrap() * (-eta * dt).exp();
+        let mut vector = information * begin;
+        for entry in [entry, rows[0].1, rows[1].1] {
+            let m = SVector::<f64, 5>::from_fn(
+                |i, _| if i < 3 { entry.f[i] } else { entry.f_c[i - 3] },
+            );
+            let w = entry.w * (1.0 - (-eta * dt).exp()) / eta;
+            information += m * m.transpose() * w;
+            vector += m * (w * entry.z);
+        }
+        let minimum = information.lu().solve(&vector).unwrap();
+        assert!((gain.rls().theta() - minimum).amax() < 1e-10 * minimum.amax().max(1.0));
+    }
+}
+
+/// A penalty pulls along `(Q1 f, Q2 f_c)` by the exact share, only where it is violated, and never past the row; `P` stays.
+#[test]
+fn a_penalty_is_relaxed_exactly_and_never_passed() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let weights = pair(1.0, 1.0, [0.0; 2]);
+    let (mut acted, mut obeyed) = (0, 0);
+    for _ in 0..50 {
+        let begin = start(&mut rng);
+        let (f, f_c) = (random::<3, 1>(&mut rng), random::<2, 1>(&mut rng));
+        let chi = rng.random_range(-1.0..1.0);
+        for (relation, w) in [
+            (AtMost, 0.3),
+            (AtLeast, 0.3),
+            (AtMost, 1e9),
+            (AtLeast, f64::MAX),
+        ] {
+            let row = CoupledRow::new(relation, f.data.0[0], f_c.data.0[0], chi, w).unwrap();
+            let before = row.violation(&begin.theta, &begin.c);
+            let both: SVector<f64, 5> = SVector::from_fn(|i, _| {
+                if i < 3 {
+                    begin.theta[i]
+                } else {
+                    begin.c[i - 3]
+                }
+            });
+            let mut p = SMatrix::<f64, 5, 5>::zeros();
+            p.fixed_view_mut::<3, 3>(0, 0).copy_from(&begin.p1);
+            p.fixed_view_mut::<2, 2>(3, 3).copy_from(&begin.p2);
+            let full = ContinuousRls::<5, ExactHold>::new(both, p, weights[0]).unwrap();
+            let mut full = Full::<2, 3, 5>::new(full);
+            let mut gain = blocks(&begin, weights);
+            gain.take_row(&row, 2.0);
+            full.take_row(&row, 2.0);
+            let after = row.violation(&gain.theta(), &gain.filter());
+            assert!((gain.covariance() - begin.p1).amax() < 1e-14);
+            // the full gain's, with the same P
+            assert!((gain.theta() - Gain::theta(&full)).amax() < 1e-12);
+            assert!((gain.filter() - full.filter()).amax() < 1e-12);
+            if before == 0.0 {
+                obeyed += 1;
+                assert_eq!((gain.theta(), gain.filter()), (begin.theta, begin.c));
+                continue;
+            }
+            acted += 1;
+            let s = f.dot(&(begin.p1 * f)) + f_c.dot(&(begin.p2 * f_c));
+            let left = before * (-w * 2.0 * s).exp();
+            assert!((after - left).abs() < 1e-13, "{before} {after} {left}");
+        }
+    }
+    assert!(acted > 50 && obeyed > 50, "{acted} {obeyed}");
+}
+
+fn with_rows<const K: usize>(
+    rows: [CoupledRow<2, 3>; K],
+) -> Result<StabilizedOe<2, 3, BlockDiagonal<2, 3>, Known<2, 1>, K>, Error> {
+    let gain = second_order::block_diagonal::<ExactHold>(second_order::weights(0.0));
+    StabilizedOe::new(gain, Known::new(true))
+        .unwrap()
+        .with_rows(rows)
+}
+
+#[test]
+fn rows_that_contradict_each_other_are_refused() {
+    let of = |relation, f, f_c, chi| CoupledRow::new(relation, f, f_c, chi, 10.0).unwrap();
+    let sum = |relation, chi| of(relation, [1.0, 0.0, 0.0], [1.0, 0.0], chi);
+    let difference = |relation, chi| of(relation, [1.0, 0.0, 0.0], [-1.0, 0.0], chi);
+    let first = |relation, chi| of(relation, [2.0, 0.0, 0.0], [0.0, 0.0], chi);
+    for (rows, row) in [
+        // a pair, an equality against a bound, and three of which any two agree
+        ([sum(Equal, 1.0), sum(Equal, 2.0), first(Equal, 0.0)], None),
+        (
+            [sum(Equal, 1.0), sum(AtLeast, 1.5), first(AtMost, 9.0)],
+            Some(1),
+        ),
+        (
+            [sum(Equal, 1.0), difference(Equal, 3.0), first(AtMost, 3.0)],
+            Some(2),
+        ),
+    ] {
+        let error = with_rows(rows).map(|_| ()).unwrap_err();
+        let Error::Constrained(ct_constrained::Error::NoCommonPoint {
+            row: found,
+            violation,
+        }) = error
+        else {
+            panic!("{error}");
+        };
+        assert!(row.is_none_or(|row| row == found), "{error}");
+        assert!((0.4..=1.1).contains(&violation.abs()), "{error}");
+        assert!(!error.to_string().contains('\n'));
+    }
+    // the same that agree, also one said twice, and one that is switched off
+    let off = CoupledRow::new(Equal, [1.0, 0.0, 0.0], [1.0, 0.0], 7.0, 0.0).unwrap();
+    let agree = [sum(Equal, 1.0), difference(Equal, 3.0), first(AtMost, 4.0)];
+    assert!(with_rows(agree).is_ok());
+    assert!(with_rows([agree[0], agree[0], agree[1], agree[2], off]).is_ok());
+    let mut estimator = with_rows([agree[0], off]).unwrap();
+    assert!(estimator.set_row(1, sum(AtLeast, 1.5)).is_err());
+    assert_eq!(estimator.rows(), &[agree[0], off]);
+    assert!(matches!(
+        estimator.set_row(2, off),
+        Err(Error::Constrained(ct_constrained::Error::NoSuchRow {
+            index: 2,
+            rows: 2
+        }))
+    ));
+    estimator.set_row(1, sum(AtLeast, 0.5)).unwrap();
+    // theta = (2, 2, 0.5), c = (1, 1)
+    assert_eq!(estimator.violations(), [2.0, 0.0]);
+}
+
+#[test]
+fn rows_out_of_range_are_refused_with_their_numbers() {
+    let make = |f, f_c, chi, w| CoupledRow::<2, 3>::new(AtMost, f, f_c, chi, w);
+    let zero = make([0.0; 3], [-0.0, 0.0], 4.0, 1.0).unwrap_err();
+    assert_eq!(zero, Error::ZeroRow { chi: 4.0 });
+    assert!(zero.to_string().contains("chi = 4 are 0"), "{zero}");
+    for w in [-1.0, f64::NAN, f64::INFINITY] {
+        let error = make([1.0; 3], [0.0; 2], 4.0, w).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains(&format!("weight of the row is {w}")),
+            "{error}"
+        );
+    }
+    assert!(make([1.0; 3], [f64::NAN, 0.0], 4.0, 1.0).is_err());
+    assert!(make([1.0; 3], [1e31, 0.0], 4.0, 1.0).is_err());
+    assert!(make([1.0, f64::INFINITY, 0.0], [1.0; 2], 4.0, 1.0).is_err());
+    assert!(make([1.0; 3], [1.0; 2], f64::NAN, 1.0).is_err());
+}
+
+/// First order with noise, which draws `c_1` to 0. The row `c_1 >= a_1/2`, for which `C^/A^ - 1/2` is positive real, is kept; but as it
+/// couples, it draws `a_1` down with `c_1`. A row on `c^` alone, `c_1 >= 8`, leaves `theta^` where it belongs.
+#[test]
+fn a_row_that_couples_draws_theta_along() {
+    let run = |f: f64, chi: f64, weight: f64| {
+        let weights = Weights::least_squares(0.02).unwrap();
+        let theta = ContinuousRls::new(SVector::from([5.0, 0.5]), SMatrix::identity(), weights);
+        let filter = ContinuousRls::new(SVector::from([8.0]), SMatrix::identity(), weights);
+        let gain = BlockDiagonal::<1, 2>::new(theta.unwrap(), filter.unwrap());
+        let row = CoupledRow::new(AtLeast, [f, 0.0], [1.0], chi, weight).unwrap();
+        let mut estimator = StabilizedOe::new(gain, LateDifference::<5>::new())
+            .unwrap()
+            .with_rows([row])
+            .unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (dt, mut y) = (0.3, 0.0);
+        let (mut violated, mut a1) = (0.0, 0.0);
+        for k in 0..4000 {
+            let u = if k / 100 % 2 == 0 { 1.0 } else { -1.0 };
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            estimator.update(
+                &IoSample {
+                    u,
+                    y: y + 0.2 * noise,
+                },
+                dt,
+            );
+            y += (1.0 - f64::exp(-dt / 10.0)) * (u - y);
+            if k >= 2000 {
+                violated -= estimator.violations()[0] / 2000.0;
+                a1 += estimator.theta()[0] / 2000.0;
+            }
+        }
+        println!(
+            "row {f} a_1 + c_1 >= {chi}, weight {weight:e}: violated by {violated:.4}, a_1 = {a1:.2}, truth 10"
+        );
+        (violated, a1)
+    };
+    let (free, a1_free) = run(-0.5, 0.0, 0.0);
+    let (kept, a1_coupled) = run(-0.5, 0.0, 1e3);
+    let (bounded, a1_alone) = run(0.0, 8.0, 1e3);
+    assert!(
+        kept < 0.01 * free && bounded < 0.01 * free,
+        "{free} {kept} {bounded}"
+    );
+    assert!(a1_coupled < 5.0, "{a1_coupled}");
+    assert!(
+        (8.0..12.0).contains(&a1_alone) && (8.0..12.0).contains(&a1_free),
+        "{a1_free} {a1_alone}"
+    );
+}

@@ -233,6 +233,15 @@ impl ArModel {
             .fold(self.sigma, |std, k| std / (1.0 - k * k).sqrt())
     }
 
+    /// How large a slow move of the signal is in the whitened signal, over the innovations' standard deviation, where the move is as large
+    /// as the process: `(1 - sum a_i) / sqrt(prod (1 - k_i^2))`. White noise: 1; noise with a long memory: less.
+    pub fn slow_gain(&self) -> f64 {
+        let at_zero = 1.0 - self.coefficients.iter().sum::<f64>();
+        self.reflections
+            .iter()
+            .fold(at_zero, |gain, k| gain / (1.0 - k * k).sqrt())
+    }
+
     /// A filter that whitens `lanes` signals at once, one row of samples at a time: a residual and
     /// the columns of its Jacobian, say.
     pub fn whitener(&self, lanes: usize) -> Whitener {

@@ -59,8 +59,12 @@ pub(crate) fn doubt<'a>(
         confirmed = found.base.clone();
     }
     // Noise that wanders bends to gains and saturations too, as their inputs are slow.
-    if !confirmed.added.is_empty() && !beyond_random_walk(&confirmed, base, Walk::SMALL_FROM_ZERO)?
-    {
+    let beyond_small_walk = |node: &Node| {
+        Ok::<_, Error>(
+            node.added.is_empty() || beyond_random_walk(node, base, Walk::SMALL_FROM_ZERO)?,
+        )
+    };
+    if !beyond_small_walk(&confirmed)? {
         confirmed = found.base.clone();
     }
     // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
@@ -77,7 +81,11 @@ pub(crate) fn doubt<'a>(
             || (others.added.len() < count && !white)
             || remains(&confirmed, &own_last)?.is_some()
         {
-            confirmed = others;
+            confirmed = if beyond_small_walk(&others)? {
+                others
+            } else {
+                found.base.clone()
+            };
         }
     }
     if in_loop {

@@ -6,7 +6,8 @@
 //! search over its logarithm.
 //!
 //! Both residuals are whitened first by the noise model of the set with the effects: beside coloured noise a random walk would
-//! otherwise describe the noise, and the effects with it. Whitened, a walk is a walk still, smaller by the sum of the filter.
+//! otherwise describe the noise, and the effects with it. Whitened, a walk is a walk still, smaller by the sum of the filter `A(1)`; sizes
+//! are stated in the standard deviation of the noise itself.
 //!
 //! **Parameters**: a walk that is taken for the plant's response bends the parameters, so each model is fitted again beside the walk, in
 //! one step from its linearisation. Without that step some effect seems to go beyond the walk in one record of thirty whose noise wanders.
@@ -42,7 +43,7 @@ const BENDING: f64 = 0.35;
 pub(crate) struct Walk {
     /// Its first value is unknown (diffuse start); otherwise zero, so that an offset which stays is no walk.
     pub anywhere: bool,
-    /// Standard deviation at the end of a record over that of the white noise, at most.
+    /// Standard deviation at the end of a record over that of the noise, at most.
     pub largest: f64,
     /// Whether the parameters are fitted again beside it.
     pub fitted_again: bool,
@@ -55,7 +56,7 @@ impl Walk {
         largest: f64::INFINITY,
         fitted_again: false,
     };
-    /// No larger than the innovations of the noise; it bends the parameters too.
+    /// No larger than the noise; it bends the parameters too.
     pub const SMALL: Self = Self {
         anywhere: true,
         largest: 1.0,
@@ -74,6 +75,8 @@ impl Walk {
 struct Whitened {
     columns: usize,
     records: Vec<Vec<f64>>,
+    /// Size of a slow move of the output in the whitened rows, over that of their innovations, where the move is as large as the noise.
+    slow: f64,
 }
 
 impl Whitened {
@@ -87,6 +90,7 @@ impl Whitened {
         Self {
             columns,
             records: records.map(whiten).collect(),
+            slow: noise.slow_gain(),
         }
     }
 
@@ -95,7 +99,7 @@ impl Whitened {
     fn deviance(&self, walk: Walk) -> f64 {
         let rows = |values: &Vec<f64>| values.len() / self.columns;
         let longest = self.records.iter().map(rows).max().unwrap_or(1);
-        let largest = walk.largest.powi(2) / longest as f64;
+        let largest = (self.slow * walk.largest).powi(2) / longest as f64;
         (DECADES.start * EACH..DECADES.end * EACH)
             .map(|step| 10_f64.powf(f64::from(step) / f64::from(EACH)))
             .filter(|q| *q <= largest)
@@ -135,7 +139,7 @@ impl Whitened {
         }
         let count = triangle.rows() as f64;
         // A walk bends the parameters by no more than moves the output as far as the walk goes.
-        let bend = (BENDING.powi(2) * count / last.max(1) as f64).sqrt();
+        let bend = ((self.slow * BENDING).powi(2) * count / last.max(1) as f64).sqrt();
         for row in self
             .records
             .iter()
@@ -303,6 +307,27 @@ mod tests {
         // A jump of one standard deviation in the first sample is what a walk would need.
         assert!(fall(false) > 20.0, "{}", fall(false));
         assert!(fall(true).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_small_walk_is_small_beside_the_noise_itself() {
+        // A line beside noise with a long memory is told from a walk as large as the noise better than from one of any size.
+        let noise = ArModel::from_coefficients(&[0.8], 0.6).unwrap();
+        let falls = (0..40).map(|seed| {
+            let series = series(0.8, 0.0, 5.0, seed);
+            let of = |rows: Vec<f64>, walk: Walk| {
+                Whitened::of(1, std::iter::once(rows), &noise).deviance(walk)
+            };
+            let line = without_line(&series);
+            [Walk::SMALL, Walk::ANY].map(|walk| of(series.clone(), walk) - of(line.clone(), walk))
+        });
+        let (mut small, mut any) = (0.0, 0.0);
+        for [from_small, from_any] in falls {
+            assert!(from_small >= from_any - 1e-9, "{from_small} {from_any}");
+            small += from_small / 40.0;
+            any += from_any / 40.0;
+        }
+        assert!(small > any + 2.0, "{small} {any}");
     }
 
     #[test]

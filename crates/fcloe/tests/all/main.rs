@@ -5,6 +5,7 @@ mod any_numbers;
 mod bad_input;
 mod convergence;
 mod coverage;
+mod error_of_the_loop;
 mod experiment;
 mod offsets;
 mod recovery;

@@ -196,7 +196,7 @@ fn filtered(system: &StateSpace, sampled: &Sampled, w: &[f64]) -> Vec<f64> {
 }
 
 /// `F^-1 v` from rest.
-fn unfiltered(system: &StateSpace, sampled: &Sampled, v: &[f64]) -> Vec<f64> {
+pub(crate) fn unfiltered(system: &StateSpace, sampled: &Sampled, v: &[f64]) -> Vec<f64> {
     let mut x = vec![0.0; system.order()];
     let input = v.iter().map(|v| {
         let w = (v - system.output(&x, 0.0)) / system.d();
@@ -218,12 +218,17 @@ pub(crate) struct Colour {
 
 impl Colour {
     pub(crate) fn new(noise: &NoiseModel, closed: &ClosedLoop, step: f64) -> Result<Self, Error> {
-        let ar = noise.ar.coefficients();
-        let o = ar.len();
         let system = match noise.path {
             NoisePath::Record => StateSpace::new(vec![], vec![], vec![], 1.0)?,
             NoisePath::Loop => StateSpace::controllable(&closed.disturbance()?)?,
         };
+        Self::behind(&noise.ar, &system, step)
+    }
+
+    /// Of an autoregression behind a system that it is held for.
+    pub(crate) fn behind(ar: &ArModel, system: &StateSpace, step: f64) -> Result<Self, Error> {
+        let ar = ar.coefficients();
+        let o = ar.len();
         let sampled = system.sampled(Hold::Zero, step)?;
         let n = system.order();
         let nu = o + n;

@@ -284,9 +284,8 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
             error.map(|error| (error / p.value).powi(2))
         })
         .collect();
-    // A regression says no standard errors; of the other methods one that is not known says that the parameter is not.
-    let silent = matches!(found.method, Method::Ls | Method::Iv);
-    let significant = silent
+    // Least squares says no standard errors; of the other methods one that is not known says that the parameter is not.
+    let significant = found.method == Method::Ls
         || parts
             .iter()
             .all(|part| part.is_some_and(|part| part < INSIGNIFICANT));

@@ -66,23 +66,37 @@ pub fn instruments(
     ClosedLoop::new(model, controller)?.require_stable()?;
     let mut sums = Sums::new(orders.parameters());
     for record in records {
-        let measured = Signals::measured(record, controller)?;
-        let simulated = Signals::simulated(model, record, controller)?;
-        let mut z = Vec::with_capacity(record.len() * orders.parameters());
-        let mut row = vec![0.0; orders.parameters()];
-        simulated.filtered(filter, |y, u| {
-            regressor(&mut row, orders, y, u);
-            z.extend_from_slice(&row);
-        })?;
-        let mut z = z.chunks_exact(orders.parameters());
-        measured.filtered(filter, |y, u| {
-            regressor(&mut row, orders, y, u);
-            if let Some(z) = z.next() {
-                sums.add(z, &row, y[orders.n]);
-            }
+        rows(record, controller, filter, model, |z, phi, y| {
+            sums.add(z, phi, y);
         })?;
     }
     plant(&sums.solve()?, orders)
+}
+
+/// Shows instruments, regressor and `p^n y_f` at each sample of a record.
+pub(super) fn rows(
+    record: &LoopRecord,
+    controller: &Controller,
+    filter: &Polynomial,
+    model: &PlantModel,
+    mut see: impl FnMut(&[f64], &[f64], f64),
+) -> Result<(), Error> {
+    let orders = model.orders();
+    let measured = Signals::measured(record, controller)?;
+    let simulated = Signals::simulated(model, record, controller)?;
+    let mut z = Vec::with_capacity(record.len() * orders.parameters());
+    let mut row = vec![0.0; orders.parameters()];
+    simulated.filtered(filter, |y, u| {
+        regressor(&mut row, orders, y, u);
+        z.extend_from_slice(&row);
+    })?;
+    let mut z = z.chunks_exact(orders.parameters());
+    measured.filtered(filter, |y, u| {
+        regressor(&mut row, orders, y, u);
+        if let Some(z) = z.next() {
+            see(z, &row, y[orders.n]);
+        }
+    })
 }
 
 /// The last of a refinement.
@@ -142,7 +156,11 @@ pub fn refine(
     Ok(last)
 }
 
-fn check(records: &[LoopRecord], orders: Orders, filter: &Polynomial) -> Result<(), Error> {
+pub(super) fn check(
+    records: &[LoopRecord],
+    orders: Orders,
+    filter: &Polynomial,
+) -> Result<(), Error> {
     orders.check()?;
     if records.is_empty() {
         return Err(Error::NoRecord);

@@ -129,8 +129,18 @@ impl Sums {
         }
     }
 
-    /// `[sum z phi']^-1 sum z y`, after a scaling of rows and columns that takes the units out.
+    /// `[sum z phi']^-1 sum z y`.
     pub(super) fn solve(&self) -> Result<Vec<f64>, Error> {
+        let x = self.solve_for(&DMatrix::from_column_slice(
+            self.v.len(),
+            1,
+            self.v.as_slice(),
+        ))?;
+        Ok(x.column(0).iter().copied().collect())
+    }
+
+    /// `[sum z phi']^-1 X`, after a scaling of rows and columns that takes the units out.
+    pub(super) fn solve_for(&self, x: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let p = self.v.len();
         let undetermined = Error::NotDetermined {
             parameters: p,
@@ -138,18 +148,24 @@ impl Sums {
         };
         let scale = |i: usize, which: usize| 1.0 / self.size[which][i].sqrt();
         let m = DMatrix::from_fn(p, p, |i, j| self.m[(i, j)] * scale(i, 0) * scale(j, 1));
-        let v = DVector::from_fn(p, |i, _| self.v[i] * scale(i, 0));
-        if !m.iter().chain(v.iter()).all(|x| x.is_finite()) {
+        let mut x = x.clone();
+        for (i, mut row) in x.row_iter_mut().enumerate() {
+            row *= scale(i, 0);
+        }
+        if !m.iter().chain(x.iter()).all(|x| x.is_finite()) {
             return Err(undetermined);
         }
         let svd = m.svd(true, true);
         if svd.singular_values.min() <= DEPENDENT * svd.singular_values.max() {
             return Err(undetermined);
         }
-        let Ok(x) = svd.solve(&v, 0.0) else {
+        let Ok(mut x) = svd.solve(&x, 0.0) else {
             return Err(undetermined);
         };
-        Ok((0..p).map(|j| x[j] * scale(j, 1)).collect())
+        for (j, mut row) in x.row_iter_mut().enumerate() {
+            row *= scale(j, 1);
+        }
+        Ok(x)
     }
 }
 

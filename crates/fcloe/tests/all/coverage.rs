@@ -5,6 +5,9 @@
 #[path = "support/rig.rs"]
 mod rig;
 
+use ct_lti::Polynomial;
+use fcloe::start;
+use rayon::prelude::*;
 use rig::{Coverage, Rig};
 
 const RUNS: u64 = 400;
@@ -60,4 +63,67 @@ fn estimated_levels_and_open_loop() {
     check(&Rig::second_order(false).with_unknown_levels());
     check(&Rig::second_order(true).with_unknown_levels());
     check(&Rig::open_loop());
+}
+
+/// Instruments with a filter that stays, and with one that is renewed: hits of the 95 % intervals, and the variance claimed over that of
+/// the estimates, for each parameter.
+fn instruments(rig: &Rig, lambda: f64) -> [Vec<(usize, f64)>; 2] {
+    let orders = rig.plant.orders();
+    let filter = Polynomial::new([lambda, 1.0]).unwrap().pow(orders.n);
+    type Run = [(Vec<f64>, Vec<f64>); 2];
+    let each: Vec<Run> = (0..RUNS)
+        .into_par_iter()
+        .map(|seed| {
+            let records = [rig.record(seed)];
+            let controller = &rig.controller;
+            let mut plant = start::least_squares(&records, controller, orders, &filter).unwrap();
+            for _ in 0..4 {
+                plant = start::instruments(&records, controller, &filter, &plant).unwrap();
+            }
+            let refined = start::refine(&records, controller, &plant, 10)
+                .unwrap()
+                .plant;
+            let renewed = refined.a_polynomial();
+            [(plant, &filter), (refined, &renewed)].map(|(plant, filter)| {
+                let errors = start::standard_errors(&records, controller, filter, &plant).unwrap();
+                (plant.theta().to_vec(), errors)
+            })
+        })
+        .collect();
+    [0, 1].map(|way| {
+        let truth = rig.plant.theta().iter().enumerate();
+        truth
+            .map(|(i, truth)| {
+                let runs = each.iter().map(|run| (run[way].0[i], run[way].1[i]));
+                let mean = |of: &dyn Fn((f64, f64)) -> f64| {
+                    runs.clone().map(of).sum::<f64>() / each.len() as f64
+                };
+                let centre = mean(&|(theta, _)| theta);
+                let scatter = mean(&|(theta, _)| (theta - centre).powi(2));
+                let hits = runs
+                    .clone()
+                    .filter(|(theta, error)| (theta - truth).abs() <= 1.96 * error);
+                (hits.count(), mean(&|(_, error)| error * error) / scatter)
+            })
+            .collect()
+    })
+}
+
+#[test]
+fn instruments_know_their_errors() {
+    for (rig, lambda) in [
+        (Rig::first_order(true), 0.05),
+        (Rig::first_order(false), 0.05),
+        (Rig::second_order(true), 0.1),
+        (Rig::second_order(false), 0.1),
+        (Rig::open_loop(), 0.1),
+    ] {
+        let found = instruments(&rig, lambda);
+        println!("{} in loop {}: {found:.2?}", rig.name, rig.in_loop);
+        for (hits, variance_ratio) in found.iter().flatten() {
+            assert!((0.85..1.25).contains(variance_ratio), "{found:.2?}");
+            // Lines between samples bias a_2 of two records by half its standard error.
+            assert!(*hits >= 340, "{found:.2?}");
+        }
+    }
 }

@@ -24,7 +24,7 @@ impl Task<'_> {
             Some(lambda) => vec![lambda],
             None => start::lambda_ladder(records, &self.controller, None)?,
         };
-        let mut best: Option<(f64, PlantModel, Start)> = None;
+        let mut best: Option<(f64, PlantModel, Start, Vec<Option<f64>>)> = None;
         for &lambda in &lambdas {
             let filter = ct_lti::Polynomial::new([lambda, 1.0])?.pow(self.orders.n);
             let least_squares =
@@ -33,11 +33,21 @@ impl Task<'_> {
                 continue;
             };
             let mut stage = Stage::LeastSquares;
+            let mut std_errors = vec![None; plant.theta().len()];
             if with_instruments {
                 let Ok((better, its)) = self.instruments(records, &filter, &plant) else {
                     continue;
                 };
                 (plant, stage) = (better, its);
+                let filter = match stage {
+                    Stage::Refined => plant.a_polynomial(),
+                    _ => filter,
+                };
+                let errors = start::standard_errors(records, &self.controller, &filter, &plant);
+                std_errors = match errors {
+                    Ok(errors) => errors.into_iter().map(Some).collect(),
+                    Err(_) => std_errors,
+                };
             }
             let Ok(simulated) = self.simulated(&record, &plant, self.levels_of(&record)) else {
                 continue;
@@ -49,23 +59,25 @@ impl Task<'_> {
                     bandwidth: lambda,
                     theta: plant.theta().to_vec(),
                 };
-                best = Some((error, plant, start));
+                best = Some((error, plant, start, std_errors));
             }
         }
         let tried = lambdas.len();
-        let (_, plant, start) = best.ok_or(fcloe::Error::NoStart { tried })?;
+        let (_, plant, start, std_errors) = best.ok_or(fcloe::Error::NoStart { tried })?;
         Ok(Found {
-            std_errors: vec![None; plant.theta().len()],
             levels: self.levels_of(&record),
             levels_from: chosen(&record),
             plant,
             start,
+            std_errors,
             batch: None,
             recursion: None,
             record,
-            warnings: vec![
-                "a regression gives no standard errors here: --method fcloe starts from it and does".to_owned(),
-            ],
+            warnings: if with_instruments {
+                Vec::new()
+            } else {
+                vec!["noise biases least squares by more than standard errors would say: none are shown; --method iv and fcloe have them".to_owned()]
+            },
         })
     }
 

@@ -1,0 +1,106 @@
+//! Standard errors of instruments.
+//!
+//! Equations: with the regressor `phi`, the instruments `z` and `x` the parameters of the monic form,
+//! ```text
+//! x^ - x = G^-1 sum z e,   G = sum z phi',   e = A/E w,   cov(x^) = G^-1 [sum_{k,l} R(k-l) z_k z_l'] G^-T
+//! ```
+//! whether w, the noise of y, circulates in the loop or stands on the record alone. w follows from e by the inverse of `A^/E` from sample
+//! to sample, an autoregression is fitted to it, and R is the autocovariance of that behind `A^/E`: no autoregression of modest order
+//! stands for the slow zeros of A. theta follows from x by its derivatives.
+//!
+//! Assumptions: the noise is stationary, independent of what drives the instruments, and of one colour, counted in samples, in all
+//! records; the model's structure is right. Where A^ is not Hurwitz the autoregression is that of e itself.
+//!
+//! **Reference**: T. Söderström, P. Stoica, Instrumental Variable Methods for System Identification, Springer 1983, ch. 6.
+
+use ct_lti::{Hold, Polynomial, StateSpace, TransferFunction};
+use ct_signals::ArModel;
+use nalgebra::DMatrix;
+
+use super::regression::{check, rows};
+use super::signals::Sums;
+use crate::noise_model::{Colour, unfiltered};
+use crate::{ClosedLoop, Controller, Error, LoopRecord, PlantModel};
+
+/// Orders of autoregressive noise that are tried: 0 to this.
+const MAX_ORDER: usize = 8;
+
+/// Standard errors of `theta` of a plant that [`instruments`](super::instruments) gave, with the filter it was given last, or
+/// [`refine`](super::refine) (the filter is then A^).
+///
+/// # Errors
+/// As [`instruments`](super::instruments).
+pub fn standard_errors(
+    records: &[LoopRecord],
+    controller: &Controller,
+    filter: &Polynomial,
+    plant: &PlantModel,
+) -> Result<Vec<f64>, Error> {
+    check(records, plant.orders(), filter)?;
+    ClosedLoop::new(plant, controller)?.require_stable()?;
+    let (n, p) = (plant.orders().n, plant.orders().parameters());
+    let monic = monic(plant);
+    let a = plant.a_polynomial();
+    let system = if a.is_hurwitz() {
+        StateSpace::controllable(&TransferFunction::new(a, filter.clone())?)?
+    } else {
+        StateSpace::new(vec![], vec![], vec![], 1.0)?
+    };
+
+    let mut sums = Sums::new(p);
+    let mut noise = Vec::with_capacity(records.len());
+    for record in records {
+        let mut e = Vec::with_capacity(record.len());
+        rows(record, controller, filter, plant, |z, phi, y| {
+            sums.add(z, phi, y);
+            e.push(y - phi.iter().zip(&monic).map(|(phi, x)| phi * x).sum::<f64>());
+        })?;
+        let sampled = system.sampled(Hold::Zero, record.step)?;
+        noise.push(unfiltered(&system, &sampled, &e));
+    }
+    let segments: Vec<&[f64]> = noise.iter().map(Vec::as_slice).collect();
+    let ar = ArModel::fit(&segments, MAX_ORDER)?;
+
+    let mut middle = DMatrix::zeros(p, p);
+    for record in records {
+        let colour = Colour::behind(&ar, &system, record.step)?;
+        let mut filtered = colour.filter(p);
+        rows(record, controller, filter, plant, |z, _, _| {
+            filtered.push(z);
+        })?;
+        middle += DMatrix::from_row_slice(p, p, &filtered.finish());
+    }
+    let samples = segments.iter().map(|w| w.len()).sum::<usize>() as f64;
+    // The variance of the innovations is over the samples less their order.
+    let order = ar.order() as f64;
+    let variance = ar.sigma().powi(2) * (samples - order) / (samples - order - p as f64).max(1.0);
+    let half = sums.solve_for(&middle)?;
+    let covariance = sums.solve_for(&half.transpose())? * variance;
+
+    // theta = [x_1/x_0 .., 1/x_0, x_n/x_0 ..].
+    let x0 = monic[0];
+    let derivatives = DMatrix::from_fn(p, p, |i, j| {
+        let from = if i + 1 < n { i + 1 } else { i };
+        let own = if i + 1 == n { 1.0 } else { monic[from] };
+        let of_x0 = if j == 0 { -own / (x0 * x0) } else { 0.0 };
+        of_x0
+            + if i + 1 != n && from == j {
+                1.0 / x0
+            } else {
+                0.0
+            }
+    });
+    let covariance = &derivatives * covariance * derivatives.transpose();
+    Ok((0..p).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect())
+}
+
+/// `[alpha_0 .., beta_0 ..]` of `A = 1 + ..`.
+fn monic(plant: &PlantModel) -> Vec<f64> {
+    let (a, b) = plant.theta().split_at(plant.orders().n);
+    let last = a.last().copied().unwrap_or(1.0);
+    std::iter::once(&1.0)
+        .chain(&a[..a.len() - 1])
+        .chain(b)
+        .map(|c| c / last)
+        .collect()
+}

@@ -5,10 +5,10 @@ use missing_effect::{Options, diagnose};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Open and closed loop, white and coloured noise, three kinds of plant: of 24 records (`RECORDS=60`: of so many) at most one may
-/// be said to miss something of the catalogue.
+/// Open and closed loop, white and coloured noise, three kinds of plant: of 24 records none may be said to miss something of the
+/// catalogue; of 60 (`RECORDS=60`) one.
 #[test]
-fn at_most_one_adequate_model_is_blamed() {
+fn adequate_models_are_not_blamed() {
     let records = std::env::var("RECORDS").map_or(24, |records| records.parse().unwrap());
     let mut blamed = Vec::new();
     let mut verdicts = std::collections::BTreeMap::new();
@@ -46,5 +46,5 @@ fn at_most_one_adequate_model_is_blamed() {
         }
     }
     println!("{verdicts:?}");
-    assert!(blamed.len() <= 1, "{blamed:?}");
+    assert!(blamed.len() as u64 <= records / 60, "{blamed:?}");
 }

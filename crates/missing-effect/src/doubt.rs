@@ -81,11 +81,7 @@ pub(crate) fn doubt<'a>(
             || (others.added.len() < count && !white)
             || remains(&confirmed, &own_last)?.is_some()
         {
-            confirmed = if beyond_small_walk(&others)? {
-                others
-            } else {
-                found.base.clone()
-            };
+            confirmed = others;
         }
     }
     if in_loop {
@@ -97,6 +93,10 @@ pub(crate) fn doubt<'a>(
         {
             confirmed = simpler;
         }
+    }
+    // What was made smaller since is no longer what was held against it.
+    if !beyond_small_walk(&confirmed)? {
+        confirmed = found.base.clone();
     }
     Ok(Doubted {
         confirmed,

@@ -138,7 +138,7 @@ impl Whitened {
             }
         }
         let count = triangle.rows() as f64;
-        // A walk bends the parameters by no more than moves the output as far as the walk goes.
+        // A walk bends the parameters by no more than what moves the output, slowly, as far as the walk goes.
         let bend = ((self.slow * BENDING).powi(2) * count / last.max(1) as f64).sqrt();
         for row in self
             .records

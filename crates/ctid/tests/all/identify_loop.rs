@@ -386,6 +386,10 @@ fn the_program_writes_what_it_prints() {
             .iter()
             .map(|p| &p["name"]);
         assert_eq!(names.collect::<Vec<_>>(), ["a1", "b0"]);
+        for parameter in json["parameters"].as_array().unwrap() {
+            let known = parameter["std_error"].as_f64().is_some_and(|e| e > 0.0);
+            assert_eq!(known, method != "ls", "{method}: {parameter}");
+        }
         assert_eq!(json["in_loop"]["r"].as_array().unwrap().len(), 2);
         assert_eq!(json["trajectory"].is_null(), method != "recursive-fcloe");
         let page = place.read("out.html");

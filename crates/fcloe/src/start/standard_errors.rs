@@ -8,8 +8,13 @@
 //! to sample, an autoregression is fitted to it, and R is the autocovariance of that behind `A^/E`: no autoregression of modest order
 //! stands for the slow zeros of A. theta follows from x by its derivatives.
 //!
-//! Assumptions: the noise is stationary, independent of what drives the instruments, and of one colour, counted in samples, in all
-//! records; the model's structure is right. Where A^ is not Hurwitz the autoregression is that of e itself.
+//! Assumptions: the noise is stationary, independent of what drives the instruments, and of one spectrum, counted in samples, in all
+//! records; the model's structure is right; the levels are exact, so that what is not known of them comes on top. Where the inverse of
+//! `A^/E` grows without bound the autoregression is that of e itself.
+//!
+//! Figures, 400 runs for each of seven settings at 20 dB: the variance is 0.97 to 1.25 times that of the estimates where the filter is
+//! renewed, up to 1.8 times with one that stays; intervals of 95 % hold the truth in 94 to 97 %, for plants of second order, which lines
+//! between samples bias, in 86 % and more (`cargo test -p fcloe --test all coverage::instruments -- --nocapture`).
 //!
 //! **Reference**: T. Söderström, P. Stoica, Instrumental Variable Methods for System Identification, Springer 1983, ch. 6.
 
@@ -24,12 +29,14 @@ use crate::{ClosedLoop, Controller, Error, LoopRecord, PlantModel};
 
 /// Orders of autoregressive noise that are tried: 0 to this.
 const MAX_ORDER: usize = 8;
+/// An inverse whose output has more than so many times the squares of its input grows without bound.
+const UNBOUNDED: f64 = 1e8;
 
 /// Standard errors of `theta` of a plant that [`instruments`](super::instruments) gave, with the filter it was given last, or
 /// [`refine`](super::refine) (the filter is then A^).
 ///
 /// # Errors
-/// As [`instruments`](super::instruments).
+/// As [`instruments`](super::instruments); [`Error::NotDetermined`] too where a variance is not finite; those of [`ArModel::fit`].
 pub fn standard_errors(
     records: &[LoopRecord],
     controller: &Controller,
@@ -40,23 +47,31 @@ pub fn standard_errors(
     ClosedLoop::new(plant, controller)?.require_stable()?;
     let (n, p) = (plant.orders().n, plant.orders().parameters());
     let monic = monic(plant);
-    let a = plant.a_polynomial();
-    let system = if a.is_hurwitz() {
-        StateSpace::controllable(&TransferFunction::new(a, filter.clone())?)?
-    } else {
-        StateSpace::new(vec![], vec![], vec![], 1.0)?
-    };
-
     let mut sums = Sums::new(p);
-    let mut noise = Vec::with_capacity(records.len());
+    let mut errors = Vec::with_capacity(records.len());
     for record in records {
         let mut e = Vec::with_capacity(record.len());
         rows(record, controller, filter, plant, |z, phi, y| {
             sums.add(z, phi, y);
             e.push(y - phi.iter().zip(&monic).map(|(phi, x)| phi * x).sum::<f64>());
         })?;
+        errors.push(e);
+    }
+    let behind = TransferFunction::new(plant.a_polynomial(), filter.clone())?;
+    let mut system = StateSpace::controllable(&behind)?;
+    let size = |s: &[f64]| s.iter().map(|s| s * s).sum::<f64>();
+    let mut noise = Vec::with_capacity(records.len());
+    for (record, e) in records.iter().zip(&errors) {
         let sampled = system.sampled(Hold::Zero, record.step)?;
-        noise.push(unfiltered(&system, &sampled, &e));
+        let w = unfiltered(&system, &sampled, e);
+        // Not finite compares as not bounded.
+        if size(&w) * system.d().powi(2) <= UNBOUNDED * size(e) {
+            noise.push(w);
+        }
+    }
+    if noise.len() < records.len() {
+        system = StateSpace::new(vec![], vec![], vec![], 1.0)?;
+        noise = errors;
     }
     let segments: Vec<&[f64]> = noise.iter().map(Vec::as_slice).collect();
     let ar = ArModel::fit(&segments, MAX_ORDER)?;
@@ -91,7 +106,15 @@ pub fn standard_errors(
             }
     });
     let covariance = &derivatives * covariance * derivatives.transpose();
-    Ok((0..p).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect())
+    let errors: Vec<f64> = (0..p).map(|i| covariance[(i, i)].sqrt()).collect();
+    if errors.iter().all(|error| error.is_finite()) {
+        Ok(errors)
+    } else {
+        Err(Error::NotDetermined {
+            parameters: p,
+            samples: samples as usize,
+        })
+    }
 }
 
 /// `[alpha_0 .., beta_0 ..]` of `A = 1 + ..`.

@@ -1,4 +1,4 @@
-//! [B] (13) without noise: `y - y^ = P^/P (theta - theta^)' sigma`, exact for parameters that differ by any amount.
+//! Baysse, Carrillo, Habbadi, (13), without noise: `y - y^ = P^/P (theta - theta^)' sigma`, exact for parameters that differ by any amount.
 
 use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
 use fcloe::{ClosedLoop, Controller, LoopSimulator, PlantModel};
@@ -6,7 +6,7 @@ use fcloe::{ClosedLoop, Controller, LoopSimulator, PlantModel};
 use crate::support::drive;
 
 /// Largest difference of both sides over the largest error of the loop, where `(theta - theta^)' sigma` is taken for straight between
-/// samples, each of which is the so-manieth part of a held value of the drive.
+/// samples; each held value of the drive spans `parts` of them.
 fn difference(
     plant: &PlantModel,
     model: &PlantModel,

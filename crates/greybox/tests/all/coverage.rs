@@ -13,10 +13,10 @@ fn records() -> u64 {
     std::env::var("RECORDS").map_or(RECORDS, |records| records.parse().unwrap())
 }
 
-/// Three standard deviations of a share of so many records around 95 %.
-fn band(records: u64) -> std::ops::RangeInclusive<f64> {
-    let deviation = (0.95 * 0.05 / records as f64).sqrt();
-    0.95 - 3.0 * deviation..=0.95 + 3.0 * deviation
+/// So many standard deviations of a share of so many records around 95 %.
+fn band(deviations: f64, records: u64) -> std::ops::RangeInclusive<f64> {
+    let width = deviations * (0.95 * 0.05 / records as f64).sqrt();
+    0.95 - width..=0.95 + width
 }
 
 /// Half widths and centres of one record's intervals.
@@ -48,7 +48,7 @@ fn check(rig: &Rig, intervals: impl Fn(&Setup) -> Intervals + Sync) {
         rig.rho
     );
     assert!(
-        each.iter().all(|c| band(count).contains(c)) && band(count).contains(&pooled),
+        each.iter().all(|c| band(3.0, count).contains(c)) && band(1.5, count).contains(&pooled),
         "{} {:?} rho {}: {each:.4?}, pooled {pooled:.4}",
         rig.plant.id(),
         rig.effects,

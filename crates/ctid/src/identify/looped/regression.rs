@@ -24,7 +24,7 @@ impl Task<'_> {
             Some(lambda) => vec![lambda],
             None => start::lambda_ladder(records, &self.controller, None)?,
         };
-        let mut best: Option<(f64, PlantModel, Start, Vec<Option<f64>>)> = None;
+        let mut best: Option<(f64, PlantModel, Start, ct_lti::Polynomial)> = None;
         for &lambda in &lambdas {
             let filter = ct_lti::Polynomial::new([lambda, 1.0])?.pow(self.orders.n);
             let least_squares =
@@ -33,21 +33,15 @@ impl Task<'_> {
                 continue;
             };
             let mut stage = Stage::LeastSquares;
-            let mut std_errors = vec![None; plant.theta().len()];
+            let mut last_filter = filter.clone();
             if with_instruments {
                 let Ok((better, its)) = self.instruments(records, &filter, &plant) else {
                     continue;
                 };
                 (plant, stage) = (better, its);
-                let filter = match stage {
-                    Stage::Refined => plant.a_polynomial(),
-                    _ => filter,
-                };
-                let errors = start::standard_errors(records, &self.controller, &filter, &plant);
-                std_errors = match errors {
-                    Ok(errors) => errors.into_iter().map(Some).collect(),
-                    Err(_) => std_errors,
-                };
+                if stage == Stage::Refined {
+                    last_filter = plant.a_polynomial();
+                }
             }
             let Ok(simulated) = self.simulated(&record, &plant, self.levels_of(&record)) else {
                 continue;
@@ -59,11 +53,24 @@ impl Task<'_> {
                     bandwidth: lambda,
                     theta: plant.theta().to_vec(),
                 };
-                best = Some((error, plant, start, std_errors));
+                best = Some((error, plant, start, last_filter));
             }
         }
         let tried = lambdas.len();
-        let (_, plant, start, std_errors) = best.ok_or(fcloe::Error::NoStart { tried })?;
+        let (_, plant, start, filter) = best.ok_or(fcloe::Error::NoStart { tried })?;
+        let mut std_errors = vec![None; plant.theta().len()];
+        let warning = if with_instruments {
+            match start::standard_errors(records, &self.controller, &filter, &plant) {
+                Ok(errors) => {
+                    std_errors = errors.into_iter().map(Some).collect();
+                    "the standard errors take the levels for exact: --method fcloe estimates them"
+                        .to_owned()
+                }
+                Err(error) => format!("no standard errors: {error}"),
+            }
+        } else {
+            "noise biases least squares by more than standard errors would say: none are shown; --method iv and fcloe have them".to_owned()
+        };
         Ok(Found {
             levels: self.levels_of(&record),
             levels_from: chosen(&record),
@@ -73,11 +80,7 @@ impl Task<'_> {
             batch: None,
             recursion: None,
             record,
-            warnings: if with_instruments {
-                Vec::new()
-            } else {
-                vec!["noise biases least squares by more than standard errors would say: none are shown; --method iv and fcloe have them".to_owned()]
-            },
+            warnings: vec![warning],
         })
     }
 

@@ -126,8 +126,13 @@ fn instruments_know_their_errors() {
         for (of, most) in found.iter().zip([2.0, 1.25]) {
             for (hits, variance_ratio) in of {
                 assert!((0.85..most).contains(variance_ratio), "{found:.2?}");
-                // Lines between samples bias plants of second order by half a standard error.
-                let least = if rig.plant.orders().n == 2 { 340 } else { 368 };
+                // Lines between samples bias plants of second order by half a standard error, and are wrong for an output that jumps.
+                let orders = rig.plant.orders();
+                let least = match orders.n {
+                    n if n == orders.m => 0,
+                    1 => 368,
+                    _ => 340,
+                };
                 assert!(*hits >= least, "{found:.2?}");
             }
         }

@@ -2,7 +2,7 @@
 //! of `docs/gallery.md`.
 //!
 //! Every effect, as the search would try it first (the middle of its starts), is built into a single tank with white noise, in open loop
-//! and under a controller, and the record is diagnosed.
+//! and under a controller, and the record is diagnosed. An argument chooses the effects whose name holds it.
 
 use std::{collections::BTreeMap, error::Error};
 
@@ -18,7 +18,9 @@ const SEED: u64 = 1;
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("| built in | found in open loop | found in closed loop |\n|---|---|---|");
-    for effect in plants::CATALOGUE {
+    let wanted = std::env::args().nth(1).unwrap_or_default();
+    let effects = plants::CATALOGUE.iter();
+    for effect in effects.filter(|effect| effect.id.contains(&wanted)) {
         let mut row = format!("| `{}` |", effect.id);
         for drive in [Drive::Open, Drive::Closed] {
             let rig = Rig {

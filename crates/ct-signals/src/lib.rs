@@ -70,6 +70,7 @@ pub mod noise;
 mod quote;
 mod record;
 pub mod residual_tests;
+mod stationary_noise;
 mod stream;
 mod unit;
 
@@ -81,4 +82,5 @@ pub use error::Error;
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};
 pub use record::{Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, Signal};
+pub use stationary_noise::{CovarianceSum, StationaryNoise};
 pub use stream::{BadLine, Line, Rows};

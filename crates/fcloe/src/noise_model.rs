@@ -23,7 +23,7 @@
 //! Reference: P. J. Huber, Proc. 5th Berkeley Symposium 1 (1967) 221-233, for the form of the covariance.
 
 use ct_lti::{Hold, Sampled, StateSpace};
-use ct_signals::ArModel;
+use ct_signals::{ArModel, StationaryNoise};
 use serde::Serialize;
 
 use crate::normal_equations::NormalEquations;
@@ -206,166 +206,48 @@ pub(crate) fn unfiltered(system: &StateSpace, sampled: &Sampled, v: &[f64]) -> V
     input.collect()
 }
 
-/// `H` as a system in discrete time with innovations of variance 1, and the autocovariance of its output.
-pub(crate) struct Colour {
-    nu: usize,
-    /// Row by row.
-    a: Vec<f64>,
-    c: Vec<f64>,
-    g: Vec<f64>,
-    r0: f64,
-}
-
-impl Colour {
-    pub(crate) fn new(noise: &NoiseModel, closed: &ClosedLoop, step: f64) -> Result<Self, Error> {
-        let system = match noise.path {
+impl NoiseModel {
+    /// `H` in discrete time, with innovations of variance 1.
+    pub(crate) fn process(&self, closed: &ClosedLoop, step: f64) -> Result<StationaryNoise, Error> {
+        let system = match self.path {
             NoisePath::Record => StateSpace::new(vec![], vec![], vec![], 1.0)?,
             NoisePath::Loop => StateSpace::controllable(&closed.disturbance()?)?,
         };
-        Self::behind(&noise.ar, &system, step)
-    }
-
-    /// Of an autoregression behind a system that it is held for.
-    pub(crate) fn behind(ar: &ArModel, system: &StateSpace, step: f64) -> Result<Self, Error> {
-        let ar = ar.coefficients();
-        let o = ar.len();
-        let sampled = system.sampled(Hold::Zero, step)?;
-        let n = system.order();
-        let nu = o + n;
-        // States: the last o values of w, then those of F. w = ar' history + e.
-        let mut a = vec![0.0; nu * nu];
-        let mut b = vec![0.0; nu];
-        let mut c = vec![0.0; nu];
-        if o > 0 {
-            a[..o].copy_from_slice(ar);
-            b[0] = 1.0;
-        }
-        for i in 1..o {
-            a[i * nu + i - 1] = 1.0;
-        }
-        for i in 0..n {
-            let row = (o + i) * nu;
-            for (j, ar) in ar.iter().enumerate() {
-                a[row + j] = sampled.g0[i] * ar;
-            }
-            a[row + o..row + nu].copy_from_slice(&sampled.phi[i * n..(i + 1) * n]);
-            b[o + i] = sampled.g0[i];
-        }
-        for (c, ar) in c.iter_mut().zip(ar) {
-            *c = system.d() * ar;
-        }
-        c[o..].copy_from_slice(system.c());
-        let sigma = stationary(nu, &a, &b);
-        let of_c: Vec<f64> = (0..nu)
-            .map(|i| dot(&sigma[i * nu..(i + 1) * nu], &c))
-            .collect();
-        let g = (0..nu).map(|i| dot(&a[i * nu..(i + 1) * nu], &of_c) + b[i] * system.d());
-        Ok(Self {
-            g: g.collect(),
-            r0: dot(&c, &of_c) + system.d() * system.d(),
-            nu,
-            a,
-            c,
-        })
-    }
-
-    /// A filter for rows of q sensitivities.
-    pub(crate) fn filter(&self, q: usize) -> Meat<'_> {
-        Meat {
-            colour: self,
-            q,
-            states: vec![0.0; q * self.nu],
-            next: vec![0.0; self.nu],
-            past: vec![0.0; q],
-            sum: vec![0.0; q * q],
-        }
+        behind(&self.ar, &system, step)
     }
 }
 
-/// `Sigma = A Sigma A' + b b'` by doubling.
-fn stationary(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
-    let product = |x: &[f64], y: &[f64], transposed: bool| -> Vec<f64> {
-        let at = |i: usize, j: usize| -> f64 {
-            (0..n)
-                .map(|k| {
-                    x[i * n + k]
-                        * if transposed {
-                            y[j * n + k]
-                        } else {
-                            y[k * n + j]
-                        }
-                })
-                .sum()
-        };
-        (0..n * n).map(|ij| at(ij / n, ij % n)).collect()
-    };
-    let mut sigma: Vec<f64> = (0..n * n).map(|ij| b[ij / n] * b[ij % n]).collect();
-    let mut power = a.to_vec();
-    // 2^50 steps: poles up to 1e-15 from the unit circle.
-    for _ in 0..50 {
-        let more = product(&product(&power, &sigma, false), &power, true);
-        let size = |m: &[f64]| m.iter().map(|m| m.abs()).sum::<f64>();
-        let small = size(&more) <= 1e-17 * size(&sigma);
-        sigma.iter_mut().zip(&more).for_each(|(s, m)| *s += m);
-        if small {
-            break;
-        }
-        power = product(&power, &power, false);
+/// An autoregression behind a system that it is held for.
+pub(crate) fn behind(ar: &ArModel, system: &StateSpace, step: f64) -> Result<StationaryNoise, Error> {
+    let ar = ar.coefficients();
+    let o = ar.len();
+    let sampled = system.sampled(Hold::Zero, step)?;
+    let n = system.order();
+    let nu = o + n;
+    // States: the last o values of w, then those of F. w = ar' history + e.
+    let mut a = vec![0.0; nu * nu];
+    let mut b = vec![0.0; nu];
+    let mut c = vec![0.0; nu];
+    if o > 0 {
+        a[..o].copy_from_slice(ar);
+        b[0] = 1.0;
     }
-    sigma
-}
-
-/// Sums `J'VJ` row by row.
-pub(crate) struct Meat<'a> {
-    colour: &'a Colour,
-    q: usize,
-    /// The filter's states, column by column of J.
-    states: Vec<f64>,
-    next: Vec<f64>,
-    past: Vec<f64>,
-    /// `sum R(0)/2 s s' + s f'`, to be made symmetric.
-    sum: Vec<f64>,
-}
-
-impl Meat<'_> {
-    /// The next row of a record.
-    pub(crate) fn push(&mut self, row: &[f64]) {
-        let Colour { nu, a, c, g, r0 } = self.colour;
-        let nu = *nu;
-        for ((past, s), state) in self
-            .past
-            .iter_mut()
-            .zip(row)
-            .zip(self.states.chunks_exact_mut(nu.max(1)))
-        {
-            *past = 0.5 * r0 * s + dot(c, state);
-            for ((next, a), g) in self.next.iter_mut().zip(a.chunks_exact(nu.max(1))).zip(g) {
-                *next = dot(a, state) + g * s;
-            }
-            state.copy_from_slice(&self.next);
-        }
-        if nu == 0 {
-            for (past, s) in self.past.iter_mut().zip(row) {
-                *past = 0.5 * r0 * s;
-            }
-        }
-        for (sums, s) in self.sum.chunks_exact_mut(self.q.max(1)).zip(row) {
-            for (sum, past) in sums.iter_mut().zip(&self.past) {
-                *sum += s * past;
-            }
-        }
+    for i in 1..o {
+        a[i * nu + i - 1] = 1.0;
     }
-
-    /// What was pushed so far, symmetric, row by row.
-    pub(crate) fn finish(self) -> Vec<f64> {
-        let q = self.q;
-        let at = |ij: usize| self.sum[ij] + self.sum[(ij % q) * q + ij / q];
-        (0..q * q).map(at).collect()
+    for i in 0..n {
+        let row = (o + i) * nu;
+        for (j, ar) in ar.iter().enumerate() {
+            a[row + j] = sampled.g0[i] * ar;
+        }
+        a[row + o..row + nu].copy_from_slice(&sampled.phi[i * n..(i + 1) * n]);
+        b[o + i] = sampled.g0[i];
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    for (c, ar) in c.iter_mut().zip(ar) {
+        *c = system.d() * ar;
+    }
+    c[o..].copy_from_slice(system.c());
+    Ok(StationaryNoise::new(a, &b, c, system.d()))
 }
 
 #[cfg(test)]
@@ -408,8 +290,8 @@ mod tests {
                 let rows: Vec<[f64; 2]> = (0..40)
                     .map(|k| [(0.3 * k as f64).sin(), (0.05 * (k * k) as f64).cos()])
                     .collect();
-                let colour = Colour::new(&noise, &closed, step).unwrap();
-                let mut filter = colour.filter(2);
+                let process = noise.process(&closed, step).unwrap();
+                let mut filter = process.sum(2);
                 rows.iter().for_each(|row| filter.push(row));
                 let found = filter.finish();
                 for (ij, found) in found.iter().enumerate() {

@@ -13,7 +13,7 @@
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::noise_model::{Colour, NoiseModel, NoisePath, Residual};
+use crate::noise_model::{NoiseModel, NoisePath, Residual};
 use crate::{ClosedLoop, Error, Fit, Problem};
 
 /// Orders of autoregressive noise that are tried: 0 to this.
@@ -82,13 +82,13 @@ impl Problem {
         })?;
         let noise = NoiseModel::of_residuals(&residuals, &closed, path, MAX_ORDER)?;
 
-        // Each record has its own filter, from rest; those of one sampling interval share the colour.
+        // Each record has its own filter, from rest; from the process of the noise at its sampling interval.
         let mut meat = vec![0.0; q * q];
-        let colours = residuals
+        let processes = residuals
             .iter()
-            .map(|residual| Colour::new(&noise, &closed, residual.step))
+            .map(|residual| noise.process(&closed, residual.step))
             .collect::<Result<Vec<_>, _>>()?;
-        let mut filters: Vec<_> = colours.iter().map(|colour| colour.filter(q)).collect();
+        let mut filters: Vec<_> = processes.iter().map(|process| process.sum(q)).collect();
         let mut row = vec![0.0; q];
         self.visit(&closed, &fit.plant, &fit.x, |index, columns, e| {
             for k in 0..e.len() {

@@ -24,7 +24,7 @@ use nalgebra::DMatrix;
 
 use super::regression::{check, rows};
 use super::signals::Sums;
-use crate::noise_model::{Colour, unfiltered};
+use crate::noise_model::{behind, unfiltered};
 use crate::{ClosedLoop, Controller, Error, LoopRecord, PlantModel};
 
 /// Orders of autoregressive noise that are tried: 0 to this.
@@ -57,8 +57,8 @@ pub fn standard_errors(
         })?;
         errors.push(e);
     }
-    let behind = TransferFunction::new(plant.a_polynomial(), filter.clone())?;
-    let mut system = StateSpace::controllable(&behind)?;
+    let of_noise = TransferFunction::new(plant.a_polynomial(), filter.clone())?;
+    let mut system = StateSpace::controllable(&of_noise)?;
     let size = |s: &[f64]| s.iter().map(|s| s * s).sum::<f64>();
     let mut noise = Vec::with_capacity(records.len());
     for (record, e) in records.iter().zip(&errors) {
@@ -78,8 +78,8 @@ pub fn standard_errors(
 
     let mut middle = DMatrix::zeros(p, p);
     for record in records {
-        let colour = Colour::behind(&ar, &system, record.step)?;
-        let mut filtered = colour.filter(p);
+        let process = behind(&ar, &system, record.step)?;
+        let mut filtered = process.sum(p);
         rows(record, controller, filter, plant, |z, _, _| {
             filtered.push(z);
         })?;

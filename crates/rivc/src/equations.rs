@@ -1,0 +1,182 @@
+//! The estimating equations `sum z (p^n y_f - phi' x) = 0` over all records, and what follows from them.
+
+use ct_signals::ArModel;
+use nalgebra::{DMatrix, DVector};
+
+use crate::bank::Bank;
+use crate::pass::{Instruments, Pass};
+use crate::Error;
+
+/// Equations whose smallest singular value, scaled, is below this share of the largest do not determine the parameters.
+const DEPENDENT: f64 = 1e-13;
+
+/// Sums over all records. Columns: what all records share, then of each record its own.
+#[derive(Debug, Clone)]
+pub(crate) struct Equations {
+    shared: usize,
+    own: usize,
+    /// `sum z phi'`, `sum z z'`, `sum z p^n y_f`.
+    zphi: DMatrix<f64>,
+    zz: DMatrix<f64>,
+    zy: DVector<f64>,
+    /// Squares of phi, to scale the columns with.
+    sizes: DVector<f64>,
+    /// Rows.
+    pub(crate) samples: usize,
+    /// Squares of the measured less the simulated output.
+    pub(crate) output_squares: f64,
+    /// Squares of the residual, whitened where there is a model of the noise.
+    pub(crate) residual_squares: f64,
+    /// The residual of each record; where the filter is that of the model `y - y^` on the measured inputs.
+    pub(crate) residuals: Vec<Vec<f64>>,
+}
+
+impl Equations {
+    pub(crate) fn new(shared: usize, own: usize, records: usize) -> Self {
+        let p = shared + own * records;
+        Self {
+            shared,
+            own,
+            zphi: DMatrix::zeros(p, p),
+            zz: DMatrix::zeros(p, p),
+            zy: DVector::zeros(p),
+            sizes: DVector::zeros(p),
+            samples: 0,
+            output_squares: 0.0,
+            residual_squares: 0.0,
+            residuals: Vec::with_capacity(records),
+        }
+    }
+
+    /// Where column i of a record is.
+    fn place(&self, index: usize, i: usize) -> usize {
+        if i < self.shared {
+            i
+        } else {
+            index * self.own + i
+        }
+    }
+
+    /// Adds a record, whitened by a model of the noise.
+    pub(crate) fn add(
+        &mut self,
+        pass: &Pass,
+        bank: &Bank,
+        instruments: Instruments,
+        noise: Option<&ArModel>,
+    ) {
+        let p = pass.columns();
+        let x = pass.x();
+        let mut residuals = Vec::with_capacity(pass.record.len());
+        let mut whitener = noise.map(|noise| noise.whitener(2 * p + 1));
+        let mut lanes = vec![0.0; 2 * p + 1];
+        let (mut zphi, mut zz) = (vec![0.0; p * p], vec![0.0; p * p]);
+        let (mut zy, mut sizes) = (vec![0.0; p], vec![0.0; p]);
+        let error = |phi: &[f64], target: f64| {
+            target - phi.iter().zip(&x).map(|(phi, x)| phi * x).sum::<f64>()
+        };
+        let (mut outputs, mut squares) = (0.0, 0.0);
+        pass.rows(bank, instruments, |row| {
+            residuals.push(error(row.phi, row.target));
+            if row.simulated.is_finite() {
+                outputs += (row.y - row.simulated).powi(2);
+            }
+            let (mut z, mut phi, mut target) = (row.z, row.phi, row.target);
+            if let Some(whitener) = &mut whitener {
+                lanes[..p].copy_from_slice(z);
+                lanes[p..2 * p].copy_from_slice(phi);
+                lanes[2 * p] = target;
+                whitener.push(&mut lanes);
+                (z, phi) = (&lanes[..p], &lanes[p..2 * p]);
+                target = lanes[2 * p];
+            }
+            squares += error(phi, target).powi(2);
+            for (i, a) in z.iter().enumerate() {
+                zy[i] += a * target;
+                sizes[i] += phi[i] * phi[i];
+                let own = i * p..(i + 1) * p;
+                for (sum, phi) in zphi[own.clone()].iter_mut().zip(phi) {
+                    *sum += a * phi;
+                }
+                for (sum, z) in zz[own].iter_mut().zip(z) {
+                    *sum += a * z;
+                }
+            }
+        });
+        for i in 0..p {
+            let row = self.place(pass.index, i);
+            self.zy[row] += zy[i];
+            self.sizes[row] += sizes[i];
+            for j in 0..p {
+                let column = self.place(pass.index, j);
+                self.zphi[(row, column)] += zphi[i * p + j];
+                self.zz[(row, column)] += zz[i * p + j];
+            }
+        }
+        self.samples += residuals.len();
+        self.output_squares += outputs;
+        self.residual_squares += squares;
+        self.residuals.push(residuals);
+    }
+
+    /// Adds a matrix of one record's columns, p by p, to one of all columns.
+    pub(crate) fn scatter(&self, of_record: &[f64], index: usize, to: &mut DMatrix<f64>) {
+        let p = self.shared + self.own;
+        for i in 0..p {
+            for j in 0..p {
+                to[(self.place(index, i), self.place(index, j))] += of_record[i * p + j];
+            }
+        }
+    }
+
+    /// Number of unknowns.
+    pub(crate) fn unknowns(&self) -> usize {
+        self.zy.len()
+    }
+
+    /// `[sum z phi']^-1 sum z p^n y_f`.
+    pub(crate) fn solve(&self) -> Result<Vec<f64>, Error> {
+        let right = DMatrix::from_column_slice(self.unknowns(), 1, self.zy.as_slice());
+        Ok(self.solve_for(right)?.iter().copied().collect())
+    }
+
+    /// `[sum z phi']^-1 X`, rows and columns scaled to units of 1.
+    fn solve_for(&self, mut right: DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+        let undetermined = || Error::NotDetermined {
+            parameters: self.unknowns(),
+            samples: self.samples,
+        };
+        let of_z = self.zz.diagonal().map(|size| 1.0 / size.sqrt());
+        let of_phi = self.sizes.map(|size| 1.0 / size.sqrt());
+        let scaled = DMatrix::from_fn(right.nrows(), right.nrows(), |i, j| {
+            self.zphi[(i, j)] * of_z[i] * of_phi[j]
+        });
+        for (mut row, scale) in right.row_iter_mut().zip(&of_z) {
+            row *= *scale;
+        }
+        if !scaled.iter().chain(right.iter()).all(|v| v.is_finite()) {
+            return Err(undetermined());
+        }
+        let svd = scaled.svd(true, true);
+        if svd.singular_values.min() <= DEPENDENT * svd.singular_values.max() {
+            return Err(undetermined());
+        }
+        let mut solution = svd.solve(&right, 0.0).map_err(|_| undetermined())?;
+        for (mut row, scale) in solution.row_iter_mut().zip(&of_phi) {
+            row *= *scale;
+        }
+        Ok(solution)
+    }
+
+    /// Variance of the residual, whitened where there is a model of the noise.
+    pub(crate) fn variance(&self) -> f64 {
+        self.residual_squares / (self.samples - self.unknowns()).max(1) as f64
+    }
+
+    /// `G^-1 S G^-T` with `G = sum z phi'`; S is `variance sum z z'` where the residual is white after whitening.
+    pub(crate) fn covariance(&self, middle: Option<DMatrix<f64>>) -> Result<DMatrix<f64>, Error> {
+        let middle = middle.unwrap_or_else(|| &self.zz * self.variance());
+        let half = self.solve_for(middle)?;
+        self.solve_for(half.transpose())
+    }
+}

@@ -1,0 +1,172 @@
+//! What can be wrong with a record, a structure or an estimate: each message names what it is about, the numbers that disagree and the
+//! mend, in one line.
+
+/// Everything this crate can refuse.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A polynomial or a step that is no such thing.
+    #[error(transparent)]
+    Lti(#[from] ct_lti::Error),
+    /// A series that `ct-signals` refuses.
+    #[error(transparent)]
+    Signals(#[from] ct_signals::Error),
+    /// No record was given.
+    #[error("no record is given; give at least one")]
+    NoRecord,
+    /// n = 0.
+    #[error("the plant has order n = 0; a plant needs at least one pole, n >= 1")]
+    OrderZero,
+    /// B of a larger degree than A.
+    #[error("B of input {input} has degree {m} over A of degree {n}; choose m of at most {n}")]
+    Improper {
+        /// Which input, from 1.
+        input: usize,
+        /// Degree of A.
+        n: usize,
+        /// Degree of B.
+        m: usize,
+    },
+    /// A structure without inputs.
+    #[error("the structure has no input; give a degree m of B for each input")]
+    NoInput,
+    /// Vectors that should be of one length.
+    #[error("{record}: {what} has {found} entries, but {expected} are needed")]
+    Length {
+        /// Name of the record.
+        record: String,
+        /// What was given.
+        what: String,
+        /// Entries that are needed.
+        expected: usize,
+        /// Entries that were given.
+        found: usize,
+    },
+    /// A number that is none.
+    #[error("{record}: {what} is {value} at sample {index}; leave the sample out, or give a number")]
+    NotFinite {
+        /// Name of the record.
+        record: String,
+        /// Which signal.
+        what: String,
+        /// Which sample, from 0.
+        index: usize,
+        /// What was found.
+        value: f64,
+    },
+    /// Times that do not rise.
+    #[error("{record}: time goes from {before} to {after} at sample {index}; times have to rise")]
+    Time {
+        /// Name of the record.
+        record: String,
+        /// Which sample, from 0.
+        index: usize,
+        /// The time before.
+        before: f64,
+        /// The time there.
+        after: f64,
+    },
+    /// A setting outside its range.
+    #[error("{what} is {value}, but must be {range}")]
+    Setting {
+        /// Which setting.
+        what: &'static str,
+        /// What was given.
+        value: f64,
+        /// What it may be.
+        range: &'static str,
+    },
+    /// A delay that leaves too little of a record.
+    #[error(
+        "{record}: a delay of up to {delay} leaves {left} of {samples} samples whose input is known, and {needed} are needed for {parameters} parameters; give a longer record, or a smaller largest delay"
+    )]
+    DelayTooLong {
+        /// Name of the record.
+        record: String,
+        /// The largest delay.
+        delay: f64,
+        /// Samples after it.
+        left: usize,
+        /// Samples in the record.
+        samples: usize,
+        /// Samples that are needed.
+        needed: usize,
+        /// Number of parameters.
+        parameters: usize,
+    },
+    /// Too few samples.
+    #[error(
+        "{samples} samples are too few for {parameters} parameters: at least {needed} are needed; lower the orders, or give more"
+    )]
+    TooShort {
+        /// Samples in all records.
+        samples: usize,
+        /// Samples that are needed.
+        needed: usize,
+        /// Number of parameters.
+        parameters: usize,
+    },
+    /// A delay beside a direct term.
+    #[error(
+        "the delay of input {input} cannot be estimated with m = n = {n}: the output would jump with it; choose m of at most {most}"
+    )]
+    DelayOfDirectTerm {
+        /// Which input, from 1.
+        input: usize,
+        /// Degree of A and B.
+        n: usize,
+        /// Largest m.
+        most: usize,
+    },
+    /// A signal that stands still.
+    #[error("{what} stands at {value} in all records, so that nothing can be identified from it; record at least a step up and a step down")]
+    Constant {
+        /// Which signal.
+        what: String,
+        /// Where it stands.
+        value: f64,
+    },
+    /// Steps that differ, where the method counts in samples.
+    #[error(
+        "{record}: the step to sample {index} is {step}, and the first one {expected}; {what} counts in samples: resample the record, or use SRIVC in open loop"
+    )]
+    Uneven {
+        /// Name of the record.
+        record: String,
+        /// Which sample, from 0.
+        index: usize,
+        /// The step to it.
+        step: f64,
+        /// The first step.
+        expected: f64,
+        /// What needs even steps.
+        what: &'static str,
+    },
+    /// A record in a loop beside one that is not.
+    #[error("{record}: the first record has {first}, and this one does not; give all records of a loop their reference, or none")]
+    MixedLoops {
+        /// Name of the record.
+        record: String,
+        /// What the first one has.
+        first: &'static str,
+    },
+    /// The reference explains nothing of the input.
+    #[error("no stable model of the input from the reference was found: without it there are no instruments in a loop; check that the reference moves")]
+    NoLoopModel,
+    /// Equations without one solution.
+    #[error(
+        "{samples} samples do not determine {parameters} parameters: some have the same effect on the output; lower the orders, or move the inputs more"
+    )]
+    NotDetermined {
+        /// Number of parameters.
+        parameters: usize,
+        /// Samples in all records.
+        samples: usize,
+    },
+    /// No start led anywhere.
+    #[error("none of {tried} bandwidths of the first filter led to a stable plant; try other orders, or another bandwidth")]
+    NoStart {
+        /// How many were tried.
+        tried: usize,
+    },
+}

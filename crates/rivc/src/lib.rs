@@ -1,0 +1,69 @@
+//! Refined instrumental variables in continuous time: SRIVC and RIVC, and in a loop CLSRIVC and CLRIVC.
+//!
+//! Model: `A(p) y = sum_j B_j(p) u_j(t - d_j) + offset + noise`, for any orders, with delays that are known or estimated, an integrator if
+//! there is one, several inputs and several records, each from a state of its own. In open loop the times may be uneven: everything is
+//! sampled exactly.
+//!
+//! | question | answer |
+//! |---|---|
+//! | Which plant made these records? | [`estimate()`] with a [`Structure`]: it needs no start |
+//! | The noise is coloured | [`Noise::Autoregressive`]: RIVC; with [`Noise::White`] the standard errors allow for it |
+//! | There is a delay, or an integrator | [`Structure::with_delay`], [`Structure::with_integrator`] |
+//! | The records are from a loop | [`Data::reference`]: the instruments come from it, and the controller need not be known |
+//! | How well do I know it? | [`Parameter::std_error`], [`Estimate::covariance`] |
+//!
+//! Time is in any one unit throughout.
+//!
+//! # Example
+//! A heater with a delay of 3.4 samples, of which neither the delay nor the order of its noise is known.
+//! ```
+//! use ct_signals::{excitation, noise};
+//! use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+//! use rivc::{Data, Delay, Kind, Noise, Settings, Structure, estimate};
+//!
+//! let u = excitation::prbs(1500, 20, -1.0, 1.0, 3)?;
+//! // 2/(1 + 8 p) e^{-3.4 p}, u held.
+//! let (decay, late) = ((-1.0_f64 / 8.0).exp(), (-0.4_f64 / 8.0).exp());
+//! let mut y = vec![20.0];
+//! for k in 0..u.len() - 1 {
+//!     let at = |lag: usize| if k >= lag { u[k - lag] } else { u[0] };
+//!     // The input changes 0.4 s after the sample.
+//!     let part = 2.0 * (at(4) * (decay / late) * (1.0 - late) + at(3) * (1.0 - decay / late));
+//!     y.push(20.0 + decay * (y[k] - 20.0) + part);
+//! }
+//! let mut rng = ChaCha8Rng::seed_from_u64(1);
+//! let v = noise::white(y.len(), 0.1, &mut rng);
+//! let y = y.iter().zip(v).map(|(y, v)| y + v).collect();
+//!
+//! let structure = Structure::new(1, [0]).with_delay(0, Delay::Estimated { most: 20.0 });
+//! let found = estimate(&[Data::even(1.0, u, y)], &structure, &Settings::new(Noise::Autoregressive))?;
+//! assert!(found.converged);
+//! for (kind, truth) in [
+//!     (Kind::A { power: 1 }, 8.0),
+//!     (Kind::B { input: 0, power: 0 }, 2.0),
+//!     (Kind::Delay { input: 0 }, 3.4),
+//! ] {
+//!     let parameter = found.parameter(kind).ok_or("not estimated")?;
+//!     assert!((parameter.value - truth).abs() < 3.0 * parameter.std_error);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod bank;
+mod data;
+mod equations;
+mod error;
+mod estimate;
+mod grid;
+mod loop_model;
+mod model;
+mod pass;
+mod prepared;
+mod problem;
+mod start;
+mod structure;
+
+pub use data::{Data, Input};
+pub use error::Error;
+pub use estimate::{Estimate, Kind, Noise, Parameter, Settings, estimate};
+pub use structure::{Delay, Structure};

@@ -1,0 +1,102 @@
+//! A plant in the monic form, with what belongs to each record.
+
+use ct_lti::Polynomial;
+
+use crate::{Error, Structure};
+
+/// `A = p^n + .. + alpha_0`; with an integrator `alpha_0` is 0.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Model {
+    pub(crate) alpha: Vec<f64>,
+    /// Of all inputs, one after the other.
+    pub(crate) beta: Vec<f64>,
+    /// Of all inputs \[time\].
+    pub(crate) delays: Vec<f64>,
+    /// Of each record: the offset, then `c_0 .. c_{n-1}`, as far as they are estimated.
+    pub(crate) of_records: Vec<Vec<f64>>,
+}
+
+impl Model {
+    /// From `[alpha, beta, change of each estimated delay, of each record]`.
+    pub(crate) fn from_solution(
+        structure: &Structure,
+        x: &[f64],
+        delays: &[f64],
+        estimate_delays: bool,
+    ) -> Self {
+        let lowest = structure.lowest();
+        let mut alpha = vec![0.0; lowest];
+        let (own, x) = x.split_at(structure.n - lowest);
+        alpha.extend_from_slice(own);
+        let (beta, mut x) = x.split_at(structure.numerators());
+        let mut delays = delays.to_vec();
+        if estimate_delays {
+            for (j, most) in structure.estimated_delays() {
+                delays[j] = (delays[j] + x[0]).clamp(0.0, most);
+                x = &x[1..];
+            }
+        }
+        let of_records = match structure.of_record() {
+            0 => Vec::new(),
+            size => x.chunks(size).map(<[f64]>::to_vec).collect(),
+        };
+        Self {
+            alpha,
+            beta: beta.to_vec(),
+            delays,
+            of_records,
+        }
+    }
+
+    /// alpha and beta that are estimated, then delays that are.
+    pub(crate) fn core(&self, structure: &Structure) -> Vec<f64> {
+        let mut core = self.alpha[structure.lowest()..].to_vec();
+        core.extend_from_slice(&self.beta);
+        core.extend(structure.estimated_delays().map(|(j, _)| self.delays[j]));
+        core
+    }
+
+    /// Whether A is Hurwitz, but for the integrator.
+    pub(crate) fn is_stable(&self, structure: &Structure) -> bool {
+        let mut a = self.alpha[structure.lowest()..].to_vec();
+        a.push(1.0);
+        a.iter().all(|a| a.is_finite()) && ct_lti::is_hurwitz(&a)
+    }
+
+    /// The same with all poles in the left half plane: those in the right one are mirrored.
+    pub(crate) fn stabilised(mut self, structure: &Structure) -> Result<Self, Error> {
+        if self.is_stable(structure) {
+            return Ok(self);
+        }
+        let lowest = structure.lowest();
+        let mut a = self.alpha[lowest..].to_vec();
+        a.push(1.0);
+        let mut roots = Polynomial::new(a)?.roots()?;
+        for root in &mut roots {
+            root.re = -root.re.abs().max(1e-6 * root.im.abs());
+        }
+        let mirrored = Polynomial::from_roots(&roots, 1.0)?;
+        for (i, alpha) in self.alpha[lowest..].iter_mut().enumerate() {
+            *alpha = mirrored.coefficient(i);
+        }
+        Ok(self)
+    }
+
+    /// Half way from another one to this one.
+    pub(crate) fn half_way_from(&self, other: &Self) -> Self {
+        let half = |new: &[f64], old: &[f64]| -> Vec<f64> {
+            new.iter().zip(old).map(|(a, b)| 0.5 * (a + b)).collect()
+        };
+        Self {
+            alpha: half(&self.alpha, &other.alpha),
+            beta: half(&self.beta, &other.beta),
+            delays: half(&self.delays, &other.delays),
+            of_records: self
+                .of_records
+                .iter()
+                .zip(&other.of_records)
+                .map(|(new, old)| half(new, old))
+                .collect(),
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! One pass over a record: regressors and instruments of every sample, from filters that run beside each other.
+//!
+//! Equations: with all signals through the same `1/E(p)`, E monic of degree n, and `c` the initial states,
+//! ```text
+//! p^n y_f = phi' x + e
+//! phi = [-p^i y_f, p^i u_f(t - d), change of the delays, 1_f, p^i pulse_f]
+//! ```
+//! The column of a delay is `-sum_i beta_i p^{i+1} u_f(t - d)`, the derivative of the equation. y runs on lines between samples. The
+//! instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A of
+//! that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates rest.
+
+use crate::bank::{Bank, MOST};
+use crate::grid::{Path, Stretch};
+use crate::model::Model;
+use crate::prepared::{Paths, Prepared};
+use crate::{Error, Structure};
+
+/// Where the instruments come from.
+#[derive(Clone, Copy)]
+pub(crate) enum Instruments<'a> {
+    /// They are the regressors: least squares.
+    Regressors,
+    /// From a simulated output, one value for each sample from the first one on.
+    Simulated(&'a [f64]),
+    /// From the output of the model, whose A the filter is.
+    Model,
+}
+
+/// What is known at a sample.
+pub(crate) struct Row<'a> {
+    pub(crate) z: &'a [f64],
+    pub(crate) phi: &'a [f64],
+    /// `p^n y_f`.
+    pub(crate) target: f64,
+    /// Of [`Instruments::Model`]: the simulated output.
+    pub(crate) simulated: f64,
+    /// The measured output.
+    pub(crate) y: f64,
+}
+
+/// A record with everything that a pass needs.
+#[derive(Clone, Copy)]
+pub(crate) struct Pass<'a> {
+    pub(crate) structure: &'a Structure,
+    pub(crate) record: &'a Prepared,
+    pub(crate) paths: &'a Paths,
+    /// Index of the record.
+    pub(crate) index: usize,
+    /// First sample that counts: there the filters begin.
+    pub(crate) first: usize,
+    pub(crate) model: &'a Model,
+    /// Whether columns of the estimated delays are there.
+    pub(crate) with_delays: bool,
+}
+
+/// The filters' states of one signal.
+type State = [f64; MOST];
+
+impl Pass<'_> {
+    /// Entries of a row.
+    pub(crate) fn columns(&self) -> usize {
+        let structure = self.structure;
+        let delays = structure.estimated_delays().count();
+        structure.parameters() - if self.with_delays { 0 } else { delays } + structure.of_record()
+    }
+
+    /// A filter `1/E` for this record.
+    pub(crate) fn bank(&self, e: &[f64]) -> Result<Bank, Error> {
+        Bank::new(e, self.paths.lengths.values())
+    }
+
+    /// The output of the model, simulated from the instruments' inputs.
+    pub(crate) fn simulated(&self) -> Result<Vec<f64>, Error> {
+        let bank = self.bank(&self.model.alpha)?;
+        let mut simulated = Vec::with_capacity(self.record.len());
+        self.rows(&bank, Instruments::Model, |row| {
+            simulated.push(row.simulated);
+        });
+        Ok(simulated)
+    }
+
+    /// Shows every row.
+    pub(crate) fn rows(
+        &self,
+        bank: &Bank,
+        instruments: Instruments,
+        mut see: impl FnMut(&Row),
+    ) {
+        let n = self.structure.n;
+        let paths = self.paths;
+        let columns = self.columns();
+        let (mut phi, mut z) = (vec![0.0; columns], vec![0.0; columns]);
+        let zero: State = [0.0; MOST];
+        let (mut of_y, mut of_simulated, mut of_one) = (zero, zero, zero);
+        let mut of_inputs = vec![zero; paths.inputs.len()];
+        let mut of_instrument = zero;
+        let mut pulse = zero;
+        pulse[n - 1] = 1.0;
+        let mut last_simulated = 0.0;
+        for k in self.first..self.record.len() {
+            let y = self.record.y[k];
+            if k > self.first {
+                let length = paths.steps[k - 1];
+                let line = |state: &mut State, from: f64, to: f64| {
+                    bank.advance(&mut state[..n], &Stretch { length, from, to });
+                };
+                line(&mut of_y, self.record.y[k - 1], y);
+                line(&mut of_one, 1.0, 1.0);
+                line(&mut pulse, 0.0, 0.0);
+                let over = |state: &mut State, path: &Path| {
+                    for stretch in path.step(k - 1) {
+                        bank.advance(&mut state[..n], stretch);
+                    }
+                };
+                for (state, path) in of_inputs.iter_mut().zip(&paths.inputs) {
+                    over(state, path);
+                }
+                if let Some(path) = &paths.instrument {
+                    over(&mut of_instrument, path);
+                }
+            }
+            let used = |j: usize| match &paths.instrument {
+                Some(path) if j == 0 => (&of_instrument, path),
+                _ => (&of_inputs[j], &paths.inputs[j]),
+            };
+            let measured = |j: usize| (&of_inputs[j], &paths.inputs[j]);
+            self.fill(&mut phi, bank, (&of_y, measured, &of_one, &pulse), k);
+            let mut simulated = f64::NAN;
+            match instruments {
+                Instruments::Regressors => z.copy_from_slice(&phi),
+                Instruments::Simulated(_) | Instruments::Model => {
+                    self.fill(&mut z, bank, (&zero, used, &of_one, &pulse), k);
+                    simulated = match instruments {
+                        Instruments::Simulated(values) => values[k - self.first],
+                        // Without terms of y, and with those of the delays at no change.
+                        _ => self.output(&z),
+                    };
+                    if k > self.first {
+                        let stretch = Stretch {
+                            length: paths.steps[k - 1],
+                            from: last_simulated,
+                            to: simulated,
+                        };
+                        bank.advance(&mut of_simulated[..n], &stretch);
+                    }
+                    last_simulated = simulated;
+                    let lowest = self.structure.lowest();
+                    for (z, state) in z.iter_mut().zip(&of_simulated[lowest..n]) {
+                        *z = -state;
+                    }
+                }
+            }
+            see(&Row {
+                z: &z,
+                phi: &phi,
+                target: bank.highest(&of_y[..n], y),
+                simulated,
+                y,
+            });
+        }
+    }
+
+    fn fill<'s>(
+        &self,
+        row: &mut [f64],
+        bank: &Bank,
+        (y, input, one, pulse): (
+            &State,
+            impl Fn(usize) -> (&'s State, &'s Path),
+            &State,
+            &State,
+        ),
+        k: usize,
+    ) {
+        let structure = self.structure;
+        let n = structure.n;
+        let mut at = 0;
+        let mut put = |value: f64| {
+            row[at] = value;
+            at += 1;
+        };
+        for state in &y[structure.lowest()..n] {
+            put(-state);
+        }
+        for (j, &m) in structure.m.iter().enumerate() {
+            let (state, path) = input(j);
+            state[..n.min(m + 1)].iter().for_each(|state| put(*state));
+            if m == n {
+                put(bank.highest(&state[..n], path.after(k)));
+            }
+        }
+        if self.with_delays {
+            for (j, _) in structure.estimated_delays() {
+                let (state, path) = input(j);
+                let from: usize = structure.m[..j].iter().map(|m| m + 1).sum();
+                let beta = &self.model.beta[from..=from + structure.m[j]];
+                let change: f64 = beta
+                    .iter()
+                    .enumerate()
+                    .map(|(i, beta)| {
+                        beta * if i + 1 < n {
+                            state[i + 1]
+                        } else {
+                            bank.highest(&state[..n], path.before(k))
+                        }
+                    })
+                    .sum();
+                put(-change);
+            }
+        }
+        if structure.offset {
+            put(one[0]);
+        }
+        if structure.initial_states {
+            pulse[..n].iter().for_each(|state| put(*state));
+        }
+    }
+
+    /// The output that a row without terms of y gives: the filter's E is the model's A.
+    fn output(&self, row: &[f64]) -> f64 {
+        let structure = self.structure;
+        let skipped = structure.n - structure.lowest();
+        let beta = row[skipped..].iter().zip(&self.model.beta);
+        let of_record = self.model.of_records.get(self.index);
+        let own = row[row.len() - structure.of_record()..].iter();
+        let own = own.zip(of_record.into_iter().flatten());
+        beta.map(|(s, b)| s * b).sum::<f64>() + own.map(|(s, c)| s * c).sum::<f64>()
+    }
+
+    /// The parameters in the order of a row, with no change of the delays.
+    pub(crate) fn x(&self) -> Vec<f64> {
+        let structure = self.structure;
+        let mut x = self.model.alpha[structure.lowest()..].to_vec();
+        x.extend_from_slice(&self.model.beta);
+        if self.with_delays {
+            x.extend(structure.estimated_delays().map(|_| 0.0));
+        }
+        if let Some(own) = self.model.of_records.get(self.index) {
+            x.extend_from_slice(own);
+        }
+        x
+    }
+}

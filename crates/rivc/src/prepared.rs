@@ -1,0 +1,195 @@
+//! Records made ready: checked, centred, with the input of the loop as the reference explains it.
+
+use ct_lti::Hold;
+
+use crate::grid::{Held, Lengths, Path};
+use crate::loop_model::LoopModel;
+use crate::{Data, Error, Structure};
+
+/// Samples for each parameter that are needed.
+pub(crate) const SAMPLES_PER_PARAMETER: usize = 3;
+
+/// A record as the passes use it.
+#[derive(Debug, Clone)]
+pub(crate) struct Prepared {
+    pub(crate) name: String,
+    pub(crate) time: Vec<f64>,
+    /// Where the steps are even.
+    pub(crate) step: Option<f64>,
+    /// About its mean where an offset is estimated and the record need not begin at rest.
+    pub(crate) y: Vec<f64>,
+    pub(crate) inputs: Vec<Vec<f64>>,
+    holds: Vec<Hold>,
+    /// In a loop the first input as the reference explains it: free of the record's noise.
+    instrument: Option<Vec<f64>>,
+    pub(crate) y_mean: f64,
+    pub(crate) u_means: Vec<f64>,
+}
+
+/// The inputs with their delays.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Paths {
+    pub(crate) lengths: Lengths,
+    /// Number of the length of each step.
+    pub(crate) steps: Vec<usize>,
+    pub(crate) inputs: Vec<Path>,
+    pub(crate) instrument: Option<Path>,
+}
+
+impl Prepared {
+    pub(crate) fn len(&self) -> usize {
+        self.y.len()
+    }
+
+    /// The first sample at which all inputs are known under delays of up to this.
+    pub(crate) fn first_known(&self, delay: f64) -> usize {
+        let from = self.time[0] + delay;
+        let early = 1e-9 * delay;
+        self.time.partition_point(|t| *t < from - early)
+    }
+
+    pub(crate) fn paths(&self, delays: &[f64]) -> Paths {
+        let mut lengths = Lengths::default();
+        let steps = match self.step {
+            Some(step) => vec![lengths.number(step); self.len() - 1],
+            None => self
+                .time
+                .windows(2)
+                .map(|pair| lengths.number(pair[1] - pair[0]))
+                .collect(),
+        };
+        let mut path = |values: &[f64], j: usize| {
+            let held = Held {
+                time: &self.time,
+                step: self.step,
+                values,
+                hold: self.holds[j],
+            };
+            held.delayed(delays[j], &mut lengths)
+        };
+        let inputs = self.inputs.iter().enumerate();
+        let inputs = inputs.map(|(j, values)| path(values, j)).collect();
+        let instrument = self.instrument.as_ref().map(|values| path(values, 0));
+        Paths {
+            lengths,
+            steps,
+            inputs,
+            instrument,
+        }
+    }
+}
+
+/// All records, checked against the structure and each other.
+pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Prepared>, Error> {
+    structure.validate()?;
+    let Some(first) = records.first() else {
+        return Err(Error::NoRecord);
+    };
+    let in_loop = first.reference.is_some();
+    let core = structure.parameters();
+    let own = structure.of_record();
+    let mut samples = 0;
+    for record in records {
+        record.validate(structure.m.len())?;
+        if record.reference.is_some() != in_loop {
+            return Err(Error::MixedLoops {
+                record: record.name.clone(),
+                first: if in_loop { "a reference" } else { "none" },
+            });
+        }
+        if in_loop {
+            record.require_even("the model of the loop")?;
+        }
+        samples += record.len();
+    }
+    let parameters = core + own * records.len();
+    let needed = SAMPLES_PER_PARAMETER * parameters;
+    if samples < needed {
+        return Err(Error::TooShort {
+            samples,
+            needed,
+            parameters,
+        });
+    }
+    for j in 0..structure.m.len() {
+        let values = |record: &Data| record.inputs[j].values.clone();
+        moves(records, values, || format!("input {}", j + 1))?;
+    }
+    moves(records, |record| record.output.clone(), || "the output".into())?;
+    let references: Vec<Vec<f64>> = records.iter().filter_map(|r| r.reference.clone()).collect();
+    let loop_model = if in_loop {
+        moves(
+            records,
+            |record| record.reference.clone().unwrap_or_default(),
+            || "the reference".into(),
+        )?;
+        let inputs: Vec<&[f64]> = records.iter().map(|r| &r.inputs[0].values[..]).collect();
+        let references: Vec<&[f64]> = references.iter().map(|r| &r[..]).collect();
+        Some(LoopModel::fit(&references, &inputs)?)
+    } else {
+        None
+    };
+    let centre = structure.offset && structure.initial_states;
+    let prepared: Vec<Prepared> = records
+        .iter()
+        .map(|record| {
+            let mean = |values: &[f64]| match centre {
+                true => values.iter().sum::<f64>() / values.len() as f64,
+                false => 0.0,
+            };
+            let less = |values: &[f64], mean: f64| values.iter().map(|v| v - mean).collect();
+            let y_mean = mean(&record.output);
+            let u_means: Vec<f64> = record.inputs.iter().map(|u| mean(&u.values)).collect();
+            let inputs = record.inputs.iter().zip(&u_means);
+            let instrument = loop_model.as_ref().zip(record.reference.as_deref());
+            Prepared {
+                name: record.name.clone(),
+                time: record.time.clone(),
+                step: record.even_step().ok(),
+                y: less(&record.output, y_mean),
+                inputs: inputs.map(|(u, mean)| less(&u.values, *mean)).collect(),
+                holds: record.inputs.iter().map(|u| u.hold).collect(),
+                instrument: instrument
+                    .map(|(model, r)| less(&model.simulate(r, &record.inputs[0].values), u_means[0])),
+                y_mean,
+                u_means,
+            }
+        })
+        .collect();
+    let largest = structure.largest_delay();
+    for record in &prepared {
+        let left = record.len() - record.first_known(largest).min(record.len());
+        let needed = SAMPLES_PER_PARAMETER * (core + own);
+        if largest > 0.0 && left < needed {
+            return Err(Error::DelayTooLong {
+                record: record.name.clone(),
+                delay: largest,
+                left,
+                samples: record.len(),
+                needed,
+                parameters: core + own,
+            });
+        }
+    }
+    Ok(prepared)
+}
+
+/// Refuses a signal that stands still in all records.
+fn moves(
+    records: &[Data],
+    of: impl Fn(&Data) -> Vec<f64>,
+    name: impl Fn() -> String,
+) -> Result<(), Error> {
+    let mut value = f64::NAN;
+    for record in records {
+        let values = of(record);
+        value = values.first().copied().unwrap_or(value);
+        if values.iter().any(|v| Some(v) != values.first()) {
+            return Ok(());
+        }
+    }
+    Err(Error::Constant {
+        what: name(),
+        value,
+    })
+}

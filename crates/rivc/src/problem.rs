@@ -1,0 +1,230 @@
+//! Records and structure together: the equations at a model, and the way from one model to the next.
+
+use ct_lti::Polynomial;
+use ct_signals::ArModel;
+
+use crate::equations::Equations;
+use crate::model::Model;
+use crate::pass::{Instruments, Pass};
+use crate::prepared::{Paths, Prepared};
+use crate::{Error, Structure};
+
+/// A step that ends at an unstable plant is halved so many times at most.
+const HALVINGS: usize = 12;
+/// The estimates rest where none moves by more than this share of its standard error, or of itself.
+const SHARE_OF_ERROR: f64 = 1e-3;
+const SHARE_OF_ITSELF: f64 = 1e-9;
+/// Passes after which the model of the noise is no longer renewed.
+const NOISE_RENEWALS: usize = 10;
+
+/// Records and structure.
+pub(crate) struct Problem<'a> {
+    pub(crate) structure: &'a Structure,
+    pub(crate) records: &'a [Prepared],
+}
+
+/// Records under given delays.
+pub(crate) struct Delayed {
+    pub(crate) delays: Vec<f64>,
+    pub(crate) paths: Vec<Paths>,
+    /// First sample of each record that counts.
+    pub(crate) first: Vec<usize>,
+}
+
+/// The end of a refinement.
+#[derive(Debug, Clone)]
+pub(crate) struct Refined {
+    pub(crate) model: Model,
+    pub(crate) iterations: usize,
+    pub(crate) converged: bool,
+    /// Model of the noise, where there is one.
+    pub(crate) noise: Option<ArModel>,
+    /// Mean square of measured less simulated output, from the instruments' inputs.
+    pub(crate) mean_square: f64,
+}
+
+impl Problem<'_> {
+    /// Paths of the inputs under these delays; samples count from where all inputs are known under delays of up to `largest`.
+    pub(crate) fn delayed(&self, delays: &[f64], largest: f64) -> Delayed {
+        let first = |record: &Prepared| match self.structure.initial_states {
+            true => record.first_known(largest).min(record.len() - 1),
+            false => 0,
+        };
+        Delayed {
+            delays: delays.to_vec(),
+            paths: self.records.iter().map(|r| r.paths(delays)).collect(),
+            first: self.records.iter().map(first).collect(),
+        }
+    }
+
+    pub(crate) fn pass<'p>(
+        &'p self,
+        delayed: &'p Delayed,
+        model: &'p Model,
+        index: usize,
+        with_delays: bool,
+    ) -> Pass<'p> {
+        Pass {
+            structure: self.structure,
+            record: &self.records[index],
+            paths: &delayed.paths[index],
+            index,
+            first: delayed.first[index],
+            model,
+            with_delays,
+        }
+    }
+
+    fn empty(&self, with_delays: bool) -> Equations {
+        let delays = self.structure.estimated_delays().count();
+        let shared = self.structure.parameters() - if with_delays { 0 } else { delays };
+        Equations::new(shared, self.structure.of_record(), self.records.len())
+    }
+
+    /// Equations whose filter and instruments are the model's.
+    pub(crate) fn equations(
+        &self,
+        delayed: &Delayed,
+        model: &Model,
+        noise: Option<&ArModel>,
+        with_delays: bool,
+    ) -> Result<Equations, Error> {
+        let mut equations = self.empty(with_delays);
+        for index in 0..self.records.len() {
+            let pass = self.pass(delayed, model, index, with_delays);
+            let bank = pass.bank(&model.alpha)?;
+            equations.add(&pass, &bank, Instruments::Model, noise);
+        }
+        Ok(equations)
+    }
+
+    /// Solves equations with a filter of its own; instruments are those of a model, or, without one, the regressors: least squares.
+    pub(crate) fn solve_with_filter(
+        &self,
+        delayed: &Delayed,
+        filter: &Polynomial,
+        model: Option<&Model>,
+    ) -> Result<Model, Error> {
+        let structure = self.structure;
+        let nothing = Model {
+            alpha: vec![0.0; structure.n],
+            beta: vec![0.0; structure.numerators()],
+            delays: delayed.delays.clone(),
+            of_records: Vec::new(),
+        };
+        let leading = filter.leading();
+        let e: Vec<f64> = (0..structure.n)
+            .map(|i| filter.coefficient(i) / leading)
+            .collect();
+        let mut equations = self.empty(false);
+        for index in 0..self.records.len() {
+            let pass = self.pass(delayed, model.unwrap_or(&nothing), index, false);
+            let bank = pass.bank(&e)?;
+            match model {
+                Some(_) => {
+                    let simulated = pass.simulated()?;
+                    equations.add(&pass, &bank, Instruments::Simulated(&simulated), None);
+                }
+                None => equations.add(&pass, &bank, Instruments::Regressors, None),
+            }
+        }
+        let x = equations.solve()?;
+        Ok(Model::from_solution(structure, &x, &delayed.delays, false))
+    }
+
+    /// The model that the equations give, as far on the way as it is stable.
+    fn next(&self, model: &Model, x: &[f64], with_delays: bool, reach: f64) -> Option<Model> {
+        let mut next = Model::from_solution(self.structure, x, &model.delays, with_delays);
+        for (new, old) in next.delays.iter_mut().zip(&model.delays) {
+            *new = new.clamp(old - reach, old + reach);
+        }
+        for _ in 0..HALVINGS {
+            if next.is_stable(self.structure) {
+                return Some(next);
+            }
+            next = next.half_way_from(model);
+        }
+        None
+    }
+
+    /// A few refinements at fixed delays: the best model on the way.
+    pub(crate) fn follow(
+        &self,
+        delayed: &Delayed,
+        mut model: Model,
+        most: usize,
+    ) -> Result<Option<(f64, Model)>, Error> {
+        let mut best: Option<(f64, Model)> = None;
+        for _ in 0..=most {
+            let equations = self.equations(delayed, &model, None, false)?;
+            let square = equations.output_squares / equations.samples as f64;
+            if square.is_finite() && best.as_ref().is_none_or(|(least, _)| square < *least) {
+                best = Some((square, model.clone()));
+            }
+            let Ok(x) = equations.solve() else {
+                break;
+            };
+            let Some(next) = self.next(&model, &x, false, 0.0) else {
+                break;
+            };
+            model = next;
+        }
+        Ok(best)
+    }
+
+    /// Filter, instruments and, where asked for, the model of the noise renewed until the estimates rest. `reach` limits the change of a
+    /// delay in one step.
+    pub(crate) fn refine(
+        &self,
+        start: Model,
+        noise_order: Option<usize>,
+        reach: f64,
+        most: usize,
+    ) -> Result<Refined, Error> {
+        let structure = self.structure;
+        let with_delays = structure.estimated_delays().next().is_some();
+        let mut largest = start.delays.iter().copied().fold(0.0, f64::max);
+        let mut delayed = self.delayed(&start.delays, largest);
+        let mut last = Refined {
+            model: start,
+            iterations: 0,
+            converged: false,
+            noise: None,
+            mean_square: f64::INFINITY,
+        };
+        loop {
+            let equations =
+                self.equations(&delayed, &last.model, last.noise.as_ref(), with_delays)?;
+            last.mean_square = equations.output_squares / equations.samples as f64;
+            if last.converged || last.iterations >= most {
+                return Ok(last);
+            }
+            let x = equations.solve()?;
+            let Some(next) = self.next(&last.model, &x, with_delays, reach) else {
+                return Ok(last);
+            };
+            let covariance = equations.covariance(None)?;
+            let (old, new) = (last.model.core(structure), next.core(structure));
+            let rests = old.iter().zip(&new).enumerate().all(|(i, (old, new))| {
+                let change = (new - old).abs();
+                change <= SHARE_OF_ERROR * covariance[(i, i)].sqrt()
+                    || change <= SHARE_OF_ITSELF * old.abs()
+            });
+            let noise_is_used = noise_order.is_none() || last.noise.is_some();
+            last.converged = rests && noise_is_used;
+            if let Some(order) = noise_order
+                && last.iterations < NOISE_RENEWALS
+            {
+                let segments: Vec<&[f64]> = equations.residuals.iter().map(Vec::as_slice).collect();
+                last.noise = Some(ArModel::fit(&segments, order)?);
+            }
+            last.model = next;
+            last.iterations += 1;
+            if with_delays {
+                // A first sample that came and went with a delay would keep the estimates from resting.
+                largest = last.model.delays.iter().copied().fold(largest, f64::max);
+                delayed = self.delayed(&last.model.delays, largest);
+            }
+        }
+    }
+}

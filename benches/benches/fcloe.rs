@@ -1,4 +1,4 @@
-//! Closed-loop output error: time per sample of the loop with its whole Jacobian, and a whole fit beside dsmc's SRIVC.
+//! Closed-loop output error: time per sample of the loop with its whole Jacobian, and a whole fit, and SRIVC and RIVC, beside dsmc's SRIVC.
 //!
 //! After criterion's figures come tables: the shortest of many short runs, in turns, so that a busy machine disturbs both
 //! sides alike; and the estimates of both over 40 noise realisations.
@@ -122,6 +122,28 @@ impl Case {
         vec![p[0] / p[1], 1.0 / p[1], p[3] / p[1], p[2] / p[1]]
     }
 
+    /// SRIVC or RIVC from filters of the bandwidth, of a record that begins at rest.
+    fn instruments(&self, noise: rivc::Noise) -> Vec<f64> {
+        let record = rivc::Data::even(STEP, self.u.clone(), self.y.clone());
+        let settings = rivc::Settings {
+            bandwidths: vec![BANDWIDTH],
+            ..rivc::Settings::new(noise)
+        };
+        let structure = rivc::Structure::new(2, [1]).from_rest();
+        let found = rivc::estimate(&[record], &structure, &settings).expect("estimates");
+        assert!(found.converged);
+        let (a, b) = (&found.plant.a, &found.plant.b[0]);
+        vec![a[1], a[2], b[0], b[1]]
+    }
+
+    fn our_srivc(&self) -> Vec<f64> {
+        self.instruments(rivc::Noise::White)
+    }
+
+    fn our_rivc(&self) -> Vec<f64> {
+        self.instruments(rivc::Noise::Autoregressive)
+    }
+
     /// A start that both are given whole: the truth, off by a quarter.
     fn near(&self) -> Vec<f64> {
         let factors = [1.25, 0.75, 1.25, 0.75];
@@ -153,6 +175,8 @@ fn fits(criterion: &mut Criterion) {
     let case = Case::new(1);
     let mut group = criterion.benchmark_group("fcloe/fit, n=2, m=1, 10 000 samples");
     group.bench_function("output error", |b| b.iter(|| case.ours()));
+    group.bench_function("SRIVC", |b| b.iter(|| case.our_srivc()));
+    group.bench_function("RIVC", |b| b.iter(|| case.our_rivc()));
     group.bench_function("dsmc SRIVC", |b| b.iter(|| case.srivc()));
     group.finish();
 }
@@ -187,9 +211,11 @@ fn tables() {
     }
 
     let case = Case::new(1);
-    let [ours, srivc, ours_near, srivc_near] = shortest(
+    let [ours, our_srivc, our_rivc, srivc, ours_near, srivc_near] = shortest(
         [
             &mut || case.ours()[0],
+            &mut || case.our_srivc()[0],
+            &mut || case.our_rivc()[0],
             &mut || case.srivc()[0],
             &mut || case.ours_from_near()[0],
             &mut || case.srivc_from_near()[0],
@@ -197,8 +223,8 @@ fn tables() {
         60,
     );
     println!("\nms per fit, second order in open loop, 10 000 samples, shortest run:");
-    println!("| start | output error | dsmc SRIVC | ratio (at most 0.5) |");
-    println!("|---|---|---|---|");
+    println!("| method | start | ours | dsmc SRIVC | ratio (at most 0.5) |");
+    println!("|---|---|---|---|---|");
     let row = |name, ours: f64, srivc: f64| {
         let (ours_ms, srivc_ms) = (1e-6 * ours, 1e-6 * srivc);
         println!(
@@ -206,15 +232,21 @@ fn tables() {
             ours / srivc
         );
     };
-    row("the bandwidth", ours, srivc);
-    row("a model off by a quarter", ours_near, srivc_near);
+    row("output error | the bandwidth", ours, srivc);
+    row(
+        "output error | a model off by a quarter",
+        ours_near,
+        srivc_near,
+    );
+    row("SRIVC | the bandwidth", our_srivc, srivc);
+    row("RIVC | the bandwidth", our_rivc, srivc);
 
     println!(
-        "\nerror in percent of the truth, 40 noise realisations at 20 dB: mean (root mean square)"
+        "\nerror in percent of the truth, 100 noise realisations at 20 dB: mean (root mean square)"
     );
     println!("| | a1 | a2 | b0 | b1 |");
     println!("|---|---|---|---|---|");
-    let cases: Vec<Case> = (100..140).map(Case::new).collect();
+    let cases: Vec<Case> = (100..200).map(Case::new).collect();
     let errors = |name: &str, fit: &dyn Fn(&Case) -> Vec<f64>| {
         let all: Vec<Vec<f64>> = cases
             .iter()
@@ -234,6 +266,8 @@ fn tables() {
         println!("| {name} | {} |", cells.collect::<Vec<_>>().join(" | "));
     };
     errors("output error", &Case::ours);
+    errors("SRIVC", &Case::our_srivc);
+    errors("RIVC", &Case::our_rivc);
     errors("dsmc SRIVC", &Case::srivc);
 }
 

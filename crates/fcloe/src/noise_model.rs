@@ -218,7 +218,11 @@ impl NoiseModel {
 }
 
 /// An autoregression behind a system that it is held for.
-pub(crate) fn behind(ar: &ArModel, system: &StateSpace, step: f64) -> Result<StationaryNoise, Error> {
+pub(crate) fn behind(
+    ar: &ArModel,
+    system: &StateSpace,
+    step: f64,
+) -> Result<StationaryNoise, Error> {
     let ar = ar.coefficients();
     let o = ar.len();
     let sampled = system.sampled(Hold::Zero, step)?;

@@ -8,7 +8,6 @@ use crate::Error;
 use crate::grid::Stretch;
 
 pub(crate) struct Bank {
-    n: usize,
     /// `e_0 .. e_{n-1}` of the monic E.
     e: Vec<f64>,
     /// For each length: Phi row by row, then the effects of the input at both ends.
@@ -30,34 +29,33 @@ impl Bank {
             tables.extend_from_slice(&sampled.g1);
         }
         Ok(Self {
-            n,
             e: e.to_vec(),
             tables,
         })
     }
 
-    /// Moves the states of a signal over one stretch.
-    pub(crate) fn advance(&self, state: &mut [f64], stretch: &Stretch) {
-        let n = self.n;
-        let table = &self.tables[stretch.length * n * (n + 2)..][..n * (n + 2)];
-        let (phi, effects) = table.split_at(n * n);
-        let (g0, g1) = effects.split_at(n);
-        // n is at most a handful.
-        let mut next = [0.0; MOST];
-        for (i, next) in next[..n].iter_mut().enumerate() {
-            let row = &phi[i * n..(i + 1) * n];
+    /// Moves the states of a signal over one stretch. N is n.
+    #[inline]
+    pub(crate) fn advance<const N: usize>(&self, state: &mut [f64; N], stretch: &Stretch) {
+        let table = &self.tables[stretch.length * N * (N + 2)..][..N * (N + 2)];
+        let (phi, effects) = table.split_at(N * N);
+        let (g0, g1) = effects.split_at(N);
+        let mut next = [0.0; N];
+        for (i, next) in next.iter_mut().enumerate() {
+            let row = &phi[i * N..(i + 1) * N];
             let free: f64 = row.iter().zip(&*state).map(|(phi, x)| phi * x).sum();
             *next = free + g0[i] * stretch.from + g1[i] * stretch.to;
         }
-        state.copy_from_slice(&next[..n]);
+        *state = next;
     }
 
     /// `p^n s/E` where the signal is at `value`.
+    #[inline]
     pub(crate) fn highest(&self, state: &[f64], value: f64) -> f64 {
         let rest: f64 = self.e.iter().zip(state).map(|(e, x)| e * x).sum();
         value - rest
     }
 }
 
-/// The largest n.
-pub(crate) const MOST: usize = 12;
+/// The largest n: passes are compiled for each.
+pub(crate) const MOST: usize = 8;

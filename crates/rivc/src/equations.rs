@@ -3,9 +3,9 @@
 use ct_signals::ArModel;
 use nalgebra::{DMatrix, DVector};
 
+use crate::Error;
 use crate::bank::Bank;
 use crate::pass::{Instruments, Pass};
-use crate::Error;
 
 /// Equations whose smallest singular value, scaled, is below this share of the largest do not determine the parameters.
 const DEPENDENT: f64 = 1e-13;
@@ -23,7 +23,7 @@ pub(crate) struct Equations {
     sizes: DVector<f64>,
     /// Rows.
     pub(crate) samples: usize,
-    /// Squares of the measured less the simulated output.
+    /// Squares of the measured less the simulated output, whitened where there is a model of the noise.
     pub(crate) output_squares: f64,
     /// Squares of the residual, whitened where there is a model of the noise.
     pub(crate) residual_squares: f64,
@@ -68,8 +68,8 @@ impl Equations {
         let p = pass.columns();
         let x = pass.x();
         let mut residuals = Vec::with_capacity(pass.record.len());
-        let mut whitener = noise.map(|noise| noise.whitener(2 * p + 1));
-        let mut lanes = vec![0.0; 2 * p + 1];
+        let mut whitener = noise.map(|noise| noise.whitener(2 * p + 2));
+        let mut lanes = vec![0.0; 2 * p + 2];
         let (mut zphi, mut zz) = (vec![0.0; p * p], vec![0.0; p * p]);
         let (mut zy, mut sizes) = (vec![0.0; p], vec![0.0; p]);
         let error = |phi: &[f64], target: f64| {
@@ -77,29 +77,35 @@ impl Equations {
         };
         let (mut outputs, mut squares) = (0.0, 0.0);
         pass.rows(bank, instruments, |row| {
-            residuals.push(error(row.phi, row.target));
-            if row.simulated.is_finite() {
-                outputs += (row.y - row.simulated).powi(2);
-            }
+            let mut residual = error(row.phi, row.target);
+            residuals.push(residual);
             let (mut z, mut phi, mut target) = (row.z, row.phi, row.target);
+            // Least squares simulates nothing.
+            let mut output = match row.simulated.is_finite() {
+                true => row.y - row.simulated,
+                false => 0.0,
+            };
             if let Some(whitener) = &mut whitener {
                 lanes[..p].copy_from_slice(z);
                 lanes[p..2 * p].copy_from_slice(phi);
                 lanes[2 * p] = target;
+                lanes[2 * p + 1] = output;
                 whitener.push(&mut lanes);
                 (z, phi) = (&lanes[..p], &lanes[p..2 * p]);
-                target = lanes[2 * p];
+                (target, output) = (lanes[2 * p], lanes[2 * p + 1]);
+                residual = error(phi, target);
             }
-            squares += error(phi, target).powi(2);
-            for (i, a) in z.iter().enumerate() {
-                zy[i] += a * target;
-                sizes[i] += phi[i] * phi[i];
-                let own = i * p..(i + 1) * p;
-                for (sum, phi) in zphi[own.clone()].iter_mut().zip(phi) {
-                    *sum += a * phi;
-                }
-                for (sum, z) in zz[own].iter_mut().zip(z) {
-                    *sum += a * z;
+            outputs += output * output;
+            squares += residual * residual;
+            for ((zy, a), (size, phi)) in zy.iter_mut().zip(z).zip(sizes.iter_mut().zip(phi)) {
+                *zy += a * target;
+                *size += phi * phi;
+            }
+            let rows = zphi.chunks_exact_mut(p).zip(zz.chunks_exact_mut(p));
+            for ((zphi, zz), a) in rows.zip(z) {
+                for ((zphi, zz), (phi, z)) in zphi.iter_mut().zip(zz).zip(phi.iter().zip(z)) {
+                    *zphi += a * phi;
+                    *zz += a * z;
                 }
             }
         });
@@ -127,6 +133,12 @@ impl Equations {
                 to[(self.place(index, i), self.place(index, j))] += of_record[i * p + j];
             }
         }
+    }
+
+    /// An autoregression of the residual, of at most this order.
+    pub(crate) fn residual_noise(&self, order: usize) -> Result<ArModel, Error> {
+        let segments: Vec<&[f64]> = self.residuals.iter().map(Vec::as_slice).collect();
+        Ok(ArModel::fit(&segments, order)?)
     }
 
     /// Number of unknowns.

@@ -43,7 +43,9 @@ pub enum Error {
         found: usize,
     },
     /// A number that is none.
-    #[error("{record}: {what} is {value} at sample {index}; leave the sample out, or give a number")]
+    #[error(
+        "{record}: {what} is {value} at sample {index}; leave the sample out, or give a number"
+    )]
     NotFinite {
         /// Name of the record.
         record: String,
@@ -119,7 +121,9 @@ pub enum Error {
         most: usize,
     },
     /// A signal that stands still.
-    #[error("{what} stands at {value} in all records, so that nothing can be identified from it; record at least a step up and a step down")]
+    #[error(
+        "{what} stands at {value} in all records, so that nothing can be identified from it; record at least a step up and a step down"
+    )]
     Constant {
         /// Which signal.
         what: String,
@@ -143,7 +147,9 @@ pub enum Error {
         what: &'static str,
     },
     /// A record in a loop beside one that is not.
-    #[error("{record}: the first record has {first}, and this one does not; give all records of a loop their reference, or none")]
+    #[error(
+        "{record}: the first record has {first}, and this one does not; give all records of a loop their reference, or none"
+    )]
     MixedLoops {
         /// Name of the record.
         record: String,
@@ -151,7 +157,9 @@ pub enum Error {
         first: &'static str,
     },
     /// The reference explains nothing of the input.
-    #[error("no stable model of the input from the reference was found: without it there are no instruments in a loop; check that the reference moves")]
+    #[error(
+        "no stable model of the input from the reference was found: without it there are no instruments in a loop; check that the reference moves"
+    )]
     NoLoopModel,
     /// Equations without one solution.
     #[error(
@@ -163,8 +171,16 @@ pub enum Error {
         /// Samples in all records.
         samples: usize,
     },
+    /// A simulation that is not finite.
+    #[error("{record}: the model runs away when it is simulated on its inputs alone")]
+    RunsAway {
+        /// Name of the record.
+        record: String,
+    },
     /// No start led anywhere.
-    #[error("none of {tried} bandwidths of the first filter led to a stable plant; try other orders, or another bandwidth")]
+    #[error(
+        "none of {tried} bandwidths of the first filter led to a stable plant; lower the orders, move the inputs more, or give another bandwidth"
+    )]
     NoStart {
         /// How many were tried.
         tried: usize,

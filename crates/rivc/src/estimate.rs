@@ -30,12 +30,15 @@ use serde::Serialize;
 use crate::equations::Equations;
 use crate::model::Model;
 use crate::pass::Instruments;
-use crate::prepared::prepare;
+use crate::plant::Plant;
+use crate::prepared::{Prepared, prepare};
 use crate::problem::{Problem, Refined};
 use crate::{Data, Delay, Error, Structure};
 
 /// Starts that are refined until they rest.
 const STARTS: usize = 3;
+/// Times that a delay is looked for again beside the one that was found under coloured noise.
+const MOVES: usize = 4;
 /// Largest order of the noise that stands behind the standard errors of SRIVC.
 const NOISE_ORDER: usize = 8;
 
@@ -122,12 +125,11 @@ pub struct Estimate {
     pub parameters: Vec<Parameter>,
     /// Covariance of [`Estimate::parameters`], row by row.
     pub covariance: Vec<f64>,
-    /// A, from p^0.
-    pub a: Vec<f64>,
-    /// B of each input, from p^0.
-    pub b: Vec<Vec<f64>>,
-    /// Delay of each input, known or estimated \[time\].
-    pub delays: Vec<f64>,
+    /// The plant, with delays that were known or estimated.
+    pub plant: Plant,
+    /// In a loop, the share of the first input's power about its mean that the reference explains, the least of all records: instruments
+    /// are weak where it is small.
+    pub explained: Option<f64>,
     /// Autoregression of the noise: that of the residual for SRIVC.
     pub noise: ArModel,
     /// Root mean square of measured less simulated output, on the measured inputs; output unit.
@@ -190,12 +192,16 @@ pub fn estimate(
     };
     let (starts, reach) = problem.starts(&known, &ladder)?;
     let tried = ladder.len();
-    let refine = |model: Model, noise: Option<usize>| {
+    let refine = |model: Model, noise: Option<(usize, ArModel)>| {
         problem.refine(model, noise, reach, settings.max_iterations)
     };
     let mut best: Option<Refined> = None;
     let mut last_error = None;
     for (_, model) in starts.into_iter().take(STARTS) {
+        let known = |best: &Refined| best.converged && alike(&best.model, &model);
+        if best.as_ref().is_some_and(known) {
+            continue;
+        }
         match refine(model, None) {
             Ok(found) => {
                 let better = best.as_ref().is_none_or(|best| {
@@ -211,10 +217,35 @@ pub fn estimate(
     let mut best = best.ok_or(last_error.unwrap_or(Error::NoStart { tried }))?;
     if settings.noise == Noise::Autoregressive {
         let iterations = best.iterations;
-        best = refine(best.model, Some(settings.noise_order))?;
+        let of_residual = |found: &Refined| -> Result<_, Error> {
+            let noise = found.equations.residual_noise(settings.noise_order)?;
+            Ok(Some((settings.noise_order, noise)))
+        };
+        let noise = of_residual(&best)?;
+        best = refine(best.model, noise)?;
+        for _ in 0..MOVES {
+            let Some(model) = problem.better_delay(&best) else {
+                break;
+            };
+            let moved = refine(model, of_residual(&best)?)?;
+            let sigma = |found: &Refined| found.noise.as_ref().map_or(f64::NAN, ArModel::sigma);
+            if sigma(&moved) >= sigma(&best) {
+                break;
+            }
+            best = moved;
+        }
         best.iterations += iterations;
     }
     finish(&problem, best, settings, records)
+}
+
+/// Whether a start is within a hundredth of a model.
+fn alike(model: &Model, start: &Model) -> bool {
+    let near = |a: &[f64], b: &[f64]| {
+        let mut pairs = a.iter().zip(b);
+        pairs.all(|(a, b)| (a - b).abs() <= 0.01 * a.abs())
+    };
+    near(&model.alpha, &start.alpha) && near(&model.beta, &start.beta)
 }
 
 fn finish(
@@ -226,14 +257,11 @@ fn finish(
     let structure = problem.structure;
     let model = &found.model;
     let with_delays = structure.estimated_delays().next().is_some();
-    let largest = model.delays.iter().copied().fold(0.0, f64::max);
-    let delayed = problem.delayed(&model.delays, largest);
-    let whitening = found.noise.as_ref();
-    let equations = problem.equations(&delayed, model, whitening, with_delays)?;
-    let segments: Vec<&[f64]> = equations.residuals.iter().map(Vec::as_slice).collect();
-    let noise = ArModel::fit(&segments, settings.noise_order)?;
+    let (equations, delayed) = (found.equations, found.delayed);
+    let noise = equations.residual_noise(settings.noise_order)?;
     let middle = match settings.noise {
         Noise::Autoregressive => None,
+        Noise::White if noise.order() == 0 => None,
         Noise::White => {
             let process = StationaryNoise::of_ar(&noise);
             let p = equations.unknowns();
@@ -283,9 +311,16 @@ fn finish(
         samples: equations.samples,
         parameters,
         covariance,
-        a,
-        b,
-        delays: model.delays.clone(),
+        plant: Plant {
+            a,
+            b,
+            delays: model.delays.clone(),
+        },
+        explained: problem
+            .records
+            .iter()
+            .filter_map(Prepared::explained)
+            .min_by(f64::total_cmp),
         noise,
         iterations: found.iterations,
         converged: found.converged,
@@ -376,7 +411,11 @@ fn normalised(
         }
     }
     // Delays are what they are, whatever the scale; they stand before the offsets.
-    let offsets = if structure.offset { model.of_records.len() } else { 0 };
+    let offsets = if structure.offset {
+        model.of_records.len()
+    } else {
+        0
+    };
     let before = kinds.len() - offsets;
     for (i, (input, _)) in structure.estimated_delays().enumerate() {
         let mut row = vec![0.0; columns];
@@ -393,5 +432,8 @@ fn normalised(
         value,
         std_error: covariance[(i, i)].sqrt(),
     });
-    (parameters.collect(), covariance.transpose().iter().copied().collect())
+    (
+        parameters.collect(),
+        covariance.transpose().iter().copied().collect(),
+    )
 }

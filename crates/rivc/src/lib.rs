@@ -10,6 +10,7 @@
 //! | The noise is coloured | [`Noise::Autoregressive`]: RIVC; with [`Noise::White`] the standard errors allow for it |
 //! | There is a delay, or an integrator | [`Structure::with_delay`], [`Structure::with_integrator`] |
 //! | The records are from a loop | [`Data::reference`]: the instruments come from it, and the controller need not be known |
+//! | What does the plant say of another record? | [`Plant::fitted`] |
 //! | How well do I know it? | [`Parameter::std_error`], [`Estimate::covariance`] |
 //!
 //! Time is in any one unit throughout.
@@ -48,6 +49,14 @@
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! # Figures
+//! | | | command |
+//! |---|---|---|
+//! | 95 % intervals of RIVC hold the truth, 1000 samples (in a loop 2000) at 20 dB, white, AR(1) and AR(2) noise, n = 2, a delay of 3.4 samples, an integrator in a loop | in 92.5 to 97.2 % of 400 records for every parameter | `RECORDS=400 cargo test -p rivc --test all coverage -- --nocapture` |
+//! | the same of SRIVC | in 93.0 to 97.2 % | the same |
+//! | recovery without noise, n = 1 to 4, even and uneven times, both holds, delays, integrators, two inputs, three records | within 1e-6 | `cargo test -p rivc --test all recovery` |
+//! | bias and spread beside dsmc's SRIVC, 100 noises at 20 dB | the same to three digits | `cargo bench -p ctid-benches --bench fcloe` |
 
 mod bank;
 mod data;
@@ -58,6 +67,7 @@ mod grid;
 mod loop_model;
 mod model;
 mod pass;
+mod plant;
 mod prepared;
 mod problem;
 mod start;
@@ -66,4 +76,5 @@ mod structure;
 pub use data::{Data, Input};
 pub use error::Error;
 pub use estimate::{Estimate, Kind, Noise, Parameter, Settings, estimate};
+pub use plant::Plant;
 pub use structure::{Delay, Structure};

@@ -9,7 +9,7 @@
 //! instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A of
 //! that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates rest.
 
-use crate::bank::{Bank, MOST};
+use crate::bank::Bank;
 use crate::grid::{Path, Stretch};
 use crate::model::Model;
 use crate::prepared::{Paths, Prepared};
@@ -53,9 +53,6 @@ pub(crate) struct Pass<'a> {
     pub(crate) with_delays: bool,
 }
 
-/// The filters' states of one signal.
-type State = [f64; MOST];
-
 impl Pass<'_> {
     /// Entries of a row.
     pub(crate) fn columns(&self) -> usize {
@@ -80,36 +77,55 @@ impl Pass<'_> {
     }
 
     /// Shows every row.
-    pub(crate) fn rows(
+    pub(crate) fn rows(&self, bank: &Bank, instruments: Instruments, mut see: impl FnMut(&Row)) {
+        let see: &mut dyn FnMut(&Row) = &mut see;
+        match self.structure.n {
+            1 => self.rows_of::<1>(bank, instruments, see),
+            2 => self.rows_of::<2>(bank, instruments, see),
+            3 => self.rows_of::<3>(bank, instruments, see),
+            4 => self.rows_of::<4>(bank, instruments, see),
+            5 => self.rows_of::<5>(bank, instruments, see),
+            6 => self.rows_of::<6>(bank, instruments, see),
+            7 => self.rows_of::<7>(bank, instruments, see),
+            // A structure has no larger order than 8.
+            _ => self.rows_of::<8>(bank, instruments, see),
+        }
+    }
+
+    fn rows_of<const N: usize>(
         &self,
         bank: &Bank,
         instruments: Instruments,
-        mut see: impl FnMut(&Row),
+        see: &mut dyn FnMut(&Row),
     ) {
-        let n = self.structure.n;
+        let structure = self.structure;
         let paths = self.paths;
         let columns = self.columns();
         let (mut phi, mut z) = (vec![0.0; columns], vec![0.0; columns]);
-        let zero: State = [0.0; MOST];
+        let zero = [0.0; N];
         let (mut of_y, mut of_simulated, mut of_one) = (zero, zero, zero);
         let mut of_inputs = vec![zero; paths.inputs.len()];
         let mut of_instrument = zero;
         let mut pulse = zero;
-        pulse[n - 1] = 1.0;
+        pulse[N - 1] = 1.0;
         let mut last_simulated = 0.0;
         for k in self.first..self.record.len() {
             let y = self.record.y[k];
             if k > self.first {
                 let length = paths.steps[k - 1];
-                let line = |state: &mut State, from: f64, to: f64| {
-                    bank.advance(&mut state[..n], &Stretch { length, from, to });
+                let line = |state: &mut [f64; N], from: f64, to: f64| {
+                    bank.advance(state, &Stretch { length, from, to });
                 };
                 line(&mut of_y, self.record.y[k - 1], y);
-                line(&mut of_one, 1.0, 1.0);
-                line(&mut pulse, 0.0, 0.0);
-                let over = |state: &mut State, path: &Path| {
+                if structure.offset {
+                    line(&mut of_one, 1.0, 1.0);
+                }
+                if structure.initial_states {
+                    line(&mut pulse, 0.0, 0.0);
+                }
+                let over = |state: &mut [f64; N], path: &Path| {
                     for stretch in path.step(k - 1) {
-                        bank.advance(&mut state[..n], stretch);
+                        bank.advance(state, stretch);
                     }
                 };
                 for (state, path) in of_inputs.iter_mut().zip(&paths.inputs) {
@@ -141,11 +157,11 @@ impl Pass<'_> {
                             from: last_simulated,
                             to: simulated,
                         };
-                        bank.advance(&mut of_simulated[..n], &stretch);
+                        bank.advance(&mut of_simulated, &stretch);
                     }
                     last_simulated = simulated;
-                    let lowest = self.structure.lowest();
-                    for (z, state) in z.iter_mut().zip(&of_simulated[lowest..n]) {
+                    let lowest = structure.lowest();
+                    for (z, state) in z.iter_mut().zip(&of_simulated[lowest..]) {
                         *z = -state;
                     }
                 }
@@ -153,40 +169,39 @@ impl Pass<'_> {
             see(&Row {
                 z: &z,
                 phi: &phi,
-                target: bank.highest(&of_y[..n], y),
+                target: bank.highest(&of_y, y),
                 simulated,
                 y,
             });
         }
     }
 
-    fn fill<'s>(
+    fn fill<'s, const N: usize>(
         &self,
         row: &mut [f64],
         bank: &Bank,
         (y, input, one, pulse): (
-            &State,
-            impl Fn(usize) -> (&'s State, &'s Path),
-            &State,
-            &State,
+            &[f64; N],
+            impl Fn(usize) -> (&'s [f64; N], &'s Path),
+            &[f64; N],
+            &[f64; N],
         ),
         k: usize,
     ) {
         let structure = self.structure;
-        let n = structure.n;
         let mut at = 0;
         let mut put = |value: f64| {
             row[at] = value;
             at += 1;
         };
-        for state in &y[structure.lowest()..n] {
+        for state in &y[structure.lowest()..] {
             put(-state);
         }
         for (j, &m) in structure.m.iter().enumerate() {
             let (state, path) = input(j);
-            state[..n.min(m + 1)].iter().for_each(|state| put(*state));
-            if m == n {
-                put(bank.highest(&state[..n], path.after(k)));
+            state[..N.min(m + 1)].iter().for_each(|state| put(*state));
+            if m == N {
+                put(bank.highest(state, path.after(k)));
             }
         }
         if self.with_delays {
@@ -198,10 +213,10 @@ impl Pass<'_> {
                     .iter()
                     .enumerate()
                     .map(|(i, beta)| {
-                        beta * if i + 1 < n {
+                        beta * if i + 1 < N {
                             state[i + 1]
                         } else {
-                            bank.highest(&state[..n], path.before(k))
+                            bank.highest(state, path.before(k))
                         }
                     })
                     .sum();
@@ -212,7 +227,7 @@ impl Pass<'_> {
             put(one[0]);
         }
         if structure.initial_states {
-            pulse[..n].iter().for_each(|state| put(*state));
+            pulse.iter().for_each(|state| put(*state));
         }
     }
 

@@ -12,7 +12,6 @@ pub(crate) const SAMPLES_PER_PARAMETER: usize = 3;
 /// A record as the passes use it.
 #[derive(Debug, Clone)]
 pub(crate) struct Prepared {
-    pub(crate) name: String,
     pub(crate) time: Vec<f64>,
     /// Where the steps are even.
     pub(crate) step: Option<f64>,
@@ -37,6 +36,38 @@ pub(crate) struct Paths {
 }
 
 impl Prepared {
+    /// A valid record, about its means where asked for, with the first input as the reference explains it.
+    pub(crate) fn new(record: &Data, centre: bool, instrument: Option<Vec<f64>>) -> Self {
+        let mean = |values: &[f64]| match centre {
+            true => values.iter().sum::<f64>() / values.len() as f64,
+            false => 0.0,
+        };
+        let less = |values: &[f64], mean: f64| values.iter().map(|v| v - mean).collect();
+        let y_mean = mean(&record.output);
+        let u_means: Vec<f64> = record.inputs.iter().map(|u| mean(&u.values)).collect();
+        let inputs = record.inputs.iter().zip(&u_means);
+        Self {
+            time: record.time.clone(),
+            step: record.even_step().ok(),
+            y: less(&record.output, y_mean),
+            inputs: inputs.map(|(u, mean)| less(&u.values, *mean)).collect(),
+            holds: record.inputs.iter().map(|u| u.hold).collect(),
+            instrument: instrument.map(|u| less(&u, u_means[0])),
+            y_mean,
+            u_means,
+        }
+    }
+
+    /// Share of the first input's power about its mean that the reference explains, in a loop.
+    pub(crate) fn explained(&self) -> Option<f64> {
+        let instrument = self.instrument.as_ref()?;
+        let mean = self.inputs[0].iter().sum::<f64>() / self.len() as f64;
+        let square = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>();
+        let all = square(&mut self.inputs[0].iter().map(|u| u - mean));
+        let left = square(&mut self.inputs[0].iter().zip(instrument).map(|(u, r)| u - r));
+        Some((1.0 - left / all).max(0.0))
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.y.len()
     }
@@ -115,7 +146,11 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
         let values = |record: &Data| record.inputs[j].values.clone();
         moves(records, values, || format!("input {}", j + 1))?;
     }
-    moves(records, |record| record.output.clone(), || "the output".into())?;
+    moves(
+        records,
+        |record| record.output.clone(),
+        || "the output".into(),
+    )?;
     let references: Vec<Vec<f64>> = records.iter().filter_map(|r| r.reference.clone()).collect();
     let loop_model = if in_loop {
         moves(
@@ -133,36 +168,18 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
     let prepared: Vec<Prepared> = records
         .iter()
         .map(|record| {
-            let mean = |values: &[f64]| match centre {
-                true => values.iter().sum::<f64>() / values.len() as f64,
-                false => 0.0,
-            };
-            let less = |values: &[f64], mean: f64| values.iter().map(|v| v - mean).collect();
-            let y_mean = mean(&record.output);
-            let u_means: Vec<f64> = record.inputs.iter().map(|u| mean(&u.values)).collect();
-            let inputs = record.inputs.iter().zip(&u_means);
-            let instrument = loop_model.as_ref().zip(record.reference.as_deref());
-            Prepared {
-                name: record.name.clone(),
-                time: record.time.clone(),
-                step: record.even_step().ok(),
-                y: less(&record.output, y_mean),
-                inputs: inputs.map(|(u, mean)| less(&u.values, *mean)).collect(),
-                holds: record.inputs.iter().map(|u| u.hold).collect(),
-                instrument: instrument
-                    .map(|(model, r)| less(&model.simulate(r, &record.inputs[0].values), u_means[0])),
-                y_mean,
-                u_means,
-            }
+            let model = loop_model.as_ref().zip(record.reference.as_deref());
+            let instrument = model.map(|(model, r)| model.simulate(r, &record.inputs[0].values));
+            Prepared::new(record, centre, instrument)
         })
         .collect();
     let largest = structure.largest_delay();
-    for record in &prepared {
+    for (record, data) in prepared.iter().zip(records) {
         let left = record.len() - record.first_known(largest).min(record.len());
         let needed = SAMPLES_PER_PARAMETER * (core + own);
         if largest > 0.0 && left < needed {
             return Err(Error::DelayTooLong {
-                record: record.name.clone(),
+                record: data.name.clone(),
                 delay: largest,
                 left,
                 samples: record.len(),

@@ -14,7 +14,10 @@ const HALVINGS: usize = 12;
 /// The estimates rest where none moves by more than this share of its standard error, or of itself.
 const SHARE_OF_ERROR: f64 = 1e-3;
 const SHARE_OF_ITSELF: f64 = 1e-9;
-/// Passes after which the model of the noise is no longer renewed.
+/// A start is near enough where a renewal changes its mean square by no more than this share.
+const SHARE_OF_SQUARE: f64 = 1e-4;
+/// The model of the noise is renewed while an estimate moves by more than this share of its standard error, so many times at most.
+const SHARE_FOR_NOISE: f64 = 0.1;
 const NOISE_RENEWALS: usize = 10;
 
 /// Records and structure.
@@ -32,15 +35,17 @@ pub(crate) struct Delayed {
 }
 
 /// The end of a refinement.
-#[derive(Debug, Clone)]
 pub(crate) struct Refined {
     pub(crate) model: Model,
     pub(crate) iterations: usize,
     pub(crate) converged: bool,
     /// Model of the noise, where there is one.
     pub(crate) noise: Option<ArModel>,
-    /// Mean square of measured less simulated output, from the instruments' inputs.
+    /// Mean square of measured less simulated output, from the instruments' inputs; whitened where there is a model of the noise.
     pub(crate) mean_square: f64,
+    /// The equations at the model, and the delayed inputs that they were taken from.
+    pub(crate) equations: Equations,
+    pub(crate) delayed: Delayed,
 }
 
 impl Problem<'_> {
@@ -147,19 +152,27 @@ impl Problem<'_> {
         None
     }
 
-    /// A few refinements at fixed delays: the best model on the way.
+    /// A few refinements at fixed delays, with a model of the noise that stays: the best model on the way, with the mean square of its
+    /// output error.
     pub(crate) fn follow(
         &self,
         delayed: &Delayed,
         mut model: Model,
+        noise: Option<&ArModel>,
         most: usize,
     ) -> Result<Option<(f64, Model)>, Error> {
         let mut best: Option<(f64, Model)> = None;
         for _ in 0..=most {
-            let equations = self.equations(delayed, &model, None, false)?;
+            let equations = self.equations(delayed, &model, noise, false)?;
             let square = equations.output_squares / equations.samples as f64;
+            let rests = best
+                .as_ref()
+                .is_some_and(|(least, _)| (square - least).abs() <= SHARE_OF_SQUARE * least);
             if square.is_finite() && best.as_ref().is_none_or(|(least, _)| square < *least) {
                 best = Some((square, model.clone()));
+            }
+            if rests {
+                break;
             }
             let Ok(x) = equations.solve() else {
                 break;
@@ -172,12 +185,12 @@ impl Problem<'_> {
         Ok(best)
     }
 
-    /// Filter, instruments and, where asked for, the model of the noise renewed until the estimates rest. `reach` limits the change of a
+    /// Filter, instruments and, where there is one, the model of the noise, of at most the given order, renewed until the estimates rest. `reach` limits the change of a
     /// delay in one step.
     pub(crate) fn refine(
         &self,
         start: Model,
-        noise_order: Option<usize>,
+        noise: Option<(usize, ArModel)>,
         reach: f64,
         most: usize,
     ) -> Result<Refined, Error> {
@@ -185,45 +198,51 @@ impl Problem<'_> {
         let with_delays = structure.estimated_delays().next().is_some();
         let mut largest = start.delays.iter().copied().fold(0.0, f64::max);
         let mut delayed = self.delayed(&start.delays, largest);
-        let mut last = Refined {
-            model: start,
-            iterations: 0,
-            converged: false,
-            noise: None,
-            mean_square: f64::INFINITY,
-        };
+        let mut model = start;
+        let (noise_order, mut noise) = noise.unzip();
+        let mut renewals = 0;
+        let (mut iterations, mut converged) = (0, false);
         loop {
-            let equations =
-                self.equations(&delayed, &last.model, last.noise.as_ref(), with_delays)?;
-            last.mean_square = equations.output_squares / equations.samples as f64;
-            if last.converged || last.iterations >= most {
-                return Ok(last);
+            let equations = self.equations(&delayed, &model, noise.as_ref(), with_delays)?;
+            let refined = |equations: Equations, delayed, model, noise| Refined {
+                mean_square: equations.output_squares / equations.samples as f64,
+                model,
+                iterations,
+                converged,
+                noise,
+                equations,
+                delayed,
+            };
+            if converged || iterations >= most {
+                return Ok(refined(equations, delayed, model, noise));
             }
             let x = equations.solve()?;
-            let Some(next) = self.next(&last.model, &x, with_delays, reach) else {
-                return Ok(last);
+            let Some(next) = self.next(&model, &x, with_delays, reach) else {
+                return Ok(refined(equations, delayed, model, noise));
             };
             let covariance = equations.covariance(None)?;
-            let (old, new) = (last.model.core(structure), next.core(structure));
-            let rests = old.iter().zip(&new).enumerate().all(|(i, (old, new))| {
-                let change = (new - old).abs();
-                change <= SHARE_OF_ERROR * covariance[(i, i)].sqrt()
-                    || change <= SHARE_OF_ITSELF * old.abs()
-            });
-            let noise_is_used = noise_order.is_none() || last.noise.is_some();
-            last.converged = rests && noise_is_used;
+            let (old, new) = (model.core(structure), next.core(structure));
+            let within = |share: f64| {
+                old.iter().zip(&new).enumerate().all(|(i, (old, new))| {
+                    let change = (new - old).abs();
+                    change <= share * covariance[(i, i)].sqrt()
+                        || change <= SHARE_OF_ITSELF * old.abs()
+                })
+            };
+            converged = within(SHARE_OF_ERROR);
             if let Some(order) = noise_order
-                && last.iterations < NOISE_RENEWALS
+                && renewals < NOISE_RENEWALS
+                && !within(SHARE_FOR_NOISE)
             {
-                let segments: Vec<&[f64]> = equations.residuals.iter().map(Vec::as_slice).collect();
-                last.noise = Some(ArModel::fit(&segments, order)?);
+                renewals += 1;
+                noise = Some(equations.residual_noise(order)?);
             }
-            last.model = next;
-            last.iterations += 1;
+            model = next;
+            iterations += 1;
             if with_delays {
                 // A first sample that came and went with a delay would keep the estimates from resting.
-                largest = last.model.delays.iter().copied().fold(largest, f64::max);
-                delayed = self.delayed(&last.model.delays, largest);
+                largest = model.delays.iter().copied().fold(largest, f64::max);
+                delayed = self.delayed(&model.delays, largest);
             }
         }
     }

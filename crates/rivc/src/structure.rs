@@ -115,7 +115,7 @@ impl Structure {
             return Err(Error::Setting {
                 what: "the order n",
                 value: self.n as f64,
-                range: "at most 12",
+                range: "at most 8",
             });
         }
         if self.m.is_empty() {

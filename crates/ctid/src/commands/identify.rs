@@ -12,14 +12,14 @@ use super::{Results, finish};
 use crate::Error;
 use crate::column_errors::of_option;
 use crate::identify::side_by_side::{self, Orders};
-use crate::identify::{self, LevelChoice, Method, Request, side_by_side_text};
+use crate::identify::{self, DelayChoice, LevelChoice, Method, Request, side_by_side_text};
 use crate::look::Look;
 use crate::model_file::{self, ControllerSettings};
 use crate::progress::Bar;
 
 #[derive(Debug, Args)]
 pub(super) struct Identify {
-    /// Record (CSV), one
+    /// Record (CSV), one; several of one plant for srivc and rivc
     #[arg(required = true, value_name = "DATA.csv")]
     data: Vec<PathBuf>,
     /// How the parameters are found; several, with commas between them, or all, are set side by side
@@ -39,7 +39,7 @@ pub(super) struct Identify {
     /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
-    /// The columns' names, where their first letters do not tell
+    /// The columns' names, where their first letters do not tell; two inputs with + between them, for srivc and rivc
     #[arg(long, value_name = "TIME,INPUT,OUTPUT", value_parser = columns)]
     columns: Option<Columns>,
     /// What the input does between samples
@@ -49,12 +49,18 @@ pub(super) struct Identify {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     memory: Option<f64>,
     /// Bandwidth of the state variable filters [1/s]: without it 3 over the time constant for stabilized-oe and ct-rls; for ls and iv the
-    /// best of several, from which fcloe and recursive-fcloe start
+    /// best of several, from which fcloe, recursive-fcloe, srivc and rivc start
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     bandwidth: Option<f64>,
     /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe
     #[arg(long, value_enum, default_value_t = LevelChoice::Auto)]
     levels: LevelChoice,
+    /// Delay of the inputs [s], for srivc and rivc: a number, auto to estimate it up to a tenth of the record, or 0..S to estimate it up to S
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    delay: Option<DelayChoice>,
+    /// The plant integrates, A(0) = 0; for srivc and rivc
+    #[arg(long)]
+    integrator: bool,
     /// Bandwidth of a filter on the reading in front of the controller [1/s]; y is the filtered reading
     #[arg(long, value_name = "ZETA", allow_negative_numbers = true)]
     sensor_filter: Option<f64>,
@@ -71,11 +77,15 @@ fn columns(text: &str) -> Result<Columns, String> {
             names.len()
         ));
     };
+    let (input, second) = match input.split_once('+') {
+        Some((first, second)) => (first.trim(), Some(second.trim().to_owned())),
+        None => (input, None),
+    };
     Ok(Columns {
         time: Some(time.to_owned()),
         input: Some(input.to_owned()),
         output: Some(output.to_owned()),
-        input_2: None,
+        input_2: second,
         reference: None,
     })
 }
@@ -94,15 +104,23 @@ impl Identify {
         if let Some(model) = &self.model {
             let path = model;
             let model = model_file::read(path)?;
-            if let Some(second) = &model.columns.input_2 {
+            if let Some(second) = &model.columns.input_2
+                && !self.methods().iter().all(|method| method.is_refined())
+            {
                 return Err(Error::file(
                     path,
                     format!(
-                        "identify fits a linear model of one input, and the model names a second one, \"{second}\": use `ctid compare`, or delete input_2 where that pump stood still"
+                        "the model names a second input, \"{second}\", which of the methods srivc and rivc alone fit: choose one of them, use `ctid compare`, or delete input_2 where that pump stood still"
                     ),
                 ));
             }
             return Ok((model.columns, model.hold, model.controller));
+        }
+        let second = self.columns.as_ref().and_then(|c| c.input_2.as_ref());
+        if second.is_some() && !self.methods().iter().all(|method| method.is_refined()) {
+            return Err(Error::Usage(
+                "--columns names two inputs, which srivc and rivc alone fit: choose one of them, or name one input".to_owned(),
+            ));
         }
         let hold = match self.hold {
             InputHold::Zero => Hold::Zero,
@@ -144,6 +162,16 @@ impl Identify {
         if self.sensor_filter.is_some() && !any_of_loop {
             return refuse("--sensor-filter", "which has nothing to do with a loop");
         }
+        let any_refined = methods.iter().any(|method| method.is_refined());
+        if self.delay.is_some() && !any_refined {
+            return refuse("--delay", "which know no delay: srivc and rivc do");
+        }
+        if self.integrator && !any_refined {
+            return refuse(
+                "--integrator",
+                "which know no integrator: srivc and rivc do",
+            );
+        }
         if self.memory.is_some() && methods.iter().all(|method| weighs_all_alike(*method)) {
             return refuse("--memory", "which weighs the whole record alike");
         }
@@ -165,6 +193,8 @@ impl Identify {
             memory: self.memory.filter(|_| !weighs_all_alike(method)),
             bandwidth: self.bandwidth,
             levels: self.levels,
+            delay: self.delay.filter(|_| method.is_refined()),
+            integrator: self.integrator && method.is_refined(),
             ..Request::new(method, order)
         };
         let controller = controller.filter(|_| of_loop);
@@ -219,14 +249,18 @@ impl Identify {
     }
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
-        let [data] = &self.data[..] else {
+        let methods = self.methods();
+        let alone = methods.len() == 1 && self.order.0.len() == 1 && self.test.is_empty();
+        let [data, more @ ..] = &self.data[..] else {
+            return Err(Error::Usage("no record is given".to_owned()));
+        };
+        if !more.is_empty() && !(alone && methods[0].is_refined()) {
             return Err(Error::Usage(format!(
-                "identify works on one record, and {} are given; give the longest, or fit a physical model to all of them with compare",
+                "identify works on one record, and {} are given; give the longest, fit all of them together by --method srivc or rivc (alone, of one order, without --test), or fit a physical model to them with compare",
                 self.data.len()
             )));
-        };
+        }
         let (columns, hold, controller) = self.layout()?;
-        let methods = self.methods();
         self.check_options(&methods)?;
         let requests = methods
             .into_iter()
@@ -238,7 +272,13 @@ impl Identify {
             .iter()
             .map(|path| self.read_test(path, (&columns, hold), &record))
             .collect::<Result<Vec<_>, _>>()?;
-        let inputs: Vec<&Path> = std::iter::once(data)
+        let more = more
+            .iter()
+            .map(|path| self.read_test(path, (&columns, hold), &record))
+            .collect::<Result<Vec<_>, _>>()?;
+        let inputs: Vec<&Path> = self
+            .data
+            .iter()
             .chain(&self.test)
             .chain(&self.model)
             .map(PathBuf::as_path)
@@ -247,7 +287,12 @@ impl Identify {
         let bar = Bar::new();
         if let ([request], [_], []) = (&requests[..], &self.order.0[..], &test[..]) {
             bar.phase("identifying");
-            let found = identify::identify(&record, request);
+            let found = if more.is_empty() {
+                identify::identify(&record, request)
+            } else {
+                let records: Vec<Record> = std::iter::once(record).chain(more).collect();
+                identify::identify_together(&records, request)
+            };
             bar.clear();
             let found = found?;
             let text = identify::text::text(&found, look);
@@ -273,7 +318,7 @@ impl Identify {
 
 /// Whether a method has no memory that could fade.
 fn weighs_all_alike(method: Method) -> bool {
-    method.is_of_loop() && method != Method::RecursiveFcloe
+    method.is_refined() || method.is_of_loop() && method != Method::RecursiveFcloe
 }
 
 /// A method, or all of them.
@@ -293,6 +338,8 @@ impl ValueEnum for Choice {
             Self::One(Method::Iv),
             Self::One(Method::Fcloe),
             Self::One(Method::RecursiveFcloe),
+            Self::One(Method::Srivc),
+            Self::One(Method::Rivc),
         ]
     }
 

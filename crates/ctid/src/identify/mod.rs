@@ -7,7 +7,7 @@
 //! | [`Method::CtRls`] | equation error of the filtered signals | noise is low: it biases the estimates, by the share of noise the filters let through |
 //! | [`Method::StabilizedOe`] | output error of a model in parallel | noise is there: it is not in the regressor |
 //!
-//! Four have to do with a loop `u = R/S (r - y)`; without a controller they identify in open loop. Their signals are deviations from levels of
+//! Four have to do with a loop of a known controller `u = R/S (r - y)`; without a controller they identify in open loop. Their signals are deviations from levels of
 //! rest, see [`LevelChoice`]; in a loop the model is that of the whole loop, driven by the reference:
 //!
 //! | method | what it does | use it where |
@@ -16,6 +16,14 @@
 //! | [`Method::RecursiveFcloe`] | the same, sample by sample, with a memory that does not fade | the plant drifts: it follows with a delay of that memory |
 //! | [`Method::Iv`] | instruments simulated in the loop | a check that needs no iteration |
 //! | [`Method::Ls`] | least squares | noise is low, or to see what noise does |
+//!
+//! Two use instruments that are renewed with the estimates, of one record or several, with a delay, an integrator, a second input, on uneven
+//! times; where a reference moves they are those of a loop, whatever its controller:
+//!
+//! | method | what it assumes of the noise |
+//! |---|---|
+//! | [`Method::Srivc`] | white; other noise costs efficiency, and the standard errors allow for it |
+//! | [`Method::Rivc`] | autoregressive, of an order that is chosen |
 //!
 //! Of the first two: the offset `d` is always estimated, as records are seldom taken from their point of rest. Inside, time and signals are scaled so that all
 //! parameters are about 1.
@@ -34,6 +42,7 @@ mod band;
 mod drift;
 mod looped;
 mod recursion;
+mod refined;
 mod scaled;
 pub mod side_by_side;
 pub mod side_by_side_text;
@@ -48,6 +57,7 @@ use self::scaled::Scaled;
 use crate::Error;
 pub use drift::{Drift, OverLevel};
 pub use looped::{Batch, Convergence, InLoop, LevelChoice, Start};
+pub use refined::{DelayChoice, Refined};
 
 /// How the parameters are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
@@ -65,6 +75,10 @@ pub enum Method {
     Fcloe,
     /// The same, recursively
     RecursiveFcloe,
+    /// Refined instruments for white noise; where the reference moves those of a loop, whatever its controller (CLSRIVC)
+    Srivc,
+    /// Refined instruments with an autoregressive model of the noise (CLRIVC in a loop)
+    Rivc,
 }
 
 impl Method {
@@ -77,12 +91,19 @@ impl Method {
             Self::Iv => "iv",
             Self::Fcloe => "fcloe",
             Self::RecursiveFcloe => "recursive-fcloe",
+            Self::Srivc => "srivc",
+            Self::Rivc => "rivc",
         }
     }
 
-    /// Whether it has to do with the loop.
+    /// Whether it has to do with the loop's controller.
     pub fn is_of_loop(self) -> bool {
-        !matches!(self, Self::StabilizedOe | Self::CtRls)
+        !matches!(self, Self::StabilizedOe | Self::CtRls) && !self.is_refined()
+    }
+
+    /// Whether it is SRIVC or RIVC: with delays, integrators, a second input, several records.
+    pub fn is_refined(self) -> bool {
+        matches!(self, Self::Srivc | Self::Rivc)
     }
 }
 
@@ -159,6 +180,10 @@ pub struct Request {
     pub levels: LevelChoice,
     /// Smallest and largest command, in the input's unit; infinite where there is none.
     pub limits: (f64, f64),
+    /// Delay of the inputs; none where nothing is said. For SRIVC and RIVC.
+    pub delay: Option<DelayChoice>,
+    /// Whether `A(0) = 0`; for the same methods.
+    pub integrator: bool,
 }
 
 impl Request {
@@ -172,6 +197,8 @@ impl Request {
             controller: None,
             levels: LevelChoice::Auto,
             limits: (f64::NEG_INFINITY, f64::INFINITY),
+            delay: None,
+            integrator: false,
         }
     }
 }
@@ -222,8 +249,14 @@ pub struct Identification {
     /// What a method that has to do with the loop says besides.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_loop: Option<InLoop>,
+    /// What SRIVC and RIVC say besides.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refined: Option<Refined>,
     /// Gain and time constant over the level; nothing where the level stands, or the record is too short to tell.
     pub drift: Option<Drift>,
+    /// The plant, without offsets.
+    #[serde(skip)]
+    pub plant: rivc::Plant,
     /// The record, to be drawn.
     #[serde(skip)]
     pub shown: Shown,
@@ -281,6 +314,9 @@ pub struct Shown {
 /// [`Error::Record`] for a record that is too short, [`Error::Usage`] where it cannot tell the parameters, [`Error::Estimator`] where the
 /// recursion has stopped.
 pub fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
+    if request.method.is_refined() {
+        return identify_together(std::slice::from_ref(record), request);
+    }
     if request.method.is_of_loop() {
         return looped::identify(record, request);
     }
@@ -316,7 +352,8 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         })
         .collect();
     warnings.extend(doubtful(&parameters, order));
-    let (time_constants, oscillations) = poles(&parameters, order)?;
+    let plant = plant(&parameters, order);
+    let (time_constants, oscillations) = poles(&plant.a)?;
     if !path.held {
         warnings.extend(unsure(&parameters, &scaled.settings()));
     }
@@ -345,6 +382,8 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         drift: drift::over_level(&bands, &scaled, order),
         trajectory: Some(bands),
         in_loop: None,
+        refined: None,
+        plant,
         shown: Shown {
             time: record.time.clone(),
             input: record.input.clone(),
@@ -352,6 +391,14 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
             simulated,
         },
     })
+}
+
+/// Identifies one plant from several records, by SRIVC or RIVC; what is drawn is the first.
+///
+/// # Errors
+/// [`Error::File`] with what `rivc` refuses.
+pub fn identify_together(records: &[Record], request: &Request) -> Result<Identification, Error> {
+    refined::identify(records, request)
 }
 
 fn moves(record: &Record, signal: &Signal) -> Result<(), Error> {
@@ -384,24 +431,41 @@ fn unusable(record: &Record, order: Order, why: &str) -> Error {
 
 /// Names and units.
 fn names(order: Order, record: &Record) -> Vec<(String, String)> {
-    let power = |i: usize| match i {
-        0 => String::new(),
-        1 => "s".to_owned(),
-        i => format!("s^{i}"),
-    };
-    let gain = match (&*record.output.unit, &*record.input.unit) {
-        (y, "") => y.to_owned(),
-        ("", u) => format!("1/{u}"),
-        (y, u) if y == u => String::new(),
-        (y, u) => format!("{y}/{u}"),
-    };
-    let mut names: Vec<_> = (1..=order.n).map(|i| (format!("a{i}"), power(i))).collect();
+    let gain = gain_unit(&record.output.unit, &record.input.unit);
+    let a = (1..=order.n).map(|i| (format!("a{i}"), power_of_time(i)));
+    let mut names: Vec<_> = a.collect();
     names.extend((0..=order.m).map(|j| {
-        let unit = format!("{} {gain}", power(j)).trim().to_owned();
+        let unit = format!("{} {gain}", power_of_time(j)).trim().to_owned();
         (format!("b{j}"), unit)
     }));
     names.push(("offset".to_owned(), record.output.unit.clone()));
     names
+}
+
+/// Of one input, from a_1 to a_n and b_0 to b_m.
+fn plant(parameters: &[Parameter], order: Order) -> rivc::Plant {
+    let values = |range: std::ops::Range<usize>| parameters[range].iter().map(|p| p.value);
+    let a = std::iter::once(1.0).chain(values(0..order.n)).collect();
+    let b = values(order.n..order.n + order.m + 1).collect();
+    rivc::Plant::new(a, b)
+}
+
+fn power_of_time(i: usize) -> String {
+    match i {
+        0 => String::new(),
+        1 => "s".to_owned(),
+        i => format!("s^{i}"),
+    }
+}
+
+fn gain_unit(output: &str, input: &str) -> String {
+    match (output, input) {
+        (y, "") => y.to_owned(),
+        ("", u) => format!("1/{u}"),
+        (y, u) if y == u => String::new(),
+        (y, u) if u.contains('/') => format!("{y}/({u})"),
+        (y, u) => format!("{y}/{u}"),
+    }
 }
 
 /// The start was better than the end.
@@ -480,10 +544,9 @@ fn too_fast(time_constants: &[f64], record: &Record, order: Order) -> Option<Str
     ))
 }
 
-fn poles(parameters: &[Parameter], order: Order) -> Result<(Vec<f64>, Vec<Oscillation>), Error> {
-    let mut a = vec![1.0];
-    a.extend(parameters.iter().take(order.n).map(|p| p.value));
-    let poles = ct_lti::Polynomial::new(a)?.roots()?;
+/// Time constants and oscillations of A, from s^0.
+fn poles(a: &[f64]) -> Result<(Vec<f64>, Vec<Oscillation>), Error> {
+    let poles = ct_lti::Polynomial::new(a.to_vec())?.roots()?;
     let mut real: Vec<f64> = poles
         .iter()
         .filter(|pole| pole.im == 0.0)

@@ -26,7 +26,7 @@ use missing_effect::Parameter;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::simulation::Driven;
+use super::refined::data;
 use super::{Identification, MAX_ORDER, Method, Order, Request, Shown, identify, rms};
 use crate::Error;
 
@@ -144,6 +144,10 @@ impl Method {
             Self::StabilizedOe => "noise that the input does not answer to",
             Self::Iv => "instruments that the noise does not reach: in a loop its controller",
             Self::Fcloe => "one plant over the record; in a loop its controller",
+            Self::Srivc => {
+                "one plant over the record; in a loop an input that is held between samples"
+            }
+            Self::Rivc => "the same, and noise that is autoregressive",
             Self::RecursiveFcloe => {
                 "a plant that drifts slower than the memory; in a loop its controller"
             }
@@ -261,10 +265,11 @@ fn row(record: &Record, test: &[Record], request: &Request) -> Row {
 
 fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<Outcome, Error> {
     let Order { n, m } = found.order;
-    let theta: Vec<f64> = found.parameters.iter().map(|p| p.value).collect();
-    let (a, b) = (&theta[..n], &theta[n..=n + m]);
     let on = |record: &Record| -> Result<(Vec<f64>, Vec<f64>), Error> {
-        let simulated = Driven::of(record).fitted(a, b)?;
+        let simulated = found
+            .plant
+            .fitted(&data(record))
+            .map_err(|error| Error::Usage(error.to_string()))?;
         let output = record.output.values.iter();
         let error = output.zip(&simulated).map(|(y, model)| y - model);
         Ok((error.collect(), simulated))
@@ -277,8 +282,9 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
     let rmse = rms(error.iter().copied());
     let spread = spread(std::slice::from_ref(record));
     let test_rmse = (!test.is_empty()).then(|| rms(tested.iter().flatten().copied()));
-    let parts: Vec<Option<f64>> = found.parameters[..=n + m]
-        .iter()
+    let of_plant = found.parameters.iter();
+    let of_plant = of_plant.filter(|p| !p.name.starts_with("offset"));
+    let parts: Vec<Option<f64>> = of_plant
         .map(|p| {
             let error = p.std_error.filter(|error| *error > 0.0);
             error.map(|error| (error / p.value).powi(2))
@@ -341,12 +347,12 @@ fn violated(
     in_loop: bool,
 ) -> Vec<String> {
     let mut violated = Vec::new();
-    if in_loop && !method.is_of_loop() {
+    if in_loop && !method.is_of_loop() && !method.is_refined() {
         violated.push("the input answers to the noise, through the controller".to_owned());
     }
     if found.input_p < UNLIKELY {
         violated.push(
-            "the input shows in its error: the order is too low, or the plant is not linear"
+            "the input shows in its error: the order is too low, there is a delay (srivc and rivc find one by --delay auto), or the plant is not linear"
                 .to_owned(),
         );
     }
@@ -357,7 +363,9 @@ fn violated(
             Method::StabilizedOe | Method::RecursiveFcloe => {
                 "the plant may have changed, or it has not converged"
             }
-            Method::Iv | Method::Fcloe => "the plant may not be linear, or of this order",
+            Method::Iv | Method::Fcloe | Method::Srivc | Method::Rivc => {
+                "the plant may not be linear, or of this order"
+            }
         };
         let percent = 100.0 * (found.rmse / least - 1.0);
         violated.push(format!(

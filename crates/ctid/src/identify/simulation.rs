@@ -1,7 +1,6 @@
 //! What a linear model says from the input alone.
 
 use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
-use ct_signals::Record;
 use nalgebra::{DMatrix, DVector};
 
 use super::Order;
@@ -26,7 +25,7 @@ pub(super) fn simulate(
         y: &scaled.y,
     };
     let offset = offset.first().copied().unwrap_or(0.0);
-    let Response { forced, fading } = driven.respond(a, b, Level::Known(offset))?;
+    let Response { forced, fading } = driven.respond(a, b, offset)?;
     let lasting = fading.iter().rev().take(fading.len().div_ceil(10));
     let at_end = lasting.fold(0.0_f64, |most, x| most.max(x.abs()));
     let warning = (at_end > LASTING).then(|| {
@@ -40,19 +39,11 @@ pub(super) fn simulate(
 }
 
 /// A record of one input and one output.
-pub(super) struct Driven<'a> {
-    pub time: Vec<f64>,
-    pub hold: Hold,
-    pub u: &'a [f64],
-    pub y: &'a [f64],
-}
-
-/// The offset of the output.
-#[derive(Clone, Copy, PartialEq)]
-enum Level {
-    Known(f64),
-    /// Fitted with the initial state.
-    Fitted,
+struct Driven<'a> {
+    time: Vec<f64>,
+    hold: Hold,
+    u: &'a [f64],
+    y: &'a [f64],
 }
 
 /// A simulated output: what the input does, and what the initial state does.
@@ -61,68 +52,18 @@ struct Response {
     fading: Vec<f64>,
 }
 
-impl<'a> Driven<'a> {
-    pub fn of(record: &'a Record) -> Self {
-        Self {
-            time: record.time.clone(),
-            hold: match record.hold {
-                ct_signals::Hold::Zero => Hold::Zero,
-                ct_signals::Hold::First => Hold::First,
-            },
-            u: &record.input.values,
-            y: &record.output.values,
-        }
-    }
-
-    /// The output of `(1 + a_1 s + ..) y = (b_0 + ..) u + d`, from an initial state and with an offset that are fitted to the output.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] where the model runs away.
-    pub fn fitted(&self, a: &[f64], b: &[f64]) -> Result<Vec<f64>, Error> {
-        // In a time in which the coefficients are about 1.
-        let unit = a
-            .last()
-            .map_or(1.0, |last| last.abs().powf(1.0 / a.len() as f64));
-        let unit = if unit > 0.0 && unit.is_finite() {
-            unit
-        } else {
-            1.0
-        };
-        let power = |from: usize| move |(i, c): (usize, &f64)| c / unit.powi((i + from) as i32);
-        let scaled = Self {
-            time: self.time.iter().map(|t| t / unit).collect(),
-            ..*self
-        };
-        let a: Vec<f64> = a.iter().enumerate().map(power(1)).collect();
-        let b: Vec<f64> = b.iter().enumerate().map(power(0)).collect();
-        let Response { forced, fading } = scaled.respond(&a, &b, Level::Fitted)?;
-        let simulated: Vec<f64> = forced.iter().zip(&fading).map(|(a, b)| a + b).collect();
-        if simulated.iter().any(|y| !y.is_finite()) {
-            return Err(Error::Usage(
-                "the model runs away when it is simulated on the input alone".to_owned(),
-            ));
-        }
-        Ok(simulated)
-    }
-
-    fn respond(&self, a: &[f64], b: &[f64], level: Level) -> Result<Response, Error> {
+impl Driven<'_> {
+    fn respond(&self, a: &[f64], b: &[f64], offset: f64) -> Result<Response, Error> {
         let denominator: Vec<f64> = std::iter::once(1.0).chain(a.iter().copied()).collect();
         let model =
             StateSpace::controllable(&TransferFunction::from_coefficients(b, &denominator)?)?;
         let first = self.u.first().copied().unwrap_or(0.0);
-        let offset = match level {
-            Level::Known(offset) => offset,
-            Level::Fitted => 0.0,
-        };
         let rest = b[0] * first + offset;
         let mut forced = self.response(&model, |k| self.u[k] - first, None)?;
         forced.iter_mut().for_each(|y| *y += rest);
-        let mut free: Vec<Vec<f64>> = (0..a.len())
+        let free: Vec<Vec<f64>> = (0..a.len())
             .map(|state| self.response(&model, |_| 0.0, Some(state)))
             .collect::<Result<_, _>>()?;
-        if level == Level::Fitted {
-            free.push(vec![1.0; self.y.len()]);
-        }
         let count = self.y.len();
         // each of size 1, so that none is lost beside another
         let sizes: Vec<f64> = free

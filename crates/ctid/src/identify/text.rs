@@ -2,7 +2,7 @@
 
 use fcloe::{Condition, NoisePath, Verdict};
 
-use super::{Identification, InLoop, LevelChoice, rms};
+use super::{Identification, InLoop, LevelChoice, Order, Refined, rms};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
@@ -24,6 +24,7 @@ pub fn text(found: &Identification, look: Look) -> String {
     text += &dynamics(found);
     text.push('\n');
     text += &in_loop(found, look);
+    text += &refined(found, look);
     text += &drift(found, look);
     text += &error(found, look);
     for warning in &found.warnings {
@@ -35,15 +36,33 @@ pub fn text(found: &Identification, look: Look) -> String {
 
 /// The equation.
 pub(crate) fn model(found: &Identification) -> String {
-    let sum = |letter: char, from: usize, to: usize| {
+    let sum = |letter: char, from: usize, to: usize, behind: &str| {
         let term = |i: usize| match i {
-            0 => format!("{letter}0"),
-            1 => format!("{letter}1 s"),
-            i => format!("{letter}{i} s^{i}"),
+            0 => format!("{letter}0{behind}"),
+            1 => format!("{letter}1{behind} s"),
+            i => format!("{letter}{i}{behind} s^{i}"),
         };
         (from..=to).map(term).collect::<Vec<_>>().join(" + ")
     };
-    let (a, b) = (sum('a', 1, found.order.n), sum('b', 0, found.order.m));
+    let Order { n, m } = found.order;
+    if let Some(refined) = &found.refined {
+        let a = match (refined.integrator, n) {
+            (true, 1) => "s".to_owned(),
+            (true, n) => format!("(s + {})", sum('a', 2, n, "")),
+            (false, n) => format!("(1 + {})", sum('a', 1, n, "")),
+        };
+        let inputs = refined.delays.iter().enumerate().map(|(j, delay)| {
+            let (behind, signal) = match j {
+                0 => (String::new(), "u".to_owned()),
+                j => (format!("_{}", j + 1), format!("u_{}", j + 1)),
+            };
+            let late = if *delay > 0.0 { "(t - delay)" } else { "" };
+            format!("({}) {signal}{late}", sum('b', 0, m, &behind))
+        });
+        let inputs = inputs.collect::<Vec<_>>().join(" + ");
+        return format!("{a} y = {inputs} + offset");
+    }
+    let (a, b) = (sum('a', 1, n, ""), sum('b', 0, m, ""));
     match &found.in_loop {
         None => format!("(1 + {a}) y = ({b}) u + offset"),
         Some(_) => format!("(1 + {a}) y = ({b}) u, y and u as deviations"),
@@ -134,11 +153,13 @@ fn settled(values: &[f64]) -> &[f64] {
 }
 
 fn dynamics(found: &Identification) -> String {
-    let mut parts: Vec<String> = found
-        .time_constants
-        .iter()
-        .map(|t| format!("time constant {} s", numbers::significant(*t, 4)))
+    let integrates = found.refined.as_ref().is_some_and(|r| r.integrator);
+    let mut parts: Vec<String> = integrates
+        .then(|| "integrator".to_owned())
+        .into_iter()
         .collect();
+    let constants = found.time_constants.iter();
+    parts.extend(constants.map(|t| format!("time constant {} s", numbers::significant(*t, 4))));
     parts.extend(found.oscillations.iter().map(|pair| {
         format!(
             "period {} s with damping {}",
@@ -275,6 +296,78 @@ fn in_loop(found: &Identification, look: Look) -> String {
     }
     text.push('\n');
     text
+}
+
+fn refined(found: &Identification, look: Look) -> String {
+    let Some(refined) = &found.refined else {
+        return String::new();
+    };
+    let mut text = format!("{}\n", look.heading("Instruments and noise"));
+    for (name, sentence) in refined_facts(found, refined) {
+        text += &look.paragraph("  - ", &format!("{name}: {sentence}"));
+    }
+    text.push('\n');
+    text
+}
+
+/// What SRIVC and RIVC say of their way.
+pub(crate) fn refined_facts(
+    found: &Identification,
+    refined: &Refined,
+) -> Vec<(&'static str, String)> {
+    let digits = |value| numbers::significant(value, 4);
+    let unit = &found.shown.output.unit;
+    let mut facts = Vec::new();
+    let from = match refined.explained {
+        Some(share) => format!(
+            "from the reference, which explains {} % of the input's power",
+            numbers::significant(100.0 * share, 3)
+        ),
+        None => "simulated from the input, open loop".to_owned(),
+    };
+    let end = match refined.converged {
+        true => "estimates at rest",
+        false => "estimates not at rest",
+    };
+    facts.push((
+        refined.name,
+        format!(
+            "instruments {from}; {} renewal{}, {end}",
+            refined.iterations,
+            if refined.iterations == 1 { "" } else { "s" }
+        ),
+    ));
+    if let [_, _, ..] = &refined.records[..] {
+        facts.push(("records", refined.records.join(", ")));
+    }
+    if let [_, _, ..] = &refined.inputs[..] {
+        let names = refined.inputs.iter().enumerate();
+        let names = names.map(|(j, name)| match j {
+            0 => format!("u is {name}"),
+            j => format!("u_{} is {name}", j + 1),
+        });
+        facts.push(("inputs", names.collect::<Vec<_>>().join(", ")));
+    }
+    let known = |delay: &&f64| **delay > 0.0;
+    let estimated = |p: &missing_effect::Parameter| p.name.starts_with("delay");
+    if refined.delays.iter().any(|delay| known(&delay)) && !found.parameters.iter().any(estimated) {
+        let delay = digits(refined.delays.iter().copied().fold(0.0, f64::max));
+        facts.push(("delay", format!("{delay} s, as given")));
+    }
+    let deviation = digits(refined.noise_deviation);
+    let noise = match &refined.noise[..] {
+        [] => format!("white, of standard deviation {deviation} {unit}"),
+        coefficients => format!(
+            "autoregressive, driven by a standard deviation of {deviation} {unit}, with {} on the samples before",
+            coefficients
+                .iter()
+                .map(|c| numbers::significant(*c, 3))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+    };
+    facts.push(("noise", noise.replace(" ,", ",").trim_end().to_owned()));
+    facts
 }
 
 /// What is known of the loop and of the way to the estimates.

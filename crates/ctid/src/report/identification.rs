@@ -43,8 +43,9 @@ fn headline(found: &Identification) -> String {
         .iter()
         .map(|warning| format!("<p class=\"notice\">{}</p>\n", escape(warning)))
         .collect();
-    let with_unit = |index: usize| {
-        found.parameters.get(index).map_or(String::new(), |p| {
+    let of = |name: &str| {
+        let parameter = found.parameters.iter().find(|p| p.name == name);
+        parameter.map_or("none: an integrator".to_owned(), |p| {
             format!("{} {}", with_error(p.value, p.std_error), unit(&p.unit))
         })
     };
@@ -54,8 +55,8 @@ fn headline(found: &Identification) -> String {
     };
     let mut facts = vec![
         ("Model", escape(&model(found))),
-        ("Gain", with_unit(found.order.n)),
-        (time_constant, with_unit(0)),
+        ("Gain", of("b0")),
+        (time_constant, of("a1")),
         ("Method", code(found.method.id())),
         ("Dynamics", dynamics(found)),
     ];
@@ -66,6 +67,10 @@ fn headline(found: &Identification) -> String {
     }
     if let Some(in_loop) = &found.in_loop {
         let more = text::facts(found, in_loop).into_iter();
+        facts.extend(more.map(|(name, sentence)| (name, escape(&sentence))));
+    }
+    if let Some(refined) = &found.refined {
+        let more = text::refined_facts(found, refined).into_iter();
         facts.extend(more.map(|(name, sentence)| (name, escape(&sentence))));
     }
     let facts: String = facts

@@ -7,6 +7,7 @@ mod design;
 mod effort;
 mod identify;
 mod identify_loop;
+mod identify_refined;
 mod injected;
 mod model_file;
 mod monitor;

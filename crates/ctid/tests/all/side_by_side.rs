@@ -125,8 +125,8 @@ fn the_program_sets_them_side_by_side() {
         "{text}"
     );
     let json = place.json("a.json");
-    assert_eq!(json["methods"].as_array().unwrap().len(), 6);
-    assert_eq!(json["orders"].as_array().unwrap().len(), 6 * 3);
+    assert_eq!(json["methods"].as_array().unwrap().len(), 8);
+    assert_eq!(json["orders"].as_array().unwrap().len(), 8 * 3);
     assert_eq!(json["test"][0], "tour-test.csv");
     for row in json["methods"].as_array().unwrap() {
         assert!(row["found"]["test_rmse"].as_f64().unwrap() > 0.0, "{row}");

@@ -12,7 +12,7 @@ fn records() -> u64 {
     std::env::var("RECORDS")
         .ok()
         .and_then(|n| n.parse().ok())
-        .unwrap_or(100)
+        .unwrap_or(50)
 }
 
 fn coloured(n: usize, rms: f64, ar: &[f64], rng: &mut impl Rng) -> Vec<f64> {
@@ -61,7 +61,10 @@ fn check(
         let bias = errors.iter().map(|e| e.0).sum::<f64>() / n;
         let spread = (errors.iter().map(|e| (e.0 - bias).powi(2)).sum::<f64>() / n).sqrt();
         let told = (errors.iter().map(|e| e.1 * e.1).sum::<f64>() / n).sqrt();
-        let worst = errors.iter().map(|(e, s)| (e / s).abs()).fold(0.0, f64::max);
+        let worst = errors
+            .iter()
+            .map(|(e, s)| (e / s).abs())
+            .fold(0.0, f64::max);
         let converged = found.iter().filter(|found| found.converged).count();
         println!(
             "{name} {} {kind:?}: {:.1} % covered, bias {:.2} of its error, errors {:.3} of the spread, worst {worst:.2}, spread {:.2} %, {converged} converged",
@@ -88,7 +91,11 @@ fn open_loop() {
     let u = held(excitation::prbs(1000, 10, -1.0, 1.0, 9).unwrap());
     let clean = respond(&b, &a, &time, &u, 0.0);
     let rms = 0.1 * spread(&clean);
-    for (name, ar) in [("white", &[][..]), ("AR(2)", &[1.3, -0.5]), ("AR(1)", &[0.9])] {
+    for (name, ar) in [
+        ("white", &[][..]),
+        ("AR(2)", &[1.3, -0.5]),
+        ("AR(1)", &[0.9]),
+    ] {
         let record = |seed| {
             let v = coloured(clean.len(), rms, ar, &mut rng(seed));
             data(time.clone(), vec![u.clone()], add(&clean, &v))
@@ -142,7 +149,8 @@ fn closed_loop() {
             vec![(A(1), 12.0), (A(2), 30.0), (B(0), 1.5)],
         ),
     ] {
-        let clean = sampled_loop(&plant, &controller, 1.0, 1, &r, fcloe::Noise::None, None).unwrap();
+        let clean =
+            sampled_loop(&plant, &controller, 1.0, 1, &r, fcloe::Noise::None, None).unwrap();
         let rms = 0.1 * spread(&clean.y);
         for (colour, ar) in [("white", &[][..]), ("AR(1)", &[0.8])] {
             let record = |seed| {
@@ -155,7 +163,13 @@ fn closed_loop() {
                 }
             };
             for noise in [Noise::White, Noise::Autoregressive] {
-                check(&format!("{name}, {colour}"), &structure, noise, &truth, record);
+                check(
+                    &format!("{name}, {colour}"),
+                    &structure,
+                    noise,
+                    &truth,
+                    record,
+                );
             }
         }
     }

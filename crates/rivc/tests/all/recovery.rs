@@ -3,7 +3,7 @@
 use crate::support::{add, data, even, held, respond};
 use ct_lti::Hold;
 use ct_signals::excitation;
-use rivc::{Delay, Estimate, Input, Kind, Noise, Settings, Structure, estimate};
+use rivc::{Delay, Estimate, Input, Kind, Noise, Plant, Settings, Structure, estimate};
 
 fn prbs(n: usize, every: usize, seed: u32) -> Vec<f64> {
     excitation::prbs(n, every, -1.0, 1.0, seed).unwrap()
@@ -17,10 +17,10 @@ fn near(found: &Estimate, a: &[f64], b: &[&[f64]], tolerance: f64) {
             "{what}: {found} for {truth}"
         );
     };
-    for (i, (found, truth)) in found.a.iter().zip(a).enumerate() {
+    for (i, (found, truth)) in found.plant.a.iter().zip(a).enumerate() {
         close(*found, *truth, &format!("a{i}"));
     }
-    for (j, (found, truth)) in found.b.iter().zip(b).enumerate() {
+    for (j, (found, truth)) in found.plant.b.iter().zip(b).enumerate() {
         for (i, (found, truth)) in found.iter().zip(*truth).enumerate() {
             close(*found, *truth, &format!("b{i} of input {j}"));
         }
@@ -122,7 +122,11 @@ fn delays_known_and_estimated_even_and_uneven() {
                 )
                 .unwrap();
                 near(&found, &a, &[&b], 1e-6);
-                assert!((found.delays[0] - delay).abs() < 1e-6, "{:?}", found.delays);
+                assert!(
+                    (found.plant.delays[0] - delay).abs() < 1e-6,
+                    "{:?}",
+                    found.plant.delays
+                );
             }
         }
     }
@@ -138,7 +142,11 @@ fn an_integrator() {
         let u = held(prbs(1000, 14, 9));
         let y = respond(b, a, &time, &u, 0.0);
         // A leak that nobody measures.
-        let y = y.iter().zip(&time).map(|(y, t)| 5.0 + y - 0.01 * t).collect();
+        let y = y
+            .iter()
+            .zip(&time)
+            .map(|(y, t)| 5.0 + y - 0.01 * t)
+            .collect();
         let structure = Structure::new(a.len() - 1, [b.len() - 1]).with_integrator();
         let found = estimate(
             &[data(time, vec![u], y)],
@@ -170,7 +178,7 @@ fn several_inputs_with_delays_of_their_own() {
     )
     .unwrap();
     near(&found, &a, &[b1, b2], 1e-6);
-    assert!((found.delays[1] - 7.3).abs() < 1e-6);
+    assert!((found.plant.delays[1] - 7.3).abs() < 1e-6);
 }
 
 /// Each record has an offset and a state of its own; the plant is the same.
@@ -187,10 +195,42 @@ fn several_records() {
             data(even(370, step), vec![held(part(&u.values))], y)
         })
         .collect();
-    let found = estimate(&records, &Structure::new(2, [0]), &Settings::new(Noise::White)).unwrap();
+    let found = estimate(
+        &records,
+        &Structure::new(2, [0]),
+        &Settings::new(Noise::White),
+    )
+    .unwrap();
     near(&found, &a, &[&b], 1e-6);
     for (record, level) in [3.0, -5.0, 0.0].into_iter().enumerate() {
         let offset = found.parameter(Kind::Offset { record }).unwrap().value;
         assert!((offset - level).abs() < 1e-5);
     }
+}
+
+/// A known plant on another record: offset and initial states are fitted, and nothing else.
+#[test]
+fn a_known_plant_on_another_record() {
+    let (a, b) = (vec![1.0, 12.0, 30.0], vec![2.0, 3.0]);
+    let u = held(prbs(500, 9, 9));
+    let y = respond(&b, &a, &even(500, 1.0), &u, 5.0);
+    let y: Vec<f64> = y[60..].iter().map(|y| y + 7.0).collect();
+    let record = data(
+        even(440, 1.0),
+        vec![held(u.values[60..].to_vec())],
+        y.clone(),
+    );
+    let off = |plant: &Plant| {
+        let simulated = plant.fitted(&record).unwrap();
+        // The first input from before the record is not known.
+        let errors = y.iter().zip(simulated).skip(60).map(|(y, s)| (y - s).abs());
+        errors.fold(0.0, f64::max)
+    };
+    let mut plant = Plant::new(a, b);
+    assert!(off(&plant) > 0.1);
+    plant.delays[0] = 5.0;
+    assert!(off(&plant) < 0.02, "{}", off(&plant));
+    plant.delays[0] = 0.0;
+    plant.a = vec![0.0, 1.0, 12.0];
+    assert!(off(&plant) > 0.1);
 }

@@ -185,7 +185,8 @@ impl Task<'_> {
                 std_error: *std_error,
             })
             .collect();
-        let (time_constants, oscillations) = poles(&parameters, order)?;
+        let plant = super::plant(&parameters, order);
+        let (time_constants, oscillations) = poles(&plant.a)?;
         let output = &record.output.values;
         let rmse = rms(output.iter().zip(&simulated).map(|(y, model)| y - model));
         let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
@@ -240,7 +241,9 @@ impl Task<'_> {
                 health,
                 convergence,
             }),
+            refined: None,
             drift: None,
+            plant,
             shown: Shown {
                 time: record.time.clone(),
                 input: record.input.clone(),

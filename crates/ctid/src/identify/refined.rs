@@ -1,0 +1,293 @@
+//! SRIVC and RIVC: refined instruments, with a delay, an integrator, a second input, several records.
+//!
+//! A reference that moves says that the record comes from a loop: the instruments then come from it, and the controller need not be known.
+
+use ct_signals::Record;
+use missing_effect::Parameter;
+use rivc::{Data, Delay, Kind, Noise, Structure};
+use serde::Serialize;
+
+use super::{Identification, Method, Order, Request, Shown, poles, rms};
+use crate::Error;
+use crate::numbers;
+
+/// A delay that is looked for without a limit is at most this part of the shortest record.
+const PART: f64 = 0.1;
+/// Instruments from a reference that explains less of the input are weak.
+const EXPLAINED: f64 = 0.2;
+
+/// What is said of the delay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DelayChoice {
+    /// It is known, s.
+    Known(f64),
+    /// It is estimated, up to a tenth of the record.
+    Auto,
+    /// It is estimated, up to this, s.
+    UpTo(f64),
+}
+
+impl std::str::FromStr for DelayChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!(
+                "a delay is a number of seconds of at least 0, auto, or a range from 0 as in 0..30; found {text}"
+            )
+        };
+        let number = |text: &str| {
+            let value = text.trim().parse::<f64>().map_err(|_| wrong())?;
+            match value.is_finite() && value >= 0.0 {
+                true => Ok(value),
+                false => Err(wrong()),
+            }
+        };
+        match text.split_once("..") {
+            None if text == "auto" => Ok(Self::Auto),
+            None => Ok(Self::Known(number(text)?)),
+            Some((from, to)) => match (number(from)?, number(to)?) {
+                (0.0, to) if to > 0.0 => Ok(Self::UpTo(to)),
+                _ => Err(wrong()),
+            },
+        }
+    }
+}
+
+/// What SRIVC and RIVC say besides the model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Refined {
+    /// SRIVC, RIVC, CLSRIVC or CLRIVC.
+    pub name: &'static str,
+    /// Whether `A(0) = 0`.
+    pub integrator: bool,
+    /// Delay of each input, s.
+    pub delays: Vec<f64>,
+    /// Records that were fitted.
+    pub records: Vec<String>,
+    /// Names of the inputs.
+    pub inputs: Vec<String>,
+    /// Coefficients of the noise, an autoregression counted in samples: of the residual for SRIVC.
+    pub noise: Vec<f64>,
+    /// Standard deviation of what drives it, output unit.
+    pub noise_deviation: f64,
+    /// In a loop: share of the input's power that the reference explains.
+    pub explained: Option<f64>,
+    /// Renewals of filter and instruments.
+    pub iterations: usize,
+    /// Whether the estimates rest.
+    pub converged: bool,
+}
+
+/// A record as the crate takes it; its reference only where it moves.
+pub(super) fn data(record: &Record) -> Data {
+    let hold = match record.hold {
+        ct_signals::Hold::Zero => ct_lti::Hold::Zero,
+        ct_signals::Hold::First => ct_lti::Hold::First,
+    };
+    let inputs = std::iter::once(&record.input).chain(&record.input_2);
+    let reference = record.reference.as_ref().filter(|reference| {
+        let (low, high) = reference.range();
+        high > low
+    });
+    Data {
+        name: record.name.clone(),
+        time: record.time.clone(),
+        inputs: inputs
+            .map(|input| rivc::Input {
+                values: input.values.clone(),
+                hold,
+            })
+            .collect(),
+        output: record.output.values.clone(),
+        reference: reference.map(|reference| reference.values.clone()),
+    }
+}
+
+/// Identifies from all records together.
+pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identification, Error> {
+    super::positive("--bandwidth", "1/s", request.bandwidth)?;
+    let first = records
+        .first()
+        .ok_or_else(|| Error::Usage("no record is given".to_owned()))?;
+    let Order { n, m } = request.order;
+    let data: Vec<Data> = records.iter().map(data).collect();
+    let inputs = data[0].inputs.len();
+    let shortest = records.iter().map(Record::duration);
+    let shortest = shortest.fold(f64::INFINITY, f64::min);
+    let delay = match request.delay {
+        None => Delay::Known(0.0),
+        Some(DelayChoice::Known(value)) => Delay::Known(value),
+        Some(DelayChoice::Auto) => Delay::Estimated {
+            most: PART * shortest,
+        },
+        Some(DelayChoice::UpTo(most)) => Delay::Estimated { most },
+    };
+    let structure = Structure {
+        integrator: request.integrator,
+        delays: vec![delay; inputs],
+        ..Structure::new(n, vec![m; inputs])
+    };
+    let settings = rivc::Settings {
+        bandwidths: request.bandwidth.into_iter().collect(),
+        ..rivc::Settings::new(match request.method {
+            Method::Rivc => Noise::Autoregressive,
+            _ => Noise::White,
+        })
+    };
+    let found =
+        rivc::estimate(&data, &structure, &settings).map_err(|error| named(first, error))?;
+
+    let parameters: Vec<Parameter> = found
+        .parameters
+        .iter()
+        .map(|parameter| {
+            let (name, unit) = name_and_unit(parameter.kind, request.integrator, first);
+            Parameter {
+                name,
+                unit,
+                value: parameter.value,
+                std_error: Some(parameter.std_error).filter(|_| found.converged),
+            }
+        })
+        .collect();
+    let dynamics = if request.integrator {
+        &found.plant.a[1..]
+    } else {
+        &found.plant.a[..]
+    };
+    let (time_constants, oscillations) = poles(dynamics)?;
+    let mut warnings = Vec::new();
+    if !found.converged {
+        warnings.push(format!(
+            "the estimates did not come to rest in {} renewals, and have no standard errors: try a lower --order, or another --bandwidth",
+            found.iterations
+        ));
+    }
+    if let Some(share) = found.explained.filter(|share| *share < EXPLAINED) {
+        warnings.push(format!(
+            "the reference explains only {:.0} % of the input: instruments from it are weak; where the record is not of a loop, leave its column out",
+            100.0 * share
+        ));
+    }
+    if let Delay::Estimated { most } = delay {
+        let at_limit = |delay: &&f64| **delay >= most * (1.0 - 1e-9);
+        if found.plant.delays.iter().any(|delay| at_limit(&delay)) {
+            warnings.push(format!(
+                "the delay is at its largest, {} s: give a larger one by --delay 0..S",
+                numbers::significant(most, 4)
+            ));
+        }
+    }
+    if let Some(slowest) = time_constants
+        .first()
+        .filter(|slowest| **slowest > shortest || **slowest < 0.0)
+        && !request.integrator
+    {
+        warnings.push(format!(
+            "the slowest time constant, {} s, is beyond the record's length of {} s: the plant may integrate, which --integrator says",
+            numbers::significant(*slowest, 3),
+            numbers::significant(shortest, 3)
+        ));
+    }
+    if inputs == 1 && !request.integrator {
+        warnings.extend(super::doubtful(&parameters, request.order));
+    }
+    warnings.extend(super::too_fast(&time_constants, first, request.order));
+    let simulated = found
+        .plant
+        .fitted(&data[0])
+        .map_err(|error| named(first, error))?;
+    let output = &first.output.values;
+    let rmse = rms(output.iter().zip(&simulated).map(|(y, model)| y - model));
+    let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
+    let deviation = rms(output.iter().map(|y| y - mean));
+    let input_names = std::iter::once(&first.input).chain(&first.input_2);
+    Ok(Identification {
+        schema: 1,
+        method: request.method,
+        order: request.order,
+        record: first.name.clone(),
+        settings: None,
+        parameters,
+        time_constants,
+        oscillations,
+        simulation_rmse: rmse,
+        fit_percent: 100.0 * (1.0 - rmse / deviation),
+        warnings,
+        trajectory: None,
+        in_loop: None,
+        refined: Some(Refined {
+            name: found.method,
+            integrator: request.integrator,
+            delays: found.plant.delays.clone(),
+            records: records.iter().map(|record| record.name.clone()).collect(),
+            inputs: input_names.map(|input| input.name.clone()).collect(),
+            noise: found.noise.coefficients().to_vec(),
+            noise_deviation: found.noise.sigma(),
+            explained: found.explained,
+            iterations: found.iterations,
+            converged: found.converged,
+        }),
+        drift: None,
+        plant: found.plant,
+        shown: Shown {
+            time: first.time.clone(),
+            input: first.input.clone(),
+            output: first.output.clone(),
+            simulated,
+        },
+    })
+}
+
+/// Of a second input and of further records with their number: `b0_2`, `offset_2`.
+fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, String) {
+    let numbered = |name: String, index: usize| match index {
+        0 => name,
+        index => format!("{name}_{}", index + 1),
+    };
+    let output = &record.output.unit;
+    // With an integrator A begins with p: everything is divided by a time.
+    let lower = usize::from(integrator);
+    match kind {
+        Kind::A { power } => (format!("a{power}"), super::power_of_time(power - lower)),
+        Kind::B { input, power } => {
+            let signal = match (input, &record.input_2) {
+                (1, Some(second)) => second,
+                _ => &record.input,
+            };
+            let unit = match power.checked_sub(lower) {
+                Some(power) => {
+                    let gain = super::gain_unit(output, &signal.unit);
+                    format!("{} {gain}", super::power_of_time(power))
+                }
+                None => match (&**output, &*signal.unit) {
+                    (y, u) if y == u => "1/s".to_owned(),
+                    (y, "") => format!("{y}/s"),
+                    ("", u) => format!("1/({u} s)"),
+                    (y, u) => format!("{y}/({u} s)"),
+                },
+            };
+            (numbered(format!("b{power}"), input), unit.trim().to_owned())
+        }
+        Kind::Delay { input } => (numbered("delay".to_owned(), input), "s".to_owned()),
+        Kind::Offset { record } => {
+            let unit = match (integrator, output.is_empty()) {
+                (false, _) => output.clone(),
+                (true, true) => "1/s".to_owned(),
+                (true, false) => format!("{output}/s"),
+            };
+            (numbered("offset".to_owned(), record), unit)
+        }
+    }
+}
+
+/// The record's name in front, once.
+fn named(record: &Record, error: rivc::Error) -> Error {
+    let what = error.to_string();
+    let name = format!("{}: ", record.name);
+    Error::File {
+        file: record.name.clone(),
+        what: what.strip_prefix(&name).unwrap_or(&what).to_owned(),
+    }
+}

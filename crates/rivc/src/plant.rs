@@ -1,0 +1,105 @@
+//! A plant that is known, on a record of its own: what it says from the inputs alone.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use crate::model::Model;
+use crate::pass::{Instruments, Pass};
+use crate::prepared::Prepared;
+use crate::{Data, Delay, Error, Structure};
+
+/// Singular values below this share of the largest belong to nothing that the record shows.
+const UNSEEN: f64 = 1e-9;
+
+/// `A(p) y = sum_j B_j(p) u_j(t - d_j)`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plant {
+    /// A, from p^0; the last coefficient is not 0.
+    pub a: Vec<f64>,
+    /// B of each input, from p^0.
+    pub b: Vec<Vec<f64>>,
+    /// Delay of each input \[time\].
+    pub delays: Vec<f64>,
+}
+
+impl Plant {
+    /// Of one input without delay.
+    pub fn new(a: Vec<f64>, b: Vec<f64>) -> Self {
+        Self {
+            a,
+            b: vec![b],
+            delays: vec![0.0],
+        }
+    }
+
+    /// The simulated output of a record, from its inputs alone: offset and initial states are those that fit the measured output best
+    /// (least squares). Before the first sample the inputs are taken to have stood.
+    ///
+    /// # Errors
+    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::Time`]; [`Error::RunsAway`] where the
+    /// output is not finite.
+    pub fn fitted(&self, record: &Data) -> Result<Vec<f64>, Error> {
+        let n = self.a.len().saturating_sub(1);
+        let mut structure = Structure::new(
+            n,
+            self.b
+                .iter()
+                .map(|b| b.len().max(1) - 1)
+                .collect::<Vec<_>>(),
+        );
+        structure.delays = self.delays.iter().map(|d| Delay::Known(*d)).collect();
+        structure.validate()?;
+        record.validate(self.b.len())?;
+        let prepared = Prepared::new(record, true, None);
+        let leading = self.a[n];
+        let model = Model {
+            alpha: self.a[..n].iter().map(|a| a / leading).collect(),
+            beta: self.b.iter().flatten().map(|b| b / leading).collect(),
+            delays: self.delays.clone(),
+            of_records: Vec::new(),
+        };
+        let pass = Pass {
+            structure: &structure,
+            record: &prepared,
+            paths: &prepared.paths(&self.delays),
+            index: 0,
+            first: 0,
+            model: &model,
+            with_delays: false,
+        };
+        let own = structure.of_record();
+        let mut forced = Vec::with_capacity(record.len());
+        let mut free = Vec::with_capacity(record.len() * own);
+        pass.rows(&pass.bank(&model.alpha)?, Instruments::Model, |row| {
+            forced.push(row.simulated);
+            free.extend_from_slice(&row.z[row.z.len() - own..]);
+        });
+        let mut free = DMatrix::from_row_slice(forced.len(), own, &free);
+        // Each of size 1, so that none is lost beside another.
+        for mut column in free.column_iter_mut() {
+            let size = column.norm();
+            if size > 0.0 {
+                column /= size;
+            }
+        }
+        let left = DVector::from_iterator(
+            forced.len(),
+            prepared.y.iter().zip(&forced).map(|(y, forced)| y - forced),
+        );
+        let runs_away = || Error::RunsAway {
+            record: record.name.clone(),
+        };
+        if !free.iter().chain(&left).all(|v| v.is_finite()) {
+            return Err(runs_away());
+        }
+        let normal = free.tr_mul(&free);
+        let inverse = normal.pseudo_inverse(UNSEEN).map_err(|_| runs_away())?;
+        let fitted = &free * (inverse * free.tr_mul(&left));
+        let pairs = forced.iter().zip(&fitted);
+        let simulated: Vec<f64> = pairs.map(|(a, b)| a + b + prepared.y_mean).collect();
+        match simulated.iter().all(|y| y.is_finite()) {
+            true => Ok(simulated),
+            false => Err(runs_away()),
+        }
+    }
+}

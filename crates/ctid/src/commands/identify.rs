@@ -254,7 +254,8 @@ impl Identify {
         let [data, more @ ..] = &self.data[..] else {
             return Err(Error::Usage("no record is given".to_owned()));
         };
-        if !more.is_empty() && !(alone && methods[0].is_refined()) {
+        let together = alone && methods[0].is_refined();
+        if !more.is_empty() && !together {
             return Err(Error::Usage(format!(
                 "identify works on one record, and {} are given; give the longest, fit all of them together by --method srivc or rivc (alone, of one order, without --test), or fit a physical model to them with compare",
                 self.data.len()

@@ -35,7 +35,7 @@ use crate::prepared::{Prepared, prepare};
 use crate::problem::{Problem, Refined};
 use crate::{Data, Delay, Error, Structure};
 
-/// Starts that are refined until they rest.
+/// Starts that come to rest, of which the best is taken.
 const STARTS: usize = 3;
 /// Times that a delay is looked for again beside the one that was found under coloured noise.
 const MOVES: usize = 4;
@@ -197,13 +197,18 @@ pub fn estimate(
     };
     let mut best: Option<Refined> = None;
     let mut last_error = None;
-    for (_, model) in starts.into_iter().take(STARTS) {
+    let mut at_rest = 0;
+    for (_, model) in starts {
+        if at_rest == STARTS {
+            break;
+        }
         let known = |best: &Refined| best.converged && alike(&best.model, &model);
         if best.as_ref().is_some_and(known) {
             continue;
         }
         match refine(model, None) {
             Ok(found) => {
+                at_rest += usize::from(found.converged);
                 let better = best.as_ref().is_none_or(|best| {
                     (!found.converged, found.mean_square) < (!best.converged, best.mean_square)
                 });

@@ -27,6 +27,7 @@ pub(crate) struct Problem<'a> {
 }
 
 /// Records under given delays.
+#[derive(Clone)]
 pub(crate) struct Delayed {
     pub(crate) delays: Vec<f64>,
     pub(crate) paths: Vec<Paths>,
@@ -201,24 +202,24 @@ impl Problem<'_> {
         let mut model = start;
         let (noise_order, mut noise) = noise.unzip();
         let mut renewals = 0;
-        let (mut iterations, mut converged) = (0, false);
+        let mut iterations = 0;
         loop {
             let equations = self.equations(&delayed, &model, noise.as_ref(), with_delays)?;
-            let refined = |equations: Equations, delayed, model, noise| Refined {
+            let refined = |equations: Equations, converged| Refined {
                 mean_square: equations.output_squares / equations.samples as f64,
-                model,
+                model: model.clone(),
                 iterations,
                 converged,
-                noise,
+                noise: noise.clone(),
                 equations,
-                delayed,
+                delayed: delayed.clone(),
             };
-            if converged || iterations >= most {
-                return Ok(refined(equations, delayed, model, noise));
+            if iterations >= most {
+                return Ok(refined(equations, false));
             }
             let x = equations.solve()?;
             let Some(next) = self.next(&model, &x, with_delays, reach) else {
-                return Ok(refined(equations, delayed, model, noise));
+                return Ok(refined(equations, false));
             };
             let covariance = equations.covariance(None)?;
             let (old, new) = (model.core(structure), next.core(structure));
@@ -229,7 +230,9 @@ impl Problem<'_> {
                         || change <= SHARE_OF_ITSELF * old.abs()
                 })
             };
-            converged = within(SHARE_OF_ERROR);
+            if within(SHARE_OF_ERROR) {
+                return Ok(refined(equations, true));
+            }
             if let Some(order) = noise_order
                 && renewals < NOISE_RENEWALS
                 && !within(SHARE_FOR_NOISE)

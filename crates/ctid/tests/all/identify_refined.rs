@@ -45,8 +45,7 @@ fn add(parts: &[&[f64]]) -> Vec<f64> {
 /// A parameter of the result is within so many standard errors, and known to a tenth.
 fn holds(found: &Value, name: &str, truth: f64) {
     let parameters = found["parameters"].as_array().unwrap();
-    let parameter = parameters.iter().find(|p| p["name"] == name);
-    let parameter = parameter.unwrap_or_else(|| panic!("no {name} in {found}"));
+    let parameter = parameters.iter().find(|p| p["name"] == name).unwrap();
     let [value, error] = ["value", "std_error"].map(|key| parameter[key].as_f64().unwrap());
     assert!((value - truth).abs() < 4.0 * error, "{name}: {parameter}");
     assert!(error < 0.1 * truth.abs(), "{name}: {parameter}");
@@ -58,7 +57,7 @@ fn a_delay_is_estimated_beside_coloured_noise() {
     let u = steps(20, 9);
     let v = noise::ar1(ROWS, 0.1, 0.8, &mut ChaCha8Rng::seed_from_u64(1));
     let y = add(&[&respond(&[2.0], &[1.0, 8.0], &u, 4), &v, &[30.0; ROWS]]);
-    place.write("late.csv", &csv("t [s],u [V],y [cm]", &[&u, &y]));
+    place.write("late.csv", csv("t [s],u [V],y [cm]", &[&u, &y]));
     for delay in ["auto", "0..30"] {
         let command =
             format!("identify late.csv --method rivc --delay {delay} --json {delay}.json");
@@ -98,7 +97,7 @@ fn an_integrator_in_a_loop_of_an_unknown_controller() {
         u.push(0.6 * error + sum);
         level += 0.2 * u[k] - 0.03;
     }
-    place.write("loop.csv", &csv("t [s],r [cm],u [V],y [cm]", &[&r, &u, &y]));
+    place.write("loop.csv", csv("t [s],r [cm],u [V],y [cm]", &[&r, &u, &y]));
     let text = place.succeeds(
         "identify loop.csv --method srivc --integrator --json loop.json --report loop.html",
     );
@@ -126,7 +125,7 @@ fn two_inputs_and_several_records() {
             &white(0.1, u64::from(seed)),
             &[level; ROWS],
         ]);
-        place.write(name, &csv("t [s],u [V],q [l/min],y [cm]", &[&u, &q, &y]));
+        place.write(name, csv("t [s],u [V],q [l/min],y [cm]", &[&u, &q, &y]));
     }
     let text =
         place.succeeds("identify a.csv b.csv --method srivc --columns t,u+q,y --json both.json");

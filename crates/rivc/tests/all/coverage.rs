@@ -66,6 +66,12 @@ fn check(
             .map(|(e, s)| (e / s).abs())
             .fold(0.0, f64::max);
         let converged = found.iter().filter(|found| found.converged).count();
+        for (seed, f) in found.iter().enumerate().filter(|f| !f.1.converged) {
+            println!(
+                "NOT {seed} {:?} {} rms {}",
+                f.parameters, f.iterations, f.residual_rms
+            );
+        }
         println!(
             "{name} {} {kind:?}: {:.1} % covered, bias {:.2} of its error, errors {:.3} of the spread, worst {worst:.2}, spread {:.2} %, {converged} converged",
             found[0].method,

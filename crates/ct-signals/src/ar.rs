@@ -122,18 +122,16 @@ impl ArModel {
                 needed: 1,
             });
         }
-        let ladder = burg(segments, max_order.min(n / SAMPLES_PER_COEFFICIENT));
+        let Burg {
+            reflections,
+            squares,
+        } = Burg::new(segments, max_order.min(n / SAMPLES_PER_COEFFICIENT));
         let mut best: Option<(f64, ArModel)> = None;
-        for order in 0..=ladder.len() {
-            let mut model = ArModel::of_stationary(&ladder[..order]);
-            let sum: f64 = segments
-                .iter()
-                .flat_map(|segment| model.whiten(segment))
-                .map(|w| w * w)
-                .sum();
+        for (order, sum) in squares.into_iter().enumerate() {
             if sum < NOTHING {
                 return Ok(ArModel::white(0.0));
             }
+            let mut model = ArModel::of_stationary(&reflections[..order]);
             let log_det: f64 = segments.iter().map(|s| model.log_det(s.len())).sum();
             let n = n as f64;
             let bic = n * (sum / n).ln() + log_det + order as f64 * n.ln();
@@ -477,38 +475,76 @@ fn predictors(reflections: &[f64]) -> Vec<Vec<f64>> {
     ladder
 }
 
-/// Partial correlations `k_1, k_2, ...` up to `max_order`, fewer when the errors reach 0.
-fn burg(segments: &[&[f64]], max_order: usize) -> Vec<f64> {
-    let mut errors: Vec<(Vec<f64>, Vec<f64>)> = segments
-        .iter()
-        .map(|segment| (segment.to_vec(), segment.to_vec()))
-        .collect();
-    let mut reflections = Vec::with_capacity(max_order);
-    for _ in 0..max_order {
-        // Align: f[t] with b[t-1].
-        for (f, b) in &mut errors {
-            if !f.is_empty() {
-                f.remove(0);
-                b.pop();
+/// What Burg's recursion gives of each order.
+struct Burg {
+    /// `k_1, k_2, ...`, fewer than asked for when the errors reach 0.
+    reflections: Vec<f64>,
+    /// Of order 0, 1, ...: the whitened series' sum of squares, the first samples' with the predictors that they have.
+    squares: Vec<f64>,
+}
+
+/// The errors of one segment.
+struct Errors {
+    /// `f_m[t]` at t.
+    forward: Vec<f64>,
+    /// `b_m[t]` at t - m.
+    backward: Vec<f64>,
+    /// Squares of `f_0[0] .. f_{m-1}[m-1]`: the samples that have fewer predecessors than the order, each over its predictor's variance
+    /// and times that of order m.
+    first: f64,
+}
+
+impl Burg {
+    fn new(segments: &[&[f64]], max_order: usize) -> Self {
+        let mut errors: Vec<Errors> = segments
+            .iter()
+            .map(|segment| Errors {
+                forward: segment.to_vec(),
+                backward: segment.to_vec(),
+                first: 0.0,
+            })
+            .collect();
+        let squares = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+        let mut burg = Self {
+            reflections: Vec::with_capacity(max_order),
+            squares: vec![errors.iter().map(|e| squares(&e.forward)).sum()],
+        };
+        for m in 0..max_order {
+            let (mut cross, mut power) = (0.0, 0.0);
+            for errors in &mut errors {
+                let (f, b) = errors.pairs(m);
+                for (f, b) in f.iter().zip(&*b) {
+                    cross += f * b;
+                    power += f * f + b * b;
+                }
             }
-        }
-        let (mut cross, mut power) = (0.0, 0.0);
-        for (f, b) in &errors {
-            for (f, b) in f.iter().zip(b) {
-                cross += f * b;
-                power += f * f + b * b;
+            if power <= 0.0 {
+                break;
             }
-        }
-        if power <= 0.0 {
-            break;
-        }
-        let k = (2.0 * cross / power).clamp(MARGIN - 1.0, 1.0 - MARGIN);
-        for (f, b) in &mut errors {
-            for (f, b) in f.iter_mut().zip(b.iter_mut()) {
-                (*f, *b) = (*f - k * *b, *b - k * *f);
+            let k = (2.0 * cross / power).clamp(MARGIN - 1.0, 1.0 - MARGIN);
+            let mut sum = 0.0;
+            for errors in &mut errors {
+                let head = errors.forward.get(m).copied().unwrap_or(0.0);
+                errors.first = (errors.first + head * head) * (1.0 - k * k);
+                sum += errors.first;
+                let (f, b) = errors.pairs(m);
+                for (f, b) in f.iter_mut().zip(b) {
+                    (*f, *b) = (*f - k * *b, *b - k * *f);
+                }
+                sum += squares(f);
             }
+            burg.reflections.push(k);
+            burg.squares.push(sum);
         }
-        reflections.push(k);
+        burg
     }
-    reflections
+}
+
+impl Errors {
+    /// `f_m[t]` and `b_m[t-1]` for all t above m.
+    fn pairs(&mut self, m: usize) -> (&mut [f64], &mut [f64]) {
+        let n = self.forward.len();
+        let from = (m + 1).min(n);
+        (&mut self.forward[from..], &mut self.backward[..n - from])
+    }
 }

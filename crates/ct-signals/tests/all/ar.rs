@@ -389,3 +389,24 @@ fn rows_behind_lost_ones_come_out_white_and_of_the_same_variance() {
         }
     }
 }
+
+/// The fit's own sum of squares is that of the series whitened afterwards, segments shorter than the order included.
+#[test]
+fn the_fit_knows_its_whitened_squares() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let series = noise::ar1(400, 1.0, 0.9, &mut rng);
+    let lagged: Vec<f64> = (4..400).map(|k| series[k] - 0.8 * series[k - 4]).collect();
+    for segments in [
+        vec![&lagged[..]],
+        vec![&lagged[..3], &lagged[10..11], &lagged[20..390]],
+        vec![&lagged[..60], &[], &lagged[70..200]],
+    ] {
+        let model = ArModel::fit(&segments, 8).unwrap();
+        assert!(model.order() >= 4, "{model:?}");
+        let whitened = segments.iter().flat_map(|segment| model.whiten(segment));
+        let squares: f64 = whitened.map(|w| w * w).sum();
+        let samples: usize = segments.iter().map(|segment| segment.len()).sum();
+        let own = model.sigma().powi(2) * (samples - model.order()) as f64;
+        assert!((own - squares).abs() < 1e-11 * squares, "{own} {squares}");
+    }
+}

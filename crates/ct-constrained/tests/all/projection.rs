@@ -166,3 +166,21 @@ fn a_violation_that_leaves_the_floating_point_range_is_an_error() {
     assert!(matches!(error, Error::NotFinite { .. }), "{error}");
     assert_eq!(*rls.theta(), start);
 }
+
+/// An equality is never let go for another row: the row that cannot be obeyed beside it is the one that is named.
+#[test]
+fn a_row_that_contradicts_an_equality_is_named_and_not_the_equality() {
+    let mut rls = estimator(vector![0.0, 0.0], SMatrix::identity());
+    let rows = [
+        Row::equal([1.0, 0.0], 1.0, 0.0).unwrap(),
+        Row::at_least([1.0, 0.0], 3.0, 0.0).unwrap(),
+    ];
+    let error = project(&mut rls, &rows).unwrap_err();
+    assert_eq!(
+        error,
+        Error::NoCommonPoint {
+            row: 1,
+            violation: 2.0
+        }
+    );
+}

@@ -101,7 +101,7 @@ fn least_squares_agrees_with_an_adaptive_solver() {
         pair((1.0, 1.0, 0.02), (1.0, 1.0, 0.02)),
         pair((0.7, 0.7, 0.3), (1.4, 1.4, 0.3)),
     ] {
-        for sizes in [[1e-9, 1e-12], [0.03, 0.05], [0.5, 1e-3]] {
+        for sizes in [[1e-9, 1e-12], [1e-6, 1e-11], [0.03, 0.05], [0.5, 1e-3]] {
             assert!(worst(weights, sizes, 0.1) < 2e-9, "{weights:?} {sizes:?}");
         }
         for sizes in [[1.0, 1.0], [100.0, 1e-6], [50.0, 50.0], [1e-3, 100.0]] {
@@ -121,6 +121,7 @@ fn other_gains_and_memories_agree_too() {
         pair((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
         pair((1.0, 0.0, 0.02), (1.0, 0.0, 0.02)),
         pair((2.0, 0.0, 0.0), (1.0, 1.0, 0.1)),
+        pair((1.0, 1.0, 0.0), (2.0, 0.0, 0.0)),
         pair((1.0, 0.05, 0.0), (1.0, 1.0, 0.1)),
     ] {
         for sizes in [

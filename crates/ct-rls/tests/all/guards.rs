@@ -339,3 +339,26 @@ fn a_forgetting_factor_is_the_same_memory_in_seconds() {
         assert_eq!((weights.c(), weights.gamma()), (1.0, 1.0));
     }
 }
+
+/// The cap holds whatever the rule that `P` is integrated by.
+#[test]
+fn the_trace_stays_at_its_cap_for_the_textbooks_rules_too() {
+    fn capped<I: ct_rls::Integrator>() {
+        let weights = Weights::least_squares(0.1).unwrap();
+        let guards = Guards {
+            trace_limit: 5.0,
+            silent_below: 0.0,
+        };
+        let mut rls =
+            ContinuousRls::<2, I>::with_integrator(SVector::zeros(), SMatrix::identity(), weights)
+                .and_then(|rls| rls.with_guards(guards))
+                .unwrap();
+        for _ in 0..1000 {
+            rls.update(&Sample::new([1.0, 0.0], 1.0), 0.1);
+            assert!(rls.covariance().trace() <= 5.0 * (1.0 + 1e-12));
+        }
+        assert!(rls.health().unwrap().capped > 0);
+    }
+    capped::<ct_rls::Euler>();
+    capped::<ct_rls::Rk4>();
+}

@@ -264,3 +264,28 @@ fn gcd(mut a: BigUint, mut b: BigUint) -> BigUint {
     }
     a << i.min(j)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half a unit of the last digit and a little more is rounded up, where the little is beyond the 64 leading bits too.
+    #[test]
+    fn what_is_dropped_counts_where_a_half_is_rounded() {
+        let rounded = |c: u128| {
+            let exact = Exact {
+                c: vec![BigInt::from(c)],
+                exponent: 0,
+            };
+            exact.rounded()[0]
+        };
+        let (one, half) = (1_u128 << 100, 1_u128 << 47);
+        let up = 0.5 + f64::EPSILON / 2.0;
+        // a half alone goes to the even digit
+        assert_eq!(rounded(one + half), 0.5);
+        for more in [1, 1 << 36, 1 << 37, (1 << 37) + 1, (1 << 38) - 1] {
+            assert_eq!(rounded(one + half + more), up, "{more:x}");
+            assert_eq!(rounded(one + half - more), 0.5, "{more:x}");
+        }
+    }
+}

@@ -201,6 +201,33 @@ mod tests {
         assert!(decided > 3990, "{decided}");
     }
 
+    /// Roots on the axis, whole numbers for coefficients: rounding says either, whatever the unit, and must not be believed.
+    #[test]
+    fn the_border_is_no_in_any_unit() {
+        for k in 1..1500_u32 {
+            let whole = |by: u32| f64::from(k * by % 97 + 1);
+            let quadratic = |a: f64, b: f64| poly(&[b, a, 1.0]);
+            let border = &quadratic(0.0, whole(31)) * &quadratic(whole(57), whole(73));
+            let higher = &border * &quadratic(whole(19), whole(41));
+            for p in [border, higher] {
+                for unit in [1.0, libm::ldexp(1.0, -120), libm::ldexp(1.0, 120)] {
+                    let c: Vec<f64> = p.coefficients().iter().map(|c| c * unit).collect();
+                    assert!(!poly(&c).is_hurwitz(), "{c:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_table_of_any_length() {
+        for n in 29..40 {
+            let p = poly(&[1.0, 1.0]).pow(n);
+            assert!(p.is_hurwitz(), "{n}");
+            // roots at +-j
+            assert!(!(&p * &poly(&[1.0, 0.0, 1.0])).is_hurwitz(), "{n}");
+        }
+    }
+
     #[test]
     fn extreme_sizes() {
         // a p^3 + b p^2 + c p + d is Hurwitz where b c > a d, whatever the products do in f64.

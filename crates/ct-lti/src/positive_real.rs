@@ -189,3 +189,20 @@ fn witness(n: &[f64]) -> f64 {
         .min_by(|a, b| a.1.total_cmp(&b.1));
     lowest.map_or(0.0, |(x, _)| x)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is far from the border is decided without long integers; what is not is left to them.
+    #[test]
+    fn signs_decide_what_is_clear() {
+        let poly = |c: &[f64]| Polynomial::new(c).unwrap();
+        // Re (1 + 2 s)/(1 + s) = (1 + 2 x)/(1 + x), from 1 to 2
+        let (p1, p2) = (poly(&[1.0, 2.0]), poly(&[1.0, 1.0]));
+        assert!(positive_by_signs(&p1, &p2, 0.0, 1));
+        assert!(positive_by_signs(&p1, &p2, 0.999, 1));
+        assert!(!positive_by_signs(&p1, &p2, 1.0, 1));
+        assert!(!positive_by_signs(&p1, &p2, 1.5, 1));
+    }
+}

@@ -291,3 +291,27 @@ fn conjugate(mut open: Vec<Complex64>) -> Vec<Complex64> {
     }
     roots
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The circles of the starts have the sizes of the roots, wherever these lie far apart.
+    #[test]
+    fn starts_have_the_sizes_of_the_roots() {
+        // two roots of the size e^2 and one of e^3: the hull of the coefficients has the slopes -2 and -3
+        let c = [1.0, 0.0, libm::exp(-4.0), libm::exp(-7.0)];
+        let sizes: Vec<f64> = starts(&c).iter().map(|z| libm::log(z.norm())).collect();
+        for (size, expected) in sizes.iter().zip([2.0, 2.0, 3.0]) {
+            assert!((size - expected).abs() < 1e-12, "{sizes:?}");
+        }
+        // (s + 1e-3)(s + 1e3)
+        let sizes: Vec<f64> = starts(&[1.0, 1000.001, 1.0])
+            .iter()
+            .map(|z| z.norm())
+            .collect();
+        for (size, expected) in sizes.iter().zip([1e-3, 1e3]) {
+            assert!((size / expected - 1.0).abs() < 1e-5, "{sizes:?}");
+        }
+    }
+}

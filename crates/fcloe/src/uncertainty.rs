@@ -11,13 +11,16 @@
 //! of a white residual hold it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`).
 
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use crate::noise_model::{NoiseModel, NoisePath, Residual};
 use crate::{ClosedLoop, Error, Fit, Problem};
 
 /// Orders of autoregressive noise that are tried: 0 to this.
 const MAX_ORDER: usize = 8;
+
+/// From so many degrees of freedom on, Student's quantiles are those of the series in 1/freedom.
+const MANY: f64 = 1e4;
 
 /// How well a fit is known.
 #[derive(Debug, Clone, Serialize)]
@@ -46,9 +49,20 @@ impl Uncertainty {
         if !(level > 0.0 && level < 1.0) {
             return Err(Error::Setting { what, value, range });
         }
-        let student = StudentsT::new(0.0, 1.0, self.freedom.max(1.0))
-            .map_err(|_| Error::Setting { what, value, range })?;
-        let quantile = student.inverse_cdf(0.5 + 0.5 * level);
+        let at = 0.5 + 0.5 * level;
+        let not_found = |_| Error::Setting { what, value, range };
+        let freedom = self.freedom.max(1.0);
+        let quantile = if freedom < MANY {
+            let student = StudentsT::new(0.0, 1.0, freedom).map_err(not_found)?;
+            student.inverse_cdf(at)
+        } else {
+            // Cornish and Fisher's first two terms, the third being below 1e-12 here. StudentsT loses its digits, and above 1e8 its end.
+            let z = Normal::standard().inverse_cdf(at);
+            let z2 = z * z;
+            let first = z * (z2 + 1.0) / 4.0;
+            let second = z * (5.0 * z2 * z2 + 16.0 * z2 + 3.0) / 96.0;
+            z + (first + second / freedom) / freedom
+        };
         Ok(self.std_errors.iter().map(|s| s * quantile).collect())
     }
 }

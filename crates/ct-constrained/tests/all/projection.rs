@@ -166,3 +166,55 @@ fn a_violation_that_leaves_the_floating_point_range_is_an_error() {
     assert!(matches!(error, Error::NotFinite { .. }), "{error}");
     assert_eq!(*rls.theta(), start);
 }
+
+/// An equality is never let go for another row: the row that cannot be obeyed beside it is the one that is named.
+#[test]
+fn a_row_that_contradicts_an_equality_is_named_and_not_the_equality() {
+    let mut rls = estimator(vector![0.0, 0.0], SMatrix::identity());
+    let rows = [
+        Row::equal([1.0, 0.0], 1.0, 0.0).unwrap(),
+        Row::at_least([1.0, 0.0], 3.0, 0.0).unwrap(),
+    ];
+    let error = project(&mut rls, &rows).unwrap_err();
+    assert_eq!(
+        error,
+        Error::NoCommonPoint {
+            row: 1,
+            violation: 2.0
+        }
+    );
+}
+
+/// The third row is the difference of the others and says the same to their rounding, which is much by its own size.
+#[test]
+fn a_row_that_others_imply_may_be_off_by_their_rounding() {
+    let (a, b, little) = (3.3e7, 0.7e7, 1e-6);
+    let mut rls = estimator(vector![0.0, 0.0], SMatrix::identity());
+    let rows = |off: f64| {
+        [
+            Row::equal([1.0, 1.0], a + b, 0.0).unwrap(),
+            Row::equal([1.0, 1.0 - little], a + (1.0 - little) * b, 0.0).unwrap(),
+            Row::at_most([0.0, little], little * b * (1.0 - off), 0.0).unwrap(),
+        ]
+    };
+    assert_eq!(project(&mut rls, &rows(1e-6)), Ok(true));
+    assert!(
+        (rls.theta() - vector![a, b]).amax() < 10.0,
+        "{}",
+        rls.theta()
+    );
+    // beyond it the rows have no common point
+    let mut rls = estimator(vector![0.0, 0.0], SMatrix::identity());
+    let error = project(&mut rls, &rows(1e-2)).unwrap_err();
+    assert!(matches!(error, Error::NoCommonPoint { .. }), "{error}");
+}
+
+#[test]
+fn terms_that_leave_the_floating_point_range_are_an_error_though_they_cancel() {
+    let start = vector![1.4e278, 1.4e278];
+    let mut rls = estimator(start, SMatrix::identity());
+    let rows = [Row::at_most([7e29, -7e29], -1.0, 0.0).unwrap()];
+    let error = project(&mut rls, &rows).unwrap_err();
+    assert!(matches!(error, Error::NotFinite { .. }), "{error}");
+    assert_eq!(*rls.theta(), start);
+}

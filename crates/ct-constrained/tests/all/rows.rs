@@ -410,6 +410,23 @@ fn rows_act_while_the_sensor_is_gone() {
     );
 }
 
+/// A silent step forgets nothing, of the rows' information neither.
+#[test]
+fn a_row_counts_in_full_while_nothing_is_forgotten() {
+    let (weight, dt) = (2.0, 0.5);
+    let weights = Weights::least_squares(1.0).unwrap();
+    let rls = ContinuousRls::new(SVector::zeros(), SMatrix::identity(), weights).unwrap();
+    let row = Row::equal([1.0, 0.0], 1.0, weight).unwrap();
+    let mut constrained = ConstrainedRls::new(rls, [row]).unwrap();
+    for k in 1..=10 {
+        let innovation = constrained.update(&Sample::new([0.0, 0.0], 0.0), dt);
+        assert_eq!(innovation.outcome, Outcome::Silent);
+        let information = 1.0 + weight * dt * f64::from(k);
+        let found = 1.0 / constrained.covariance()[(0, 0)];
+        assert!((found / information - 1.0).abs() < 1e-12, "{k}: {found}");
+    }
+}
+
 /// Whatever [`Row`] accepts is enforced: no weight is so large that the row is left out.
 #[test]
 fn a_row_of_any_weight_is_enforced() {
@@ -469,4 +486,25 @@ fn bad_settings_are_refused_with_their_numbers() {
             .update_with(&Sample::new([1.0, 1.0], 1.0), 0.1, &half)
             .is_err()
     );
+}
+
+/// A step's row counts by the forgetting of that step, whatever the last step's memory and length were.
+#[test]
+fn a_row_counts_by_the_memory_and_the_length_of_its_own_step() {
+    let (weight, f) = (2.0, [1.0, 0.0]);
+    let row = Row::equal(f, 1.0, weight).unwrap();
+    let start = Weights::least_squares(0.0).unwrap();
+    let rls = ContinuousRls::new(SVector::zeros(), SMatrix::identity(), start).unwrap();
+    let mut constrained = ConstrainedRls::new(rls, [row]).unwrap();
+    // the data say nothing of the row's parameter
+    let sample = Sample::new([0.0, 1.0], 0.0);
+    let mut information: f64 = 1.0;
+    for (eta, dt) in [(0.5, 1.0), (2.0, 1.0), (2.0, 0.1), (2.0, 0.1), (0.1, 0.1)] {
+        let weights = Weights::least_squares(eta).unwrap();
+        constrained.update_with(&sample, dt, &weights).unwrap();
+        let kept = (-eta * dt).exp();
+        information = information * kept + weight * (1.0 - kept) / eta;
+        let found = 1.0 / constrained.covariance()[(0, 0)];
+        assert!((found / information - 1.0).abs() < 1e-12, "{eta} {dt}");
+    }
 }

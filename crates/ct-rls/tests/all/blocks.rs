@@ -68,7 +68,7 @@ fn worst(weights: [Weights; 2], size: [f64; 2], dt: f64) -> f64 {
         let p2 = p2 * (size[1] / phi2.dot(&(p2 * phi2)));
         let mut one = ContinuousRls::<3>::new(theta, p1, weights[0]).unwrap();
         let mut two = ContinuousRls::<2>::new(c, p2, weights[1]).unwrap();
-        let mut alone = one.clone();
+        let (mut alone, mut alone2) = (one.clone(), two.clone());
         let epsilon = 0.8;
         let innovation = update_blocks((&mut one, &phi1), (&mut two, &phi2), epsilon, dt);
         assert!(innovation.outcome.used());
@@ -76,6 +76,8 @@ fn worst(weights: [Weights; 2], size: [f64; 2], dt: f64) -> f64 {
         // P moves as that of a block alone
         alone.update(&ct_rls::Sample { phi: phi1, y: 0.0 }, dt);
         assert_eq!(alone.factor(), one.factor());
+        alone2.update(&ct_rls::Sample { phi: phi2, y: 0.0 }, dt);
+        assert_eq!(alone2.factor(), two.factor());
         let shares = reference(weights, size, epsilon, dt);
         let moved = [
             one.theta().dot(&phi1) / size[0],
@@ -99,7 +101,7 @@ fn least_squares_agrees_with_an_adaptive_solver() {
         pair((1.0, 1.0, 0.02), (1.0, 1.0, 0.02)),
         pair((0.7, 0.7, 0.3), (1.4, 1.4, 0.3)),
     ] {
-        for sizes in [[1e-9, 1e-12], [0.03, 0.05], [0.5, 1e-3]] {
+        for sizes in [[1e-9, 1e-12], [1e-6, 1e-11], [0.03, 0.05], [0.5, 1e-3]] {
             assert!(worst(weights, sizes, 0.1) < 2e-9, "{weights:?} {sizes:?}");
         }
         for sizes in [[1.0, 1.0], [100.0, 1e-6], [50.0, 50.0], [1e-3, 100.0]] {
@@ -119,6 +121,7 @@ fn other_gains_and_memories_agree_too() {
         pair((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
         pair((1.0, 0.0, 0.02), (1.0, 0.0, 0.02)),
         pair((2.0, 0.0, 0.0), (1.0, 1.0, 0.1)),
+        pair((1.0, 1.0, 0.0), (2.0, 0.0, 0.0)),
         pair((1.0, 0.05, 0.0), (1.0, 1.0, 0.1)),
     ] {
         for sizes in [
@@ -192,6 +195,7 @@ fn a_row_over_two_blocks_agrees_with_an_adaptive_solver() {
         ([0.5, 0.5], [1.0, 1.0]),
         ([2.0, 0.4], [1.0, 1.0]),
         ([3.0, 3.0], [0.0, 0.0]),
+        ([3.0, 0.5], [0.0, 0.0]),
         ([3.0, 1.0], [0.0, 1.5]),
     ] {
         let weights = [0, 1]
@@ -211,9 +215,15 @@ fn a_row_over_two_blocks_agrees_with_an_adaptive_solver() {
             let off = (moved[i] / shares[i] - 1.0).abs();
             assert!(off < 1e-6, "{off:e}: {information:?} {ratio:?}");
         }
-        let grown = information[0] * ratio[0] * sizes[0];
-        let left = f1.dot(&(one.covariance() * f1)) * (1.0 + grown) / sizes[0];
-        assert!((left - 1.0).abs() < 1e-12, "{left}");
+        let remains = [
+            f1.dot(&(one.covariance() * f1)),
+            f2.dot(&(two.covariance() * f2)),
+        ];
+        for i in 0..2 {
+            let grown = information[i] * ratio[i] * sizes[i];
+            let left = remains[i] * (1.0 + grown) / sizes[i];
+            assert!((left - 1.0).abs() < 1e-12, "{left}");
+        }
         // a row is not a sample
         assert_eq!(one.health().unwrap().used, 0);
     }

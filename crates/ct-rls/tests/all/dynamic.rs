@@ -154,3 +154,27 @@ fn estimates_can_be_replaced() {
     ));
     assert_eq!(rls.theta().as_slice(), [3.0, 4.0]);
 }
+
+/// A parameter that walks and is not excited is held by the cap for sizes known at run time too.
+#[test]
+fn a_walk_grows_to_the_cap_and_no_further() {
+    let weights = Weights::least_squares(0.0).unwrap();
+    let guards = Guards {
+        trace_limit: 5.0,
+        silent_below: 0.0,
+    };
+    let mut rls = DynamicRls::<RandomWalk>::with_integrator(
+        DVector::zeros(2),
+        &DMatrix::identity(2, 2),
+        weights,
+    )
+    .and_then(|rls| rls.with_intensity(&[0.2, 0.2])?.with_guards(guards))
+    .unwrap();
+    for _ in 0..100 {
+        rls.update_with(&[1.0, 0.0], 1.0, 0.5, &weights);
+        assert!(rls.covariance().trace() <= 5.0 * (1.0 + 1e-12));
+    }
+    // without the cap, 1 + 0.2 * 50 s
+    assert!(rls.covariance()[(1, 1)] > 4.0);
+    assert!(rls.health().unwrap().capped > 0);
+}

@@ -312,3 +312,53 @@ fn a_relaxation_beyond_the_floating_point_range_is_refused() {
     assert_eq!(*rls.theta(), vector![0.0, 0.0]);
     assert_eq!(rls.relax(&SVector::zeros(), 1.0, 1.0), Some(1.0));
 }
+
+/// Below the rounding of its entries a pivot is no number: positive, and yet nothing that is known of the matrix.
+#[test]
+fn a_start_that_is_singular_to_rounding_is_refused() {
+    let weights = Weights::least_squares(0.0).unwrap();
+    let refused = |p| {
+        let made = ContinuousRls::<2>::new(SVector::zeros(), p, weights);
+        matches!(made, Err(Error::NotPositiveDefinite { .. }))
+    };
+    let above_one = 1.0 + f64::EPSILON;
+    assert!(refused(SMatrix::from([[above_one, 1.0], [1.0, 1.0]])));
+    assert!(!refused(SMatrix::from([[1.0 + 1e-13, 1.0], [1.0, 1.0]])));
+    // too small by itself, its range being that of the inverse
+    assert!(refused(SMatrix::from([[1e-101, 0.0], [0.0, 1.0]])));
+    assert!(!refused(SMatrix::from([[1e-99, 0.0], [0.0, 1.0]])));
+}
+
+#[test]
+fn a_forgetting_factor_is_the_same_memory_in_seconds() {
+    for (lambda, dt) in [(0.5, 2.0), (0.98, 0.1), (1.0, 3.0)] {
+        let weights = Weights::from_forgetting_factor(lambda, dt).unwrap();
+        // a step of dt leaves the share lambda of the information
+        let left = f64::exp(-weights.eta() * dt);
+        assert!((left - lambda).abs() < 1e-15, "{left} {lambda}");
+        assert_eq!((weights.c(), weights.gamma()), (1.0, 1.0));
+    }
+}
+
+/// The cap holds whatever the rule that `P` is integrated by.
+#[test]
+fn the_trace_stays_at_its_cap_for_the_textbooks_rules_too() {
+    fn capped<I: ct_rls::Integrator>() {
+        let weights = Weights::least_squares(0.1).unwrap();
+        let guards = Guards {
+            trace_limit: 5.0,
+            silent_below: 0.0,
+        };
+        let mut rls =
+            ContinuousRls::<2, I>::with_integrator(SVector::zeros(), SMatrix::identity(), weights)
+                .and_then(|rls| rls.with_guards(guards))
+                .unwrap();
+        for _ in 0..1000 {
+            rls.update(&Sample::new([1.0, 0.0], 1.0), 0.1);
+            assert!(rls.covariance().trace() <= 5.0 * (1.0 + 1e-12));
+        }
+        assert!(rls.health().unwrap().capped > 0);
+    }
+    capped::<ct_rls::Euler>();
+    capped::<ct_rls::Rk4>();
+}

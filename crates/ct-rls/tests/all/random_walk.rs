@@ -247,3 +247,11 @@ fn intensities_that_are_refused() {
     rls.reset_covariance(&(SMatrix::identity() * 3.0)).unwrap();
     assert_eq!(rls.intensity(), vector![0.5, 0.0]);
 }
+
+#[test]
+fn its_health_tells_the_smallest_pivot() {
+    let weights = Weights::least_squares(0.0).unwrap();
+    let p = SMatrix::from_diagonal(&vector![4.0, 0.25]);
+    let rls = estimator::<2>(p, weights, vector![0.1, 0.1]);
+    assert_eq!(rls.health().unwrap().smallest_pivot, 0.25);
+}

@@ -108,6 +108,26 @@ fn a_controller_that_does_not_match() {
     assert!(refusal(exchanged, &pi()).contains("not R/S"));
 }
 
+/// Noise that the controller never saw follows r by chance, and by about as much as is told: in a quarter of the records it does so by more.
+#[test]
+fn what_follows_r_by_chance_is_taken_off() {
+    let r: Vec<f64> = drive(40).iter().flat_map(|r| [*r; 10]).collect();
+    let clean = continuous_loop(&plant(), &pi(), 1.0, &r, Hold::Zero, Noise::None).unwrap();
+    let (runs, mut above) = (100, 0);
+    for seed in 0..runs {
+        let w = noise_at_snr(&clean.y, 20.0, &mut ChaCha8Rng::seed_from_u64(seed)).unwrap();
+        let data = continuous_loop(&plant(), &pi(), 1.0, &r, Hold::Zero, Noise::OnRecord(&w));
+        let data = data.unwrap();
+        let record =
+            LoopRecord::closed_loop(1.0, r.clone(), Some(data.u), data.y, Offsets::Deviations);
+        let found = controller_mismatch(&record, &pi()).unwrap().unwrap();
+        assert!(found.by_chance > 0.0 && found.by_chance < found.rms);
+        above += u32::from(found.systematic > 0.0);
+    }
+    println!("above in {above} of {runs}");
+    assert!((12..=40).contains(&above), "{above}");
+}
+
 /// Neither noise, wherever it enters, nor offsets, nor a sampled controller, nor the printed digits are a mismatch.
 #[test]
 fn a_controller_that_matches_is_believed() {

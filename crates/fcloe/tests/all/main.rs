@@ -7,6 +7,7 @@ mod convergence;
 mod coverage;
 mod error_of_the_loop;
 mod experiment;
+mod freedom;
 mod offsets;
 mod recovery;
 mod recursive;

@@ -179,6 +179,15 @@ fn a_file_becomes_a_record() {
     time[30..].iter_mut().for_each(|t| *t += 0.2);
     let error = LoopRecord::from_record(&record(time), Offsets::Means).unwrap_err();
     assert!(error.to_string().contains("time[30] is 0.69"), "{error}");
+    // a millionth of the step, whatever the unit of time
+    for step in [1e-3, 1.0, 1e3] {
+        for (share, even) in [(5e-7, true), (5e-6, false)] {
+            let mut time: Vec<f64> = (0..n).map(|k| step * k as f64).collect();
+            time[20] += share * step;
+            let found = LoopRecord::from_record(&record(time), Offsets::Means);
+            assert_eq!(found.is_ok(), even, "{step} {share}");
+        }
+    }
     let orders = Orders { n: 1, m: 0 };
     assert!(
         Problem::new(&[found], &pi(), orders)

@@ -231,3 +231,102 @@ fn what_the_controller_is_not_told() {
         "{gain} {tau}"
     );
 }
+
+/// J and one step's parts, for the start that the iteration begins with.
+fn first_step(
+    problem: &Problem,
+    start: &PlantModel,
+    method: Method,
+    coordinates: Coordinates,
+) -> (f64, Vec<f64>) {
+    let settings = Settings {
+        method,
+        coordinates,
+        tolerance: 1e-15,
+        max_iterations: 1,
+    };
+    let fit = problem.fit(start, &settings).unwrap();
+    let (from, to) = (&fit.way[0], &fit.way[1]);
+    let step = to.theta.iter().zip(&from.theta).map(|(a, b)| a - b);
+    (from.cost, step.collect())
+}
+
+/// `J'` at a point, by differences of J alone.
+fn slope(problem: &Problem, at: &PlantModel) -> Vec<f64> {
+    let cost = |index: usize, by: f64| {
+        let mut theta = at.theta().to_vec();
+        theta[index] *= 1.0 + by;
+        let at = PlantModel::from_theta(at.orders(), &theta).unwrap();
+        first_step(problem, &at, Method::GaussNewton, Coordinates::Theta).0
+    };
+    let by = 1e-5;
+    let parameters = at.theta().iter().enumerate();
+    parameters
+        .map(|(i, theta)| (cost(i, by) - cost(i, -by)) / (2.0 * by * theta))
+        .collect()
+}
+
+/// With a large mu a damped step is `-J'/mu`, in theta; in delta it is `-theta0^2 J'/mu`; the gradient's has the same direction.
+#[test]
+fn steps_in_delta_have_the_scale_of_the_start_squared() {
+    let (plant, controller, step) = &cases()[0];
+    let problem = disturbed(plant, controller, *step);
+    let from = start(plant);
+    let slope = slope(&problem, &from);
+    for coordinates in [Coordinates::Theta, Coordinates::Delta] {
+        let scale = |i: usize| match coordinates {
+            Coordinates::Theta => 1.0,
+            Coordinates::Delta => from.theta()[i].powi(2),
+        };
+        let mu = match coordinates {
+            Coordinates::Theta => 1e9,
+            Coordinates::Delta => 1e11,
+        };
+        let damped = Method::LevenbergMarquardt {
+            mu,
+            damping: Damping::Identity,
+        };
+        let (_, step) = first_step(&problem, &from, damped, coordinates);
+        let (_, along) = first_step(&problem, &from, Method::Gradient, coordinates);
+        let length = along[0] / (-slope[0] * scale(0));
+        assert!(length > 0.0);
+        for i in 0..slope.len() {
+            let expected = -slope[i] * scale(i) / mu;
+            let off = step[i] / expected - 1.0;
+            assert!(off.abs() < 1e-3, "{coordinates:?} {i}: {off:e}");
+            let off = along[i] / (-slope[i] * scale(i) * length) - 1.0;
+            assert!(off.abs() < 1e-3, "{coordinates:?} {i}: {off:e}");
+        }
+    }
+}
+
+/// Records of other steps or holds than the one before are each simulated as they are: J of all is the sum of theirs.
+#[test]
+fn the_cost_of_several_records_is_the_sum_of_theirs() {
+    let (plant, controller, _) = &cases()[0];
+    let at = start(plant);
+    let records: Vec<LoopRecord> = [
+        (1.0, Hold::Zero),
+        (2.0, Hold::Zero),
+        (2.0, Hold::First),
+        (1.0, Hold::First),
+    ]
+    .into_iter()
+    .map(|(step, hold)| {
+        let r = drive(300);
+        let data = continuous_loop(plant, controller, step, &r, hold, Noise::None).unwrap();
+        let mut record = LoopRecord::closed_loop(step, r, None, data.y, Offsets::Deviations);
+        record.r_hold = hold;
+        record
+    })
+    .collect();
+    let cost = |records: &[LoopRecord]| {
+        let problem = Problem::new(records, controller, plant.orders()).unwrap();
+        first_step(&problem, &at, Method::GaussNewton, Coordinates::Theta).0
+    };
+    let sum: f64 = records
+        .iter()
+        .map(|one| cost(std::slice::from_ref(one)))
+        .sum();
+    assert!((cost(&records) / sum - 1.0).abs() < 1e-12);
+}

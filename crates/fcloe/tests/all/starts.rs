@@ -328,3 +328,58 @@ fn bad_input() {
         Err(Error::RegressionWithoutInput { .. })
     ));
 }
+
+/// What it rests at is its own: the instruments of the last plant, through the last plant's own filter, give that plant; and the start is
+/// forgotten.
+#[test]
+fn a_refinement_rests_where_its_own_filter_and_instruments_lead() {
+    let (record, controller) = first_table(Some(3));
+    let records = std::slice::from_ref(&record);
+    let refined = |gain, tau| {
+        let start = PlantModel::first_order(gain, tau).unwrap();
+        let refined = start::refine(records, &controller, &start, 20).unwrap();
+        assert!(refined.rests && refined.iterations > 1);
+        refined.plant
+    };
+    let (slow, fast) = (refined(4.0, 300.0), refined(9.0, 40.0));
+    let again = start::instruments(records, &controller, &slow.a_polynomial(), &slow).unwrap();
+    assert!(worst(&again, &slow) < 1e-4, "{again:?} {slow:?}");
+    assert!(worst(&fast, &slow) < 3e-4, "{fast:?} {slow:?}");
+}
+
+/// Filters count in the unit of time of the record, whatever its step is.
+#[test]
+fn another_unit_of_time_is_another_tau_and_nothing_else() {
+    let (record, _) = first_table(None);
+    let unit = 0.02;
+    let other = LoopRecord {
+        step: unit * record.step,
+        ..record.clone()
+    };
+    for rule in [
+        Discretisation::Euler,
+        Discretisation::ZeroOrderHold,
+        Discretisation::ZeroOrderHoldAsPrinted,
+    ] {
+        let (gain, tau) = gain_and_tau(&first_order::least_squares(&record, LAMBDA, rule).unwrap());
+        let found = first_order::least_squares(&other, LAMBDA / unit, rule).unwrap();
+        let found = gain_and_tau(&found);
+        assert!((found.0 / gain - 1.0).abs() < 1e-9, "{found:?}");
+        assert!((found.1 / (tau * unit) - 1.0).abs() < 1e-9, "{found:?}");
+    }
+}
+
+/// Without noise many bandwidths lead to the same plant, which is tried once.
+#[test]
+fn candidates_are_not_alike() {
+    let (plant, controller, r) = second_order();
+    let records = [record(&plant, &controller, 1.0, r, None, 20.0)];
+    let settings = PipelineSettings::default();
+    let found = start::pipeline(&records, &controller, plant.orders(), &settings).unwrap();
+    for (k, one) in found.iter().enumerate() {
+        for other in &found[..k] {
+            let off = worst(&one.plant, &other.plant);
+            assert!(off > 0.009, "{:?} {:?}", one.plant, other.plant);
+        }
+    }
+}

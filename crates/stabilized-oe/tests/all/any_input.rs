@@ -146,3 +146,28 @@ fn bad_starts_are_refused_with_their_numbers() {
     assert!(estimator.with_model_state([0.0, f64::NAN, 0.0]).is_err());
     assert!(StateVariableFilters::<2>::new(-1.0).is_err());
 }
+
+fn a_fault_stays_out<D: Derivatives<1, Sample = IoSample>>(derivatives: D, fault: f64) {
+    let gain = BlockDiagonal::<1, 2>::new(block([10.0, 2.0], 1e-3), block([10.0], 1e-3));
+    let mut estimator = StabilizedOe::new(gain, derivatives).unwrap();
+    let dt = 0.5;
+    for k in 0..20 {
+        let before = *estimator.theta();
+        let u = if k == 10 { fault } else { 1.0 };
+        let innovation = estimator.update(&IoSample { u, y: 1.0 }, dt);
+        assert_eq!(innovation.outcome.used(), k != 10, "{fault:e} {k}");
+        if k == 10 {
+            assert_eq!(innovation.outcome, Outcome::NotFinite);
+            assert_eq!(estimator.theta(), &before);
+        }
+        assert!(estimator.model_output().abs() < 3.0, "{fault:e} {k}");
+    }
+}
+
+#[test]
+fn an_input_out_of_range_is_a_fault_and_does_not_reach_the_model() {
+    for fault in [1e31, -1e31, f64::INFINITY, f64::NAN] {
+        a_fault_stays_out(LateDifference::<3>::new(), fault);
+        a_fault_stays_out(StateVariableFilters::<1>::new(0.4).unwrap(), fault);
+    }
+}

@@ -4,6 +4,7 @@
 mod any_input;
 mod bounding;
 mod convergence;
+mod gain;
 mod lyapunov;
 mod lyapunov_strict;
 mod orders;

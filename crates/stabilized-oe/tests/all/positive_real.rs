@@ -79,6 +79,13 @@ fn corners_decide<const N: usize>(seed: u64, cases: usize, spread: f64) -> [usiz
                     let c = core::array::from_fn(|i| rng.random_range(c_lower[i]..=c_upper[i]));
                     assert!(real(c, a).exceeds(above).unwrap().holds());
                 }
+                // the boxes' own corners, where it is nearest to fail
+                for _ in 0..50 {
+                    let mut one = |low: f64, high: f64| if rng.random() { low } else { high };
+                    let a = core::array::from_fn(|i| one(lower[i], upper[i]));
+                    let c = core::array::from_fn(|i| one(c_lower[i], c_upper[i]));
+                    assert!(real(c, a).exceeds(above).unwrap().holds());
+                }
             }
             FilterBounds::NotPositiveReal {
                 c, a, frequency, ..

@@ -2,6 +2,7 @@
 
 use crate::support::reference::{Entry, Equations, blocks, differ, random, start, state};
 use crate::support::second_order;
+use ct_constrained::Bounds;
 use ct_constrained::Relation::{AtLeast, AtMost, Equal};
 use ct_rls::{ContinuousRls, ExactHold, RecursiveEstimator, Weights};
 use nalgebra::{SMatrix, SVector};
@@ -81,6 +82,8 @@ fn a_row_alone_is_exact_over_a_step() {
             pair(0.5, 0.5, [0.3, 0.3]),
             pair(1.0, 0.4, [0.2, 0.2]),
             pair(0.7, 0.0, [0.0, 0.0]),
+            // ratios of their own
+            [1.0, 0.4].map(|gamma| Weights::new(1.0, gamma, 0.2).unwrap()),
         ] {
             let w = 10f64.powf(rng.random_range(-2.0..1.5));
             worst = worst.max(row_alone(&mut rng, weights, w, &[1])[0]);
@@ -350,4 +353,46 @@ fn a_row_that_couples_draws_theta_along() {
         (8.0..12.0).contains(&a1_alone) && (8.0..12.0).contains(&a1_free),
         "{a1_free} {a1_alone}"
     );
+}
+
+/// Penalties come after equalities, whatever the order they are given in: what they ask for holds when the step is over.
+#[test]
+fn penalties_act_after_equalities() {
+    let weights = Weights::least_squares(0.0).unwrap();
+    let p = SMatrix::from_diagonal(&SVector::from([1e-6, 1.0]));
+    let theta = ContinuousRls::new(SVector::from([20.0, 1.0]), p, weights).unwrap();
+    let filter = ContinuousRls::new(SVector::from([10.0]), SMatrix::identity(), weights).unwrap();
+    // draws b_0 to 3, and may have at most 1.5
+    let equality = CoupledRow::new(Equal, [-0.1, 1.0], [0.0], 1.0, 10.0).unwrap();
+    let penalty = CoupledRow::new(AtMost, [0.0, 1.0], [0.0], 1.5, 1e12).unwrap();
+    for rows in [[equality, penalty], [penalty, equality]] {
+        let gain = BlockDiagonal::<1, 2>::new(theta.clone(), filter.clone());
+        let mut estimator = StabilizedOe::new(gain, LateDifference::<3>::new())
+            .and_then(|estimator| estimator.with_rows(rows))
+            .unwrap();
+        // all is silent
+        estimator.update(&IoSample { u: 0.0, y: 0.0 }, 0.5);
+        let b0 = estimator.theta()[1];
+        assert!((b0 - 1.5).abs() < 1e-9, "{b0}");
+    }
+}
+
+/// A row asks for an unstable model: the step is halved until the model is stable, and counted.
+#[test]
+fn a_step_that_would_lose_stability_is_shortened_and_counted() {
+    let weights = Weights::least_squares(0.0).unwrap();
+    let theta = ContinuousRls::new(SVector::from([10.0, 1.0]), SMatrix::identity(), weights);
+    let filter = ContinuousRls::new(SVector::from([10.0]), SMatrix::identity(), weights);
+    let row = CoupledRow::new(AtMost, [1.0, 0.0], [0.0], -20.0, 1e12).unwrap();
+    let gain = BlockDiagonal::<1, 2>::new(theta.unwrap(), filter.unwrap());
+    let mut estimator = StabilizedOe::new(gain, LateDifference::<3>::new())
+        .and_then(|estimator| estimator.with_theta_bounds(Bounds::none()))
+        .and_then(|estimator| estimator.with_rows([row]))
+        .unwrap();
+    for (count, expected) in [(1, 2.5), (2, 2.5 - 22.5 / 16.0)] {
+        estimator.update(&IoSample { u: 0.0, y: 0.0 }, 0.5);
+        let a1 = estimator.theta()[0];
+        assert!((a1 - expected).abs() < 1e-6, "{a1} {expected}");
+        assert_eq!(estimator.bounded().unstable, count);
+    }
 }

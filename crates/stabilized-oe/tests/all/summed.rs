@@ -110,6 +110,27 @@ fn a_row_is_exact_over_a_step() {
     assert!(worst < 1e-8, "{worst:e}");
 }
 
+/// Next to no constant part changes next to nothing: a row then counts by the memory, as for the adaptive gain.
+#[test]
+fn a_row_acts_as_for_the_adaptive_gain_where_the_constant_part_vanishes() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for weights in [pair(0.5, 0.5, [0.3, 0.3]), pair(1.0, 0.4, [0.6, 0.0])] {
+        let begin = start(&mut rng);
+        let (f, f_c) = (random::<3, 1>(&mut rng), random::<2, 1>(&mut rng));
+        let z = f.dot(&begin.theta) + f_c.dot(&begin.c) - 1.0;
+        let row = CoupledRow::new(Relation::Equal, f.data.0[0], f_c.data.0[0], z, 2.0).unwrap();
+        let mut adaptive = blocks(&begin, weights);
+        let (little, little_c) = (Theta::repeat(1e-12), Filter::repeat(1e-12));
+        let mut sum = AdaptivePlusConstant::new(adaptive.clone(), little, little_c).unwrap();
+        adaptive.take_row(&row, 1.5);
+        sum.take_row(&row, 1.5);
+        let off = (Gain::theta(&sum) - Gain::theta(&adaptive)).amax();
+        assert!(off < 1e-6, "{off:e}");
+        let off = (sum.filter() - adaptive.filter()).amax();
+        assert!(off < 1e-6, "{off:e}");
+    }
+}
+
 /// The error never changes its sign nor grows, whatever the step and the gains.
 #[test]
 fn no_step_overshoots() {

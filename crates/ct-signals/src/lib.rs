@@ -72,6 +72,7 @@ mod record;
 pub mod residual_tests;
 mod stationary_noise;
 mod stream;
+mod student;
 mod unit;
 
 pub use ar::{ArModel, Whitener};
@@ -84,3 +85,4 @@ pub use quote::{escaped, quoted, shown};
 pub use record::{Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, Signal};
 pub use stationary_noise::{CovarianceSum, StationaryNoise};
 pub use stream::{BadLine, Line, Rows};
+pub use student::student_half_width;

@@ -10,17 +10,14 @@
 //! coloured, levels known and estimated: 95 % intervals hold the truth in 94.2 to 96.0 % for every parameter, where those
 //! of a white residual hold it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`).
 
+use ct_signals::student_half_width;
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use crate::noise_model::{NoiseModel, NoisePath, Residual};
 use crate::{ClosedLoop, Error, Fit, Problem};
 
 /// Orders of autoregressive noise that are tried: 0 to this.
 const MAX_ORDER: usize = 8;
-
-/// From so many degrees of freedom on, Student's quantiles are those of the series in 1/freedom.
-const MANY: f64 = 1e4;
 
 /// How well a fit is known.
 #[derive(Debug, Clone, Serialize)]
@@ -49,20 +46,7 @@ impl Uncertainty {
         if !(level > 0.0 && level < 1.0) {
             return Err(Error::Setting { what, value, range });
         }
-        let at = 0.5 + 0.5 * level;
-        let not_found = |_| Error::Setting { what, value, range };
-        let freedom = self.freedom.max(1.0);
-        let quantile = if freedom < MANY {
-            let student = StudentsT::new(0.0, 1.0, freedom).map_err(not_found)?;
-            student.inverse_cdf(at)
-        } else {
-            // Cornish and Fisher's first two terms, the third being below 1e-12 here. StudentsT loses its digits, and above 1e8 its end.
-            let z = Normal::standard().inverse_cdf(at);
-            let z2 = z * z;
-            let first = z * (z2 + 1.0) / 4.0;
-            let second = z * (5.0 * z2 * z2 + 16.0 * z2 + 3.0) / 96.0;
-            z + (first + second / freedom) / freedom
-        };
+        let quantile = student_half_width(level, self.freedom);
         Ok(self.std_errors.iter().map(|s| s * quantile).collect())
     }
 }

@@ -2,7 +2,6 @@
 
 use ct_signals::ArModel;
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::{
     Error, Setup, Stop, Stopping, Triangle,
@@ -156,7 +155,7 @@ impl Fit {
         self.std_errors()
             .into_iter()
             .zip(self.freedom())
-            .map(|(error, freedom)| Some(error? * student(level, freedom?)))
+            .map(|(error, freedom)| Some(error? * ct_signals::student_half_width(level, freedom?)))
             .collect()
     }
 
@@ -182,12 +181,6 @@ impl Fit {
             matrix,
         ))
     }
-}
-
-/// The quantile of Student's distribution that bounds a two-sided interval.
-pub(crate) fn student(level: f64, freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom.max(1.0))
-        .map_or(f64::NAN, |t| t.inverse_cdf(0.5 + 0.5 * level))
 }
 
 /// Fits from random starts, with the noise's colour estimated.

@@ -14,7 +14,7 @@
 
 use ct_signals::ArModel;
 
-use crate::{Error, Fit, Rows, Setup, Triangle, fit::student, marginal, noise_factor::Factor};
+use crate::{Error, Fit, Rows, Setup, Triangle, marginal, noise_factor::Factor};
 
 /// The uncertainty of a fit whose residual has another colour than its metric.
 #[derive(Debug, Clone)]
@@ -34,7 +34,9 @@ impl Robust {
         self.std_errors
             .iter()
             .zip(&self.freedom)
-            .map(|(error, freedom)| Some((*error)? * student(level, (*freedom)?)))
+            .map(|(error, freedom)| {
+                Some((*error)? * ct_signals::student_half_width(level, (*freedom)?))
+            })
             .collect()
     }
 }

@@ -204,10 +204,43 @@ pub(super) fn command(source: &mut Source) -> String {
             "diagnose {with_model} --effort quick --max-effects 1 --json out.json --report out.html"
         ),
         1 | 2 => {
-            let methods = ["ct-rls", "stabilized-oe", "ls", "iv", "fcloe", "refine"];
+            let methods = [
+                "ct-rls",
+                "stabilized-oe",
+                "ls",
+                "iv",
+                "fcloe",
+                "recursive-fcloe",
+                "srivc",
+                "rivc",
+                "rivc",
+            ];
             let method = source.pick(&methods);
-            let model = ["", "--model model.toml", "--columns t,u,y"][source.below(3)];
-            format!("identify data.csv {model} --method {method} --json out.json")
+            let model = [
+                "",
+                "--model model.toml",
+                "--columns t,u,y",
+                "--columns t,u+r,y",
+            ][source.below(4)];
+            let mut words = format!("identify data.csv {model} --method {method} --json out.json");
+            if source.chance(0.3) {
+                words += [" --order 2,1", " --order 4,4", " --order 3,0"][source.below(3)];
+            }
+            if method.ends_with("rivc") {
+                match source.below(4) {
+                    0 => words += " --delay auto",
+                    1 => words += &format!(" --delay {}", source.number()),
+                    2 => words += &format!(" --delay 0..{}", source.number()),
+                    _ => {}
+                }
+                if source.chance(0.3) {
+                    words += " --integrator";
+                }
+                if source.chance(0.2) {
+                    words += " other.csv";
+                }
+            }
+            words
         }
         3 => {
             let mut words = format!(

@@ -8,7 +8,7 @@
 use ct_lti::Polynomial;
 use serde::{Deserialize, Serialize};
 
-use super::regression::{instruments, least_squares, refine};
+use super::regression::{instruments, least_squares, srivc};
 use super::signals::Signals;
 use crate::controller::positive;
 use crate::{ClosedLoop, Controller, Error, LoopRecord, Orders, PlantModel};
@@ -24,8 +24,8 @@ pub enum Stage {
     LeastSquares,
     /// Instruments from the loop.
     Instruments,
-    /// Filter and instruments renewed with the estimates.
-    Refined,
+    /// SRIVC: filter and instruments renewed with the estimates.
+    Srivc,
     /// All poles at one place, and the gain that y and u have in step with r: nothing better had a stable loop.
     Guess,
 }
@@ -142,10 +142,10 @@ pub fn pipeline(
             keep(&next, Stage::Instruments, lambda);
             last = next;
         }
-        if let Ok(refined) = refine(records, controller, &last, settings.refinements)
+        if let Ok(refined) = srivc(records, controller, &last, settings.refinements)
             && refined.iterations > 0
         {
-            keep(&refined.plant, Stage::Refined, lambda);
+            keep(&refined.plant, Stage::Srivc, lambda);
         }
     }
     if found.is_empty() {

@@ -10,9 +10,10 @@
 //! Instruments: `[sum z phi']^-1 sum z p^n y_f`, with z the regressor of a model of the loop, driven by r, so that it
 //! owes nothing to the noise, circulating or not. In open loop it is driven by u.
 //!
-//! Refinement: the filter is renewed, `E = A^`, and the instruments with it, until the estimates rest: for white noise on
+//! SRIVC, in a loop CLSRIVC: the filter is renewed, `E = A^`, and the instruments with it, until the estimates rest. For white noise on
 //! the record that is the least possible variance (P. C. Young, A. Jakeman, International Journal of Control 31 (1980)
-//! 741-764, for open loop). What remains is the error of the lines between samples, about 1 % of a2 in an example.
+//! 741-764, for open loop; M. Gilson, H. Garnier, P. C. Young, P. Van den Hof, in Identification of Continuous-time Models from Sampled Data, Springer
+//! 2008, ch. 5, for the loop). In a loop of a continuous controller there remains the error of what u does between samples.
 //!
 //! Several records are taken together.
 
@@ -110,13 +111,13 @@ pub struct Refinement {
     pub rests: bool,
 }
 
-/// Instruments and filter renewed with the estimates, at most `most` times. It ends early, with the last plant whose
+/// SRIVC, in a loop CLSRIVC: instruments and filter renewed with the estimates, at most `most` times. It ends early, with the last plant whose
 /// loop is stable, where the next one's is not, or where A^ is not Hurwitz and so is no filter.
 ///
 /// # Errors
 /// [`Error::UnstableLoop`] for the start; those of [`LoopRecord::validate`], [`Error::RegressionWithoutInput`],
 /// [`Error::NoRecord`].
-pub fn refine(
+pub fn srivc(
     records: &[LoopRecord],
     controller: &Controller,
     start: &PlantModel,

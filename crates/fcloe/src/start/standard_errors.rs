@@ -33,7 +33,7 @@ const MAX_ORDER: usize = 8;
 const UNBOUNDED: f64 = 1e8;
 
 /// Standard errors of `theta` of a plant that [`instruments`](super::instruments) gave, with the filter it was given last, or
-/// [`refine`](super::refine) (the filter is then A^).
+/// [`srivc`](super::srivc) (the filter is then A^).
 ///
 /// # Errors
 /// As [`instruments`](super::instruments); [`Error::NotDetermined`] too where a variance is not finite; those of [`ArModel::fit`].

@@ -80,7 +80,7 @@ fn instruments(rig: &Rig, lambda: f64) -> [Vec<(usize, f64)>; 2] {
             for _ in 0..4 {
                 plant = start::instruments(&records, controller, &filter, &plant).unwrap();
             }
-            let refined = start::refine(&records, controller, &plant, 10)
+            let refined = start::srivc(&records, controller, &plant, 10)
                 .unwrap()
                 .plant;
             let renewed = refined.a_polynomial();

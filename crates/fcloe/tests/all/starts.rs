@@ -122,7 +122,7 @@ fn each_start_in_open_loop() {
         let filter = Polynomial::new([LAMBDA, 1.0]).unwrap();
         let general = start::least_squares(records, &none, plant.orders(), &filter).unwrap();
         let iv = start::instruments(records, &none, &filter, &general).unwrap();
-        let refined = start::refine(records, &none, &iv, 10).unwrap();
+        let refined = start::srivc(records, &none, &iv, 10).unwrap();
         assert!(refined.rests);
         let (standard, printed) = (with(Form::Standard), with(Form::AsPrinted));
         let plants = [&ls, &standard, &printed, &general, &iv, &refined.plant];
@@ -227,7 +227,7 @@ fn refinement_without_bias() {
         let filter = Polynomial::new([0.04, 1.0]).unwrap().pow(2);
         let ls = start::least_squares(&records, &controller, plant.orders(), &filter).unwrap();
         let iv = start::instruments(&records, &controller, &filter, &ls).unwrap();
-        let refined = start::refine(&records, &controller, &iv, 10).unwrap();
+        let refined = start::srivc(&records, &controller, &iv, 10).unwrap();
         assert!(refined.iterations > 1);
         for (mean, theta) in mean.iter_mut().zip(refined.plant.theta()) {
             *mean += theta / RUNS as f64;
@@ -337,7 +337,7 @@ fn a_refinement_rests_where_its_own_filter_and_instruments_lead() {
     let records = std::slice::from_ref(&record);
     let refined = |gain, tau| {
         let start = PlantModel::first_order(gain, tau).unwrap();
-        let refined = start::refine(records, &controller, &start, 20).unwrap();
+        let refined = start::srivc(records, &controller, &start, 20).unwrap();
         assert!(refined.rests && refined.iterations > 1);
         refined.plant
     };

@@ -39,7 +39,7 @@ impl Task<'_> {
                     continue;
                 };
                 (plant, stage) = (better, its);
-                if stage == Stage::Refined {
+                if stage == Stage::Srivc {
                     last_filter = plant.a_polynomial();
                 }
             }
@@ -95,9 +95,9 @@ impl Task<'_> {
         for _ in 0..INSTRUMENTS {
             plant = start::instruments(records, &self.controller, filter, &plant)?;
         }
-        let refined = start::refine(records, &self.controller, &plant, REFINEMENTS)?;
+        let refined = start::srivc(records, &self.controller, &plant, REFINEMENTS)?;
         Ok(if refined.rests {
-            (refined.plant, Stage::Refined)
+            (refined.plant, Stage::Srivc)
         } else {
             (plant, Stage::Instruments)
         })
@@ -108,7 +108,7 @@ pub(super) fn name(stage: Stage) -> &'static str {
     match stage {
         Stage::LeastSquares => "least squares",
         Stage::Instruments => "instruments",
-        Stage::Refined => "instruments, filter renewed",
+        Stage::Srivc => "SRIVC",
         Stage::Guess => "a guess",
     }
 }

@@ -73,13 +73,19 @@ pub trait Gain<const N: usize, const P: usize> {
 pub struct BlockDiagonal<const N: usize, const P: usize, I: Integrator = ExactHold> {
     theta: ContinuousRls<P, I>,
     filter: ContinuousRls<N, I>,
+    /// Whether the last step's data forgot nothing, as the guard found the regressor silent: its rows forget nothing either.
+    silent: [bool; 2],
 }
 
 impl<const N: usize, const P: usize, I: Integrator> BlockDiagonal<N, P, I> {
     /// From the estimators of the two blocks, made by [`ContinuousRls::with_integrator`]: each with its start, its `P(0)`, its
     /// [`Weights`] and its [`Guards`]. Take `eta = 0` for `c^`, or rely on its cap: its regressor vanishes where the model is right.
     pub fn new(theta: ContinuousRls<P, I>, filter: ContinuousRls<N, I>) -> Self {
-        Self { theta, filter }
+        Self {
+            theta,
+            filter,
+            silent: [false; 2],
+        }
     }
 
     /// The constant gain `c P1`, `c P2` from `theta^(0)` and `c^(0)`.
@@ -95,7 +101,13 @@ impl<const N: usize, const P: usize, I: Integrator> BlockDiagonal<N, P, I> {
         Ok(Self {
             theta: ContinuousRls::with_integrator(theta, p1, weights)?,
             filter: ContinuousRls::with_integrator(filter, p2, weights)?,
+            silent: [false; 2],
         })
+    }
+
+    /// Whether the last step's data forgot nothing.
+    pub(crate) fn silent(&self) -> [bool; 2] {
+        self.silent
     }
 
     /// The estimator of `theta^`.
@@ -141,6 +153,7 @@ impl<const N: usize, const P: usize, I: Integrator> Gain<N, P> for BlockDiagonal
         epsilon: f64,
         dt: f64,
     ) -> Innovation {
+        self.silent = [is_silent(&self.theta, phi), is_silent(&self.filter, e1)];
         update_blocks(
             (&mut self.theta, phi),
             (&mut self.filter, &-e1),
@@ -163,7 +176,7 @@ impl<const N: usize, const P: usize, I: Integrator> Gain<N, P> for BlockDiagonal
             return;
         }
         let weights = [self.theta.weights(), self.filter.weights()];
-        let (information, ratio) = row_step(row, weights, dt);
+        let (information, ratio) = row_step(row, (weights, self.silent), dt);
         absorb_blocks(
             (&mut self.theta, row.f()),
             (&mut self.filter, row.f_c()),
@@ -194,13 +207,15 @@ impl<const N: usize, const P: usize, I: Integrator> Gain<N, P> for BlockDiagonal
 #[derive(Clone, Debug)]
 pub struct Full<const N: usize, const P: usize, const T: usize, I: Integrator = ExactHold> {
     rls: ContinuousRls<T, I>,
+    /// As of [`BlockDiagonal`].
+    silent: bool,
 }
 
 impl<const N: usize, const P: usize, const T: usize, I: Integrator> Full<N, P, T, I> {
     /// From an estimator of `(theta, c)`, made by [`ContinuousRls::with_integrator`].
     pub fn new(rls: ContinuousRls<T, I>) -> Self {
         const { assert!(T == N + P, "T must be N + P") }
-        Self { rls }
+        Self { rls, silent: false }
     }
 
     /// The estimator of `(theta^, c^)`.
@@ -252,6 +267,7 @@ impl<const N: usize, const P: usize, const T: usize, I: Integrator> Gain<N, P>
     ) -> Innovation {
         let phi = SVector::from(Self::joined(phi, &-e1));
         let y = epsilon + phi.dot(self.rls.theta());
+        self.silent = is_silent(&self.rls, &phi);
         self.rls.update(&Sample { phi, y }, dt)
     }
 
@@ -288,7 +304,8 @@ impl<const N: usize, const P: usize, const T: usize, I: Integrator> Gain<N, P>
             return;
         }
         let f = SVector::from(Self::joined(row.f(), row.f_c()));
-        let ([information, _], [ratio, _]) = row_step(row, [self.rls.weights(); 2], dt);
+        let ([information, _], [ratio, _]) =
+            row_step(row, ([self.rls.weights(); 2], [self.silent; 2]), dt);
         if ratio == 0.0 {
             // exact whatever the rule
             self.rls.relax(&f, row.chi(), information);
@@ -314,16 +331,36 @@ impl<const N: usize, const P: usize, const T: usize, I: Integrator> Gain<N, P>
 /// A row's weight times the time it acts for, and its `gamma/w`, for either block: the data's for an equality, 0 for a penalty.
 fn row_step<const N: usize, const P: usize>(
     row: &CoupledRow<N, P>,
-    weights: [Weights; 2],
+    (weights, silent): ([Weights; 2], [bool; 2]),
     dt: f64,
 ) -> ([f64; 2], [f64; 2]) {
     match row.relation() {
         Relation::Equal => (
-            weights.map(|w| row.weight() * window(w, dt)),
+            windows(weights, silent, dt).map(|window| row.weight() * window),
             weights.map(|w| w.gamma() / w.c()),
         ),
         Relation::AtMost | Relation::AtLeast => ([row.weight() * dt; 2], [0.0; 2]),
     }
+}
+
+/// Of either block, the time that counts of a row: see [`window`].
+pub(crate) fn windows(weights: [Weights; 2], silent: [bool; 2], dt: f64) -> [f64; 2] {
+    core::array::from_fn(|i| {
+        if silent[i] {
+            dt
+        } else {
+            window(weights[i], dt)
+        }
+    })
+}
+
+/// Whether an estimator's guard finds this regressor silent.
+pub(crate) fn is_silent<const K: usize, I: Integrator>(
+    rls: &ContinuousRls<K, I>,
+    phi: &SVector<f64, K>,
+) -> bool {
+    let Guards { silent_below, .. } = rls.guards();
+    phi.norm_squared() <= silent_below * silent_below.abs()
 }
 
 /// What an adaptive gain asks of the error transfer function: `Re H > gamma/(2 c)`.

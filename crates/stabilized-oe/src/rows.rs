@@ -103,7 +103,7 @@ impl<const N: usize, const P: usize> CoupledRow<N, P> {
     }
 }
 
-/// `(1 - e^{-eta h})/eta`: what a row's weight is multiplied by where `P` has grown by `e^{eta h}` before it.
+/// `(1 - e^{-eta h})/eta`: what a row's weight is multiplied by where `P` has grown by `e^{eta h}` before it; `h` where nothing was forgotten.
 pub(crate) fn window(weights: Weights, dt: f64) -> f64 {
     let x = weights.eta() * dt;
     if x < f64::EPSILON {

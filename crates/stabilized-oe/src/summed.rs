@@ -31,11 +31,11 @@
 //! Reference: A. J. Udink ten Cate, WP-85-54, IIASA, Laxenburg, 1985, section 4 and appendix C.
 
 use ct_constrained::{Bounds, Relation};
-use ct_rls::{ContinuousRls, ExactHold, Guards, Health, Innovation, Weights};
+use ct_rls::{ContinuousRls, ExactHold, Health, Innovation, Weights};
 use nalgebra::{SMatrix, SVector};
 
+use crate::gain::{is_silent, windows};
 use crate::quadrature::{Block, shares};
-use crate::rows::window;
 use crate::{BlockDiagonal, CoupledRow, Error, Gain};
 
 /// The largest `c_lambda lambda_i`: as that of `c`, it keeps every number in range.
@@ -154,8 +154,8 @@ struct Step {
 
 /// The weights that a step takes place with: without forgetting where the block's guard finds its regressor silent.
 fn in_force<const K: usize>(rls: &ContinuousRls<K>, f: &SVector<f64, K>) -> Option<Weights> {
-    let (weights, Guards { silent_below, .. }) = (rls.weights(), rls.guards());
-    if f.norm_squared() <= silent_below * silent_below.abs() {
+    let weights = rls.weights();
+    if is_silent(rls, f) {
         return Weights::new(weights.c(), weights.gamma(), 0.0).ok();
     }
     Some(weights)
@@ -227,9 +227,10 @@ impl<const N: usize, const P: usize> Gain<N, P> for AdaptivePlusConstant<N, P> {
         ];
         // the row's own time runs to its information
         let length = (row.weight() * dt).min(MAX_INFORMATION);
-        let weights = data.map(|w| {
+        let windows = windows(data, self.blocks.silent(), dt);
+        let weights: [_; 2] = core::array::from_fn(|i| {
             let (c, ratio) = if equality {
-                (window(w, dt) / dt, w.gamma() / w.c())
+                (windows[i] / dt, data[i].gamma() / data[i].c())
             } else {
                 (1.0, 0.0)
             };

@@ -10,7 +10,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use stabilized_oe::{
-    BlockDiagonal, CoupledRow, Error, Full, Gain, IoSample, Known, LateDifference, StabilizedOe,
+    AdaptivePlusConstant, BlockDiagonal, CoupledRow, Error, Full, Gain, IoSample, Known,
+    LateDifference, StabilizedOe,
 };
 
 /// A row and its entry in the equations, where data have the ratios `Gamma/W` of `weights`.
@@ -94,6 +95,62 @@ fn a_row_alone_is_exact_over_a_step() {
 }
 
 /// The two blocks have no common clock then.
+/// Where the guards find the data silent nothing is forgotten, and a row counts for the whole step: all is as with an infinite memory.
+#[test]
+fn a_row_of_a_silent_step_forgets_nothing() {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    let begin = start(&mut rng);
+    let forgetful = pair(1.0, 1.0, [0.4, 0.9]);
+    let (row, _) = row(&mut rng, 2.0, forgetful);
+    let guarded = |weights: [Weights; 2]| {
+        BlockDiagonal::<2, 3>::new(
+            ContinuousRls::new(begin.theta, begin.p1, weights[0]).unwrap(),
+            ContinuousRls::new(begin.c, begin.p2, weights[1]).unwrap(),
+        )
+    };
+    let full = |eta: f64| {
+        let weights = Weights::new(1.0, 1.0, eta).unwrap();
+        let p = SMatrix::<f64, 5, 5>::identity() * 2.0;
+        Full::<2, 3, 5>::new(ContinuousRls::new(SVector::zeros(), p, weights).unwrap())
+    };
+    fn after(mut gain: impl Gain<2, 3>, row: &CoupledRow<2, 3>, phi: f64) -> impl Gain<2, 3> {
+        let (phi, e1) = (SVector::repeat(phi), SVector::repeat(phi));
+        gain.advance(&phi, &e1, 0.0, 0.8);
+        gain.take_row(row, 0.8);
+        gain
+    }
+    let largest = |a: &dyn Fn() -> [f64; 5], b: &dyn Fn() -> [f64; 5]| {
+        let pairs = a().into_iter().zip(b());
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    fn estimates(gain: &impl Gain<2, 3>) -> [f64; 5] {
+        let (theta, c) = (gain.theta(), gain.filter());
+        core::array::from_fn(|i| if i < 3 { theta[i] } else { c[i - 3] })
+    }
+    let endless = pair(1.0, 1.0, [0.0; 2]);
+    for (phi, same) in [(0.0, true), (1e-3, false)] {
+        let (a, b) = (
+            after(guarded(forgetful), &row, phi),
+            after(guarded(endless), &row, phi),
+        );
+        let off = largest(&|| estimates(&a), &|| estimates(&b));
+        assert_eq!(off < 1e-14, same, "block-diagonal, {phi}: {off}");
+        let (a, b) = (after(full(0.4), &row, phi), after(full(0.0), &row, phi));
+        let off = largest(&|| estimates(&a), &|| estimates(&b));
+        assert_eq!(off < 1e-14, same, "full, {phi}: {off}");
+        let summed = |weights| {
+            let lambda = (SVector::repeat(0.3), SVector::repeat(0.2));
+            AdaptivePlusConstant::new(guarded(weights), lambda.0, lambda.1).unwrap()
+        };
+        let (a, b) = (
+            after(summed(forgetful), &row, phi),
+            after(summed(endless), &row, phi),
+        );
+        let off = largest(&|| estimates(&a), &|| estimates(&b));
+        assert_eq!(off < 1e-14, same, "sum, {phi}: {off}");
+    }
+}
+
 #[test]
 fn with_two_memories_a_row_is_of_second_order() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);

@@ -355,7 +355,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
 
     /// The sample is held for `dt` seconds. The innovation's `epsilon` is the filtered error `eps~`.
     ///
-    /// Where `y` is not finite the model runs on and nothing is learnt.
+    /// Where `y` is not finite the model runs on and nothing is learnt. Where the input cannot be used the one before is held on.
     #[inline]
     fn update(&mut self, sample: &D::Sample, dt: f64) -> Innovation {
         if self.failure.is_some() {
@@ -368,6 +368,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         let places = if self.offset { P - 1 } else { P };
         let since = self.model.since();
         let Some(y) = self.derivatives.take(sample, since, &mut inputs[N..places]) else {
+            self.model.extend(dt);
             return Self::unused(Outcome::NotFinite);
         };
         if self.offset {

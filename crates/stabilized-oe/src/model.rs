@@ -53,6 +53,13 @@ impl<const N: usize, const P: usize> Model<N, P> {
         self.held = Some(Held { theta, inputs, dt });
     }
 
+    /// Makes the step under way `dt` seconds longer.
+    pub fn extend(&mut self, dt: f64) {
+        if let Some(held) = &mut self.held {
+            held.dt += dt;
+        }
+    }
+
     /// `y_m'` to `y_m^(n)`.
     #[inline]
     pub fn derivatives(&self, theta: &[f64; P], inputs: &[f64; P]) -> [f64; N] {

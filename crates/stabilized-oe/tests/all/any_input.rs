@@ -120,6 +120,28 @@ fn a_gap_is_run_through() {
     assert!((estimator.theta() - SVector::from([10.0, 2.0])).amax() < 0.05);
 }
 
+/// The time of a sample whose input is lost passes for the model too: it is where the plant is when the next one comes.
+#[test]
+fn a_lost_input_is_held_on() {
+    let model = |lost: bool| {
+        let gain = BlockDiagonal::<1, 2>::new(block([10.0, 2.0], 1e-9), block([10.0], 1e-9));
+        let mut estimator =
+            StabilizedOe::new(gain, StateVariableFilters::<1>::new(1.0).unwrap()).unwrap();
+        for k in 0..30 {
+            let u = if lost && (5..12).contains(&k) {
+                f64::NAN
+            } else {
+                1.0
+            };
+            estimator.update(&IoSample { u, y: 0.0 }, 0.5);
+        }
+        estimator.model_output()
+    };
+    let (whole, with_gap) = (model(false), model(true));
+    assert!(whole > 1.0);
+    assert!((whole - with_gap).abs() < 1e-6, "{whole} {with_gap}");
+}
+
 #[test]
 fn bad_starts_are_refused_with_their_numbers() {
     let gain =

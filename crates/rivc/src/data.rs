@@ -4,8 +4,10 @@ use ct_lti::Hold;
 
 use crate::Error;
 
-/// Steps that differ by more than this share of the first one are uneven.
+/// Times further from an even grid than this share of a step are uneven.
 const EVEN: f64 = 1e-6;
+/// What counts in samples takes times for even that are within this share of a step of an even grid.
+const NEARLY_EVEN: f64 = 0.1;
 
 /// One input of a record.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,6 +96,13 @@ impl Data {
                 });
             }
         }
+        if self.len() < 2 {
+            return Err(Error::TooShortRecord {
+                record: record(),
+                samples: self.len(),
+                needed: 2,
+            });
+        }
         let falls = self.time.windows(2).position(|pair| pair[1] <= pair[0]);
         if let Some(k) = falls {
             return Err(Error::Time {
@@ -106,35 +115,42 @@ impl Data {
         Ok(())
     }
 
-    /// The step where all are the same to 1e-6, else the first sample whose step differs, with it.
-    pub(crate) fn even_step(&self) -> Result<f64, (usize, f64, f64)> {
-        let n = self.len();
-        let (Some(first), Some(last)) = (self.time.first(), self.time.last()) else {
-            return Ok(0.0);
-        };
-        if n < 2 {
-            return Ok(0.0);
-        }
-        let mean = (last - first) / (n - 1) as f64;
-        let steps = self.time.windows(2).map(|pair| pair[1] - pair[0]);
-        match steps
-            .enumerate()
-            .find(|(_, step)| (step - mean).abs() > EVEN * mean)
-        {
-            Some((k, step)) => Err((k + 1, step, mean)),
-            None => Ok(mean),
+    /// The mean step \[time\].
+    pub(crate) fn mean_step(&self) -> f64 {
+        let last = self.len() - 1;
+        (self.time[last] - self.time[0]) / last as f64
+    }
+
+    /// The first sample that is further from an even grid than this share of a step.
+    fn off_grid(&self, share: f64) -> Option<usize> {
+        let step = self.mean_step();
+        let on_grid = |k: usize| self.time[0] + k as f64 * step;
+        let times = self.time.iter().enumerate();
+        times
+            .skip(1)
+            .find(|(k, t)| (*t - on_grid(*k)).abs() > share * step)
+            .map(|(k, _)| k)
+    }
+
+    /// The step where the times are even to 1e-6 of it.
+    pub(crate) fn even_step(&self) -> Option<f64> {
+        match self.off_grid(EVEN) {
+            Some(_) => None,
+            None => Some(self.mean_step()),
         }
     }
 
-    /// [`Data::even_step`], refused for what counts in samples.
-    pub(crate) fn require_even(&self, what: &'static str) -> Result<f64, Error> {
-        self.even_step()
-            .map_err(|(index, step, expected)| Error::Uneven {
+    /// Refuses times that are not nearly even, for what counts in samples.
+    pub(crate) fn require_even(&self, what: &'static str) -> Result<(), Error> {
+        match self.off_grid(NEARLY_EVEN) {
+            Some(index) => Err(Error::Uneven {
                 record: self.name.clone(),
                 index,
-                step,
-                expected,
+                step: self.time[index] - self.time[index - 1],
+                expected: self.mean_step(),
                 what,
-            })
+            }),
+            None => Ok(()),
+        }
     }
 }

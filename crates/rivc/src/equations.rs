@@ -9,6 +9,10 @@ use crate::pass::{Instruments, Pass};
 
 /// Equations whose smallest singular value, scaled, is below this share of the largest do not determine the parameters.
 const DEPENDENT: f64 = 1e-13;
+/// Errors of this share of the output are those of rounding.
+const ROUNDING: f64 = 1e-10;
+/// The noise of a record is taken for at least this share of the largest of all.
+const LEAST_NOISE: f64 = 1e-9;
 
 /// Sums over all records. Columns: what all records share, then of each record its own.
 #[derive(Debug, Clone)]
@@ -23,10 +27,10 @@ pub(crate) struct Equations {
     sizes: DVector<f64>,
     /// Rows.
     pub(crate) samples: usize,
-    /// Squares of the measured less the simulated output, whitened where there is a model of the noise.
-    pub(crate) output_squares: f64,
+    /// Squares of the measured output, in the same unit.
+    measured_squares: f64,
     /// Squares of the residual, whitened where there is a model of the noise.
-    pub(crate) residual_squares: f64,
+    residual_squares: f64,
     /// The residual of each record; where the filter is that of the model `y - y^` on the measured inputs.
     pub(crate) residuals: Vec<Vec<f64>>,
 }
@@ -42,7 +46,7 @@ impl Equations {
             zy: DVector::zeros(p),
             sizes: DVector::zeros(p),
             samples: 0,
-            output_squares: 0.0,
+            measured_squares: 0.0,
             residual_squares: 0.0,
             residuals: Vec::with_capacity(records),
         }
@@ -57,7 +61,7 @@ impl Equations {
         }
     }
 
-    /// Adds a record, whitened by a model of the noise.
+    /// Adds a record, whitened by a model of its noise and divided by that model's standard deviation.
     pub(crate) fn add(
         &mut self,
         pass: &Pass,
@@ -68,34 +72,30 @@ impl Equations {
         let p = pass.columns();
         let x = pass.x();
         let mut residuals = Vec::with_capacity(pass.record.len());
-        let mut whitener = noise.map(|noise| noise.whitener(2 * p + 2));
-        let mut lanes = vec![0.0; 2 * p + 2];
+        let mut whitener = noise.map(|noise| noise.whitener(2 * p + 1));
+        let weight = noise.map_or(1.0, |noise| 1.0 / noise.sigma());
+        let mut values = vec![0.0; 2 * p + 1];
         let (mut zphi, mut zz) = (vec![0.0; p * p], vec![0.0; p * p]);
         let (mut zy, mut sizes) = (vec![0.0; p], vec![0.0; p]);
         let error = |phi: &[f64], target: f64| {
             target - phi.iter().zip(&x).map(|(phi, x)| phi * x).sum::<f64>()
         };
-        let (mut outputs, mut squares) = (0.0, 0.0);
+        let (mut squares, mut measured) = (0.0, 0.0);
         pass.rows(bank, instruments, |row| {
             let mut residual = error(row.phi, row.target);
             residuals.push(residual);
+            measured += (row.y * weight).powi(2);
             let (mut z, mut phi, mut target) = (row.z, row.phi, row.target);
-            // Least squares simulates nothing.
-            let mut output = match row.simulated.is_finite() {
-                true => row.y - row.simulated,
-                false => 0.0,
-            };
             if let Some(whitener) = &mut whitener {
-                lanes[..p].copy_from_slice(z);
-                lanes[p..2 * p].copy_from_slice(phi);
-                lanes[2 * p] = target;
-                lanes[2 * p + 1] = output;
-                whitener.push(&mut lanes);
-                (z, phi) = (&lanes[..p], &lanes[p..2 * p]);
-                (target, output) = (lanes[2 * p], lanes[2 * p + 1]);
+                values[..p].copy_from_slice(z);
+                values[p..2 * p].copy_from_slice(phi);
+                values[2 * p] = target;
+                whitener.push(&mut values);
+                values.iter_mut().for_each(|value| *value *= weight);
+                (z, phi) = (&values[..p], &values[p..2 * p]);
+                target = values[2 * p];
                 residual = error(phi, target);
             }
-            outputs += output * output;
             squares += residual * residual;
             for ((zy, a), (size, phi)) in zy.iter_mut().zip(z).zip(sizes.iter_mut().zip(phi)) {
                 *zy += a * target;
@@ -120,13 +120,13 @@ impl Equations {
             }
         }
         self.samples += residuals.len();
-        self.output_squares += outputs;
+        self.measured_squares += measured;
         self.residual_squares += squares;
         self.residuals.push(residuals);
     }
 
     /// Adds a matrix of one record's columns, p by p, to one of all columns.
-    pub(crate) fn scatter(&self, of_record: &[f64], index: usize, to: &mut DMatrix<f64>) {
+    pub(crate) fn add_block(&self, of_record: &[f64], index: usize, to: &mut DMatrix<f64>) {
         let p = self.shared + self.own;
         for i in 0..p {
             for j in 0..p {
@@ -135,10 +135,43 @@ impl Equations {
         }
     }
 
-    /// An autoregression of the residual, of at most this order.
-    pub(crate) fn residual_noise(&self, order: usize) -> Result<ArModel, Error> {
-        let segments: Vec<&[f64]> = self.residuals.iter().map(Vec::as_slice).collect();
-        Ok(ArModel::fit(&segments, order)?)
+    /// An autoregression of each record's residual, of at most this order; one without noise counts as one with a billionth of the largest.
+    pub(crate) fn residual_noise(&self, order: usize) -> Result<Vec<ArModel>, Error> {
+        let models = self.residuals.iter().map(|e| ArModel::fit(&[e], order));
+        let models: Vec<ArModel> = models.collect::<Result<_, _>>()?;
+        let largest = models.iter().map(ArModel::sigma).fold(0.0, f64::max);
+        let least = (LEAST_NOISE * largest).max(f64::MIN_POSITIVE.sqrt());
+        let at_least = |model: ArModel| match model.sigma() < least {
+            true => ArModel::white(least),
+            false => model,
+        };
+        Ok(models.into_iter().map(at_least).collect())
+    }
+
+    /// The same equations with some unknowns fixed at values, and so without their rows and columns; `places` are ascending.
+    pub(crate) fn with_fixed(&self, places: &[usize], values: &[f64]) -> Self {
+        let mut reduced = self.clone();
+        for (place, value) in places.iter().zip(values) {
+            reduced.zy -= self.zphi.column(*place) * *value;
+        }
+        reduced.zphi = reduced
+            .zphi
+            .remove_rows_at(places)
+            .remove_columns_at(places);
+        reduced.zz = reduced.zz.remove_rows_at(places).remove_columns_at(places);
+        reduced.zy = reduced.zy.remove_rows_at(places);
+        reduced.sizes = reduced.sizes.remove_rows_at(places);
+        reduced
+    }
+
+    /// Mean square of the residual, not below that of rounding: of the output error where the filter is that of the model.
+    pub(crate) fn mean_square(&self) -> f64 {
+        let rounding = ROUNDING * ROUNDING * self.measured_squares;
+        // Not a number stays what it is.
+        match self.residual_squares < rounding {
+            true => rounding / self.samples as f64,
+            false => self.residual_squares / self.samples as f64,
+        }
     }
 
     /// Number of unknowns.

@@ -80,7 +80,7 @@ pub enum Error {
     },
     /// A delay that leaves too little of a record.
     #[error(
-        "{record}: a delay of up to {delay} leaves {left} of {samples} samples whose input is known, and {needed} are needed for {parameters} parameters; give a longer record, or a smaller largest delay"
+        "{record}: a delay of up to {delay:?} leaves {left} of {samples} samples whose input is known, and {needed} are needed for {parameters} parameters; give a longer record, or a smaller largest delay"
     )]
     DelayTooLong {
         /// Name of the record.
@@ -95,6 +95,24 @@ pub enum Error {
         needed: usize,
         /// Number of parameters.
         parameters: usize,
+    },
+    /// A record that is too short by itself.
+    #[error(
+        "{record}: {samples} samples are too few, and at least {needed} are needed; leave the record out, or lower the orders"
+    )]
+    TooShortRecord {
+        /// Name of the record.
+        record: String,
+        /// Samples in it.
+        samples: usize,
+        /// Samples that are needed.
+        needed: usize,
+    },
+    /// A B without coefficients.
+    #[error("B of input {input} has no coefficient; give at least b_0")]
+    NoNumerator {
+        /// Which input, from 1.
+        input: usize,
     },
     /// Too few samples.
     #[error(
@@ -122,7 +140,7 @@ pub enum Error {
     },
     /// A signal that stands still.
     #[error(
-        "{what} stands at {value} in all records, so that nothing can be identified from it; record at least a step up and a step down"
+        "{what} is constant at {value} in all records, so that nothing can be identified from it; record at least a step up and a step down"
     )]
     Constant {
         /// Which signal.
@@ -132,7 +150,7 @@ pub enum Error {
     },
     /// Steps that differ, where the method counts in samples.
     #[error(
-        "{record}: the step to sample {index} is {step}, and the first one {expected}; {what} counts in samples: resample the record, or use SRIVC in open loop"
+        "{record}: the times leave an even grid at sample {index}, with a step of {step} where the mean is {expected}; {what} counts in samples: resample the record, or take SRIVC in open loop"
     )]
     Uneven {
         /// Name of the record.
@@ -141,26 +159,35 @@ pub enum Error {
         index: usize,
         /// The step to it.
         step: f64,
-        /// The first step.
+        /// The mean step.
         expected: f64,
         /// What needs even steps.
         what: &'static str,
     },
     /// A record in a loop beside one that is not.
     #[error(
-        "{record}: the first record has {first}, and this one does not; give all records of a loop their reference, or none"
+        "{record}: this record has {found} that changes, and the first one has {first}; give all records of a loop their reference, or none"
     )]
     MixedLoops {
         /// Name of the record.
         record: String,
+        /// What it has.
+        found: &'static str,
         /// What the first one has.
         first: &'static str,
     },
-    /// The reference explains nothing of the input.
+    /// No model of the input from the reference.
     #[error(
-        "no stable model of the input from the reference was found: without it there are no instruments in a loop; check that the reference moves"
+        "{record}: {samples} samples give no stable model of the input from the reference, and without it there are no instruments in a loop; give at least {needed}, and a reference that changes often"
     )]
-    NoLoopModel,
+    NoLoopModel {
+        /// Name of the record.
+        record: String,
+        /// Samples in it.
+        samples: usize,
+        /// Samples that the smallest model needs.
+        needed: usize,
+    },
     /// Equations without one solution.
     #[error(
         "{samples} samples do not determine {parameters} parameters: some have the same effect on the output; lower the orders, or move the inputs more"
@@ -172,8 +199,8 @@ pub enum Error {
         samples: usize,
     },
     /// A simulation that is not finite.
-    #[error("{record}: the model runs away when it is simulated on its inputs alone")]
-    RunsAway {
+    #[error("{record}: the model diverges when it is simulated on its inputs alone")]
+    Diverges {
         /// Name of the record.
         record: String,
     },

@@ -8,16 +8,17 @@
 //! cov(x) = sigma^2 G^-1 [sum (L z)(L z)'] G^-T        G = sum (L z)(L phi)'
 //! cov(x) = G^-1 [sum_{k,l} R(k-l) z_k z_l'] G^-T      SRIVC: R the autocovariance of the residual, an autoregression
 //! ```
-//! and filter, instruments and L are renewed until the estimates rest. A delay that is estimated takes part by its derivative.
+//! and filter, instruments and L are computed again until the estimates have converged. A delay that is estimated takes part by its derivative. Of several
+//! records each has a model of its noise, or a variance, of its own, and counts accordingly.
 //!
-//! Assumptions: the noise owes nothing to the inputs, in a loop nothing to the reference; in a loop the input is what its hold says, as of a
+//! Assumptions: the plant is stable, but for an integrator; the noise owes nothing to the inputs, in a loop nothing to the reference; in a loop the input is what its hold says, as of a
 //! controller that is sampled: behind a continuous one it is not, and the estimates are biased by what u does between the samples
 //! (closed-loop output error has no need of u). The starts find the right minimum; with noise of more power than the output they may not.
 //!
-//! Convergence: no proof for finite records; [`Estimate::converged`] says whether the estimates rest. For white noise (SRIVC), or
-//! autoregressive noise (RIVC), the limit has the least possible variance in open loop.
+//! Convergence: no proof for finite records; [`Estimate::converged`] says whether the estimates have converged. For white noise (SRIVC), or
+//! autoregressive noise (RIVC), the limit has the least possible variance in open loop, as far as y is a line between its samples.
 //!
-//! Cost: one pass a renewal, about `2 p^2 + (3 + 2 inputs) n^2` products a sample; up to 8 passes for each of some 10 bandwidths to start.
+//! Cost: one pass an iteration, about `2 p^2 + (3 + 2 inputs) n^2` products a sample; up to 8 passes for each of some 10 bandwidths to start.
 //!
 //! References: P. C. Young, A. Jakeman, International Journal of Control 31 (1980) 741-764; M. Gilson, H. Garnier, P. C. Young, P. Van den
 //! Hof, in H. Garnier, L. Wang (eds.), Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 5, for the loop;
@@ -35,7 +36,7 @@ use crate::prepared::{Prepared, prepare};
 use crate::problem::{Problem, Refined};
 use crate::{Data, Delay, Error, Structure};
 
-/// Starts that come to rest, of which the best is taken.
+/// Starts from which the iteration is followed until so many have converged.
 const STARTS: usize = 3;
 /// Times that a delay is looked for again beside the one that was found under coloured noise.
 const MOVES: usize = 4;
@@ -59,14 +60,14 @@ pub struct Settings {
     pub noise: Noise,
     /// Largest order of autoregressive noise.
     pub noise_order: usize,
-    /// Bandwidths of the first filters \[1/time\]; empty for a ladder over all that the records show.
+    /// Bandwidths of the first filters \[1/time\]; empty for a grid over all that the records show.
     pub bandwidths: Vec<f64>,
-    /// Most renewals.
+    /// Most iterations.
     pub max_iterations: usize,
 }
 
 impl Settings {
-    /// Up to 60 renewals, noise of up to order 8, a ladder of bandwidths.
+    /// Up to 60 iterations, noise of up to order 8, a grid of bandwidths.
     pub fn new(noise: Noise) -> Self {
         Self {
             noise,
@@ -112,8 +113,8 @@ pub struct Parameter {
     pub kind: Kind,
     /// Its estimate.
     pub value: f64,
-    /// Its standard error.
-    pub std_error: f64,
+    /// Its standard error; nothing for a delay at the end of its range.
+    pub std_error: Option<f64>,
 }
 
 /// The estimate. `A = 1 + a_1 p + .. + a_n p^n`, with an integrator `A = p + a_2 p^2 + .. + a_n p^n`.
@@ -123,22 +124,22 @@ pub struct Estimate {
     pub method: &'static str,
     /// All a that are estimated, all b, input by input, the estimated delays, and the offset of each record.
     pub parameters: Vec<Parameter>,
-    /// Covariance of [`Estimate::parameters`], row by row.
+    /// Covariance of [`Estimate::parameters`], row by row; 0 for a delay at the end of its range.
     pub covariance: Vec<f64>,
     /// The plant, with delays that were known or estimated.
     pub plant: Plant,
     /// In a loop, the share of the first input's power about its mean that the reference explains, the least of all records: instruments
     /// are weak where it is small.
     pub explained: Option<f64>,
-    /// Autoregression of the noise: that of the residual for SRIVC.
-    pub noise: ArModel,
+    /// Autoregression of each record's residual, counted in its samples.
+    pub noise: Vec<ArModel>,
     /// Root mean square of measured less simulated output, on the measured inputs; output unit.
     pub residual_rms: f64,
     /// Samples whose residual counts.
     pub samples: usize,
-    /// Renewals.
+    /// Iterations from the last start.
     pub iterations: usize,
-    /// Whether the estimates rest.
+    /// Whether the estimates have converged; else they are those with the least output error on the way, and their standard errors mean little.
     pub converged: bool,
     /// Of each record, the first sample that counts: the inputs before it are not known under the delays.
     pub first: Vec<usize>,
@@ -186,46 +187,52 @@ pub fn estimate(
         Delay::Estimated { .. } => 0.0,
     });
     let known: Vec<f64> = known.collect();
-    let ladder = match &settings.bandwidths[..] {
+    let bandwidths = match &settings.bandwidths[..] {
         [] => problem.bandwidths(),
         given => given.to_vec(),
     };
-    let (starts, reach) = problem.starts(&known, &ladder)?;
-    let tried = ladder.len();
-    let refine = |model: Model, noise: Option<(usize, ArModel)>| {
+    let (starts, reach) = problem.starts(&known, &bandwidths)?;
+    let tried = bandwidths.len();
+    let refine = |model: Model, noise: Option<(usize, Vec<ArModel>)>| {
         problem.refine(model, noise, reach, settings.max_iterations)
     };
-    let mut best: Option<Refined> = None;
+    let mut found: Vec<Refined> = Vec::new();
     let mut last_error = None;
-    let mut at_rest = 0;
     for (_, model) in starts {
-        if at_rest == STARTS {
+        if found.iter().filter(|found| found.converged).count() == STARTS {
             break;
         }
-        let known = |best: &Refined| best.converged && alike(&best.model, &model);
-        if best.as_ref().is_some_and(known) {
+        if found.iter().any(|found| alike(&found.model, &model)) {
             continue;
         }
         match refine(model, None) {
-            Ok(found) => {
-                at_rest += usize::from(found.converged);
-                let better = best.as_ref().is_none_or(|best| {
-                    (!found.converged, found.mean_square) < (!best.converged, best.mean_square)
-                });
-                if better {
-                    best = Some(found);
-                }
-            }
+            Ok(refined) => found.push(refined),
             Err(error) => last_error = Some(error),
         }
     }
+    let least = found.iter().map(|found| found.mean_square);
+    let least = least.fold(f64::INFINITY, f64::min);
+    // Of those that fit about as well one that has converged.
+    let near = found
+        .into_iter()
+        .filter(|found| found.mean_square <= least * problem.growth());
+    let best = near.min_by(|a, b| {
+        let key = |found: &Refined| (!found.converged, found.mean_square);
+        let (a, b) = (key(a), key(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
     let mut best = best.ok_or(last_error.unwrap_or(Error::NoStart { tried }))?;
-    if settings.noise == Noise::Autoregressive {
-        let iterations = best.iterations;
+    let order = match settings.noise {
+        Noise::Autoregressive => Some(settings.noise_order),
+        // One variance needs no weights, several do.
+        Noise::White if records.len() > 1 => Some(0),
+        Noise::White => None,
+    };
+    if let Some(order) = order {
         let of_residual = |found: &Refined| -> Result<_, Error> {
-            let noise = found.equations.residual_noise(settings.noise_order)?;
-            Ok(Some((settings.noise_order, noise)))
+            Ok(Some((order, found.equations.residual_noise(order)?)))
         };
+        let first = best.iterations;
         let noise = of_residual(&best)?;
         best = refine(best.model, noise)?;
         for _ in 0..MOVES {
@@ -233,15 +240,23 @@ pub fn estimate(
                 break;
             };
             let moved = refine(model, of_residual(&best)?)?;
-            let sigma = |found: &Refined| found.noise.as_ref().map_or(f64::NAN, ArModel::sigma);
-            if sigma(&moved) >= sigma(&best) {
+            if innovations(&moved) >= innovations(&best) {
                 break;
             }
             best = moved;
         }
-        best.iterations += iterations;
+        best.iterations += first;
     }
     finish(&problem, best, settings, records)
+}
+
+/// `sum N log sigma` over the records: less where the noise that is left is less.
+fn innovations(found: &Refined) -> f64 {
+    let models = found.noise.iter().flatten();
+    let pairs = models.zip(&found.equations.residuals);
+    pairs
+        .map(|(model, e)| e.len() as f64 * model.sigma().ln())
+        .sum()
 }
 
 /// Whether a start is within a hundredth of a model.
@@ -250,7 +265,9 @@ fn alike(model: &Model, start: &Model) -> bool {
         let mut pairs = a.iter().zip(b);
         pairs.all(|(a, b)| (a - b).abs() <= 0.01 * a.abs())
     };
-    near(&model.alpha, &start.alpha) && near(&model.beta, &start.beta)
+    near(&model.alpha, &start.alpha)
+        && near(&model.beta, &start.beta)
+        && near(&model.delays, &start.delays)
 }
 
 fn finish(
@@ -266,28 +283,48 @@ fn finish(
     let noise = equations.residual_noise(settings.noise_order)?;
     let middle = match settings.noise {
         Noise::Autoregressive => None,
-        Noise::White if noise.order() == 0 => None,
+        Noise::White if noise.iter().all(|noise| noise.order() == 0) => None,
         Noise::White => {
-            let process = StationaryNoise::of_ar(&noise);
             let p = equations.unknowns();
             let mut middle = DMatrix::zeros(p, p);
-            for index in 0..records.len() {
+            for (index, noise) in noise.iter().enumerate() {
+                let process = StationaryNoise::of_ar(noise);
                 let pass = problem.pass(&delayed, model, index, with_delays);
                 let bank = pass.bank(&model.alpha)?;
                 let mut sum = process.sum(pass.columns());
                 pass.rows(&bank, Instruments::Model, |row| sum.push(row.z));
-                equations.scatter(&sum.finish(), index, &mut middle);
+                // The equations' rows are over the record's standard deviation, both factors of them.
+                let weight = found
+                    .noise
+                    .as_ref()
+                    .map_or(1.0, |weights| 1.0 / weights[index].sigma());
+                let mut block = sum.finish();
+                let scale = noise.sigma().powi(2) * weight.powi(4);
+                block.iter_mut().for_each(|value| *value *= scale);
+                equations.add_block(&block, index, &mut middle);
             }
-            // The innovations' variance is over the samples less their order.
-            let (samples, order) = (equations.samples as f64, noise.order() as f64);
-            let freedom = (samples - order - p as f64).max(1.0);
-            Some(middle * (noise.sigma().powi(2) * (samples - order) / freedom))
+            // The innovations' variances are over the samples less their orders.
+            let orders: usize = noise.iter().map(ArModel::order).sum();
+            let samples = (equations.samples - orders.min(equations.samples)) as f64;
+            Some(middle * (samples / (samples - p as f64).max(1.0)))
         }
     };
-    let covariance = equations.covariance(middle)?;
-    let (parameters, covariance) = normalised(problem, model, &covariance);
-    let not_known = parameters.iter().any(|p| !p.std_error.is_finite());
-    if not_known {
+    let zeros = vec![0.0; found.at_limit.len()];
+    let reduced = equations.with_fixed(&found.at_limit, &zeros);
+    let middle = middle.map(|middle| {
+        middle
+            .remove_rows_at(&found.at_limit)
+            .remove_columns_at(&found.at_limit)
+    });
+    let mut covariance = reduced.covariance(middle)?;
+    for place in &found.at_limit {
+        covariance = covariance
+            .insert_row(*place, 0.0)
+            .insert_column(*place, 0.0);
+    }
+    let (parameters, covariance) = normalised(problem, model, &covariance, &found.at_limit);
+    let mut errors = parameters.iter().filter_map(|p| p.std_error);
+    if errors.any(|error| !error.is_finite()) {
         return Err(Error::NotDetermined {
             parameters: equations.unknowns(),
             samples: equations.samples,
@@ -353,6 +390,7 @@ fn normalised(
     problem: &Problem,
     model: &Model,
     covariance: &DMatrix<f64>,
+    at_limit: &[usize],
 ) -> (Vec<Parameter>, Vec<f64>) {
     let structure = problem.structure;
     let (n, lowest) = (structure.n, structure.lowest());
@@ -435,7 +473,10 @@ fn normalised(
     let parameters = parameters.map(|(i, (kind, value))| Parameter {
         kind,
         value,
-        std_error: covariance[(i, i)].sqrt(),
+        std_error: match kind {
+            Kind::Delay { .. } if at_limit.contains(&(delays_at + i - before)) => None,
+            _ => Some(covariance[(i, i)].sqrt()),
+        },
     });
     (
         parameters.collect(),

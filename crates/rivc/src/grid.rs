@@ -105,7 +105,8 @@ impl Held<'_> {
             part = 0.0;
             whole += 1.0;
         }
-        let whole = whole as usize;
+        // Beyond the record one delay is as good as another.
+        let whole = whole.min(n as f64) as usize;
         let second = lengths.number((1.0 - part) * step);
         let first = if part > 0.0 {
             lengths.number(part * step)

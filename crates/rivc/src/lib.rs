@@ -1,7 +1,7 @@
 //! Refined instrumental variables in continuous time: SRIVC and RIVC, and in a loop CLSRIVC and CLRIVC.
 //!
 //! Model: `A(p) y = sum_j B_j(p) u_j(t - d_j) + offset + noise`, for any orders, with delays that are known or estimated, an integrator if
-//! there is one, several inputs and several records, each from a state of its own. In open loop the times may be uneven: everything is
+//! there is one, several inputs and several records, each from a state of its own and with noise of its own size. The plant is stable, but for the integrator. In open loop the times may be uneven: everything is
 //! sampled exactly.
 //!
 //! | question | answer |
@@ -45,7 +45,8 @@
 //!     (Kind::Delay { input: 0 }, 3.4),
 //! ] {
 //!     let parameter = found.parameter(kind).ok_or("not estimated")?;
-//!     assert!((parameter.value - truth).abs() < 3.0 * parameter.std_error);
+//!     let error = parameter.std_error.ok_or("at its limit")?;
+//!     assert!((parameter.value - truth).abs() < 3.0 * error);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -53,8 +54,8 @@
 //! # Figures
 //! | | | command |
 //! |---|---|---|
-//! | 95 % intervals of RIVC hold the truth, 1000 samples (in a loop 2000) at 20 dB, white, AR(1) and AR(2) noise, n = 2, a delay of 3.4 samples, an integrator in a loop | in 92.5 to 97.2 % of 400 records for every parameter | `RECORDS=400 cargo test -p rivc --test all coverage -- --nocapture` |
-//! | the same of SRIVC | in 93.0 to 97.2 % | the same |
+//! | 95 % intervals of RIVC hold the truth, 1000 samples (in a loop 2000) at 20 dB, white, AR(1) and AR(2) noise, n = 2, delays of 3 and 3.4 samples, an integrator in a loop, records of unequal noise | in 92.5 to 97.2 % of 400 records for every parameter | `RECORDS=400 cargo test -p rivc --test all coverage -- --nocapture` |
+//! | the same of SRIVC, coloured noise included | in 91.5 to 97.2 % | the same |
 //! | recovery without noise, n = 1 to 4, even and uneven times, both holds, delays, integrators, two inputs, three records | within 1e-6 | `cargo test -p rivc --test all recovery` |
 //! | bias and spread beside dsmc's SRIVC, 100 noises at 20 dB | the same to three digits | `cargo bench -p ctid-benches --bench fcloe` |
 

@@ -13,98 +13,133 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::Error;
-
 /// Orders that are tried.
 const ORDERS: [usize; 5] = [2, 4, 8, 14, 20];
 /// Samples for each coefficient that are needed.
 const SAMPLES_PER_COEFFICIENT: usize = 10;
-/// A simulation further from its mean than so many times the measured input is not stable.
-const FAR: f64 = 10.0;
+/// Weight on each coefficient, over the number of samples, for signals of size 1.
+const RIDGE: f64 = 1e-10;
+/// A simulation further from its mean than so many times the size of the measured input is not stable.
+const FAR: f64 = 30.0;
 
 #[derive(Debug, Clone)]
 pub(crate) struct LoopModel {
     order: usize,
-    /// Of u, of r from the present value on, and the constant.
+    /// Of u, of r from the present value on, and the constant, for signals about their means and of size 1.
     coefficients: Vec<f64>,
+    u: Scale,
+    r: Scale,
+}
+
+/// Mean and root mean square about it.
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    mean: f64,
+    size: f64,
+}
+
+impl Scale {
+    fn of(values: &[f64]) -> Self {
+        let n = values.len().max(1) as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+        Self {
+            mean,
+            size: square.sqrt().max(f64::MIN_POSITIVE),
+        }
+    }
+
+    fn scaled(self, values: &[f64]) -> Vec<f64> {
+        values.iter().map(|v| (v - self.mean) / self.size).collect()
+    }
 }
 
 impl LoopModel {
-    pub(crate) fn fit(references: &[&[f64]], inputs: &[&[f64]]) -> Result<Self, Error> {
-        let samples: usize = inputs.iter().map(|u| u.len()).sum();
+    /// Samples that the smallest model needs.
+    pub(crate) const NEEDED: usize = SAMPLES_PER_COEFFICIENT * (2 * ORDERS[0] + 2) + ORDERS[0];
+
+    /// Nothing where no model is stable, or the record is too short for any.
+    pub(crate) fn fit(r: &[f64], u: &[f64]) -> Option<Self> {
+        let scales = (Scale::of(u), Scale::of(r));
+        let scaled = (scales.0.scaled(u), scales.1.scaled(r));
+        let fits =
+            |order: &&usize| u.len() >= SAMPLES_PER_COEFFICIENT * (2 * **order + 2) + **order;
+        let orders: Vec<usize> = ORDERS.iter().filter(fits).copied().collect();
+        // All orders are compared on the same rows.
+        let from = *orders.last()?;
         let mut best: Option<(f64, Self)> = None;
-        for order in ORDERS {
-            let size = 2 * order + 2;
-            if samples < SAMPLES_PER_COEFFICIENT * size {
-                break;
-            }
-            let Some((model, squares, rows)) = Self::of_order(order, references, inputs) else {
+        for order in orders {
+            let Some((model, squares)) = Self::of_order(order, from, &scaled, scales) else {
                 continue;
             };
-            let pairs = references.iter().zip(inputs);
-            if !pairs.into_iter().all(|(r, u)| model.stays(r, u)) {
+            let simulated = model.of_scaled(&scaled.1, scaled.0[0]);
+            if !simulated.iter().all(|v| v.abs() <= FAR) {
                 continue;
             }
-            let rows = rows as f64;
-            let variance = (squares / rows).max(f64::MIN_POSITIVE);
-            let criterion = rows * variance.ln() + size as f64 * rows.ln();
+            let rows = (u.len() - from) as f64;
+            let variance = (squares / rows).max(f64::EPSILON.powi(2));
+            let criterion = rows * variance.ln() + (2 * order + 2) as f64 * rows.ln();
             if best.as_ref().is_none_or(|(least, _)| criterion < *least) {
                 best = Some((criterion, model));
             }
         }
-        best.map(|(_, model)| model).ok_or(Error::NoLoopModel)
+        best.map(|(_, model)| model)
     }
 
     fn of_order(
         order: usize,
-        references: &[&[f64]],
-        inputs: &[&[f64]],
-    ) -> Option<(Self, f64, usize)> {
+        from: usize,
+        (u, r): &(Vec<f64>, Vec<f64>),
+        (of_u, of_r): (Scale, Scale),
+    ) -> Option<(Self, f64)> {
         let size = 2 * order + 2;
         let mut normal = DMatrix::zeros(size, size);
         let mut right = DVector::zeros(size);
-        let (mut power, mut rows) = (0.0, 0);
+        let mut power = 0.0;
         let mut row = vec![0.0; size];
-        for (r, u) in references.iter().zip(inputs) {
-            // About their means, so that the equations are well conditioned.
-            let (r_mean, u_mean) = (mean(r), mean(u));
-            for k in order..u.len() {
-                for i in 1..=order {
-                    row[i - 1] = u[k - i] - u_mean;
-                }
-                for i in 0..=order {
-                    row[order + i] = r[k - i] - r_mean;
-                }
-                row[size - 1] = 1.0;
-                let target = u[k] - u_mean;
-                for (i, a) in row.iter().enumerate() {
-                    right[i] += a * target;
-                    for (j, b) in row.iter().enumerate().take(i + 1) {
-                        normal[(i, j)] += a * b;
-                    }
-                }
-                power += target * target;
-                rows += 1;
+        for k in from..u.len() {
+            for i in 1..=order {
+                row[i - 1] = u[k - i];
             }
+            for i in 0..=order {
+                row[order + i] = r[k - i];
+            }
+            row[size - 1] = 1.0;
+            for (i, a) in row.iter().enumerate() {
+                right[i] += a * u[k];
+                for (j, b) in row.iter().enumerate().take(i + 1) {
+                    normal[(i, j)] += a * b;
+                }
+            }
+            power += u[k] * u[k];
         }
         // References of few steps leave some coefficients without effect: a small weight on all of them decides.
-        let ridge = 1e-10 * normal.diagonal().max();
+        let weight = RIDGE * u.len() as f64;
         for i in 0..size {
-            normal[(i, i)] += ridge;
+            normal[(i, i)] += weight;
         }
         let solution = normal.cholesky()?.solve(&right);
         let squares = power - solution.dot(&right);
         let model = Self {
             order,
             coefficients: solution.iter().copied().collect(),
+            u: of_u,
+            r: of_r,
         };
-        Some((model, squares, rows))
+        Some((model, squares))
     }
 
-    /// From the reference alone; before the record reference and input stand at their first values.
-    pub(crate) fn simulate(&self, r: &[f64], u: &[f64]) -> Vec<f64> {
-        let (r_mean, u_mean) = (mean(r), mean(u));
-        let first = |values: &[f64], mean: f64| values.first().map_or(0.0, |v| v - mean);
+    /// From the reference alone; before the record reference and input are taken to have been at their first values.
+    pub(crate) fn simulate(&self, r: &[f64], first: f64) -> Vec<f64> {
+        let first = (first - self.u.mean) / self.u.size;
+        let mut simulated = self.of_scaled(&self.r.scaled(r), first);
+        for value in &mut simulated {
+            *value = self.u.mean + self.u.size * *value;
+        }
+        simulated
+    }
+
+    fn of_scaled(&self, r: &[f64], first: f64) -> Vec<f64> {
         let (of_u, of_r) = self.coefficients.split_at(self.order);
         let mut simulated: Vec<f64> = Vec::with_capacity(r.len());
         for k in 0..r.len() {
@@ -114,27 +149,13 @@ impl LoopModel {
             };
             let mut value = of_r[self.order + 1];
             for (i, a) in of_u.iter().enumerate() {
-                value += a * past(&simulated, i + 1, first(u, u_mean));
+                value += a * past(&simulated, i + 1, first);
             }
             for (i, b) in of_r[..=self.order].iter().enumerate() {
-                value += b * (past(r, i, r[0]) - r_mean);
+                value += b * past(r, i, r[0]);
             }
             simulated.push(value);
         }
-        for value in &mut simulated {
-            *value += u_mean;
-        }
         simulated
     }
-
-    fn stays(&self, r: &[f64], u: &[f64]) -> bool {
-        let u_mean = mean(u);
-        let size = u.iter().map(|u| (u - u_mean).abs()).fold(0.0, f64::max);
-        let simulated = self.simulate(r, u);
-        simulated.iter().all(|v| (v - u_mean).abs() <= FAR * size)
-    }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }

@@ -32,6 +32,7 @@ impl Model {
         let mut delays = delays.to_vec();
         if estimate_delays {
             for (j, most) in structure.estimated_delays() {
+                // To the last digit within its limits.
                 delays[j] = (delays[j] + x[0]).clamp(0.0, most);
                 x = &x[1..];
             }
@@ -97,6 +98,40 @@ impl Model {
                 .zip(&other.of_records)
                 .map(|(new, old)| half(new, old))
                 .collect(),
+        }
+    }
+
+    /// The same plant with one more pole, at `-rate`, for a structure whose order is larger by one: about the same output where the pole is
+    /// fast. `lower` is the structure of this model.
+    pub(crate) fn with_pole(&self, rate: f64, lower: &Structure, structure: &Structure) -> Self {
+        // (p + rate) times a polynomial whose leading coefficient may be left out.
+        let times = |c: &[f64], leading: Option<f64>| -> Vec<f64> {
+            let all: Vec<f64> = c.iter().copied().chain(leading).collect();
+            let of_p = std::iter::once(0.0).chain(all.iter().copied());
+            let of_rate = all.iter().map(|c| c * rate).chain([0.0]);
+            of_p.zip(of_rate).map(|(a, b)| a + b).collect()
+        };
+        let mut alpha = times(&self.alpha, Some(1.0));
+        alpha.pop();
+        let mut beta = Vec::with_capacity(structure.numerators());
+        let mut own = self.beta.iter();
+        for (m, fewer) in structure.m.iter().zip(&lower.m) {
+            beta.extend(own.by_ref().take(fewer + 1).map(|b| b * rate));
+            beta.resize(beta.len() + m - fewer, 0.0);
+        }
+        let of_records = self.of_records.iter().map(|own| {
+            let (offset, states) = own.split_at(usize::from(structure.offset));
+            let mut own: Vec<f64> = offset.iter().map(|d| d * rate).collect();
+            if structure.initial_states {
+                own.extend(times(states, None));
+            }
+            own
+        });
+        Self {
+            alpha,
+            beta,
+            delays: self.delays.clone(),
+            of_records: of_records.collect(),
         }
     }
 }

@@ -36,7 +36,7 @@ impl Plant {
     /// (least squares). Before the first sample the inputs are taken to have stood.
     ///
     /// # Errors
-    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::Time`]; [`Error::RunsAway`] where the
+    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::Time`]; [`Error::Diverges`] where the
     /// output is not finite.
     pub fn fitted(&self, record: &Data) -> Result<Vec<f64>, Error> {
         let n = self.a.len().saturating_sub(1);
@@ -49,6 +49,9 @@ impl Plant {
         );
         structure.delays = self.delays.iter().map(|d| Delay::Known(*d)).collect();
         structure.validate()?;
+        if let Some(j) = self.b.iter().position(Vec::is_empty) {
+            return Err(Error::NoNumerator { input: j + 1 });
+        }
         record.validate(self.b.len())?;
         let prepared = Prepared::new(record, true, None);
         let leading = self.a[n];
@@ -86,20 +89,20 @@ impl Plant {
             forced.len(),
             prepared.y.iter().zip(&forced).map(|(y, forced)| y - forced),
         );
-        let runs_away = || Error::RunsAway {
+        let diverges = || Error::Diverges {
             record: record.name.clone(),
         };
         if !free.iter().chain(&left).all(|v| v.is_finite()) {
-            return Err(runs_away());
+            return Err(diverges());
         }
         let normal = free.tr_mul(&free);
-        let inverse = normal.pseudo_inverse(UNSEEN).map_err(|_| runs_away())?;
+        let inverse = normal.pseudo_inverse(UNSEEN).map_err(|_| diverges())?;
         let fitted = &free * (inverse * free.tr_mul(&left));
         let pairs = forced.iter().zip(&fitted);
         let simulated: Vec<f64> = pairs.map(|(a, b)| a + b + prepared.y_mean).collect();
         match simulated.iter().all(|y| y.is_finite()) {
             true => Ok(simulated),
-            false => Err(runs_away()),
+            false => Err(diverges()),
         }
     }
 }

@@ -48,7 +48,7 @@ impl Prepared {
         let inputs = record.inputs.iter().zip(&u_means);
         Self {
             time: record.time.clone(),
-            step: record.even_step().ok(),
+            step: record.even_step(),
             y: less(&record.output, y_mean),
             inputs: inputs.map(|(u, mean)| less(&u.values, *mean)).collect(),
             holds: record.inputs.iter().map(|u| u.hold).collect(),
@@ -56,6 +56,11 @@ impl Prepared {
             y_mean,
             u_means,
         }
+    }
+
+    /// Whether the first input is one that a reference explains.
+    pub(crate) fn is_in_loop(&self) -> bool {
+        self.instrument.is_some()
     }
 
     /// Share of the first input's power about its mean that the reference explains, in a loop.
@@ -125,7 +130,20 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
         if record.reference.is_some() != in_loop {
             return Err(Error::MixedLoops {
                 record: record.name.clone(),
-                first: if in_loop { "a reference" } else { "none" },
+                found: if in_loop {
+                    "no reference"
+                } else {
+                    "a reference"
+                },
+                first: if in_loop { "one" } else { "none" },
+            });
+        }
+        let needed = SAMPLES_PER_PARAMETER * own.max(1);
+        if record.len() < needed {
+            return Err(Error::TooShortRecord {
+                record: record.name.clone(),
+                samples: record.len(),
+                needed,
             });
         }
         if in_loop {
@@ -151,28 +169,27 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
         |record| record.output.clone(),
         || "the output".into(),
     )?;
-    let references: Vec<Vec<f64>> = records.iter().filter_map(|r| r.reference.clone()).collect();
-    let loop_model = if in_loop {
-        moves(
-            records,
-            |record| record.reference.clone().unwrap_or_default(),
-            || "the reference".into(),
-        )?;
-        let inputs: Vec<&[f64]> = records.iter().map(|r| &r.inputs[0].values[..]).collect();
-        let references: Vec<&[f64]> = references.iter().map(|r| &r[..]).collect();
-        Some(LoopModel::fit(&references, &inputs)?)
-    } else {
-        None
-    };
+    if in_loop {
+        let reference = |record: &Data| record.reference.clone().unwrap_or_default();
+        moves(records, reference, || "the reference".into())?;
+    }
     let centre = structure.offset && structure.initial_states;
     let prepared: Vec<Prepared> = records
         .iter()
         .map(|record| {
-            let model = loop_model.as_ref().zip(record.reference.as_deref());
-            let instrument = model.map(|(model, r)| model.simulate(r, &record.inputs[0].values));
-            Prepared::new(record, centre, instrument)
+            let u = &record.inputs[0].values;
+            let explained = |r: &[f64]| match LoopModel::fit(r, u) {
+                Some(model) => Ok(model.simulate(r, u[0])),
+                None => Err(Error::NoLoopModel {
+                    record: record.name.clone(),
+                    samples: u.len(),
+                    needed: LoopModel::NEEDED,
+                }),
+            };
+            let instrument = record.reference.as_deref().map(explained).transpose()?;
+            Ok(Prepared::new(record, centre, instrument))
         })
-        .collect();
+        .collect::<Result<_, Error>>()?;
     let largest = structure.largest_delay();
     for (record, data) in prepared.iter().zip(records) {
         let left = record.len() - record.first_known(largest).min(record.len());

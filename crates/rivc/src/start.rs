@@ -1,21 +1,23 @@
-//! Where the refinement starts: regressions over a ladder of bandwidths and, for delays, over a grid that is made finer around the best.
+//! Where the refinement starts: regressions over a grid of bandwidths and, for delays, over a grid that is made finer around the best.
 
 use ct_lti::Polynomial;
 use rayon::prelude::*;
 
-use crate::Error;
 use crate::model::Model;
 use crate::problem::{Delayed, Problem, Refined};
+use crate::{Error, Structure};
 
-/// Regressions with instruments under a filter that stays, and refinements of each start.
+/// Regressions with instruments under a filter that stays, and iterations from there.
 const THOROUGH: Effort = Effort {
     instruments: 1,
-    refinements: 6,
+    iterations: 6,
+    lower_orders: true,
 };
 /// The same on a grid of delays, where only the best point matters.
 const ROUGH: Effort = Effort {
     instruments: 1,
-    refinements: 3,
+    iterations: 3,
+    lower_orders: false,
 };
 /// Points of the first grid of delays.
 const POINTS: usize = 16;
@@ -24,6 +26,10 @@ const REACH: f64 = 0.25;
 /// Grids that are finer by this factor.
 const FINER: f64 = 4.0;
 const GRIDS: usize = 4;
+/// A pole that is added lies at this over the step.
+const FAST: f64 = 2.0;
+/// Other points of the first grid that are starts too, beside no delay: where the order is high the rough comparison may miss the best.
+const OTHERS: usize = 2;
 /// Where a better delay is looked for, in steps from the one that was found.
 const NEIGHBOURS: [f64; 8] = [2.0, 1.5, 1.0, 0.5, -0.5, -1.0, -1.5, -2.0];
 
@@ -31,7 +37,8 @@ const NEIGHBOURS: [f64; 8] = [2.0, 1.5, 1.0, 0.5, -0.5, -1.0, -1.5, -2.0];
 #[derive(Clone, Copy)]
 struct Effort {
     instruments: usize,
-    refinements: usize,
+    iterations: usize,
+    lower_orders: bool,
 }
 
 /// A model and the mean square of its output error.
@@ -61,40 +68,87 @@ impl Problem<'_> {
     }
 
     /// From one bandwidth; nothing where it leads to no stable plant.
-    fn of_bandwidth(&self, delayed: &Delayed, bandwidth: f64, effort: Effort) -> Option<Start> {
-        let filter = Polynomial::new([bandwidth, 1.0])
-            .ok()?
-            .pow(self.structure.n);
-        let solve = |model: Option<&Model>| -> Option<Model> {
-            let solved = self.solve_with_filter(delayed, &filter, model).ok()?;
-            solved.stabilised(self.structure).ok()
+    fn of_bandwidth(
+        &self,
+        delayed: &Delayed,
+        bandwidth: f64,
+        effort: Effort,
+    ) -> Result<Option<Start>, Error> {
+        let filter = Polynomial::new([bandwidth, 1.0])?.pow(self.structure.n);
+        let solve = |model: Option<&Model>| -> Result<Model, Error> {
+            let solved = self.solve_with_filter(delayed, &filter, model)?;
+            solved.stabilised(self.structure)
         };
         let mut model = solve(None)?;
         for _ in 0..effort.instruments {
-            let Some(next) = solve(Some(&model)) else {
+            let Ok(next) = solve(Some(&model)) else {
                 break;
             };
             model = next;
         }
-        self.follow(delayed, model, None, effort.refinements)
-            .ok()
-            .flatten()
+        self.follow(delayed, model, None, effort.iterations)
     }
 
-    /// The best of the bandwidths, the best first, at these delays.
+    /// Starts from all bandwidths, the best first, at these delays.
+    ///
+    /// # Errors
+    /// [`Error::NoStart`]; what every bandwidth says alike.
     fn at_delays(
         &self,
         delays: &[f64],
         largest: f64,
         (bandwidths, effort): (&[f64], Effort),
-    ) -> Vec<Start> {
+    ) -> Result<Vec<Start>, Error> {
         let delayed = self.delayed(delays, largest);
-        let starts = bandwidths.par_iter();
-        let mut starts: Vec<Start> = starts
-            .filter_map(|bandwidth| self.of_bandwidth(&delayed, *bandwidth, effort))
+        let tried = bandwidths.par_iter();
+        let found: Vec<Result<Option<Start>, Error>> = tried
+            .map(|bandwidth| self.of_bandwidth(&delayed, *bandwidth, effort))
             .collect();
+        let mut starts = Vec::new();
+        let mut undetermined = None;
+        let mut others = 0;
+        for found in found {
+            match found {
+                Ok(Some(start)) => starts.push(start),
+                Err(error @ Error::NotDetermined { .. }) => undetermined = Some(error),
+                _ => others += 1,
+            }
+        }
+        if effort.lower_orders {
+            starts.extend(self.of_lower_order(delays, largest, bandwidths));
+        }
+        if starts.is_empty() {
+            return Err(match undetermined {
+                Some(error) if others == 0 => error,
+                _ => Error::NoStart {
+                    tried: bandwidths.len(),
+                },
+            });
+        }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        starts
+        Ok(starts)
+    }
+
+    /// A start from the best plant of the next lower order, by one more pole that is fast: it fits as well, where starts of an order that the
+    /// record does not carry may lead nowhere.
+    fn of_lower_order(&self, delays: &[f64], largest: f64, bandwidths: &[f64]) -> Option<Start> {
+        let n = self.structure.n.checked_sub(1).filter(|n| *n > 0)?;
+        let lower = Structure {
+            n,
+            m: self.structure.m.iter().map(|m| (*m).min(n)).collect(),
+            ..self.structure.clone()
+        };
+        let problem = Problem {
+            structure: &lower,
+            records: self.records,
+        };
+        let starts = problem.at_delays(delays, largest, (bandwidths, THOROUGH));
+        let (_, best) = starts.ok()?.into_iter().next()?;
+        let model = best.with_pole(FAST / self.shortest_step(), &lower, self.structure);
+        let delayed = self.delayed(delays, largest);
+        self.follow(&delayed, model, None, THOROUGH.iterations)
+            .ok()
+            .flatten()
     }
 
     /// Starts, the best first; `delays` holds the known ones, and by how much a delay may move in one renewal comes back.
@@ -103,13 +157,13 @@ impl Problem<'_> {
         delays: &[f64],
         bandwidths: &[f64],
     ) -> Result<(Vec<Start>, f64), Error> {
-        let none = || Error::NoStart {
-            tried: bandwidths.len(),
-        };
         let estimated: Vec<(usize, f64)> = self.structure.estimated_delays().collect();
         let mut delays = delays.to_vec();
-        let largest = self.structure.largest_delay();
+        // All samples count here, as if the inputs had stood before the record: samples that are left out for the largest delay may hold
+        // the only step.
+        let largest = 0.0;
         let mut finest = 0.0_f64;
+        let mut others: Vec<Vec<f64>> = Vec::new();
         let thinned: Vec<f64> = bandwidths.iter().copied().step_by(2).collect();
         let rounds = if estimated.len() > 1 { 2 } else { 1 };
         for _ in 0..rounds {
@@ -121,14 +175,23 @@ impl Problem<'_> {
                     delays
                 };
                 let grid = (0..=POINTS).into_par_iter();
-                let coarse = grid.filter_map(|i| {
-                    let value = i as f64 * spacing;
-                    let starts = self.at_delays(&at(value), largest, (&thinned, ROUGH));
-                    Some((value, starts.into_iter().next()?))
-                });
-                let (mut value, mut best) = coarse
-                    .min_by(|a, b| a.1.0.total_cmp(&b.1.0))
-                    .ok_or_else(none)?;
+                let coarse: Vec<(f64, Result<Start, Error>)> = grid
+                    .map(|i| {
+                        let value = i as f64 * spacing;
+                        let starts = self.at_delays(&at(value), largest, (&thinned, ROUGH));
+                        (value, starts.map(|mut starts| starts.swap_remove(0)))
+                    })
+                    .collect();
+                let square = |start: &Result<Start, Error>| match start {
+                    Ok((square, _)) => *square,
+                    Err(_) => f64::INFINITY,
+                };
+                let mut coarse = coarse;
+                coarse.sort_by(|a, b| square(&a.1).total_cmp(&square(&b.1)));
+                let next = coarse[1..].iter().take(OTHERS).map(|(value, _)| *value);
+                others = next.chain([0.0]).map(at).collect();
+                let (mut value, best) = coarse.swap_remove(0);
+                let mut best = best?;
                 let mut spacing = spacing;
                 for _ in 0..GRIDS {
                     spacing /= FINER;
@@ -157,11 +220,15 @@ impl Problem<'_> {
                 finest = finest.max(2.0 * spacing).max(REACH * self.shortest_step());
             }
         }
-        let known = delays.iter().copied().fold(0.0, f64::max);
-        let starts = self.at_delays(&delays, known, (bandwidths, THOROUGH));
-        if starts.is_empty() {
-            return Err(none());
+        let at = |delays: &[f64]| {
+            let known = delays.iter().copied().fold(0.0, f64::max);
+            self.at_delays(delays, known, (bandwidths, THOROUGH))
+        };
+        let mut starts = at(&delays)?;
+        for other in &others {
+            starts.extend(at(other).unwrap_or_default());
         }
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok((starts, finest))
     }
 
@@ -173,7 +240,7 @@ impl Problem<'_> {
             found.model.delays.iter().copied().fold(0.0, f64::max) + NEIGHBOURS[0].abs() * step;
         let square = |model: &Model| {
             let delayed = self.delayed(&model.delays, largest);
-            self.follow(&delayed, model.clone(), found.noise.as_ref(), 3)
+            self.follow(&delayed, model.clone(), found.noise.as_deref(), 3)
                 .ok()?
         };
         let (own, _) = square(&found.model)?;

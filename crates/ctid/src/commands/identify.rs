@@ -228,10 +228,11 @@ impl Identify {
         fitted: &Record,
     ) -> Result<Record, Error> {
         let record = read_csv_any_input(path, columns, hold).map_err(self.named_by())?;
-        let pairs = [
+        let mut pairs = vec![
             (&record.input, &fitted.input),
             (&record.output, &fitted.output),
         ];
+        pairs.extend(record.input_2.iter().zip(&fitted.input_2));
         for (test, fitted) in pairs {
             if test.unit != fitted.unit {
                 return Err(Error::file(
@@ -260,6 +261,11 @@ impl Identify {
                 "identify works on one record, and {} are given; give the longest, fit all of them together by --method srivc or rivc (alone, of one order, without --test), or fit a physical model to them with compare",
                 self.data.len()
             )));
+        }
+        for (k, path) in self.data.iter().enumerate() {
+            if self.data[..k].contains(path) {
+                return Err(Error::file(path, "is given twice; give each record once"));
+            }
         }
         let (columns, hold, controller) = self.layout()?;
         self.check_options(&methods)?;
@@ -308,7 +314,11 @@ impl Identify {
                 total,
             });
         };
-        let records = (&record, &test[..], controller.is_some());
+        let moves = record.reference.as_ref().is_some_and(|reference| {
+            let (low, high) = reference.range();
+            high > low
+        });
+        let records = (&record, &test[..], controller.is_some() || moves);
         let found = side_by_side::compare(records, &requests, &self.order.0, &tell);
         bar.clear();
         let found = found?;

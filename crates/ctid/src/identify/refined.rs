@@ -67,16 +67,25 @@ pub struct Refined {
     pub records: Vec<String>,
     /// Names of the inputs.
     pub inputs: Vec<String>,
-    /// Coefficients of the noise, an autoregression counted in samples: of the residual for SRIVC.
-    pub noise: Vec<f64>,
-    /// Standard deviation of what drives it, output unit.
-    pub noise_deviation: f64,
+    /// Noise of each record.
+    pub noise: Vec<RecordNoise>,
+    /// Rows of each record that do not count, as the inputs before the record are not known under the delays.
+    pub left_out: Vec<usize>,
     /// In a loop: share of the input's power that the reference explains.
     pub explained: Option<f64>,
-    /// Renewals of filter and instruments.
+    /// Iterations.
     pub iterations: usize,
-    /// Whether the estimates rest.
+    /// Whether the estimates have converged.
     pub converged: bool,
+}
+
+/// The noise of a record, an autoregression counted in samples: of the residual for SRIVC.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordNoise {
+    /// Its coefficients; none where it is white.
+    pub coefficients: Vec<f64>,
+    /// Standard deviation of what drives it, output unit.
+    pub deviation: f64,
 }
 
 /// A record as the crate takes it; its reference only where it moves.
@@ -136,7 +145,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
         })
     };
     let found =
-        rivc::estimate(&data, &structure, &settings).map_err(|error| named(first, error))?;
+        rivc::estimate(&data, &structure, &settings).map_err(|error| named(records, error))?;
 
     let parameters: Vec<Parameter> = found
         .parameters
@@ -147,7 +156,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
                 name,
                 unit,
                 value: parameter.value,
-                std_error: Some(parameter.std_error).filter(|_| found.converged),
+                std_error: parameter.std_error.filter(|_| found.converged),
             }
         })
         .collect();
@@ -160,7 +169,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
     let mut warnings = Vec::new();
     if !found.converged {
         warnings.push(format!(
-            "the estimates did not come to rest in {} renewals, and have no standard errors: try a lower --order, or another --bandwidth",
+            "the estimates did not converge in {} iterations, and have no standard errors: try a lower --order, or another --bandwidth",
             found.iterations
         ));
     }
@@ -170,14 +179,28 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             100.0 * share
         ));
     }
-    if let Delay::Estimated { most } = delay {
-        let at_limit = |delay: &&f64| **delay >= most * (1.0 - 1e-9);
-        if found.plant.delays.iter().any(|delay| at_limit(&delay)) {
-            warnings.push(format!(
-                "the delay is at its largest, {} s: give a larger one by --delay 0..S",
-                numbers::significant(most, 4)
-            ));
+    if matches!(delay, Delay::Estimated { .. }) {
+        let pairs = parameters.iter().zip(&found.parameters);
+        for (parameter, _) in pairs.filter(|(_, found)| found.std_error.is_none()) {
+            let value = numbers::significant(parameter.value, 4);
+            warnings.push(match parameter.value {
+                0.0 => format!("no {} was found: the best one is 0", parameter.name),
+                _ => format!(
+                    "{} is at its largest, {value} s: the estimates are those of that delay; give a larger one by --delay 0..S",
+                    parameter.name
+                ),
+            });
         }
+    }
+    let is_constant = |reference: &&ct_signals::Signal| {
+        let (low, high) = reference.range();
+        low == high
+    };
+    if let Some(reference) = first.reference.as_ref().filter(is_constant) {
+        warnings.push(format!(
+            "\"{}\" is constant: if a controller moved the input, these estimates, which take it for open loop, are biased",
+            ct_signals::quoted(&reference.name)
+        ));
     }
     if let Some(slowest) = time_constants
         .first()
@@ -185,7 +208,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
         && !request.integrator
     {
         warnings.push(format!(
-            "the slowest time constant, {} s, is beyond the record's length of {} s: the plant may integrate, which --integrator says",
+            "the slowest time constant, {} s, is beyond the record's length of {} s: the plant may integrate: try --integrator",
             numbers::significant(*slowest, 3),
             numbers::significant(shortest, 3)
         ));
@@ -193,15 +216,42 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
     if inputs == 1 && !request.integrator {
         warnings.extend(super::doubtful(&parameters, request.order));
     }
+    for (parameter, found) in parameters.iter().zip(&found.parameters) {
+        let own = inputs > 1 || request.integrator;
+        let of_plant = !matches!(found.kind, Kind::Offset { .. });
+        if let Some(error) = parameter.std_error.filter(|_| own && of_plant)
+            && parameter.value.abs() < 2.0 * error
+        {
+            warnings.push(format!(
+                "{} cannot be told from 0: its standard error is {:.0} % of it; try a lower --order, or leave out what it belongs to",
+                parameter.name,
+                100.0 * error / parameter.value.abs()
+            ));
+        }
+    }
     warnings.extend(super::too_fast(&time_constants, first, request.order));
-    let simulated = found
-        .plant
-        .fitted(&data[0])
-        .map_err(|error| named(first, error))?;
-    let output = &first.output.values;
-    let rmse = rms(output.iter().zip(&simulated).map(|(y, model)| y - model));
-    let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
-    let deviation = rms(output.iter().map(|y| y - mean));
+    let (mut errors, mut deviations) = (Vec::new(), Vec::new());
+    let mut simulated = Vec::new();
+    for (record, data) in records.iter().zip(&data) {
+        let fitted = found
+            .plant
+            .fitted(data)
+            .map_err(|error| named(records, error))?;
+        let output = &record.output.values;
+        errors.extend(output.iter().zip(&fitted).map(|(y, model)| y - model));
+        let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
+        deviations.extend(output.iter().map(|y| y - mean));
+        if simulated.is_empty() {
+            simulated = fitted;
+        }
+    }
+    let rmse = rms(errors.into_iter());
+    let deviation = rms(deviations.into_iter());
+    if rmse > deviation {
+        warnings.push(
+            "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does), or the order is wrong".to_owned(),
+        );
+    }
     let input_names = std::iter::once(&first.input).chain(&first.input_2);
     Ok(Identification {
         schema: 1,
@@ -223,8 +273,15 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             delays: found.plant.delays.clone(),
             records: records.iter().map(|record| record.name.clone()).collect(),
             inputs: input_names.map(|input| input.name.clone()).collect(),
-            noise: found.noise.coefficients().to_vec(),
-            noise_deviation: found.noise.sigma(),
+            noise: found
+                .noise
+                .iter()
+                .map(|noise| RecordNoise {
+                    coefficients: noise.coefficients().to_vec(),
+                    deviation: noise.sigma(),
+                })
+                .collect(),
+            left_out: found.first.clone(),
             explained: found.explained,
             iterations: found.iterations,
             converged: found.converged,
@@ -283,11 +340,16 @@ fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, Stri
 }
 
 /// The record's name in front, once.
-fn named(record: &Record, error: rivc::Error) -> Error {
+fn named(records: &[Record], error: rivc::Error) -> Error {
     let what = error.to_string();
-    let name = format!("{}: ", record.name);
-    Error::File {
-        file: record.name.clone(),
-        what: what.strip_prefix(&name).unwrap_or(&what).to_owned(),
-    }
+    let own = records.iter().find_map(|record| {
+        let rest = what.strip_prefix(&format!("{}: ", record.name))?;
+        Some((record.name.clone(), rest.to_owned()))
+    });
+    let (file, what) = match (own, records.first()) {
+        (Some(own), _) => own,
+        (None, Some(first)) => (first.name.clone(), what),
+        (None, None) => return Error::Usage(what),
+    };
+    Error::File { file, what }
 }

@@ -264,7 +264,6 @@ fn row(record: &Record, test: &[Record], request: &Request) -> Row {
 }
 
 fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<Outcome, Error> {
-    let Order { n, m } = found.order;
     let on = |record: &Record| -> Result<(Vec<f64>, Vec<f64>), Error> {
         let simulated = found
             .plant
@@ -284,6 +283,9 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
     let test_rmse = (!test.is_empty()).then(|| rms(tested.iter().flatten().copied()));
     let of_plant = found.parameters.iter();
     let of_plant = of_plant.filter(|p| !p.name.starts_with("offset"));
+    let estimated = of_plant.clone().count();
+    // A delay may well be 0.
+    let of_plant = of_plant.filter(|p| !p.name.starts_with("delay"));
     let parts: Vec<Option<f64>> = of_plant
         .map(|p| {
             let error = p.std_error.filter(|error| *error > 0.0);
@@ -309,7 +311,7 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
     let (_, input_p) = residual_tests::prewhitened_input_test(&record.input.values, &error, lags)?;
     let noise = ArModel::fit(&[&error], NOISE_ORDER.min(error.len() / 10))?;
     let samples = error.len() as f64;
-    let fitted = (2 * n + m + 2 + noise.order()) as f64;
+    let fitted = (estimated + found.order.n + 1 + noise.order()) as f64;
     Ok(Outcome {
         parameters: found.parameters.clone(),
         time_constants: found.time_constants.clone(),

@@ -272,7 +272,11 @@ fn error(found: &Identification, look: Look) -> String {
     let title = "Simulation error of the final model";
     let mut text = format!("{}\n", look.heading(title));
     text += &look.paragraph("  ", &line);
+    let several = found.refined.as_ref().is_some_and(|r| r.records.len() > 1);
     let note = match found.in_loop.as_ref().map(|looped| looped.r.is_empty()) {
+        None if several => {
+            "(of all records together, of which the first is drawn; the model runs on the input alone, from a fitted initial state)"
+        }
         None => {
             "(the model runs on the input alone, from a fitted initial state; it is not a prediction error)"
         }
@@ -326,13 +330,13 @@ pub(crate) fn refined_facts(
         None => "simulated from the input, open loop".to_owned(),
     };
     let end = match refined.converged {
-        true => "estimates at rest",
-        false => "estimates not at rest",
+        true => "converged",
+        false => "not converged",
     };
     facts.push((
         refined.name,
         format!(
-            "instruments {from}; {} renewal{}, {end}",
+            "instruments {from}; {} iteration{}, {end}",
             refined.iterations,
             if refined.iterations == 1 { "" } else { "s" }
         ),
@@ -354,19 +358,33 @@ pub(crate) fn refined_facts(
         let delay = digits(refined.delays.iter().copied().fold(0.0, f64::max));
         facts.push(("delay", format!("{delay} s, as given")));
     }
-    let deviation = digits(refined.noise_deviation);
-    let noise = match &refined.noise[..] {
-        [] => format!("white, of standard deviation {deviation} {unit}"),
-        coefficients => format!(
-            "autoregressive, driven by a standard deviation of {deviation} {unit}, with {} on the samples before",
-            coefficients
-                .iter()
-                .map(|c| numbers::significant(*c, 3))
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
-    };
-    facts.push(("noise", noise.replace(" ,", ",").trim_end().to_owned()));
+    let noise = refined.noise.iter().map(|noise| {
+        let deviation = digits(noise.deviation);
+        let unit = match unit.is_empty() {
+            true => String::new(),
+            false => format!(" {unit}"),
+        };
+        match &noise.coefficients[..] {
+            [] => format!("white, of standard deviation {deviation}{unit}"),
+            coefficients => format!(
+                "autoregressive, driven by a standard deviation of {deviation}{unit}, with {} on the samples before",
+                coefficients
+                    .iter()
+                    .map(|c| numbers::significant(*c, 3))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ),
+        }
+    });
+    facts.push(("noise", noise.collect::<Vec<_>>().join("; ")));
+    if refined.left_out.iter().any(|rows| *rows > 0) {
+        let rows: Vec<String> = refined.left_out.iter().map(usize::to_string).collect();
+        let rows = rows.join(", ");
+        facts.push((
+            "left out",
+            format!("the first {rows} rows, whose delayed inputs are from before the record"),
+        ));
+    }
     facts
 }
 

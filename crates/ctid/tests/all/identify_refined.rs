@@ -62,12 +62,7 @@ fn a_delay_is_estimated_beside_coloured_noise() {
         let command =
             format!("identify late.csv --method rivc --delay {delay} --json {delay}.json");
         let text = place.succeeds(&command);
-        for words in [
-            "u(t - delay)",
-            "RIVC",
-            "autoregressive",
-            "estimates at rest",
-        ] {
+        for words in ["u(t - delay)", "RIVC", "autoregressive", "converged"] {
             assert!(text.contains(words), "no {words} in {text}");
         }
         let found = place.json(&format!("{delay}.json"));
@@ -179,6 +174,10 @@ fn what_cannot_be_is_refused() {
     place.refuses(
         "identify tour.csv --columns t,u+r,y --method fcloe",
         &["two inputs", "srivc and rivc"],
+    );
+    place.refuses(
+        "identify tour.csv tour.csv --model tour.toml --method srivc",
+        &["tour.csv", "given twice"],
     );
     place.refuses(
         &identify("--method srivc --order 2,2 --delay auto"),

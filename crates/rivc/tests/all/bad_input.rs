@@ -1,7 +1,7 @@
 //! What cannot be is refused in one line that names the numbers and the mend.
 
 use ct_signals::excitation;
-use rivc::{Data, Delay, Noise, Settings, Structure, estimate};
+use rivc::{Data, Delay, Noise, Plant, Settings, Structure, estimate};
 
 use crate::support::{data, even, held, respond};
 
@@ -68,10 +68,10 @@ fn records() {
     says(&of(bad), &["the output has 399 entries", "400"]);
     let mut bad = record(400);
     bad.inputs[0].values.fill(3.0);
-    says(&of(bad), &["input 1 stands at 3"]);
+    says(&of(bad), &["input 1 is constant at 3"]);
     let mut bad = record(400);
     bad.output.fill(3.0);
-    says(&of(bad), &["the output stands at 3"]);
+    says(&of(bad), &["the output is constant at 3"]);
 }
 
 /// In samples are counted the model of the noise and that of the loop; SRIVC in open loop counts none.
@@ -79,7 +79,7 @@ fn records() {
 fn uneven_times() {
     let first = Structure::new(1, [0]);
     let mut uneven = record(400);
-    uneven.time[5] += 0.1;
+    uneven.time[5] += 0.3;
     says(
         &refusal(&[uneven.clone()], &first, Noise::Autoregressive),
         &["model of the noise", "sample 5"],
@@ -91,17 +91,50 @@ fn uneven_times() {
     );
 }
 
+/// Times that were rounded are even enough to count by.
+#[test]
+fn rounded_times_are_even_enough() {
+    let mut rounded = record(400);
+    for (k, t) in rounded.time.iter_mut().enumerate() {
+        *t += 0.02 * (k as f64).sin();
+    }
+    let first = Structure::new(1, [0]);
+    let found = estimate(&[rounded], &first, &Settings::new(Noise::Autoregressive)).unwrap();
+    assert!((found.plant.a[1] - 8.0).abs() < 0.2, "{found:?}");
+}
+
+/// Empty records, short ones and plants without coefficients.
+#[test]
+fn nothing_is_no_panic() {
+    let first = Structure::new(1, [0]);
+    let empty = data(vec![], vec![held(vec![])], vec![]);
+    let one = data(vec![0.0], vec![held(vec![1.0])], vec![1.0]);
+    for bad in [&empty, &one] {
+        let message = refusal(&[record(400), bad.clone()], &first, Noise::White);
+        says(&message, &["too few"]);
+        assert!(Plant::new(vec![1.0, 8.0], vec![2.0]).fitted(bad).is_err());
+    }
+    let mut plant = Plant::new(vec![1.0, 8.0], vec![2.0]);
+    plant.delays[0] = 1e300;
+    assert!(plant.fitted(&record(400)).is_ok());
+    plant.b[0].clear();
+    says(
+        &plant.fitted(&record(400)).unwrap_err().to_string(),
+        &["no coefficient"],
+    );
+}
+
 #[test]
 fn loops() {
     let first = Structure::new(1, [0]);
     let mut in_loop = record(400);
     in_loop.reference = Some(in_loop.inputs[0].values.clone());
     let message = refusal(&[in_loop.clone(), record(400)], &first, Noise::White);
-    says(&message, &["a reference", "or none"]);
+    says(&message, &["no reference", "or none"]);
     in_loop.reference = Some(vec![1.0; 400]);
     says(
         &refusal(&[in_loop], &first, Noise::White),
-        &["the reference stands at 1"],
+        &["the reference is constant at 1"],
     );
 }
 

@@ -3,7 +3,7 @@
 use crate::support::{add, data, even, held, respond};
 use ct_lti::Hold;
 use ct_signals::excitation;
-use rivc::{Delay, Estimate, Input, Kind, Noise, Plant, Settings, Structure, estimate};
+use rivc::{Data, Delay, Estimate, Input, Kind, Noise, Plant, Settings, Structure, estimate};
 
 fn prbs(n: usize, every: usize, seed: u32) -> Vec<f64> {
     excitation::prbs(n, every, -1.0, 1.0, seed).unwrap()
@@ -233,4 +233,110 @@ fn a_known_plant_on_another_record() {
     plant.delays[0] = 0.0;
     plant.a = vec![0.0, 1.0, 12.0];
     assert!(off(&plant) > 0.1);
+}
+
+/// A delay beyond its range stays at the end of it, without a standard error, and the others are those of that delay.
+#[test]
+fn a_delay_beyond_its_range() {
+    let time = even(1000, 1.0);
+    let u = held(prbs(1000, 25, 9));
+    let y = respond(&[2.0], &[1.0, 5.0], &time, &u, 12.0);
+    let records = [data(time, vec![u], y)];
+    let of = |delay| {
+        let structure = Structure::new(1, [0]).with_delay(0, delay);
+        estimate(&records, &structure, &Settings::new(Noise::White)).unwrap()
+    };
+    for most in [8.0, 11.0] {
+        let (limited, known) = (of(Delay::Estimated { most }), of(Delay::Known(most)));
+        let delay = limited.parameter(Kind::Delay { input: 0 }).unwrap();
+        assert_eq!((delay.value, delay.std_error), (most, None));
+        let [limited, known] = [&limited, &known].map(|found| found.plant.a[1]);
+        assert!((limited / known - 1.0).abs() < 0.02, "{limited} {known}");
+    }
+}
+
+/// The only step is early: no grid of delays may leave it out.
+#[test]
+fn the_delay_of_an_early_step() {
+    let time = even(600, 1.0);
+    for at in [10, 30, 50] {
+        let values = (0..600).map(|k| f64::from(u8::from(k >= at))).collect();
+        let u = held(values);
+        let y = respond(&[2.0], &[1.0, 8.0], &time, &u, 4.3);
+        let v = ct_signals::noise::white(600, 0.02, &mut crate::support::rng(at));
+        let records = [data(time.clone(), vec![u], add(&y, &v))];
+        let structure = Structure::new(1, [0]).with_delay(0, Delay::Estimated { most: 60.0 });
+        let found = estimate(&records, &structure, &Settings::new(Noise::White)).unwrap();
+        assert!(
+            (found.plant.delays[0] - 4.3).abs() < 0.5,
+            "{at}: {:?}",
+            found.plant
+        );
+        assert!(
+            (found.plant.b[0][0] - 2.0).abs() < 0.05,
+            "{at}: {:?}",
+            found.plant
+        );
+    }
+}
+
+/// An order too high has no parameters that are known, but a model that fits as well as the plant.
+#[test]
+fn an_order_too_high_fits_no_worse() {
+    let time = even(1000, 1.0);
+    let u = held(prbs(1000, 12, 9));
+    let clean = respond(&[2.0], &[1.0, 8.0], &time, &u, 0.0);
+    for seed in 0..20 {
+        let v = ct_signals::noise::white(1000, 0.2, &mut crate::support::rng(seed));
+        let records = [data(time.clone(), vec![u.clone()], add(&clean, &v))];
+        for structure in [
+            Structure::new(2, [0]),
+            Structure::new(3, [1]),
+            Structure::new(2, [0]).with_delay(0, Delay::Estimated { most: 50.0 }),
+        ] {
+            let found = estimate(&records, &structure, &Settings::new(Noise::White)).unwrap();
+            assert!(found.residual_rms < 0.22, "{seed} {structure:?}: {found:?}");
+            let simulated = found.plant.fitted(&records[0]).unwrap();
+            let errors = records[0].output.iter().zip(simulated);
+            let square = errors.map(|(y, s)| (y - s).powi(2)).sum::<f64>() / 1000.0;
+            assert!(
+                square.sqrt() < 0.22,
+                "{seed} {structure:?}: {}",
+                square.sqrt()
+            );
+        }
+    }
+}
+
+/// Loops in any unit have the same instruments.
+#[test]
+fn a_loop_in_any_unit() {
+    let controller = fcloe::Controller::pi(0.6, 0.02).unwrap();
+    let plant = fcloe::PlantModel::new(&[12.0, 30.0], &[1.5]).unwrap();
+    let r = prbs(1000, 40, 9);
+    let w = ct_signals::noise::white(1000, 0.05, &mut crate::support::rng(1));
+    let noise = fcloe::Noise::InLoop(&w);
+    let found = fcloe::sampled_loop(&plant, &controller, 1.0, 1, &r, noise, None).unwrap();
+    let of = |of_u: f64, of_y: f64| {
+        let scaled = |v: &[f64], by: f64| v.iter().map(|v| v * by).collect::<Vec<_>>();
+        let record = Data {
+            reference: Some(scaled(&r, of_y)),
+            ..data(
+                even(1000, 1.0),
+                vec![held(scaled(&found.u, of_u))],
+                scaled(&found.y, of_y),
+            )
+        };
+        let structure = Structure::new(2, [0]);
+        estimate(&[record], &structure, &Settings::new(Noise::White)).unwrap()
+    };
+    let one = of(1.0, 1.0);
+    assert!(one.explained.unwrap() > 0.9);
+    for (of_u, of_y) in [(1e-6, 1e-6), (1e-3, 1e3), (1e6, 1e-9)] {
+        let other = of(of_u, of_y);
+        let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+        close(other.explained.unwrap(), one.explained.unwrap());
+        close(other.plant.a[2], one.plant.a[2]);
+        close(other.plant.b[0][0] * of_u / of_y, one.plant.b[0][0]);
+    }
 }

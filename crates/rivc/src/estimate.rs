@@ -28,6 +28,7 @@ use ct_signals::{ArModel, StationaryNoise};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use crate::delay::beginnings;
 use crate::equations::Equations;
 use crate::model::Model;
 use crate::pass::Instruments;
@@ -191,7 +192,13 @@ pub fn estimate(
         [] => problem.bandwidths(),
         given => given.to_vec(),
     };
-    let (starts, reach) = problem.starts(&known, &bandwidths)?;
+    let beginnings = beginnings(&prepared);
+    let searched = Problem {
+        structure,
+        records: beginnings.as_deref().unwrap_or(&prepared),
+    };
+    let (candidates, reach) = searched.search_delays(&known, &bandwidths)?;
+    let starts = problem.starts(&candidates, &bandwidths)?;
     let tried = bandwidths.len();
     let refine = |model: Model, noise: Option<(usize, Vec<ArModel>)>| {
         problem.refine(model, noise, reach, settings.max_iterations)

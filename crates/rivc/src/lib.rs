@@ -61,6 +61,7 @@
 
 mod bank;
 mod data;
+mod delay;
 mod equations;
 mod error;
 mod estimate;

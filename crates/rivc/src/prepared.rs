@@ -58,6 +58,19 @@ impl Prepared {
         }
     }
 
+    /// So many rows from the first one on.
+    pub(crate) fn first_rows(&self, rows: usize) -> Self {
+        let rows = rows.min(self.len());
+        let part = |values: &Vec<f64>| values[..rows].to_vec();
+        Self {
+            time: part(&self.time),
+            y: part(&self.y),
+            inputs: self.inputs.iter().map(part).collect(),
+            instrument: self.instrument.as_ref().map(part),
+            ..self.clone()
+        }
+    }
+
     /// Whether the first input is one that a reference explains.
     pub(crate) fn is_in_loop(&self) -> bool {
         self.instrument.is_some()

@@ -1,0 +1,158 @@
+//! Where the delays are: a grid, made finer around the best, and neighbours that another noise may prefer.
+//!
+//! The grid is searched on the beginning of long records, if the inputs move there as they do later: it only has to find the right minimum.
+
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::model::Model;
+use crate::prepared::Prepared;
+use crate::problem::{Problem, Refined};
+use crate::start::{ROUGH, Start};
+
+/// Points of the first grid of delays.
+const POINTS: usize = 16;
+/// A delay moves by this share of a step at least in one renewal, if it has to.
+const REACH: f64 = 0.25;
+/// Grids that are finer by this factor.
+const FINER: f64 = 4.0;
+const GRIDS: usize = 4;
+/// Other points of the first grid that are starts too, beside no delay: where the order is high the rough comparison may miss the best.
+const OTHERS: usize = 2;
+/// Where a better delay is looked for, in steps from the one that was found.
+const NEIGHBOURS: [f64; 8] = [2.0, 1.5, 1.0, 0.5, -0.5, -1.0, -1.5, -2.0];
+
+/// Rows of each record on which the grid is searched.
+const ROWS: usize = 4000;
+/// They are enough where each input moves by this share of what it does in the whole record.
+const LIKE_ALL: f64 = 0.5;
+
+/// The beginnings of the records, where they are long and their beginnings like the rest.
+pub(crate) fn beginnings(records: &[Prepared]) -> Option<Vec<Prepared>> {
+    if records.iter().all(|record| record.len() <= ROWS) {
+        return None;
+    }
+    let beginnings: Vec<Prepared> = records
+        .iter()
+        .map(|record| record.first_rows(ROWS))
+        .collect();
+    let mut pairs = beginnings.iter().zip(records);
+    let alike = pairs.all(|(part, all)| {
+        let mut inputs = part.inputs.iter().zip(&all.inputs);
+        inputs.all(|(part, all)| spread(part) >= LIKE_ALL * spread(all))
+    });
+    alike.then_some(beginnings)
+}
+
+/// Standard deviation.
+fn spread(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+impl Problem<'_> {
+    /// Delays to start from, the best first, and by how much a delay may move in one iteration from there. `delays` holds the known ones.
+    ///
+    /// # Errors
+    /// As [`Problem::at_delays`].
+    pub(crate) fn search_delays(
+        &self,
+        delays: &[f64],
+        bandwidths: &[f64],
+    ) -> Result<(Vec<Vec<f64>>, f64), Error> {
+        let estimated: Vec<(usize, f64)> = self.structure.estimated_delays().collect();
+        let mut delays = delays.to_vec();
+        // All samples count here, as if the inputs had stood before the record: samples that are left out for the largest delay may hold
+        // the only step.
+        let largest = 0.0;
+        let mut finest = 0.0_f64;
+        let mut others: Vec<Vec<f64>> = Vec::new();
+        let thinned: Vec<f64> = bandwidths.iter().copied().step_by(2).collect();
+        let rounds = if estimated.len() > 1 { 2 } else { 1 };
+        for _ in 0..rounds {
+            for (j, most) in &estimated {
+                let spacing = most / POINTS as f64;
+                let at = |value: f64| {
+                    let mut delays = delays.clone();
+                    delays[*j] = value;
+                    delays
+                };
+                let grid = (0..=POINTS).into_par_iter();
+                let mut coarse: Vec<(f64, Result<Start, Error>)> = grid
+                    .map(|i| {
+                        let value = i as f64 * spacing;
+                        let starts = self.at_delays(&at(value), largest, (&thinned, ROUGH));
+                        (value, starts.map(|mut starts| starts.swap_remove(0)))
+                    })
+                    .collect();
+                let square = |start: &Result<Start, Error>| match start {
+                    Ok((square, _)) => *square,
+                    Err(_) => f64::INFINITY,
+                };
+                coarse.sort_by(|a, b| square(&a.1).total_cmp(&square(&b.1)));
+                let next = coarse[1..].iter().take(OTHERS).map(|(value, _)| *value);
+                others = next.chain([0.0]).map(at).collect();
+                let (mut value, best) = coarse.swap_remove(0);
+                let mut best = best?;
+                let mut spacing = spacing;
+                for _ in 0..GRIDS {
+                    spacing /= FINER;
+                    let offsets = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
+                    let centre = value;
+                    let finer = offsets.into_par_iter().filter_map(|offset| {
+                        let value = centre + offset * spacing;
+                        if !(0.0..=*most).contains(&value) {
+                            return None;
+                        }
+                        let delayed = self.delayed(&at(value), largest);
+                        let model = Model {
+                            delays: delayed.delays.clone(),
+                            ..best.1.clone()
+                        };
+                        let start = self.follow(&delayed, model, None, 3).ok()??;
+                        Some((value, start))
+                    });
+                    if let Some((better, start)) = finer.min_by(|a, b| a.1.0.total_cmp(&b.1.0))
+                        && start.0 < best.0
+                    {
+                        (value, best) = (better, start);
+                    }
+                }
+                delays[*j] = value;
+                finest = finest.max(2.0 * spacing).max(REACH * self.shortest_step());
+            }
+        }
+        let mut candidates = vec![delays];
+        candidates.extend(others);
+        Ok((candidates, finest))
+    }
+
+    /// Delays about those of a model, whose whitened output error is compared under one model of the noise: each stretch between samples
+    /// has a minimum of its own, and which is the lowest depends on the noise's spectrum. The best model, where one is better.
+    pub(crate) fn better_delay(&self, found: &Refined) -> Option<Model> {
+        let step = self.shortest_step();
+        let largest =
+            found.model.delays.iter().copied().fold(0.0, f64::max) + NEIGHBOURS[0].abs() * step;
+        let square = |model: &Model| {
+            let delayed = self.delayed(&model.delays, largest);
+            self.follow(&delayed, model.clone(), found.noise.as_deref(), 3)
+                .ok()?
+        };
+        let (own, _) = square(&found.model)?;
+        let estimated: Vec<(usize, f64)> = self.structure.estimated_delays().collect();
+        let mut candidates = Vec::new();
+        for (j, most) in estimated {
+            for offset in NEIGHBOURS {
+                let mut model = found.model.clone();
+                model.delays[j] += offset * step;
+                if (0.0..=most).contains(&model.delays[j]) {
+                    candidates.push(model);
+                }
+            }
+        }
+        let tried = candidates.par_iter().filter_map(square);
+        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (best.0 < own).then_some(best.1)
+    }
+}

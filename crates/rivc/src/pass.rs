@@ -7,7 +7,7 @@
 //! ```
 //! The column of a delay is `-sum_i beta_i p^{i+1} u_f(t - d)`, the derivative of the equation. y runs on lines between samples. The
 //! instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A of
-//! that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates rest.
+//! that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates have converged.
 
 use crate::bank::Bank;
 use crate::grid::{Path, Stretch};

@@ -5,9 +5,10 @@
 use rayon::prelude::*;
 
 use crate::Error;
+use crate::iterate::Refined;
 use crate::model::Model;
 use crate::prepared::Prepared;
-use crate::problem::{Problem, Refined};
+use crate::problem::Problem;
 use crate::start::{ROUGH, Start};
 
 /// Points of the first grid of delays.

@@ -39,8 +39,9 @@ pub(super) struct Identify {
     /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
-    /// The columns' names, where their first letters do not tell; two inputs with + between them, for srivc and rivc
-    #[arg(long, value_name = "TIME,INPUT,OUTPUT", value_parser = columns)]
+    /// The columns' names, where their first letters do not tell; two inputs with + between them, for srivc and rivc. Without a fourth name there is
+    /// no reference
+    #[arg(long, value_name = "TIME,INPUT,OUTPUT[,REFERENCE]", value_parser = columns)]
     columns: Option<Columns>,
     /// What the input does between samples
     #[arg(long, value_enum, default_value_t = InputHold::Zero)]
@@ -68,14 +69,18 @@ pub(super) struct Identify {
     results: Results,
 }
 
-/// Three names, in the order of the help.
+/// Three or four names, in the order of the help.
 fn columns(text: &str) -> Result<Columns, String> {
     let names: Vec<&str> = text.split(',').map(str::trim).collect();
-    let [time, input, output] = names[..] else {
-        return Err(format!(
-            "three names are needed, those of time, input and output, and {} are given",
-            names.len()
-        ));
+    let (time, input, output, reference) = match names[..] {
+        [time, input, output] => (time, input, output, None),
+        [time, input, output, reference] => (time, input, output, Some(reference.to_owned())),
+        _ => {
+            return Err(format!(
+                "three names are needed, those of time, input and output, or four with that of the reference, and {} are given",
+                names.len()
+            ));
+        }
     };
     let (input, second) = match input.split_once('+') {
         Some((first, second)) => (first.trim(), Some(second.trim().to_owned())),
@@ -86,7 +91,7 @@ fn columns(text: &str) -> Result<Columns, String> {
         input: Some(input.to_owned()),
         output: Some(output.to_owned()),
         input_2: second,
-        reference: None,
+        reference,
     })
 }
 
@@ -160,7 +165,10 @@ impl Identify {
             return refuse("--levels", "which estimates an offset");
         }
         if self.sensor_filter.is_some() && !any_of_loop {
-            return refuse("--sensor-filter", "which has nothing to do with a loop");
+            return refuse(
+                "--sensor-filter",
+                "whose models have no place for it: a sensor's lag is part of the plant there, an order more or a delay",
+            );
         }
         let any_refined = methods.iter().any(|method| method.is_refined());
         if self.delay.is_some() && !any_refined {
@@ -220,6 +228,18 @@ impl Identify {
         }
     }
 
+    /// A record as `--columns` says: without a reference that it does not name.
+    fn without_unnamed(&self, mut record: Record) -> Record {
+        let named = self
+            .columns
+            .as_ref()
+            .map(|columns| columns.reference.is_some());
+        if named == Some(false) {
+            record.reference = None;
+        }
+        record
+    }
+
     /// A record that is simulated only, in the units of the one that is fitted.
     fn read_test(
         &self,
@@ -228,6 +248,7 @@ impl Identify {
         fitted: &Record,
     ) -> Result<Record, Error> {
         let record = read_csv_any_input(path, columns, hold).map_err(self.named_by())?;
+        let record = self.without_unnamed(record);
         let mut pairs = vec![
             (&record.input, &fitted.input),
             (&record.output, &fitted.output),
@@ -257,10 +278,18 @@ impl Identify {
         };
         let together = alone && methods[0].is_refined();
         if !more.is_empty() && !together {
-            return Err(Error::Usage(format!(
-                "identify works on one record, and {} are given; give the longest, fit all of them together by --method srivc or rivc (alone, of one order, without --test), or fit a physical model to them with compare",
-                self.data.len()
-            )));
+            let count = self.data.len();
+            return Err(Error::Usage(
+                if methods.iter().all(|method| method.is_refined()) {
+                    format!(
+                        "{count} records are fitted together by one method, of one order, without --test: give one of each, or one record"
+                    )
+                } else {
+                    format!(
+                        "identify works on one record, and {count} are given; give the longest, fit all of them together by --method srivc or rivc, or fit a physical model to them with compare"
+                    )
+                },
+            ));
         }
         for (k, path) in self.data.iter().enumerate() {
             if self.data[..k].contains(path) {
@@ -274,6 +303,7 @@ impl Identify {
             .map(|method| self.request(method, controller.as_ref()))
             .collect::<Result<Vec<_>, _>>()?;
         let record = read_csv(data, &columns, hold).map_err(self.named_by())?;
+        let record = self.without_unnamed(record);
         let test = self
             .test
             .iter()

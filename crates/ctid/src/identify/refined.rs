@@ -2,7 +2,7 @@
 //!
 //! A reference that moves says that the record comes from a loop: the instruments then come from it, and the controller need not be known.
 
-use ct_signals::Record;
+use ct_signals::{Record, quoted, residual_tests};
 use missing_effect::Parameter;
 use rivc::{Data, Delay, Kind, Noise, Structure};
 use serde::Serialize;
@@ -15,6 +15,8 @@ use crate::numbers;
 const PART: f64 = 0.1;
 /// Instruments from a reference that explains less of the input are weak.
 const EXPLAINED: f64 = 0.2;
+/// A signal that shows in the error with less than this probability by chance is said.
+const UNLIKELY: f64 = 0.01;
 
 /// What is said of the delay.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,16 +169,16 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
     };
     let (time_constants, oscillations) = poles(dynamics)?;
     let mut warnings = Vec::new();
+    if let Some(share) = found.explained.filter(|share| *share < EXPLAINED) {
+        warnings.push(format!(
+            "the reference explains only {:.0} % of the input: instruments from it are weak; where the record is not of a loop, name time, input and output alone by --columns",
+            100.0 * share
+        ));
+    }
     if !found.converged {
         warnings.push(format!(
             "the estimates did not converge in {} iterations, and have no standard errors: try a lower --order, or another --bandwidth",
             found.iterations
-        ));
-    }
-    if let Some(share) = found.explained.filter(|share| *share < EXPLAINED) {
-        warnings.push(format!(
-            "the reference explains only {:.0} % of the input: instruments from it are weak; where the record is not of a loop, leave its column out",
-            100.0 * share
         ));
     }
     if matches!(delay, Delay::Estimated { .. }) {
@@ -199,7 +201,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
     if let Some(reference) = first.reference.as_ref().filter(is_constant) {
         warnings.push(format!(
             "\"{}\" is constant: if a controller moved the input, these estimates, which take it for open loop, are biased",
-            ct_signals::quoted(&reference.name)
+            quoted(&reference.name)
         ));
     }
     if let Some(slowest) = time_constants
@@ -230,6 +232,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
         }
     }
     warnings.extend(super::too_fast(&time_constants, first, request.order));
+    let mut visible = Visible::default();
     let (mut errors, mut deviations) = (Vec::new(), Vec::new());
     let mut simulated = Vec::new();
     for (record, data) in records.iter().zip(&data) {
@@ -238,18 +241,21 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             .fitted(data)
             .map_err(|error| named(records, error))?;
         let output = &record.output.values;
-        errors.extend(output.iter().zip(&fitted).map(|(y, model)| y - model));
+        let error: Vec<f64> = output.iter().zip(&fitted).map(|(y, m)| y - m).collect();
+        visible.test(record, data.reference.is_some(), &error)?;
+        errors.extend(error);
         let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
         deviations.extend(output.iter().map(|y| y - mean));
         if simulated.is_empty() {
             simulated = fitted;
         }
     }
+    warnings.extend(visible.warning(inputs));
     let rmse = rms(errors.into_iter());
     let deviation = rms(deviations.into_iter());
     if rmse > deviation {
         warnings.push(
-            "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does), or the order is wrong".to_owned(),
+            "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does); the input may answer to the output alone, through a controller whose reference is not there or does not move; or order or --integrator do not belong".to_owned(),
         );
     }
     let input_names = std::iter::once(&first.input).chain(&first.input_2);
@@ -295,6 +301,51 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             simulated,
         },
     })
+}
+
+/// The signal that shows most in the simulation errors.
+#[derive(Default)]
+struct Visible {
+    tests: usize,
+    least: Option<(f64, String)>,
+}
+
+impl Visible {
+    /// In open loop every input is held against the error, in a loop the reference, as the input answers to the noise there.
+    fn test(&mut self, record: &Record, in_loop: bool, error: &[f64]) -> Result<(), Error> {
+        let signals: Vec<&ct_signals::Signal> = match record.reference.as_ref().filter(|_| in_loop)
+        {
+            Some(reference) => vec![reference],
+            None => std::iter::once(&record.input)
+                .chain(&record.input_2)
+                .collect(),
+        };
+        let lags = (error.len() / 10).clamp(2, 25);
+        for signal in signals {
+            let (_, p) = residual_tests::prewhitened_input_test(&signal.values, error, lags)?;
+            self.tests += 1;
+            if self.least.as_ref().is_none_or(|(least, _)| p < *least) {
+                self.least = Some((p, signal.name.clone()));
+            }
+        }
+        Ok(())
+    }
+
+    fn warning(self, inputs: usize) -> Option<String> {
+        let (p, name) = self.least?;
+        let several = match inputs {
+            1 => "",
+            _ => {
+                " (one A serves all inputs, so that time constants that differ need a higher order)"
+            }
+        };
+        (p * (self.tests as f64) < UNLIKELY).then(|| {
+            format!(
+                "\"{}\" shows in the simulation error: the order is too low{several}, there is a delay (try --delay auto), or the plant is not linear; the standard errors do not hold then",
+                quoted(&name)
+            )
+        })
+    }
 }
 
 /// Of a second input and of further records with their number: `b0_2`, `offset_2`.

@@ -145,9 +145,11 @@ impl Method {
             Self::Iv => "instruments that the noise does not reach: in a loop its controller",
             Self::Fcloe => "one plant over the record; in a loop its controller",
             Self::Srivc => {
-                "one plant over the record; in a loop an input that is held between samples"
+                "one plant over the record; in a loop an input that is held between samples; noise of any colour, though white noise is what it is best for"
             }
-            Self::Rivc => "the same, and noise that is autoregressive",
+            Self::Rivc => {
+                "one plant over the record and autoregressive noise; in a loop an input that is held between samples"
+            }
             Self::RecursiveFcloe => {
                 "a plant that drifts slower than the memory; in a loop its controller"
             }
@@ -308,7 +310,14 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
         2.0 * (rmse / spread).ln() + mean.ln()
     });
     let lags = (error.len() / 10).clamp(2, 25);
-    let (_, input_p) = residual_tests::prewhitened_input_test(&record.input.values, &error, lags)?;
+    let mut input_p = 1.0_f64;
+    let inputs: Vec<&Signal> = std::iter::once(&record.input)
+        .chain(&record.input_2)
+        .collect();
+    for input in &inputs {
+        let (_, p) = residual_tests::prewhitened_input_test(&input.values, &error, lags)?;
+        input_p = input_p.min(p * inputs.len() as f64);
+    }
     let noise = ArModel::fit(&[&error], NOISE_ORDER.min(error.len() / 10))?;
     let samples = error.len() as f64;
     let fitted = (estimated + found.order.n + 1 + noise.order()) as f64;

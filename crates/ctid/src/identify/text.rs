@@ -56,7 +56,11 @@ pub(crate) fn model(found: &Identification) -> String {
                 0 => (String::new(), "u".to_owned()),
                 j => (format!("_{}", j + 1), format!("u_{}", j + 1)),
             };
-            let late = if *delay > 0.0 { "(t - delay)" } else { "" };
+            let late = if *delay > 0.0 {
+                format!("(t - delay{behind})")
+            } else {
+                String::new()
+            };
             format!("({}) {signal}{late}", sum('b', 0, m, &behind))
         });
         let inputs = inputs.collect::<Vec<_>>().join(" + ");
@@ -376,13 +380,20 @@ pub(crate) fn refined_facts(
             ),
         }
     });
-    facts.push(("noise", noise.collect::<Vec<_>>().join("; ")));
+    // SRIVC takes the noise for white, whatever its residual is.
+    let name = match refined.name.ends_with("SRIVC") {
+        true => "residual",
+        false => "noise model",
+    };
+    facts.push((name, noise.collect::<Vec<_>>().join("; ")));
     if refined.left_out.iter().any(|rows| *rows > 0) {
         let rows: Vec<String> = refined.left_out.iter().map(usize::to_string).collect();
-        let rows = rows.join(", ");
         facts.push((
             "left out",
-            format!("the first {rows} rows, whose delayed inputs are from before the record"),
+            format!(
+                "rows at the beginning, whose delayed inputs are from before the record: {}",
+                rows.join(", ")
+            ),
         ));
     }
     facts

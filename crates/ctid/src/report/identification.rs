@@ -156,7 +156,7 @@ fn parameters(found: &Identification) -> String {
         ),
         (None, None) => (
             "Of the whole record",
-            "Standard errors hold for noise of any colour, in the loop or on the record, and for a model that is right.",
+            "Standard errors hold for noise of any colour and for a model that is right: nothing of the input shows in its error, and nothing but the input, or the loop's reference, moves the plant.",
         ),
     };
     let table = table(

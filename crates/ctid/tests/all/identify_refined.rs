@@ -70,11 +70,17 @@ fn a_delay_is_estimated_beside_coloured_noise() {
         holds(&found, "b0", 2.0);
         holds(&found, "delay", 4.0);
     }
+    // A delay that is forgotten, or given in another unit, shows.
+    for forgotten in ["", " --delay 0.07"] {
+        let text = place.succeeds(&format!("identify late.csv --method rivc{forgotten}"));
+        assert!(text.contains("shows in the"), "{text}");
+    }
     let text = place.succeeds("identify late.csv --method srivc --delay 4");
+    assert!(!text.contains("shows in the"), "{text}");
     assert!(text.contains("4.000 s, as given"), "{text}");
     // Beside methods that know no delay it concerns those that do.
     let text = place.succeeds("identify late.csv --method rivc,fcloe --delay auto --report a.html");
-    assert!(text.contains("there is a delay"), "{text}");
+    assert!(text.contains("violated"), "{text}");
     assert!(place.read("a.html").contains("rivc"));
 }
 
@@ -107,6 +113,22 @@ fn an_integrator_in_a_loop_of_an_unknown_controller() {
     // Without the integrator the program says what to try.
     let text = place.succeeds("identify loop.csv --method srivc");
     assert!(text.contains("--integrator"), "{text}");
+}
+
+/// A column r that belongs to nothing: the program says so, and three names leave it out.
+#[test]
+fn a_reference_that_explains_nothing() {
+    let place = Place::new();
+    let (u, r) = (steps(20, 9), steps(33, 13));
+    let y = add(&[&respond(&[2.0], &[1.0, 8.0], &u, 0), &white(0.1, 3)]);
+    place.write("r.csv", csv("t [s],r [cm],u [V],y [cm]", &[&r, &u, &y]));
+    let text = place.succeeds("identify r.csv --method srivc");
+    assert!(text.contains("explains only"), "{text}");
+    let text = place.succeeds("identify r.csv --method srivc --columns t,u,y --json r.json");
+    assert!(text.contains("open loop"), "{text}");
+    holds(&place.json("r.json"), "a1", 8.0);
+    let text = place.succeeds("identify r.csv --method srivc --columns t,u,y,r");
+    assert!(text.contains("CLSRIVC"), "{text}");
 }
 
 #[test]
@@ -170,6 +192,10 @@ fn what_cannot_be_is_refused() {
     place.refuses(
         "identify tour.csv tour-test.csv --model tour.toml --method fcloe",
         &["one record, and 2 are given", "srivc or rivc"],
+    );
+    place.refuses(
+        "identify tour.csv tour-test.csv --model tour.toml --method rivc --order 1..2",
+        &["2 records", "one order"],
     );
     place.refuses(
         "identify tour.csv --columns t,u+r,y --method fcloe",

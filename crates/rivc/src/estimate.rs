@@ -34,6 +34,7 @@ use crate::model::Model;
 use crate::plant::Plant;
 use crate::prepared::prepare;
 use crate::problem::Problem;
+use crate::start::Start;
 use crate::{Data, Delay, Error, Structure};
 
 /// Starts from which the iteration is followed until so many have converged.
@@ -197,24 +198,37 @@ pub fn estimate(
         records: beginnings.as_deref().unwrap_or(&prepared),
     };
     let (candidates, reach) = searched.search_delays(&known, &bandwidths)?;
-    let starts = problem.starts(&candidates, &bandwidths)?;
     let tried = bandwidths.len();
     let refine = |model: Model, noise: Option<(usize, Vec<ArModel>)>| {
         problem.refine(model, noise, reach, settings.max_iterations)
     };
     let mut found: Vec<Refined> = Vec::new();
     let mut last_error = None;
-    for (_, model) in starts {
-        if found.iter().filter(|found| found.converged).count() == STARTS {
-            break;
+    let mut follow = |starts: Vec<Start>, found: &mut Vec<Refined>| {
+        for (_, model) in starts {
+            if found.iter().filter(|found| found.converged).count() == STARTS {
+                break;
+            }
+            if found.iter().any(|found| alike(&found.model, &model)) {
+                continue;
+            }
+            match refine(model, None) {
+                Ok(refined) => found.push(refined),
+                Err(error) => last_error = Some(error),
+            }
         }
-        if found.iter().any(|found| alike(&found.model, &model)) {
-            continue;
+    };
+    let starts = problem.starts(&candidates, &bandwidths);
+    let refused = match starts {
+        Ok(starts) => {
+            follow(starts, &mut found);
+            None
         }
-        match refine(model, None) {
-            Ok(refined) => found.push(refined),
-            Err(error) => last_error = Some(error),
-        }
+        Err(error) => Some(error),
+    };
+    if !found.iter().any(|found| found.converged) {
+        let starts = problem.starts_of_lower_orders(&candidates, &bandwidths);
+        follow(starts, &mut found);
     }
     let least = found.iter().map(|found| found.mean_square);
     let least = least.fold(f64::INFINITY, f64::min);
@@ -227,7 +241,7 @@ pub fn estimate(
         let (a, b) = (key(a), key(b));
         a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
     });
-    let mut best = best.ok_or(last_error.unwrap_or(Error::NoStart { tried }))?;
+    let mut best = best.ok_or(refused.or(last_error).unwrap_or(Error::NoStart { tried }))?;
     let order = match settings.noise {
         Noise::Autoregressive => Some(settings.noise_order),
         // One variance needs no weights, several do.

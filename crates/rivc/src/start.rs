@@ -11,13 +11,11 @@ use crate::{Error, Structure};
 const THOROUGH: Effort = Effort {
     instruments: 1,
     iterations: 6,
-    lower_orders: true,
 };
 /// The same on a grid of delays, where only the best point matters.
 pub(crate) const ROUGH: Effort = Effort {
     instruments: 1,
     iterations: 3,
-    lower_orders: false,
 };
 /// A pole that is added lies at this over the step.
 const FAST: f64 = 2.0;
@@ -27,7 +25,6 @@ const FAST: f64 = 2.0;
 pub(crate) struct Effort {
     instruments: usize,
     iterations: usize,
-    lower_orders: bool,
 }
 
 /// A model and the mean square of its output error.
@@ -103,9 +100,6 @@ impl Problem<'_> {
                 _ => others += 1,
             }
         }
-        if effort.lower_orders {
-            starts.extend(self.of_lower_order(delays, largest, bandwidths));
-        }
         if starts.is_empty() {
             return Err(match undetermined {
                 Some(error) if others == 0 => error,
@@ -120,7 +114,7 @@ impl Problem<'_> {
 
     /// A start from the best plant of the next lower order, by one more pole that is fast: it fits as well, where starts of an order that the
     /// record does not carry may lead nowhere.
-    fn of_lower_order(&self, delays: &[f64], largest: f64, bandwidths: &[f64]) -> Option<Start> {
+    fn of_lower_order(&self, delays: &[f64], bandwidths: &[f64]) -> Option<Start> {
         let n = self.structure.n.checked_sub(1).filter(|n| *n > 0)?;
         let lower = Structure {
             n,
@@ -131,13 +125,32 @@ impl Problem<'_> {
             structure: &lower,
             records: self.records,
         };
-        let starts = problem.at_delays(delays, largest, (bandwidths, THOROUGH));
-        let (_, best) = starts.ok()?.into_iter().next()?;
+        let largest = delays.iter().copied().fold(0.0, f64::max);
+        let own = problem.at_delays(delays, largest, (bandwidths, THOROUGH));
+        let own = own.into_iter().flatten().next();
+        let lowest = problem.of_lower_order(delays, bandwidths);
+        let (_, best) = own
+            .into_iter()
+            .chain(lowest)
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
         let model = best.with_pole(FAST / self.shortest_step(), &lower, self.structure);
         let delayed = self.delayed(delays, largest);
-        self.follow(&delayed, model, None, THOROUGH.iterations)
-            .ok()
-            .flatten()
+        let found = self.follow(&delayed, model, None, THOROUGH.iterations);
+        found.ok().flatten()
+    }
+
+    /// Starts from plants of lower order at each of these delays, the best first.
+    pub(crate) fn starts_of_lower_orders(
+        &self,
+        candidates: &[Vec<f64>],
+        bandwidths: &[f64],
+    ) -> Vec<Start> {
+        let starts = candidates.iter();
+        let mut starts: Vec<Start> = starts
+            .filter_map(|delays| self.of_lower_order(delays, bandwidths))
+            .collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts
     }
 
     /// Starts at each of these delays, the best first.

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::Error;
 use crate::iterate::Refined;
+use crate::loop_model::Scale;
 use crate::model::Model;
 use crate::prepared::Prepared;
 use crate::problem::Problem;
@@ -13,7 +14,7 @@ use crate::start::{ROUGH, Start};
 
 /// Points of the first grid of delays.
 const POINTS: usize = 16;
-/// A delay moves by this share of a step at least in one renewal, if it has to.
+/// A delay moves by this share of a step at least in one iteration, if it has to.
 const REACH: f64 = 0.25;
 /// Grids that are finer by this factor.
 const FINER: f64 = 4.0;
@@ -40,16 +41,9 @@ pub(crate) fn beginnings(records: &[Prepared]) -> Option<Vec<Prepared>> {
     let mut pairs = beginnings.iter().zip(records);
     let alike = pairs.all(|(part, all)| {
         let mut inputs = part.inputs.iter().zip(&all.inputs);
-        inputs.all(|(part, all)| spread(part) >= LIKE_ALL * spread(all))
+        inputs.all(|(part, all)| Scale::of(part).size >= LIKE_ALL * Scale::of(all).size)
     });
     alike.then_some(beginnings)
-}
-
-/// Standard deviation.
-fn spread(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
 impl Problem<'_> {

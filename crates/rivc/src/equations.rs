@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-10;
 const LEAST_NOISE: f64 = 1e-9;
 
 /// Sums over all records. Columns: what all records share, then of each record its own.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct Equations {
     shared: usize,
     own: usize,
@@ -150,18 +150,23 @@ impl Equations {
 
     /// The same equations with some unknowns fixed at values, and so without their rows and columns; `places` are ascending.
     pub(crate) fn with_fixed(&self, places: &[usize], values: &[f64]) -> Self {
-        let mut reduced = self.clone();
+        let mut zy = self.zy.clone();
         for (place, value) in places.iter().zip(values) {
-            reduced.zy -= self.zphi.column(*place) * *value;
+            zy -= self.zphi.column(*place) * *value;
         }
-        reduced.zphi = reduced
-            .zphi
-            .remove_rows_at(places)
-            .remove_columns_at(places);
-        reduced.zz = reduced.zz.remove_rows_at(places).remove_columns_at(places);
-        reduced.zy = reduced.zy.remove_rows_at(places);
-        reduced.sizes = reduced.sizes.remove_rows_at(places);
-        reduced
+        let without = |m: &DMatrix<f64>| {
+            let rows = m.clone().remove_rows_at(places);
+            rows.remove_columns_at(places)
+        };
+        Self {
+            zphi: without(&self.zphi),
+            zz: without(&self.zz),
+            zy: zy.remove_rows_at(places),
+            sizes: self.sizes.clone().remove_rows_at(places),
+            // As long as the records, and not needed to solve.
+            residuals: Vec::new(),
+            ..*self
+        }
     }
 
     /// Mean square of the residual, not below that of rounding: of the output error where the filter is that of the model.

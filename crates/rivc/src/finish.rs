@@ -109,7 +109,7 @@ pub(crate) fn finish(
         noise,
         iterations: found.iterations,
         converged: found.converged,
-        first: delayed.first,
+        first: delayed.first.clone(),
     })
 }
 

@@ -1,5 +1,7 @@
 //! The iteration: filter, instruments and models of the noise estimated again until nothing changes.
 
+use std::sync::Arc;
+
 use ct_signals::ArModel;
 
 use crate::Error;
@@ -36,8 +38,8 @@ pub(crate) struct Refined {
     /// Mean square of the output error on the measured inputs; whitened where there are models of the noise.
     pub(crate) mean_square: f64,
     /// The equations at the model, and the delayed inputs that they were taken from.
-    pub(crate) equations: Equations,
-    pub(crate) delayed: Delayed,
+    pub(crate) equations: Arc<Equations>,
+    pub(crate) delayed: Arc<Delayed>,
     /// Places of the delays that are at a limit: their columns are left out.
     pub(crate) at_limit: Vec<usize>,
 }
@@ -154,7 +156,7 @@ impl Problem<'_> {
         let estimated = structure.estimated_delays().count();
         let with_delays = estimated > 0;
         let mut largest = start.delays.iter().copied().fold(0.0, f64::max);
-        let mut delayed = self.delayed(&start.delays, largest);
+        let mut delayed = Arc::new(self.delayed(&start.delays, largest));
         let (noise_order, mut noise) = noise.unzip();
         let mut updates = 0;
         let growth = self.growth();
@@ -163,7 +165,9 @@ impl Problem<'_> {
             last: vec![0.0; estimated],
         };
         let mut model = start;
-        let mut equations = self.equations(&delayed, &model, noise.as_deref(), with_delays)?;
+        // Shared with the best so far: both are as long as the records.
+        let mut equations =
+            Arc::new(self.equations(&delayed, &model, noise.as_deref(), with_delays)?);
         let mut best: Option<Refined> = None;
         for iterations in 0.. {
             let asked = self.ask(&model, &equations, with_delays, &mut reach);
@@ -213,12 +217,12 @@ impl Problem<'_> {
                     if with_delays {
                         // A first sample that came and went with a delay would keep the estimates from converging.
                         largest = next.delays.iter().copied().fold(largest, f64::max);
-                        delayed = self.delayed(&next.delays, largest);
+                        delayed = Arc::new(self.delayed(&next.delays, largest));
                     }
                     let there = self.equations(&delayed, &next, noise.as_deref(), with_delays)?;
                     let limit = best.as_ref().map_or(f64::INFINITY, |best| best.mean_square);
                     if there.mean_square() <= limit * growth {
-                        taken = Some(there);
+                        taken = Some(Arc::new(there));
                         break;
                     }
                 }

@@ -33,13 +33,13 @@ pub(crate) struct LoopModel {
 
 /// Mean and root mean square about it.
 #[derive(Debug, Clone, Copy)]
-struct Scale {
+pub(crate) struct Scale {
     mean: f64,
-    size: f64,
+    pub(crate) size: f64,
 }
 
 impl Scale {
-    fn of(values: &[f64]) -> Self {
+    pub(crate) fn of(values: &[f64]) -> Self {
         let n = values.len().max(1) as f64;
         let mean = values.iter().sum::<f64>() / n;
         let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;

@@ -21,7 +21,6 @@ pub(crate) struct Problem<'a> {
 }
 
 /// Records under given delays.
-#[derive(Clone)]
 pub(crate) struct Delayed {
     pub(crate) delays: Vec<f64>,
     pub(crate) paths: Vec<Paths>,

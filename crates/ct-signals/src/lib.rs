@@ -3,6 +3,7 @@
 //! | question | answer |
 //! |---|---|
 //! | How do I read my measurements? | [`read_csv`], with [`Columns`] to say which column is what |
+//! | When was a row recorded, where the file has dates? | [`TimestampReader`], [`Zone`] |
 //! | And where they come one by one? | [`Rows`], a line at a time |
 //! | How do I make a record in code? | [`Record`], [`excitation`], [`noise`], then [`Record::validate`] |
 //! | Is anything left in a residual? | [`residual_tests`] |
@@ -73,6 +74,7 @@ pub mod residual_tests;
 mod stationary_noise;
 mod stream;
 mod student;
+mod timestamp;
 mod unit;
 
 pub use ar::{ArModel, Whitener};
@@ -86,3 +88,4 @@ pub use record::{Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, Signal};
 pub use stationary_noise::{CovarianceSum, StationaryNoise};
 pub use stream::{BadLine, Line, Rows};
 pub use student::student_half_width;
+pub use timestamp::{Timestamp, TimestampError, TimestampReader, Zone};

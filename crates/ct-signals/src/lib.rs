@@ -4,6 +4,7 @@
 //! |---|---|
 //! | How do I read my measurements? | [`read_csv`], with [`Columns`] to say which column is what |
 //! | When was a row recorded, where the file has dates? | [`TimestampReader`], [`Zone`] |
+//! | What does a unit in a header mean, and how is it converted? | [`Unit`] |
 //! | And where they come one by one? | [`Rows`], a line at a time |
 //! | How do I make a record in code? | [`Record`], [`excitation`], [`noise`], then [`Record::validate`] |
 //! | Is anything left in a residual? | [`residual_tests`] |
@@ -89,3 +90,4 @@ pub use stationary_noise::{CovarianceSum, StationaryNoise};
 pub use stream::{BadLine, Line, Rows};
 pub use student::student_half_width;
 pub use timestamp::{Timestamp, TimestampError, TimestampReader, Zone};
+pub use unit::{Conversion, Dimension, Unit};

@@ -1,9 +1,20 @@
-//! Names and units in a header: `y [cm]`, `y (cm)` and `y_cm` are the name `y` and the unit `cm`.
+//! Names and units in a header: `y [cm]`, `y (cm)` and `y_cm` are the name `y` and the unit `cm`. What a unit means, and how values
+//! are converted, says [`Unit`].
 
-/// Units that are understood after an underscore, where there is no bracket to say so.
+mod dimension;
+mod quantity;
+mod table;
+
+pub use dimension::Dimension;
+pub use quantity::{Conversion, Unit};
+
+/// Units that are understood after an underscore, where there is no bracket to say so. Missing are those that are more often a part of the
+/// name: `T_l`, `u_in`, `q_h`, `T_rad`, `omega_N`.
 const SUFFIXES: &[&str] = &[
-    "V", "mV", "A", "mA", "m", "cm", "mm", "C", "degC", "°C", "K", "bar", "mbar", "Pa", "kPa", "%",
-    "pct", "percent", "Hz", "rpm", "W", "kW",
+    "V", "mV", "kV", "A", "mA", "m", "cm", "mm", "C", "degC", "°C", "degF", "°F", "K", "bar",
+    "mbar", "Pa", "hPa", "kPa", "MPa", "psi", "%", "pct", "percent", "ppm", "Hz", "kHz", "rpm",
+    "W", "kW", "MW", "kWh", "Nm", "kg", "deg", "ml", "mL", "litre", "litres", "liter", "liters",
+    "lmin", "lpm", "gpm", "m3", "m3h",
 ];
 
 /// Units that are understood after an underscore in a time's header only: `u_min` is no time.
@@ -70,5 +81,45 @@ pub(crate) fn seconds(unit: &str) -> Option<f64> {
         "h" => Some(3600.0),
         "d" => Some(86400.0),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_suffix_is_a_unit() {
+        for unit in SUFFIXES.iter().chain(TIME_SUFFIXES) {
+            assert!(Unit::parse(unit).is_some(), "{unit}");
+        }
+    }
+
+    #[test]
+    fn a_suffix_is_a_unit_only_where_it_is_plain() {
+        for (header, name, unit) in [
+            ("level_litres", "level", "litres"),
+            ("q_lmin", "q", "lmin"),
+            ("T_degF", "T", "degF"),
+            ("q [l/min]", "q", "l/min"),
+            ("T_l", "T_l", ""),
+            ("u_in", "u_in", ""),
+            ("T_rad", "T_rad", ""),
+            ("q_min", "q_min", ""),
+        ] {
+            assert_eq!(split(header), (name, unit));
+        }
+    }
+
+    #[test]
+    fn seconds_are_those_of_the_unit() {
+        for text in [
+            "us", "ms", "s", "sec", "min", "minutes", "h", "hr", "hours", "d", "days",
+        ] {
+            let conversion = Unit::parse(text)
+                .zip(Unit::parse("s"))
+                .and_then(|(unit, second)| unit.conversion_to(&second));
+            assert_eq!(conversion.map(|c| c.factor), seconds(text), "{text}");
+        }
     }
 }

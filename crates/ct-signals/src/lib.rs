@@ -77,8 +77,9 @@ mod stream;
 mod student;
 mod timestamp;
 mod unit;
+mod whitener;
 
-pub use ar::{ArModel, Whitener};
+pub use ar::ArModel;
 pub use column_fault::ColumnFault;
 pub use columns::{Columns, Heading};
 pub use csv_file::{csv_header, parse_csv, parse_csv_any_input, read_csv, read_csv_any_input};
@@ -91,3 +92,4 @@ pub use stream::{BadLine, Line, Rows};
 pub use student::student_half_width;
 pub use timestamp::{Timestamp, TimestampError, TimestampReader, Zone};
 pub use unit::{Conversion, Dimension, Unit};
+pub use whitener::Whitener;

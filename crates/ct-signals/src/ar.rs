@@ -29,14 +29,13 @@
 
 use serde::Serialize;
 
-use crate::record::check_finite;
-use crate::{Error, Whitener};
+use crate::{Error, Whitener, ar_missing};
 
 /// Partial correlations stay this far inside -1..1, so that even a constant or a sine leaves a
 /// stable predictor.
-const MARGIN: f64 = 1e-9;
+pub(crate) const MARGIN: f64 = 1e-9;
 /// Squares that sum to less are those of nothing: products of them underflow.
-const NOTHING: f64 = 1e-200;
+pub(crate) const NOTHING: f64 = 1e-200;
 
 /// Orders that leave fewer samples than this for each coefficient are not tried.
 const SAMPLES_PER_COEFFICIENT: usize = 5;
@@ -106,15 +105,29 @@ impl ArModel {
     /// Fits a process to one or several independent stretches of a signal, of order 0 to
     /// `max_order`; orders with fewer than 5 samples for each coefficient are left out.
     ///
+    /// NaN stands for a sample that is missing. Where none is, the fit is Burg's; where some are, it maximises the exact
+    /// likelihood of those that are there, and the order is chosen by the same criterion with `N` their number. Of the
+    /// processes that a regular decimation cannot tell apart (every second sample only: of either sign), it is the slower one. Missing samples
+    /// at a segment's ends take no part.
+    ///
     /// The mean is not removed. A signal that is 0 throughout, or whose squares underflow, gives white noise of sigma 0.
     ///
     /// # Errors
-    /// [`Error::ValueNotFinite`], and [`Error::TooFewSamples`] when there are no samples at all.
+    /// [`Error::ValueNotFinite`] for an infinite value, and [`Error::TooFewSamples`] when there are no samples at all.
     pub fn fit(segments: &[&[f64]], max_order: usize) -> Result<Self, Error> {
+        let mut n = 0;
+        let mut parts = Vec::with_capacity(segments.len());
         for segment in segments {
-            check_finite("autoregressive fit", "v", segment)?;
+            check_not_infinite("autoregressive fit", "v", segment)?;
+            let there = |v: &f64| !v.is_nan();
+            let first = segment.iter().position(there).unwrap_or(segment.len());
+            let end = segment
+                .iter()
+                .rposition(there)
+                .map_or(first, |last| last + 1);
+            parts.push(&segment[first..end]);
+            n += segment.iter().filter(|v| there(v)).count();
         }
-        let n: usize = segments.iter().map(|segment| segment.len()).sum();
         if n == 0 {
             return Err(Error::TooFewSamples {
                 task: "autoregressive fit",
@@ -122,16 +135,21 @@ impl ArModel {
                 needed: 1,
             });
         }
+        let max_order = max_order.min(n / SAMPLES_PER_COEFFICIENT);
+        if n < parts.iter().map(|part| part.len()).sum() {
+            return Ok(ar_missing::fit(&parts, n, max_order));
+        }
+        let segments = &parts;
         let Burg {
             reflections,
             squares,
-        } = Burg::new(segments, max_order.min(n / SAMPLES_PER_COEFFICIENT));
+        } = Burg::new(segments, max_order);
         let mut best: Option<(f64, ArModel)> = None;
         for (order, sum) in squares.into_iter().enumerate() {
             if sum < NOTHING {
                 return Ok(ArModel::white(0.0));
             }
-            let mut model = ArModel::of_stationary(&reflections[..order]);
+            let mut model = ArModel::of_stationary(&reflections[..order], 1.0);
             let log_det: f64 = segments.iter().map(|s| model.log_det(s.len())).sum();
             let n = n as f64;
             let bic = n * (sum / n).ln() + log_det + order as f64 * n.ln();
@@ -189,11 +207,11 @@ impl ArModel {
     }
 
     /// Of partial correlations that are within -1..1.
-    fn of_stationary(reflections: &[f64]) -> Self {
+    pub(crate) fn of_stationary(reflections: &[f64], sigma: f64) -> Self {
         ArModel {
             reflections: reflections.to_vec(),
             coefficients: predictors(reflections).pop().unwrap_or_default(),
-            sigma: 1.0,
+            sigma,
         }
     }
 
@@ -246,11 +264,21 @@ impl ArModel {
         Whitener::new(self, lanes)
     }
 
-    /// Whitens one record. White innovations of variance `sigma^2` come back, not of variance 1.
+    /// Whitens one record, in which NaN stands for a sample that is missing. White innovations of variance `sigma^2` come
+    /// back, not of variance 1, and NaN for the missing ones.
+    ///
+    /// Each sample is predicted from all earlier samples that are there, and its error scaled to `sigma`: `w = L^-1 v` over
+    /// the samples that are there, for their covariance `sigma^2 L L'`.
     pub fn whiten(&self, values: &[f64]) -> Vec<f64> {
         let mut whitener = self.whitener(1);
         let mut whitened = values.to_vec();
+        let mut lost = 0;
         for value in &mut whitened {
+            if value.is_nan() {
+                lost += 1;
+                continue;
+            }
+            whitener.skip_many(std::mem::take(&mut lost));
             whitener.push(std::slice::from_mut(value));
         }
         whitened
@@ -270,6 +298,51 @@ impl ArModel {
             .map(|(i, k)| -((i + 1).min(n) as f64) * (1.0 - k * k).ln())
             .sum()
     }
+
+    /// `log|R|` of a record in which samples are missing, over the samples that are there: one entry for each instant, false
+    /// where the sample is missing.
+    ///
+    /// The sum of the logarithms of their prediction variances over `sigma^2`, `>= 0`; [`ArModel::log_det`] of `n`, bit for
+    /// bit, where all `n` of them are there. The likelihood is that of [`ArModel::log_det`], with `n` the samples that are there
+    /// and `w` the values of [`ArModel::whiten`] that are not NaN.
+    ///
+    /// Of a series: `model.log_det_of(series.iter().map(|v| !v.is_nan()))`.
+    pub fn log_det_of(&self, observed: impl IntoIterator<Item = bool>) -> f64 {
+        let mut observed = observed.into_iter().skip_while(|there| !there);
+        let Some(_) = observed.next() else {
+            return 0.0;
+        };
+        // Up to the first that is missing.
+        let whole = 1 + observed.by_ref().take_while(|there| *there).count();
+        let mut sum = LogProduct::default();
+        let mut whitener = self.whitener(0);
+        for _ in 0..whole.min(self.order()) {
+            whitener.push(&mut []);
+        }
+        let mut lost = 1;
+        for there in observed {
+            if !there {
+                lost += 1;
+                continue;
+            }
+            whitener.skip_many(std::mem::take(&mut lost));
+            sum.push(whitener.push_with_variance(&mut []));
+        }
+        self.log_det(whole) + sum.log()
+    }
+}
+
+/// NaN stands for a missing sample; no value may be infinite.
+pub(crate) fn check_not_infinite(task: &str, signal: &str, values: &[f64]) -> Result<(), Error> {
+    match values.iter().position(|v| v.is_infinite()) {
+        None => Ok(()),
+        Some(index) => Err(Error::ValueNotFinite {
+            record: task.into(),
+            signal: signal.into(),
+            index,
+            value: values[index],
+        }),
+    }
 }
 
 /// `a^(0), ..., a^(p)` by Levinson's recursion.
@@ -285,6 +358,36 @@ fn predictors(reflections: &[f64]) -> Vec<Vec<f64>> {
         ladder.push(a.clone());
     }
     ladder
+}
+
+/// The logarithm of a product of many positive numbers, for the cost of a product.
+#[derive(Debug)]
+pub(crate) struct LogProduct {
+    product: f64,
+    logarithm: f64,
+}
+
+impl Default for LogProduct {
+    fn default() -> Self {
+        Self {
+            product: 1.0,
+            logarithm: 0.0,
+        }
+    }
+}
+
+impl LogProduct {
+    pub(crate) fn push(&mut self, factor: f64) {
+        self.product *= factor;
+        if !(1e-100..1e100).contains(&self.product) {
+            self.logarithm += self.product.ln();
+            self.product = 1.0;
+        }
+    }
+
+    pub(crate) fn log(&self) -> f64 {
+        self.logarithm + self.product.ln()
+    }
 }
 
 /// What Burg's recursion gives of each order.

@@ -62,6 +62,7 @@
 //! ```
 
 mod ar;
+mod ar_missing;
 mod column_fault;
 mod columns;
 mod csv_file;

@@ -2,18 +2,27 @@
 //!
 //! Both tests give a probability `p`: how often a residual that is pure noise would look at least
 //! this far from it. Below 0.01, say, something remains.
+//!
+//! **Missing samples**: NaN. Means, sums and counts are then over the samples and the pairs of samples that are there. In a
+//! white Gaussian series of `n` samples with `n_k` pairs at lag k,
+//! `E[(sum x[t] x[t+k])^2] = n_k (sum x^2)^2/(n (n+2))` whatever the pattern (to the mean's removal): `n_k` takes the place of
+//! `n - k` in the sums below. Lags with fewer than 5 pairs do not count, nor as degrees of freedom.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::record::check_finite;
+use crate::ar::check_not_infinite;
 use crate::{ArModel, Error};
 
 /// Highest order of the filters that whiten the input and the residual.
 const MAX_PREWHITENING_ORDER: usize = 20;
 
+/// Lags with fewer pairs of samples do not count where samples are missing: their products are far from Gaussian.
+const FEWEST_PAIRS: usize = 5;
+
 /// Autocorrelation of `x`, mean removed, at lags `0..=max_lag`; 1 at lag 0.
 ///
-/// 0 at lags that the record is too short for, and at all lags above 0 when `x` does not vary.
+/// 0 at lags that the record is too short for, and at all lags above 0 when `x` does not vary. Missing samples (NaN) as in
+/// [`cross_correlation`].
 pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
     let mut correlation = cross_correlation(x, x, max_lag);
     correlation[0] = 1.0;
@@ -26,9 +35,25 @@ pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
 /// The sum at each lag is divided by the number of samples, as is usual, which keeps values within
 /// -1..1. 0 at lags that the record is too short for, and at all when one of the two does not vary.
 /// Of two series of different lengths the end of the longer is left out.
+///
+/// Where samples are missing (NaN) it is, at each lag, the correlation over the pairs that are there, times `(N - lag)/N` for the series' length
+/// `N`, as that of a whole series has it. Its standard deviation is then about `(N - lag)/N` over the root of
+/// the number of [`pairs`], for white series.
 pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
     let n = u.len().min(e.len());
     let (u, e) = (centred(&u[..n]), centred(&e[..n]));
+    if has_missing(&u) || has_missing(&e) {
+        let at = |lag: usize| {
+            let sums = Pairs::at(&u, &e, lag);
+            let scale = (sums.of_u * sums.of_e).sqrt();
+            if scale > 0.0 {
+                sums.product / scale * (n - lag) as f64 / n as f64
+            } else {
+                0.0
+            }
+        };
+        return (0..=max_lag).map(at).collect();
+    }
     let scale = (sum_of_products(&u, &u) * sum_of_products(&e, &e)).sqrt();
     (0..=max_lag)
         .map(|lag| {
@@ -37,6 +62,18 @@ pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
             } else {
                 0.0
             }
+        })
+        .collect()
+}
+
+/// How many pairs `u[k]`, `e[k + lag]` are there at lags `0..=max_lag`: `n - lag` where no sample is missing (NaN).
+pub fn pairs(u: &[f64], e: &[f64], max_lag: usize) -> Vec<usize> {
+    let n = u.len().min(e.len());
+    let (u, e) = (&u[..n], &e[..n]);
+    (0..=max_lag)
+        .map(|lag| {
+            let pairs = u.iter().zip(e.iter().skip(lag));
+            pairs.filter(|(u, e)| !u.is_nan() && !e.is_nan()).count()
         })
         .collect()
 }
@@ -50,9 +87,12 @@ pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
 /// Reference: G. M. Ljung, G. E. P. Box, *On a measure of lack of fit in time series models*,
 /// Biometrika 65 (1978) 297-303.
 ///
+/// Missing samples are NaN: `n` counts the samples that are there, and `rho_k` is the sum over the pairs that are there over
+/// that of all squares. Where `x` is a whitened series, its innovations behind a gap count like any others.
+///
 /// # Errors
 /// [`Error::InvalidSetting`] unless `fitted < lags`, [`Error::TooFewSamples`] unless there are more
-/// samples than lags, [`Error::ValueNotFinite`].
+/// samples than lags and more lags with pairs than `fitted`, [`Error::ValueNotFinite`] for an infinite value.
 pub fn ljung_box(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
     const TASK: &str = "Ljung-Box test";
     if fitted >= lags {
@@ -62,8 +102,18 @@ pub fn ljung_box(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
             range: format!("more than the {fitted} fitted noise coefficients"),
         });
     }
-    check_length(TASK, x.len(), lags)?;
-    check_finite(TASK, "x", x)?;
+    check_length(TASK, present(x), lags)?;
+    check_not_infinite(TASK, "x", x)?;
+    if has_missing(x) {
+        let x = centred(x);
+        let n = present(&x) as f64;
+        let squares: f64 = x.iter().filter(|x| !x.is_nan()).map(|x| x * x).sum();
+        let term = |sums: &Pairs| {
+            let rho = sums.product / squares;
+            n * (n + 2.0) * rho * rho / sums.count as f64
+        };
+        return portmanteau_of_pairs(TASK, &x, &x, lags, fitted, term);
+    }
     portmanteau(x.len(), &autocorrelation(x, lags)[1..], lags - fitted)
 }
 
@@ -78,12 +128,16 @@ pub fn ljung_box(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
 /// Lag 0 is reported but does not count: `y[k]` is read before `u[k]` acts, so the input cannot
 /// show there, while a controller that reads `y[k]` can.
 ///
+/// Missing samples of either are NaN. The filters are then those of [`ArModel::fit`] and [`ArModel::whiten`] for such series, and
+/// the sum is that of `n_k r_k^2`, `r_k` the correlation over the `n_k` pairs that are there: given the input, it has the
+/// right mean whichever of the input's moves are missing.
+///
 /// Reference: L. D. Haugh, *Checking the independence of two covariance-stationary time series*,
 /// J. American Statistical Association 71 (1976) 378-385.
 ///
 /// # Errors
 /// [`Error::SeriesMismatch`], [`Error::TooFewSamples`] unless there are more samples than lags,
-/// [`Error::InvalidSetting`] when `lags` is 0, [`Error::ValueNotFinite`].
+/// [`Error::InvalidSetting`] when `lags` is 0, [`Error::ValueNotFinite`] for an infinite value.
 pub fn prewhitened_input_test(u: &[f64], e: &[f64], lags: usize) -> Result<(Vec<f64>, f64), Error> {
     const TASK: &str = "correlation with the input";
     if u.len() != e.len() {
@@ -100,10 +154,18 @@ pub fn prewhitened_input_test(u: &[f64], e: &[f64], lags: usize) -> Result<(Vec<
             range: "at least 1".into(),
         });
     }
-    check_length(TASK, u.len(), lags)?;
-    check_finite(TASK, "u", u)?;
-    check_finite(TASK, "e", e)?;
-    let correlation = cross_correlation(&whitened(u)?, &whitened(e)?, lags);
+    check_length(TASK, present(u).min(present(e)), lags)?;
+    check_not_infinite(TASK, "u", u)?;
+    check_not_infinite(TASK, "e", e)?;
+    let (u, e) = (whitened(u)?, whitened(e)?);
+    let correlation = cross_correlation(&u, &e, lags);
+    if has_missing(&u) || has_missing(&e) {
+        let term = |sums: &Pairs| {
+            sums.count as f64 * sums.product * sums.product / (sums.of_u * sums.of_e)
+        };
+        let p = portmanteau_of_pairs(TASK, &centred(&u), &centred(&e), lags, 0, term)?;
+        return Ok((correlation, p));
+    }
     let p = portmanteau(u.len(), &correlation[1..], lags)?;
     Ok((correlation, p))
 }
@@ -121,6 +183,36 @@ fn portmanteau(n: usize, correlation: &[f64], freedom: usize) -> Result<f64, Err
         .enumerate()
         .map(|(k, r)| n * (n + 2.0) * r * r / (n - (k + 1) as f64))
         .sum();
+    exceedance(q, freedom)
+}
+
+/// The same from the pairs at lags `1..=lags` that are there, each with its term of the sum, less `fitted` degrees of freedom.
+fn portmanteau_of_pairs(
+    task: &'static str,
+    u: &[f64],
+    e: &[f64],
+    lags: usize,
+    fitted: usize,
+    term: impl Fn(&Pairs) -> f64,
+) -> Result<f64, Error> {
+    let counted: Vec<f64> = (1..=lags)
+        .map(|lag| Pairs::at(u, e, lag))
+        .filter(|sums| sums.count >= FEWEST_PAIRS)
+        // A series that does not vary is correlated with nothing.
+        .map(|sums| Some(term(&sums)).filter(|q| q.is_finite()).unwrap_or(0.0))
+        .collect();
+    if counted.len() <= fitted {
+        return Err(Error::TooFewSamples {
+            task,
+            found: present(u).min(present(e)),
+            needed: 2 * FEWEST_PAIRS * (fitted + 1),
+        });
+    }
+    exceedance(counted.iter().sum(), counted.len() - fitted)
+}
+
+/// The probability that a chi-square variable of so many degrees of freedom is above `q`.
+fn exceedance(q: f64, freedom: usize) -> Result<f64, Error> {
     ChiSquared::new(freedom as f64)
         .map(|chi_square| chi_square.sf(q))
         .map_err(|_| Error::InvalidSetting {
@@ -141,8 +233,49 @@ fn check_length(task: &'static str, n: usize, lags: usize) -> Result<(), Error> 
     })
 }
 
+/// Sums over the pairs `u[t]`, `e[t + lag]` that are there.
+struct Pairs {
+    count: usize,
+    product: f64,
+    of_u: f64,
+    of_e: f64,
+}
+
+impl Pairs {
+    fn at(u: &[f64], e: &[f64], lag: usize) -> Self {
+        let mut sums = Self {
+            count: 0,
+            product: 0.0,
+            of_u: 0.0,
+            of_e: 0.0,
+        };
+        for (u, e) in u.iter().zip(e.iter().skip(lag)) {
+            if !u.is_nan() && !e.is_nan() {
+                sums.count += 1;
+                sums.product += u * e;
+                sums.of_u += u * u;
+                sums.of_e += e * e;
+            }
+        }
+        sums
+    }
+}
+
+fn has_missing(x: &[f64]) -> bool {
+    x.iter().any(|x| x.is_nan())
+}
+
+/// Samples that are there.
+fn present(x: &[f64]) -> usize {
+    x.iter().filter(|x| !x.is_nan()).count()
+}
+
 fn centred(x: &[f64]) -> Vec<f64> {
-    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    let mean = if has_missing(x) {
+        x.iter().filter(|x| !x.is_nan()).sum::<f64>() / present(x) as f64
+    } else {
+        x.iter().sum::<f64>() / x.len() as f64
+    };
     x.iter().map(|v| v - mean).collect()
 }
 

@@ -2,9 +2,10 @@
 
 use approx::assert_relative_eq;
 use ct_signals::residual_tests::{
-    autocorrelation, cross_correlation, ljung_box, prewhitened_input_test,
+    autocorrelation, cross_correlation, ljung_box, pairs, prewhitened_input_test,
 };
 use ct_signals::{ArModel, Error, excitation, noise};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
@@ -176,7 +177,7 @@ fn tests_that_make_no_sense_are_refused() {
         Err(Error::TooFewSamples { needed: 31, .. })
     ));
     assert!(matches!(
-        ljung_box(&[1.0, f64::NAN, 2.0], 1, 0),
+        ljung_box(&[1.0, f64::INFINITY, 2.0], 1, 0),
         Err(Error::ValueNotFinite { .. })
     ));
     let error = prewhitened_input_test(&x, &x[1..], 5);
@@ -185,4 +186,132 @@ fn tests_that_make_no_sense_are_refused() {
     // A still input explains nothing: no correlation.
     let (correlation, p) = prewhitened_input_test(&[1.0; 30], &x, 5).unwrap();
     assert_eq!((correlation, p), (vec![0.0; 6], 1.0));
+}
+
+/// 30 % of the samples at random, or blocks of 10 to 40.
+fn thinned(x: &[f64], blocks: bool, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let mut x = x.to_vec();
+    let n = x.len();
+    if blocks {
+        for _ in 0..n / 80 {
+            let at = rng.random_range(0..n - 40);
+            x[at..at + rng.random_range(10..40)].fill(f64::NAN);
+        }
+    } else {
+        x.iter_mut()
+            .filter(|_| rng.random::<f64>() < 0.3)
+            .for_each(|x| *x = f64::NAN);
+    }
+    x
+}
+
+#[test]
+fn correlations_by_hand_where_samples_are_missing() {
+    // x - mean = -2, ., 0, 2 and lag 2 has one pair of 0 and -2, lag 3 one of 2 and -2.
+    let x = [1.0, f64::NAN, 3.0, 5.0];
+    assert_eq!(pairs(&x, &x, 4), [3, 1, 1, 1, 0]);
+    let r = autocorrelation(&x, 4);
+    for (r, expected) in r.iter().zip([1.0, 0.0, 0.0, -0.25, 0.0]) {
+        assert_relative_eq!(*r, expected, max_relative = 1e-12);
+    }
+    // Nearly as many as there are, nearly the same.
+    let mut x = noise::ar1(5000, 1.0, 0.8, &mut rng(4));
+    let whole = autocorrelation(&x, 10);
+    x[2000] = f64::NAN;
+    for (a, b) in whole.iter().zip(autocorrelation(&x, 10)) {
+        assert!((a - b).abs() < 2e-3, "{a} {b}");
+    }
+    assert_eq!(pairs(&[0.0; 5], &[0.0; 4], 2), [4, 3, 2]);
+}
+
+#[test]
+fn tests_are_even_where_samples_are_missing_and_see_what_is_there() {
+    let runs = std::env::var("RECORDS").map_or(RUNS / 2, |runs| runs.parse().unwrap());
+    for blocks in [false, true] {
+        let context = if blocks { "blocks" } else { "at random" };
+        let all = |p: &dyn Fn(&mut ChaCha8Rng) -> f64| -> Vec<f64> {
+            (0..runs).map(|seed| p(&mut rng(seed))).collect()
+        };
+        let sized = |p: Vec<f64>, what: &str| {
+            let share = share_below(&p, 0.05);
+            println!("{what}, {context}: {share} below 0.05");
+            assert_uniform(&p, &format!("{what}, {context}"));
+            // Three standard errors, and what the chi-square approximation misses.
+            let width = 3.0 * (0.05 * 0.95 / runs as f64).sqrt() + 0.005;
+            assert!((share - 0.05).abs() < width, "{what}, {context}: {share}");
+        };
+        sized(
+            all(&|rng| {
+                let x = noise::white(N, 3.0, rng);
+                ljung_box(&thinned(&x, blocks, rng), 20, 0).unwrap()
+            }),
+            "white",
+        );
+        sized(
+            all(&|rng| {
+                let x = thinned(&noise::ar1(N, 1.0, 0.6, rng), blocks, rng);
+                let model = ArModel::fit(&[&x], 6).unwrap();
+                ljung_box(&model.whiten(&x), 12, model.order()).unwrap()
+            }),
+            "whitened by its own model",
+        );
+        let coloured = all(&|rng| {
+            let x = noise::ar1(N, 3.0, 0.3, rng);
+            ljung_box(&thinned(&x, blocks, rng), 20, 0).unwrap()
+        });
+        assert!(
+            share_below(&coloured, 0.01) > 0.6,
+            "{}",
+            share_below(&coloured, 0.01)
+        );
+        println!(
+            "coloured, {context}: {} below 0.01",
+            share_below(&coloured, 0.01)
+        );
+        let unexplained = |gain: f64, rho: f64| {
+            move |rng: &mut ChaCha8Rng| {
+                let u = steps(rng);
+                let mut e = noise::ar1(N, 0.4, rho, rng);
+                let mut x = 0.0;
+                for k in 1..N {
+                    x = 0.8 * x + 0.2 * gain * (u[k - 1] - 5.0);
+                    e[k] += x;
+                }
+                prewhitened_input_test(&u, &thinned(&e, blocks, rng), 20)
+                    .unwrap()
+                    .1
+            }
+        };
+        sized(all(&unexplained(0.0, 0.0)), "white beside steps");
+        sized(all(&unexplained(0.0, 0.9)), "noise of 0.9 beside steps");
+        let seen = all(&unexplained(0.16, 0.0));
+        assert!(
+            share_below(&seen, 0.01) > 0.8,
+            "{}",
+            share_below(&seen, 0.01)
+        );
+        println!(
+            "beside an effect, {context}: {} below 0.01",
+            share_below(&seen, 0.01)
+        );
+    }
+}
+
+#[test]
+fn lags_without_pairs_do_not_count() {
+    let mut x = noise::white(600, 1.0, &mut rng(7));
+    let sampled: Vec<f64> = x.iter().step_by(3).copied().collect();
+    for (k, x) in x.iter_mut().enumerate() {
+        if k % 3 != 0 {
+            *x = f64::NAN;
+        }
+    }
+    // Every third sample only: the test of the series of these.
+    let (whole, thin) = (ljung_box(&sampled, 6, 0), ljung_box(&x, 18, 0));
+    assert_relative_eq!(whole.unwrap(), thin.unwrap(), max_relative = 1e-9);
+    assert!(matches!(
+        ljung_box(&x, 2, 0),
+        Err(Error::TooFewSamples { .. })
+    ));
+    assert!(ljung_box(&[f64::NAN; 40], 5, 0).is_err());
 }

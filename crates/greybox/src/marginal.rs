@@ -11,7 +11,8 @@
 //! -2 log l = (N - p) log(R_rr^2) + log|V| + 2 sum_j log|R_jj|,   V the noise's covariance over sigma^2,
 //! ```
 //! minimised over the partial correlations of the model, `k_i = tanh z_i`, by BFGS from Burg's solution.
-//! `R_rr^2/(N - p)` is then the innovations' variance. The order is Burg's.
+//! `R_rr^2/(N - p)` is then the innovations' variance. The order is Burg's. Rows without a reading, whose residual is NaN, are left out
+//! of all of this exactly: `N` counts the others, and `V` is their covariance.
 //!
 //! **Cost**: `O(N (p + 1) (p + q))` for an evaluation, about ten evaluations for each coefficient, most of them side by side.
 //!
@@ -159,6 +160,14 @@ fn model(z: &[f64]) -> Result<ArModel, Error> {
     Ok(ArModel::from_reflections(&tanh(z), 1.0)?)
 }
 
+/// Record by record, whether each row's reading is there: the residual of a missing one is NaN.
+pub(crate) fn observed(rows: &Rows) -> impl Iterator<Item = Vec<bool>> {
+    let columns = rows.columns;
+    let there = move |row: &[f64]| !row[columns - 1].is_nan();
+    rows.records()
+        .map(move |record| record.chunks_exact(columns).map(there).collect())
+}
+
 struct Criterion {
     /// Minus twice the logarithm of the marginal likelihood.
     value: f64,
@@ -174,7 +183,7 @@ impl Criterion {
         let mut order = columns.to_vec();
         order.push(rows.columns - 1);
         let triangle = rows.fold(&order, model);
-        let log_det: f64 = rows.lengths.iter().map(|&n| model.log_det(n)).sum();
+        let log_det: f64 = observed(rows).map(|record| model.log_det_of(record)).sum();
         let mut rank = 0.0;
         let mut volume = 0.0;
         for j in 0..p {
@@ -259,4 +268,81 @@ fn bfgs(mut x: Vec<f64>, f: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
         }
     }
     x
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use approx::assert_relative_eq;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Covariance, of unit innovations, of the rows that are there, one block for each record.
+    pub(crate) fn covariance(noise: &ArModel, lengths: &[usize], there: &[usize]) -> DMatrix<f64> {
+        let n = lengths.iter().sum();
+        let mut all = DMatrix::zeros(n, n);
+        let mut from = 0;
+        for &length in lengths {
+            let mut inverse = DMatrix::zeros(length, length);
+            for j in 0..length {
+                let mut unit = vec![0.0; length];
+                unit[j] = 1.0;
+                inverse.set_column(j, &DVector::from_vec(noise.whiten(&unit)));
+            }
+            let factor = inverse.try_inverse().unwrap();
+            all.view_mut((from, from), (length, length))
+                .copy_from(&(&factor * factor.transpose()));
+            from += length;
+        }
+        all.select_rows(there).select_columns(there)
+    }
+
+    /// Rows of two records with two columns and the residual, NaN in some; of the rows that are there the columns, the
+    /// residuals, and which these rows are.
+    pub(crate) fn rows_with_missing() -> (Rows, DMatrix<f64>, DVector<f64>, Vec<usize>) {
+        let lengths = vec![40, 23];
+        let missing = |k: usize| matches!(k, 0 | 4 | 6 | 7 | 20..=29 | 45 | 47 | 61 | 62);
+        let mut values = Vec::new();
+        for k in 0..63 {
+            let t = k as f64;
+            let residual = (1.7 * t).sin() + (0.3 * t).cos() + 0.2 * (0.05 * t * t).sin();
+            let residual = if missing(k) { f64::NAN } else { residual };
+            values.extend([(0.2 * t).sin(), 1.0 / (1.0 + t), residual]);
+        }
+        let rows = Rows {
+            columns: 3,
+            lengths,
+            values,
+        };
+        let there: Vec<usize> = (0..63).filter(|&k| !missing(k)).collect();
+        let all = DMatrix::from_row_slice(63, 3, &rows.values).select_rows(&there);
+        let (j, r) = (all.columns(0, 2).into_owned(), all.column(2).into_owned());
+        (rows, j, r, there)
+    }
+
+    #[test]
+    fn criterion_is_that_of_dense_algebra_where_rows_are_missing() {
+        let (rows, j, r, there) = rows_with_missing();
+        for coefficients in [&[][..], &[0.8], &[0.7, -0.3, 0.2]] {
+            let model = ArModel::from_coefficients(coefficients, 1.0).unwrap();
+            let ours = Criterion::of(&rows, &[0, 1], &model);
+            let v = covariance(&model, &rows.lengths, &there);
+            let weight = v.clone().try_inverse().unwrap();
+            let normal = j.transpose() * &weight * &j;
+            let solved = normal.clone().try_inverse().unwrap() * j.transpose() * &weight * &r;
+            let left = &r - &j * solved;
+            let squares = (left.transpose() * &weight * &left)[(0, 0)];
+            let freedom = there.len() as f64 - 2.0;
+            let dense = freedom * squares.ln() + v.determinant().ln() + normal.determinant().ln();
+            assert_relative_eq!(ours.value, dense, max_relative = 1e-9);
+            assert_relative_eq!(ours.variance, squares / freedom, max_relative = 1e-9);
+            assert_relative_eq!(ours.left, freedom);
+        }
+        // The search starts from the model of the readings that are there, and lowers the criterion.
+        let most = noise(&rows, &[0, 1], 3).unwrap();
+        let at = Criterion::of(&rows, &[0, 1], &most);
+        let white = Criterion::of(&rows, &[0, 1], &ArModel::white(1.0));
+        assert!(most.order() > 0 && at.value < white.value);
+        assert_relative_eq!(most.sigma().powi(2), at.variance, max_relative = 1e-9);
+    }
 }

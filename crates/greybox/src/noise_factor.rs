@@ -2,18 +2,66 @@
 
 use ct_signals::ArModel;
 
-/// A noise model's factor `L`, of unit innovations, of the covariance `L L'` of one record, seen from its end.
+/// A noise model's factor `L`, of unit innovations, of the covariance `L L'` of the samples of one record that are there.
 ///
 /// With the predictors `a^(m)`, `m = min(k, q)`, of the sample `k` and `s_m` their error over the innovations',
 /// `v[k] = sum_i a^(m)_i v[k-i] + s_m e[k]`: `L = A^-1 S`, `A` a unit lower band and `S` diagonal. Rows of `lanes`
 /// values run along the time.
+///
+/// Where rows are missing, the last q values are the filter's state, the missing ones by their estimates, and both
+/// transposes run the adjoint of that filter ([`ct_signals::Whitener`]) backwards. Missing rows are zero then, whatever they were.
 pub(crate) struct Factor {
     predictors: Vec<Vec<f64>>,
     scales: Vec<f64>,
+    /// Row by row from the first that is there; `None` where none is missing.
+    gains: Option<Gains>,
+}
+
+/// The filter of one record, row by row.
+struct Gains {
+    /// Missing rows before the first that is there.
+    before: usize,
+    rows: Vec<Row>,
+}
+
+enum Row {
+    Missing,
+    There {
+        /// Standard deviation of its prediction error over the innovations'.
+        scale: f64,
+        /// How many rows before it a missing one is, and the share of the prediction error that corrects its estimate.
+        gains: Vec<(usize, f64)>,
+    },
+}
+
+impl Gains {
+    fn new(noise: &ArModel, observed: &[bool]) -> Option<Self> {
+        if observed.iter().all(|there| *there) {
+            return None;
+        }
+        let before = observed.iter().take_while(|there| !**there).count();
+        let mut whitener = noise.whitener(0);
+        let row = |there: &bool| {
+            if !there {
+                whitener.skip();
+                return Row::Missing;
+            }
+            let scale = whitener.push_with_variance(&mut []).sqrt();
+            Row::There {
+                scale,
+                gains: whitener.gains().collect(),
+            }
+        };
+        Some(Self {
+            before,
+            rows: observed[before..].iter().map(row).collect(),
+        })
+    }
 }
 
 impl Factor {
-    pub(crate) fn new(noise: &ArModel) -> Self {
+    /// Of a record with one entry for each row: false where it is missing.
+    pub(crate) fn new(noise: &ArModel, observed: &[bool]) -> Self {
         let reflections = noise.reflections();
         let mut scales = vec![1.0; reflections.len() + 1];
         for (m, k) in reflections.iter().enumerate().rev() {
@@ -22,6 +70,7 @@ impl Factor {
         Self {
             predictors: noise.predictors(),
             scales,
+            gains: Gains::new(noise, observed),
         }
     }
 
@@ -31,6 +80,10 @@ impl Factor {
 
     /// `L' x` in place: the rows that follow are known when a row's turn comes, backwards in time.
     pub(crate) fn colour_transposed(&self, rows: &mut [f64], lanes: usize) {
+        if let Some(gains) = &self.gains {
+            self.adjoint(gains, rows, lanes, true);
+            return;
+        }
         let (n, q) = (rows.len() / lanes, self.order());
         for k in (0..n).rev() {
             let (upto, later) = rows.split_at_mut((k + 1) * lanes);
@@ -52,6 +105,10 @@ impl Factor {
 
     /// `L^-T x` in place.
     pub(crate) fn whiten_transposed(&self, rows: &mut [f64], lanes: usize) {
+        if let Some(gains) = &self.gains {
+            self.adjoint(gains, rows, lanes, false);
+            return;
+        }
         let (n, q) = (rows.len() / lanes, self.order());
         for (row, scale) in rows.chunks_exact_mut(lanes).zip(&self.scales[..q]) {
             for x in row {
@@ -66,6 +123,55 @@ impl Factor {
                     for (x, y) in own.iter_mut().zip(row) {
                         *x -= a * y;
                     }
+                }
+            }
+        }
+    }
+    /// The adjoint of the filter that colours, or of the one that whitens: the sensitivity to each row of `sum x y`, `y`
+    /// what the filter makes of the rows.
+    fn adjoint(&self, filter: &Gains, rows: &mut [f64], lanes: usize, colour: bool) {
+        let q = self.order();
+        let (before, rows) = rows.split_at_mut(filter.before * lanes);
+        before.fill(0.0);
+        let mut input = vec![0.0; lanes];
+        // Sensitivity to each row as a part of the state.
+        let mut state = vec![0.0; rows.len()];
+        for (k, row) in filter.rows.iter().enumerate().rev() {
+            let (past, own) = state[..(k + 1) * lanes].split_at_mut(k * lanes);
+            let out = &mut rows[k * lanes..][..lanes];
+            let predictor = &self.predictors[q.min(k)];
+            input.copy_from_slice(own);
+            // `own`: to the prediction of this row, on which the state before acts.
+            match row {
+                Row::Missing => out.fill(0.0),
+                Row::There { scale, gains } => {
+                    // To the prediction error.
+                    let error = &mut input;
+                    for (error, x) in error.iter_mut().zip(&*out) {
+                        *error = if colour { *error + x } else { x / scale };
+                    }
+                    if colour {
+                        own.copy_from_slice(error);
+                    }
+                    for (lag, gain) in gains {
+                        let past = &past[(k - lag) * lanes..][..lanes];
+                        for (error, past) in error.iter_mut().zip(past) {
+                            *error += gain * past;
+                        }
+                    }
+                    for ((out, error), own) in out.iter_mut().zip(&*error).zip(&mut *own) {
+                        if colour {
+                            *out = scale * error;
+                        } else {
+                            *out = error + *own;
+                            *own = -error;
+                        }
+                    }
+                }
+            }
+            for (a, past) in predictor.iter().zip(past.chunks_exact_mut(lanes).rev()) {
+                for (past, own) in past.iter_mut().zip(&*own) {
+                    *past += a * own;
                 }
             }
         }
@@ -91,8 +197,8 @@ mod tests {
     #[test]
     fn transposes_agree_with_dense_algebra() {
         let noise = ArModel::from_coefficients(&[1.2, -0.6, 0.25], 1.0).unwrap();
-        let factor = Factor::new(&noise);
         for n in [1, 2, 3, 4, 12] {
+            let factor = Factor::new(&noise, &vec![true; n]);
             let l = dense(&noise, n);
             let x = nalgebra::DMatrix::from_fn(n, 2, |i, j| ((3 * i + 7 * j) as f64).sin());
             let mut rows: Vec<f64> = x.transpose().iter().copied().collect();
@@ -104,6 +210,66 @@ mod tests {
             factor.whiten_transposed(&mut rows, 2);
             for (a, b) in rows.iter().zip(x.transpose().iter()) {
                 assert_relative_eq!(a, b, max_relative = 1e-12, epsilon = 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn transposes_agree_with_dense_algebra_where_rows_are_missing() {
+        let n = 30;
+        for coefficients in [
+            &[][..],
+            &[0.9],
+            &[1.2, -0.6, 0.25],
+            &[0.3, 0.1, 0.0, -0.4, 0.2],
+        ] {
+            let noise = ArModel::from_coefficients(coefficients, 1.0).unwrap();
+            let full = dense(&noise, n);
+            for missing in [
+                vec![0, 1],
+                vec![1],
+                vec![3, 5, 6, 7, 29],
+                (0..n).filter(|k| k % 3 != 1).collect(),
+                (8..22).collect(),
+            ] {
+                let observed: Vec<bool> = (0..n).map(|k| !missing.contains(&k)).collect();
+                let there: Vec<usize> = (0..n).filter(|&k| observed[k]).collect();
+                // The covariance without the rows and columns of what is missing.
+                let covariance = (&full * full.transpose())
+                    .select_rows(&there)
+                    .select_columns(&there);
+                let l = covariance.cholesky().unwrap().l();
+                let x = nalgebra::DMatrix::from_fn(there.len(), 2, |i, j| {
+                    ((3 * i + 7 * j) as f64).sin()
+                });
+                let mut rows = vec![f64::NAN; 2 * n];
+                for (i, k) in there.iter().enumerate() {
+                    rows[2 * k] = x[(i, 0)];
+                    rows[2 * k + 1] = x[(i, 1)];
+                }
+                let check = |rows: &[f64], expected: &nalgebra::DMatrix<f64>| {
+                    for (i, k) in there.iter().enumerate() {
+                        for j in 0..2 {
+                            let (ours, dense) = (rows[2 * k + j], expected[(i, j)]);
+                            assert_relative_eq!(ours, dense, max_relative = 1e-10, epsilon = 1e-11);
+                        }
+                    }
+                    for k in &missing {
+                        assert_eq!(rows[2 * k..2 * k + 2], [0.0, 0.0]);
+                    }
+                };
+                let factor = Factor::new(&noise, &observed);
+                let mut coloured = rows.clone();
+                factor.colour_transposed(&mut coloured, 2);
+                check(&coloured, &(l.transpose() * &x));
+                let mut whitened = rows;
+                factor.whiten_transposed(&mut whitened, 2);
+                check(
+                    &whitened,
+                    &l.transpose().try_inverse().map(|i| i * &x).unwrap(),
+                );
+                factor.colour_transposed(&mut whitened, 2);
+                check(&whitened, &x);
             }
         }
     }

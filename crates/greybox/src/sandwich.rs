@@ -50,7 +50,8 @@ pub fn robust(setup: &Setup, fit: &Fit, order: usize) -> Result<Robust, Error> {
         .rows(&fit.x)
         .ok_or(Error::NoFiniteStart { starts: 1 })?;
     let noise = marginal::noise(&rows, fit.interior(), order)?;
-    let sandwich = Sandwich::new(&rows, fit);
+    let bread = fit.triangle.covariance(fit.interior());
+    let sandwich = Sandwich::new(&rows, fit.interior(), &fit.noise, bread);
     let variances = |noise: &ArModel, variance: f64| sandwich.variances(noise, variance);
     let own = variances(&noise, noise.sigma().powi(2)).unwrap_or_default();
     let freedom =
@@ -64,35 +65,41 @@ pub fn robust(setup: &Setup, fit: &Fit, order: usize) -> Result<Robust, Error> {
     })
 }
 
-/// `C` and the rows `M J` of the entries that are not at a bound.
+/// `C` and the rows `M J` of the entries that are not at a bound. Rows whose reading is missing have no part in either.
 struct Sandwich {
     bread: Option<Vec<Vec<f64>>>,
     lanes: usize,
-    records: Vec<Vec<f64>>,
+    /// For each record its rows, zero where missing, and whether each is there.
+    records: Vec<(Vec<f64>, Vec<bool>)>,
 }
 
 impl Sandwich {
-    fn new(rows: &Rows, fit: &Fit) -> Self {
-        let lanes = fit.interior().len();
-        let factor = Factor::new(&fit.noise);
+    /// From the rows' columns of these entries and the noise model of the fit, `W`, and `C` over them.
+    fn new(rows: &Rows, columns: &[usize], metric: &ArModel, bread: Option<Vec<Vec<f64>>>) -> Self {
+        let lanes = columns.len();
         let records = rows
             .records()
-            .map(|record| {
-                let mut whitener = fit.noise.whitener(lanes);
-                let mut own = Vec::with_capacity(record.len() / rows.columns * lanes);
-                for row in record.chunks_exact(rows.columns) {
+            .zip(marginal::observed(rows))
+            .map(|(record, observed)| {
+                let mut whitener = metric.whitener(lanes);
+                let mut own = Vec::with_capacity(observed.len() * lanes);
+                for (row, there) in record.chunks_exact(rows.columns).zip(&observed) {
                     let from = own.len();
-                    own.extend(fit.interior().iter().map(|&column| row[column]));
-                    whitener.push(&mut own[from..]);
+                    own.extend(columns.iter().map(|&column| row[column]));
+                    if *there {
+                        whitener.push(&mut own[from..]);
+                    } else {
+                        whitener.skip();
+                    }
                 }
                 if lanes > 0 {
-                    factor.whiten_transposed(&mut own, lanes);
+                    Factor::new(metric, &observed).whiten_transposed(&mut own, lanes);
                 }
-                own
+                (own, observed)
             })
             .collect();
         Self {
-            bread: fit.triangle.covariance(fit.interior()),
+            bread,
             lanes,
             records,
         }
@@ -103,11 +110,10 @@ impl Sandwich {
         if self.lanes == 0 {
             return Some(Vec::new());
         }
-        let factor = Factor::new(noise);
         let mut filling = Triangle::new(self.lanes);
-        for record in &self.records {
+        for (record, observed) in &self.records {
             let mut rows = record.clone();
-            factor.colour_transposed(&mut rows, self.lanes);
+            Factor::new(noise, observed).colour_transposed(&mut rows, self.lanes);
             for row in rows.chunks_exact(self.lanes) {
                 filling.push(row);
             }
@@ -127,5 +133,39 @@ impl Sandwich {
                 })
                 .collect(),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::marginal::tests::{covariance, rows_with_missing};
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn agrees_with_dense_algebra_where_rows_are_missing() {
+        let (rows, j, _, there) = rows_with_missing();
+        let noise = ArModel::from_coefficients(&[0.7, -0.3, 0.2], 1.0).unwrap();
+        for metric in [
+            ArModel::white(1.0),
+            ArModel::from_coefficients(&[0.6, 0.2], 1.0).unwrap(),
+        ] {
+            let bread = rows.fold(&[0, 1, 2], &metric).covariance(&[0, 1]);
+            let ours = Sandwich::new(&rows, &[0, 1], &metric, bread)
+                .variances(&noise, 0.5)
+                .unwrap();
+            let weighted = covariance(&metric, &rows.lengths, &there)
+                .try_inverse()
+                .unwrap()
+                * &j;
+            let bread = (j.transpose() * &weighted).try_inverse().unwrap();
+            let filling =
+                weighted.transpose() * covariance(&noise, &rows.lengths, &there) * &weighted;
+            let dense = &bread * filling * &bread * 0.5;
+            for (i, ours) in ours.iter().enumerate() {
+                assert_relative_eq!(*ours, dense[(i, i)], max_relative = 1e-9);
+            }
+        }
     }
 }

@@ -31,14 +31,21 @@ impl Rows {
         })
     }
 
-    /// The folded rows, whitened by a noise model, with columns chosen and put in this order.
+    /// The folded rows, whitened by a noise model, with columns chosen and put in this order. Rows whose residual is NaN are
+    /// missing: they are not folded in, and the rows behind them are whitened by what is there.
     pub(crate) fn fold(&self, order: &[usize], noise: &ArModel) -> Triangle {
         let mut triangle = Triangle::new(order.len());
         let mut whitener = noise.whitener(order.len());
         let mut chosen = vec![0.0; order.len()];
         for record in self.records() {
             whitener.reset();
+            let mut missing = 0;
             for row in record.chunks_exact(self.columns) {
+                if row[self.columns - 1].is_nan() {
+                    missing += 1;
+                    continue;
+                }
+                whitener.skip_many(std::mem::take(&mut missing));
                 for (to, &column) in chosen.iter_mut().zip(order) {
                     *to = row[column];
                 }

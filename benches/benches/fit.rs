@@ -7,7 +7,7 @@
 use std::{collections::BTreeMap, hint::black_box, time::Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use ct_signals::{ArModel, Hold, Record, Signal};
+use ct_signals::{ArModel, Channel, Record};
 use greybox::{FitOptions, Setup, Triangle, fit_from};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
@@ -43,11 +43,10 @@ fn record() -> Option<Record> {
     Some(Record {
         name: "tanks".into(),
         time: (0..SAMPLES).map(|k| k as f64 * H).collect(),
-        input: Signal::new("u", "V", u),
-        output: Signal::new("y", "cm", y),
-        input_2: None,
-        reference: None,
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", u)],
+        outputs: vec![Channel::new("y", "cm", y)],
+        references: Vec::new(),
+        calendar: None,
     })
 }
 

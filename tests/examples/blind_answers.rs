@@ -40,8 +40,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             data: vec![record.clone()],
             model: record.with_extension("toml"),
             test: Vec::new(),
+            options: ct_signals::ReadOptions::default(),
         };
-        let found = diagnose(&files.read()?, &Options::default(), &|_| {})?;
+        let found = diagnose(&files.read()?.problem, &Options::default(), &|_| {})?;
         answers.push(answer(&name, &found));
         let truth = public.join(format!("../answers/{name}.answer.json"));
         let mut line = format!("{name} {:?} {}", found.verdict, first(&found));

@@ -11,14 +11,14 @@ fn main() -> io::Result<()> {
         .and_then(|rows| rows.parse().ok())
         .unwrap_or(1000);
     let onset = Onset::nothing(rows, 0.0, 0);
-    let record = onset
+    let mut record = onset
         .run(true, 1)
         .ok_or_else(|| io::Error::other("the loop does not run"))?;
     let mut out = BufWriter::new(io::stdout().lock());
     writeln!(out, "t [s],r [cm],u [V],y [cm]")?;
-    let reference = record.reference.map_or(Vec::new(), |r| r.values);
+    let reference = record.references.pop().map_or(Vec::new(), |r| r.values);
     for (k, r) in reference.iter().enumerate() {
-        let (u, y) = (record.input.values[k], record.output.values[k]);
+        let (u, y) = (record.inputs[0].values[k], record.outputs[0].values[k]);
         writeln!(out, "{:.4},{r:.3},{u:.4},{y:.4}", record.time[k])?;
     }
     out.flush()

@@ -274,7 +274,7 @@ fn misfit(rig: &Rig, seed: u64, near: Option<&[f64]>, more: usize) -> Option<Fit
     let records = [without_noise(rig, seed)];
     let level = *rig.levels.last()?;
     let sound = |y: &f64| y.is_finite() && (0.1 * level..3.0 * level).contains(y);
-    if !records[0].output.values.iter().all(sound) {
+    if !records[0].outputs[0].values.iter().all(sound) {
         return None;
     }
     let setup = Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
@@ -396,7 +396,7 @@ mod tests {
         let rig = with_effect(effect, 1.0, Drive::Open, 0.0, 300, 1).unwrap();
         assert!((rig.converter / rig.noise - 12.0_f64.sqrt()).abs() < 1e-12);
         let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1));
-        for y in &record.output.values {
+        for y in &record.outputs[0].values {
             let steps = y / rig.converter;
             assert!((steps - steps.round()).abs() < 1e-9);
         }

@@ -8,7 +8,7 @@ pub mod onset;
 pub mod outside;
 pub mod three_tanks;
 
-use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
+use ct_signals::{Channel, Error, Record, excitation, noise};
 use missing_effect::Problem;
 use plants::{
     Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Term,
@@ -339,11 +339,13 @@ impl Rig {
         Record {
             name: "rig".to_string(),
             time: time.to_vec(),
-            input: Signal::new("u", "V", u),
-            output: Signal::new("y", "cm", y),
-            input_2: None,
-            reference: (self.drive == Drive::Closed).then(|| Signal::new("r", "cm", wanted)),
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", u)],
+            outputs: vec![Channel::new("y", "cm", y)],
+            references: (self.drive == Drive::Closed)
+                .then(|| Channel::new("r", "cm", wanted))
+                .into_iter()
+                .collect(),
+            calendar: None,
         }
     }
 }

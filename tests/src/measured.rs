@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ct_signals::{Columns, Hold, Record, Signal, read_csv};
+use ct_signals::{Channel, Columns, ReadOptions, Record, read_csv};
 use missing_effect::{Diagnosis, Problem, Verdict};
 use plants::{Known, Plant};
 
@@ -321,18 +321,20 @@ fn loop_of(file: &str) -> Option<&str> {
 }
 
 fn csv(path: &Path, columns: &Columns) -> Result<Record, String> {
-    read_csv(path, columns, Hold::Zero).map_err(|why| why.to_string())
+    let reading = read_csv(path, columns, &ReadOptions::default());
+    reading
+        .map(|reading| reading.record)
+        .map_err(|why| why.to_string())
 }
 
 fn valve(path: &Path) -> Result<Record, String> {
-    let column = |name: &str| Some(name.to_string());
     csv(
         path,
         &Columns {
-            time: column("t_s"),
-            input: column("op_pct"),
-            output: column("pv"),
-            reference: column("sp"),
+            time: Some("t_s".to_string()),
+            inputs: vec!["op_pct".to_string()],
+            outputs: vec!["pv".to_string()],
+            references: vec!["sp".to_string()],
             ..Columns::default()
         },
     )
@@ -343,8 +345,8 @@ fn heater(path: &Path, number: usize) -> Result<Record, String> {
         path,
         &Columns {
             time: Some("t_s".to_string()),
-            input: Some(format!("Q{number}_pct")),
-            output: Some(format!("T{number}_C")),
+            inputs: vec![format!("Q{number}_pct")],
+            outputs: vec![format!("T{number}_C")],
             ..Columns::default()
         },
     )
@@ -384,11 +386,10 @@ fn groundwater(path: &Path) -> Result<Record, String> {
     let record = Record {
         name,
         time,
-        input: Signal::new("P - E", "m", input),
-        input_2: None,
-        output: Signal::new("h", "m", output),
-        reference: None,
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("P - E", "m", input)],
+        outputs: vec![Channel::new("h", "m", output)],
+        references: Vec::new(),
+        calendar: None,
     };
     record.validate().map_err(|why| why.to_string())?;
     Ok(record)

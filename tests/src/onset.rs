@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
+use ct_signals::{ArModel, Channel, Record, excitation, noise};
 use greybox::{Setup, Stopping, fit_from};
 use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
 use plants::{Command, EffectInfo, Placed, Plant, Scales, Simulator, Structure};
@@ -120,7 +120,7 @@ impl Onset {
         let records = [self.run(false, 1)?];
         let level = *self.rig.levels.last()?;
         let sound = |y: &f64| y.is_finite() && (0.1 * level..3.0 * level).contains(y);
-        if !records[0].output.values.iter().all(sound) {
+        if !records[0].outputs[0].values.iter().all(sound) {
             return None;
         }
         let setup = Setup::from_records(
@@ -215,11 +215,14 @@ impl Onset {
         Some(Record {
             name: "loop".to_string(),
             time: (0..rig.samples).map(|k| k as f64 * rig.interval).collect(),
-            input: Signal::new("u", "V", u),
-            input_2: None,
-            output: Signal::new("y", "cm", y),
-            reference: commands.is_none().then(|| Signal::new("r", "cm", wanted)),
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", u)],
+            outputs: vec![Channel::new("y", "cm", y)],
+            references: commands
+                .is_none()
+                .then(|| Channel::new("r", "cm", wanted))
+                .into_iter()
+                .collect(),
+            calendar: None,
         })
     }
 
@@ -228,23 +231,23 @@ impl Onset {
     pub fn watched(&self, settings: Settings, seed: u64) -> Option<Vec<Alarm>> {
         let record = self.run(true, seed)?;
         let model = Model {
-            hold: record.hold,
+            hold: record.hold(),
             ..Model::new(self.rig.plant, self.rig.known())
         };
         let units = Units {
-            output: record.output.unit.clone(),
-            input: record.input.unit.clone(),
+            output: record.outputs[0].unit.clone(),
+            input: record.inputs[0].unit.clone(),
         };
         let mut monitor = Monitor::new(model, settings, units).ok()?;
         let mut alarms = Vec::new();
         for (k, lost) in self.lost_rows(&record, seed).into_iter().enumerate() {
             let row = Row {
                 time: record.time[k],
-                input: record.input.values[k],
+                input: record.inputs[0].values[k],
                 output: if lost {
                     f64::NAN
                 } else {
-                    record.output.values[k]
+                    record.outputs[0].values[k]
                 },
             };
             alarms.extend(monitor.update(&row).ok()?.alarm);
@@ -261,7 +264,7 @@ impl Onset {
             rows.fill_with(|| rng.random_bool(lost.share));
             return rows;
         }
-        let steps = record.reference.as_ref().unwrap_or(&record.input);
+        let steps = record.references.first().unwrap_or(&record.inputs[0]);
         let between = 0.5 * (self.rig.hold.0 + self.rig.hold.1) as f64;
         let burst = ((lost.share * between).round() as usize).max(1);
         for k in 1..rows.len() {
@@ -282,10 +285,10 @@ impl Onset {
         let middle = 0.5 * (rig.command.0 + rig.command.1);
         let mut plain = Simulator::new(&self.structure(), &rig.theta, &rig.levels, middle).ok()?;
         for k in 0..rig.samples {
-            if (record.output.values[k] - plain.read()).abs() >= rig.noise {
+            if (record.outputs[0].values[k] - plain.read()).abs() >= rig.noise {
                 return Some(k);
             }
-            plain.advance(Command::held(record.input.values[k]), rig.interval);
+            plain.advance(Command::held(record.inputs[0].values[k]), rig.interval);
         }
         None
     }

@@ -1,6 +1,6 @@
 //! Three tanks of 154 cm^2 that are joined by valves, two pumps, the level of T3 measured.
 
-use ct_signals::{Hold, Record, Signal, excitation, noise};
+use ct_signals::{Channel, Record, excitation, noise};
 use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -59,10 +59,9 @@ pub fn record(hidden: Option<(&str, usize, &[f64])>, samples: usize, seed: u64) 
     Record {
         name: "three tanks".into(),
         time: (0..samples).map(|k| k as f64 * INTERVAL).collect(),
-        input: Signal::new("u1", "V", u),
-        input_2: Some(Signal::new("u2", "V", v)),
-        output: Signal::new("h3", "cm", y),
-        reference: None,
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u1", "V", u), Channel::new("u2", "V", v)],
+        outputs: vec![Channel::new("h3", "cm", y)],
+        references: Vec::new(),
+        calendar: None,
     }
 }

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use ct_signals::Signal;
+use ct_signals::Channel;
 use ctid::input::Files;
 use ctid_tests::{Drive, Rig};
 use missing_effect::{ControlLoop, Diagnosis, Options, Problem, Verdict, compare, diagnose};
@@ -156,13 +156,13 @@ fn a_loop_that_cannot_be_simulated_is_not() {
         }
     };
     let mut without = good.clone();
-    without.records[0].reference = None;
+    without.records[0].references.clear();
     refused(
         &without,
         &["rig: the record holds no reference", "[columns]"],
     );
     let mut constant = good.clone();
-    constant.records[0].reference = Some(Signal::new("r", "cm", vec![16.0; 1000]));
+    constant.records[0].references = vec![Channel::new("r", "cm", vec![16.0; 1000])];
     refused(&constant, &["reference stays at 16", "set point changes"]);
     let mut other = good.clone();
     other.controller = Some(Controller::pi(0.6, 200.0, (0.0, 10.0)).unwrap());
@@ -212,8 +212,9 @@ fn controllers_of_independent_records_give_the_measured_commands() {
             data: vec![path.with_extension("csv")],
             test: Vec::new(),
             model: path.clone(),
+            options: ct_signals::ReadOptions::default(),
         };
-        let problem = files.read().unwrap();
+        let problem = files.read().unwrap().problem;
         let Some(controller) = &problem.controller else {
             continue;
         };

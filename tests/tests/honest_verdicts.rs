@@ -213,7 +213,7 @@ fn a_comparison_knows_the_noise_of_a_white_record() {
         for seed in 1..=2 {
             let rig = Rig::single_tank();
             let mut problem = problem(&rig, seed);
-            for value in &mut problem.records[0].output.values {
+            for value in &mut problem.records[0].outputs[0].values {
                 *value *= unit;
             }
             problem.known.area[0] = None;
@@ -228,7 +228,7 @@ fn a_comparison_knows_the_noise_of_a_white_record() {
             );
             // Three times the noise in one window of the twelve.
             let more = noise::white(83, 3.0 * noise, &mut ChaCha8Rng::seed_from_u64(seed));
-            for (y, e) in problem.records[0].output.values[500..583]
+            for (y, e) in problem.records[0].outputs[0].values[500..583]
                 .iter_mut()
                 .zip(more)
             {

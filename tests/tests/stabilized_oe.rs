@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use ct_constrained::Bounds;
 use ct_rls::{ContinuousRls, ExactHold, RecursiveEstimator, Weights};
-use ct_signals::{Columns, Hold, Record, noise, read_csv};
+use ct_signals::{Columns, ReadOptions, Record, noise, read_csv};
 use ctid_tests::{Drive, Rig};
 use greybox::{Fit, FitOptions, Setup, fit};
 use nalgebra::{SMatrix, SVector};
@@ -30,7 +30,7 @@ enum Memory {
 /// The estimates after every sample, started from two lags of `time` s and the ranges of the signals, with bounds on `c^` that are
 /// positive real for all plants within 30 % of that.
 fn run(record: &Record, time: f64, memory: Memory) -> Vec<Theta> {
-    let (u, y) = (record.input.range(), record.output.range());
+    let (u, y) = (record.inputs[0].range(), record.outputs[0].range());
     let gain = (y.1 - y.0) / (u.1 - u.0);
     let start = Theta::from([2.0 * time, time * time, gain, y.0 - gain * u.0]);
     let size = Theta::from([time, time * time, gain, y.1 - y.0]);
@@ -49,7 +49,7 @@ fn run(record: &Record, time: f64, memory: Memory) -> Vec<Theta> {
     .with_offset()
     .with_filter_bounds(around(0.9, 1.2))
     .unwrap()
-    .with_model_state([record.output.values[0], 0.0])
+    .with_model_state([record.outputs[0].values[0], 0.0])
     .unwrap();
     let checked = estimator.check_filter_bounds(&around(0.7, 1.3)).unwrap();
     assert!(checked.hold(), "{checked}");
@@ -63,8 +63,8 @@ fn run(record: &Record, time: f64, memory: Memory) -> Vec<Theta> {
         let weights = Weights::least_squares(eta).unwrap();
         estimator.gain_mut().blocks_mut().0.set_weights(weights);
         let sample = IoSample {
-            u: record.input.values[k],
-            y: record.output.values[k],
+            u: record.inputs[0].values[k],
+            y: record.outputs[0].values[k],
         };
         assert!(
             estimator
@@ -208,7 +208,11 @@ fn measured() -> Option<Record> {
         );
         return None;
     }
-    Some(read_csv(&file, &Columns::default(), Hold::Zero).unwrap())
+    Some(
+        read_csv(&file, &Columns::default(), &ReadOptions::default())
+            .unwrap()
+            .record,
+    )
 }
 
 /// Standard deviation of the gain's estimate over the record, relative to its mean, once the start is forgotten.
@@ -235,7 +239,7 @@ fn on_measured_tanks_the_estimates_drift() {
         for seed in 0..3 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let noise = noise::white(output[0].len(), 0.03, &mut rng);
-            lags.output.values = output[0].iter().zip(noise).map(|(y, e)| y + e).collect();
+            lags.outputs[0].values = output[0].iter().zip(noise).map(|(y, e)| y + e).collect();
             let same = drift(&lags, time, memory);
             println!("memory {memory} s: measured {real:.3}, lags {same:.3}");
             assert!(real > times * same, "{real} {same}");

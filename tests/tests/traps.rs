@@ -257,7 +257,7 @@ fn a_held_input_is_not_taken_for_a_continuous_one() {
             ..rig.clone()
         };
         let mut record = silent.run(&mut ChaCha8Rng::seed_from_u64(5));
-        record.hold = hold;
+        record.inputs[0].hold = hold;
         let records = [record];
         let setup =
             Setup::from_records(rig.plant, rig.known(), &[], &records, Default::default()).unwrap();
@@ -279,7 +279,7 @@ fn a_held_input_is_not_taken_for_a_continuous_one() {
     let mut record = quiet.run(&mut ChaCha8Rng::seed_from_u64(5));
     let right = diagnose(&quiet.problem(record.clone()), &Options::default(), &|_| {}).unwrap();
     assert_eq!(right.verdict, Verdict::Adequate, "{:?}", right.sentences);
-    record.hold = Hold::First;
+    record.inputs[0].hold = Hold::First;
     let wrong = diagnose(&quiet.problem(record), &Options::default(), &|_| {}).unwrap();
     assert_ne!(wrong.verdict, Verdict::Adequate);
 }

@@ -21,6 +21,11 @@
 //! `w[k] = (v[k] - sum_{i<=m} a^(m)_i v[k-i]) sigma/sigma_m`, `m = min(k, p)`. This is
 //! `w = L^-1 v` for the covariance `sigma^2 L L'`, with no sample lost.
 //!
+//! **Missing samples** are NaN: the likelihood, the whitening and the log-determinant are then those of the samples that are
+//! there, exactly ([`Whitener`]), and the fit maximises that likelihood from order to order, as Burg's recursion needs
+//! unbroken stretches. At a correlation of 0.8 and 2000 samples the standard deviation of the estimate grows by 7 % where
+//! 30 % are missing at random, and by 31 % where only every third is there.
+//!
 //! **Cost**: `p` multiplications per value whitened.
 //!
 //! **Reference**: J. P. Burg, *Maximum entropy spectral analysis*, thesis, Stanford 1975;
@@ -107,8 +112,8 @@ impl ArModel {
     ///
     /// NaN stands for a sample that is missing. Where none is, the fit is Burg's; where some are, it maximises the exact
     /// likelihood of those that are there, and the order is chosen by the same criterion with `N` their number. Of the
-    /// processes that a regular decimation cannot tell apart (every second sample only: of either sign), it is the slower one. Missing samples
-    /// at a segment's ends take no part.
+    /// processes that a regular decimation cannot tell apart (every second sample only: of either sign), it is the
+    /// slower one. Missing samples at a segment's ends take no part.
     ///
     /// The mean is not removed. A signal that is 0 throughout, or whose squares underflow, gives white noise of sigma 0.
     ///

@@ -4,20 +4,21 @@
 //! ```text
 //! D = n log(sum w^2) + log|R| = n log(sum x^2),   x = w |R|^(1/2n)
 //! ```
-//! is minus twice the log likelihood, to a constant, with `sigma` at its best. As the logarithm of a sum of squares it is minimised over the
-//! partial correlations by the Gauss-Newton method, the derivatives of `x` by differences.
+//! is minus twice the log likelihood, to a constant, with `sigma` at its best. As the logarithm of a sum of squares it is
+//! minimised over the partial correlations by the Gauss-Newton method, the derivatives of `x` by differences.
 //!
 //! **Orders**: one after the other. The partial correlation of the next order starts at 0. Where the linearised criterion would fall by
 //! much less than the order's penalty it stays there: estimates of partial correlations at lags beyond the order are nearly
 //! independent of the others. Otherwise it takes its step, and where that shows that it is not small, all of them are
 //! refined.
 //!
-//! **Start**: where hardly any two samples are this lag apart, as where only every third sample is there, `D` does not change to first order at
-//! 0, and may have several minima: the best of a few values is the start. Of two that the samples cannot tell apart, the
+//! **Start**: where hardly any two samples are this lag apart, as where only every third sample is there, `D` does not change
+//! to first order at 0, and may have several minima: the best of a few values is the start. Of two that the samples cannot tell apart, the
 //! positive one: the process that is slower than the sampling.
 //!
 //! **Cost**: an evaluation is one whitening, `O(n p)` and a little more for missing samples; one or two for each order, and about
-//! `p + 2` for each iteration of a refinement. In all about twenty times Burg's recursion.
+//! `p + 2` for each iteration of a refinement. In all 20 to 50 times Burg's recursion where 30 % of 2000 samples are missing, and about
+//! 100 times for every third sample only.
 
 use crate::ArModel;
 use crate::ar::{LogProduct, MARGIN, NOTHING};
@@ -79,7 +80,8 @@ pub(crate) fn fit(segments: &[&[f64]], n: usize, max_order: usize) -> ArModel {
         } else {
             series.step(&mut k, &mut at, &[order - 1], SMALL * penalty);
         }
-        if before - at.deviance > penalty {
+        // The first order has no others.
+        if order > 1 && before - at.deviance > penalty {
             series.refine(&mut k, &mut at, ROUGH);
         }
         if at.squares < NOTHING {

@@ -1,36 +1,116 @@
 //! Which column of a file is the time, the input, the output and the reference.
 //!
 //! A column that is named is looked for by its whole header first, then by its name without the
-//! unit. A unit that the file gives must be the one that the model gives, where both do. A column
-//! that is not named is guessed from the letter that control engineers give it: `t`, `u`, `y`, `r`. The second input is never
+//! unit. A unit that the file gives is converted to the one that the model gives, where both do. A column
+//! that is not named is guessed from the letter that control engineers give it: `t`, `u`, `y`, `r`. A second input or output is never
 //! guessed: whether there is one is for the model to say.
 
 use serde::{Deserialize, Serialize};
 
-use crate::{ColumnFault, Error, quoted, unit};
+use crate::{ColumnFault, Error, quoted, unit, unit::Conversion};
 
 /// The names of the columns, as `[columns]` of a model file gives them; what is absent is guessed.
 ///
-/// A unit may follow in brackets: `y [cm]`, `y (cm)`, or as a suffix: `y_cm`.
+/// A unit may follow in brackets: `y [cm]`, `y (cm)`, or as a suffix: `y_cm`. Where the file has another unit of the same dimension,
+/// its values are converted.
 #[derive(Deserialize, Serialize, Default, Clone, Debug, PartialEq)]
-#[serde(deny_unknown_fields, default)]
+#[serde(from = "Named", into = "Named")]
 pub struct Columns {
-    /// Sampling instants, in us, ms, s, min, h or d; without a unit in s. Guessed: `t...`.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Sampling instants, in us, ms, s, min, h or d, without a unit in s; or dates and times. Guessed: `t...`.
     pub time: Option<String>,
-    /// The command to the actuator. Guessed: `u...`, `input`.
+    /// The commands to the actuators and the measured disturbances. Guessed, one: `u...`, `input`.
+    pub inputs: Vec<String>,
+    /// The sensors' readings. Guessed, one: `y...`, `output`.
+    pub outputs: Vec<String>,
+    /// The set points. Guessed, one: `r`, `r_...`, `ref`, `reference`, `setpoint`; may be missing when none is named.
+    pub references: Vec<String>,
+    /// How dates and times are written, as `strftime` has it: `%d.%m.%Y %H:%M:%S`. Without one it is found from the column.
+    pub time_format: Option<String>,
+    /// The zone of dates that do not say: `Europe/Berlin`, `UTC`, `+01:00`. UTC where it is absent.
+    pub time_zone: Option<String>,
+    /// Words and numbers that stand in cells whose sample is missing, beside the usual ones: `-999`, `Offline`.
+    pub missing: Vec<String>,
+}
+
+/// The same as a model file writes it: one name or a list of them.
+#[derive(Deserialize, Serialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct Named {
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub input: Option<String>,
-    /// The command to a second actuator, of a plant that has two; not guessed.
+    time: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub input_2: Option<String>,
-    /// The sensor's reading. Guessed: `y...`, `output`.
+    input: Option<Names>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub output: Option<String>,
-    /// The set point. Guessed: `r`, `r_...`, `ref`, `reference`, `setpoint`; may be missing when
-    /// it is not named.
+    input_2: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub reference: Option<String>,
+    output: Option<Names>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference: Option<Names>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_format: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_zone: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    missing: Vec<String>,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(
+    untagged,
+    expecting = "a column's name in quotes, such as \"y [cm]\", or a list of them"
+)]
+enum Names {
+    One(String),
+    Several(Vec<String>),
+}
+
+impl Names {
+    fn of(mut names: Vec<String>) -> Option<Self> {
+        match names.len() {
+            0 => None,
+            1 => names.pop().map(Self::One),
+            _ => Some(Self::Several(names)),
+        }
+    }
+
+    fn all(names: Option<Self>) -> Vec<String> {
+        match names {
+            None => Vec::new(),
+            Some(Self::One(name)) => vec![name],
+            Some(Self::Several(names)) => names,
+        }
+    }
+}
+
+impl From<Named> for Columns {
+    fn from(named: Named) -> Self {
+        let mut inputs = Names::all(named.input);
+        inputs.extend(named.input_2);
+        Self {
+            time: named.time,
+            inputs,
+            outputs: Names::all(named.output),
+            references: Names::all(named.reference),
+            time_format: named.time_format,
+            time_zone: named.time_zone,
+            missing: named.missing,
+        }
+    }
+}
+
+impl From<Columns> for Named {
+    fn from(columns: Columns) -> Self {
+        Self {
+            time: columns.time,
+            input: Names::of(columns.inputs),
+            input_2: None,
+            output: Names::of(columns.outputs),
+            reference: Names::of(columns.references),
+            time_format: columns.time_format,
+            time_zone: columns.time_zone,
+            missing: columns.missing,
+        }
+    }
 }
 
 /// What stands above a column.
@@ -61,7 +141,10 @@ pub(crate) struct Found {
     pub index: usize,
     pub header: String,
     pub name: String,
+    /// The unit in which the values are wanted.
     pub unit: String,
+    /// The file's unit and the conversion from it, where it is another one.
+    pub converted: Option<(String, Conversion)>,
 }
 
 /// Where everything is.
@@ -70,10 +153,19 @@ pub(crate) struct Layout {
     pub time: Found,
     /// Seconds in one unit of the time column.
     pub seconds: f64,
-    pub input: Found,
-    pub input_2: Option<Found>,
-    pub output: Found,
-    pub reference: Option<Found>,
+    pub inputs: Vec<Found>,
+    pub outputs: Vec<Found>,
+    pub references: Vec<Found>,
+}
+
+impl Layout {
+    /// The columns that hold values: inputs, outputs, references.
+    pub fn channels(&self) -> impl Iterator<Item = &Found> {
+        self.inputs
+            .iter()
+            .chain(&self.outputs)
+            .chain(&self.references)
+    }
 }
 
 /// What is looked for: a role and the words it goes by.
@@ -86,17 +178,12 @@ struct Role {
 const TIME: Role = Role {
     name: "time",
     letter: 't',
-    words: &["t", "time", "timestamp"],
+    words: &["t", "time", "timestamp", "date", "datetime"],
 };
 const INPUT: Role = Role {
     name: "input",
     letter: 'u',
     words: &["u", "input"],
-};
-const INPUT_2: Role = Role {
-    name: "input_2",
-    letter: 'u',
-    words: &[],
 };
 const OUTPUT: Role = Role {
     name: "output",
@@ -147,11 +234,11 @@ impl Columns {
         };
         Self {
             time: guess(&TIME),
-            input: guess(&INPUT),
-            // A second command is one only where it is named.
-            input_2: None,
-            output: guess(&OUTPUT),
-            reference: guess(&REFERENCE),
+            // A second one is one only where it is named.
+            inputs: guess(&INPUT).into_iter().collect(),
+            outputs: guess(&OUTPUT).into_iter().collect(),
+            references: guess(&REFERENCE).into_iter().collect(),
+            ..Self::default()
         }
     }
 
@@ -168,27 +255,27 @@ impl Columns {
             names: headers,
         };
         // The named ones first, so that none of them is guessed for another role.
-        let named = |role: &Role, wanted: &Option<String>| {
-            wanted
-                .as_deref()
-                .map(|wanted| header.named(role, wanted))
-                .transpose()
+        let named = |role: &Role, wanted: &[String]| {
+            let found = wanted.iter().map(|wanted| header.named(role, wanted));
+            found.collect::<Result<Vec<Found>, Error>>()
         };
-        let time = named(&TIME, &self.time)?;
-        let input = named(&INPUT, &self.input)?;
-        let input_2 = named(&INPUT_2, &self.input_2)?;
-        let output = named(&OUTPUT, &self.output)?;
-        let reference = named(&REFERENCE, &self.reference)?;
+        let time: Vec<String> = self.time.iter().cloned().collect();
+        let mut time = named(&TIME, &time)?;
+        let mut inputs = named(&INPUT, &self.inputs)?;
+        let mut outputs = named(&OUTPUT, &self.outputs)?;
+        let mut references = named(&REFERENCE, &self.references)?;
 
         let mut taken: Vec<(usize, &'static str)> = Vec::new();
-        for (role, column) in [
+        let all = [
             (TIME, &time),
-            (INPUT, &input),
-            (INPUT_2, &input_2),
-            (OUTPUT, &output),
-            (REFERENCE, &reference),
-        ] {
-            let Some(column) = column else { continue };
+            (INPUT, &inputs),
+            (OUTPUT, &outputs),
+            (REFERENCE, &references),
+        ];
+        for (role, column) in all
+            .iter()
+            .flat_map(|(role, columns)| columns.iter().map(move |column| (role, column)))
+        {
             if let Some((_, first)) = taken.iter().find(|(index, _)| *index == column.index) {
                 return Err(header.fault(ColumnFault::Shared {
                     column: quoted(&column.header),
@@ -199,17 +286,21 @@ impl Columns {
             taken.push((column.index, role.name));
         }
 
-        let needed = |role: &Role, column: Option<Found>| match column {
-            Some(column) => Ok(column),
-            None => header
-                .guess(role, &taken)?
-                .ok_or_else(|| header.missing(role, None)),
-        };
-        let time = needed(&TIME, time)?;
-        let input = needed(&INPUT, input)?;
-        let output = needed(&OUTPUT, output)?;
+        for (role, columns) in [
+            (&TIME, &mut time),
+            (&INPUT, &mut inputs),
+            (&OUTPUT, &mut outputs),
+        ] {
+            if columns.is_empty() {
+                let guessed = header.guess(role, &taken)?;
+                columns.push(guessed.ok_or_else(|| header.missing(role, None))?);
+            }
+        }
+        let time = time.swap_remove(0);
         // Nobody has to have a reference: where it is not plain which column it is, there is none.
-        let reference = reference.or_else(|| header.guess(&REFERENCE, &taken).ok().flatten());
+        if references.is_empty() {
+            references.extend(header.guess(&REFERENCE, &taken).ok().flatten());
+        }
         let seconds = unit::seconds(&time.unit).ok_or_else(|| Error::UnknownTimeUnit {
             file: file.into(),
             row,
@@ -219,10 +310,9 @@ impl Columns {
         Ok(Layout {
             time,
             seconds,
-            input,
-            input_2,
-            output,
-            reference,
+            inputs,
+            outputs,
+            references,
         })
     }
 }
@@ -265,18 +355,31 @@ impl Header<'_> {
             }
         };
         let file_unit = file_unit(&self.names[index]);
-        if !file_unit.is_empty() && !model_unit.is_empty() && !unit::same(&file_unit, model_unit) {
-            return Err(self.fault(ColumnFault::Unit {
+        let mut found = self.found(
+            index,
+            if file_unit.is_empty() {
+                model_unit
+            } else {
+                &file_unit
+            },
+        );
+        if file_unit.is_empty() || model_unit.is_empty() || unit::same(&file_unit, model_unit) {
+            return Ok(found);
+        }
+        // A unit of time is converted with the rest of the column.
+        if role.name == TIME.name && unit::seconds(&file_unit).is_some() {
+            return Ok(found);
+        }
+        let conversion = unit::conversion(&file_unit, model_unit).ok_or_else(|| {
+            self.fault(ColumnFault::Unit {
                 column: quoted(&self.names[index]),
                 file_unit: quoted(&file_unit),
                 named_unit: quoted(model_unit),
-            }));
-        }
-        if !file_unit.is_empty() {
-            Ok(self.found(index, &file_unit))
-        } else {
-            Ok(self.found(index, model_unit))
-        }
+            })
+        })?;
+        found.unit = model_unit.into();
+        found.converted = Some((file_unit, conversion));
+        Ok(found)
     }
 
     /// The column whose name is one of the role's words; else whose name begins with such a word
@@ -323,6 +426,7 @@ impl Header<'_> {
             header,
             name,
             unit: unit.into(),
+            converted: None,
         }
     }
 

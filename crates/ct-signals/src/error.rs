@@ -1,7 +1,7 @@
 //! What can be wrong with a record or a setting: each message names the place, the numbers that
 //! disagree and the mend, in one line.
 
-use crate::{ColumnFault, shown};
+use crate::{ColumnFault, TimestampError, shown};
 
 /// Everything this crate can refuse.
 ///
@@ -145,7 +145,7 @@ pub enum Error {
     },
     /// A cell that is needed is empty.
     #[error(
-        "{file}, row {row}, column \"{column}\": the cell is empty; fill it in, or split the file there: each part is a record of its own"
+        "{file}, row {row}, column \"{column}\": the cell is empty; fill it in, or leave out --strict: then its sample is missing"
     )]
     EmptyCell {
         /// The path as it was given.
@@ -183,7 +183,7 @@ pub enum Error {
     },
     /// A cell holds NaN or an infinity.
     #[error(
-        "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or split the file there: each part is a record of its own"
+        "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or leave out --strict: then its sample is missing"
     )]
     NotFinite {
         /// The path as it was given.
@@ -215,8 +215,7 @@ pub enum Error {
     },
     /// Two rows in a row have the same time.
     #[error(
-        "{file}, row {row}, column \"{column}\": the time {time} is repeated from the row before; remove one of the two rows, or write the time with more digits",
-        time = shown(*.time)
+        "{file}, row {row}, column \"{column}\": the time {time} is repeated from the row before; remove one of the two rows, or write the time with more digits"
     )]
     RepeatedTime {
         /// The path as it was given.
@@ -226,13 +225,11 @@ pub enum Error {
         /// The column's header.
         column: String,
         /// The time, as the file gives it.
-        time: f64,
+        time: String,
     },
     /// The time runs backward.
     #[error(
-        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; sort the rows by time, or split the file there: each part is a record of its own",
-        time = shown(*.time),
-        previous = shown(*.previous)
+        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; {mend}"
     )]
     BackwardTime {
         /// The path as it was given.
@@ -242,16 +239,54 @@ pub enum Error {
         /// The column's header.
         column: String,
         /// The time in this row, as the file gives it.
-        time: f64,
+        time: String,
         /// The time in the row before.
-        previous: f64,
+        previous: String,
+        /// What to do.
+        mend: &'static str,
+    },
+    /// A date or a time that is not understood.
+    #[error("{file}, row {row}, column \"{column}\": {error}")]
+    Timestamp {
+        /// The path as it was given.
+        file: String,
+        /// Line number.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// What is wrong, and the mend.
+        error: Box<TimestampError>,
+    },
+    /// A limit of the part of a file that is wanted is not understood.
+    #[error("{option} \"{text}\": {mend}")]
+    Bound {
+        /// The option.
+        option: &'static str,
+        /// What was given.
+        text: String,
+        /// What to do.
+        mend: String,
+    },
+    /// A column without any sample.
+    #[error(
+        "{file}, row {row}, column \"{column}\": from here on the samples of all {rows} rows are missing ({words}); name another column under [columns], or choose another part with --from and --to"
+    )]
+    NoSample {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the first row in use.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The number of rows.
+        rows: usize,
+        /// What stands in their cells, quoted.
+        words: String,
     },
     /// Samples are missing.
     #[error(
-        "{file}, row {row}, column \"{column}\": {missing} missing before this row (the time steps from {previous} to {time}, elsewhere by {interval}); split the file there: each part is a record of its own",
+        "{file}, row {row}, column \"{column}\": {missing} missing before this row (the time steps from {previous} to {time}, elsewhere by {interval} s); leave out --strict to go on over it, or split the file there",
         missing = samples(*.missing),
-        time = shown(*.time),
-        previous = shown(*.previous),
         interval = shown(*.interval)
     )]
     Gap {
@@ -264,10 +299,10 @@ pub enum Error {
         /// How many samples are missing.
         missing: u64,
         /// The time before the gap, as the file gives it.
-        previous: f64,
+        previous: String,
         /// The time after the gap.
-        time: f64,
-        /// The median step of the time.
+        time: String,
+        /// The median step of the time \[s\].
         interval: f64,
     },
     /// The input never moves.

@@ -17,7 +17,7 @@
 //! A tank is simulated that drains more slowly than the model believes; the residual tells.
 //! ```
 //! use ct_signals::residual_tests::{ljung_box, prewhitened_input_test};
-//! use ct_signals::{Hold, Record, Signal, excitation, noise};
+//! use ct_signals::{Channel, Record, excitation, noise};
 //! use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 //!
 //! let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -40,17 +40,15 @@
 //! let record = Record {
 //!     name: "simulated".into(),
 //!     time: (0..n).map(|k| k as f64).collect(),
-//!     input: Signal::new("u", "V", u.clone()),
-//!     output: Signal::new("y", "cm", y),
-//!     input_2: None,
-//!     reference: None,
-//!     hold: Hold::Zero,
+//!     inputs: vec![Channel::new("u", "V", u.clone())],
+//!     outputs: vec![Channel::new("y", "cm", y)],
+//!     ..Record::default()
 //! };
 //! record.validate()?;
 //!
 //! let residual = |time_constant| -> Vec<f64> {
 //!     let model = response(time_constant);
-//!     record.output.values.iter().zip(model).map(|(y, m)| y - m).collect()
+//!     record.outputs[0].values.iter().zip(model).map(|(y, m)| y - m).collect()
 //! };
 //! // The right model leaves noise ...
 //! assert!(ljung_box(&residual(30.0), 20, 0)? > 0.01);
@@ -63,15 +61,18 @@
 
 mod ar;
 mod ar_missing;
+mod calendar;
 mod column_fault;
 mod columns;
-mod csv_file;
+mod csv;
 mod error;
 pub mod excitation;
+mod gaps;
 mod limits;
 pub mod noise;
 mod quote;
 mod record;
+mod resample;
 pub mod residual_tests;
 mod stationary_noise;
 mod stream;
@@ -81,13 +82,17 @@ mod unit;
 mod whitener;
 
 pub use ar::ArModel;
+pub use calendar::{Calendar, duration, time_unit};
 pub use column_fault::ColumnFault;
 pub use columns::{Columns, Heading};
-pub use csv_file::{csv_header, parse_csv, parse_csv_any_input, read_csv, read_csv_any_input};
+pub use csv::{
+    Converted, MissingSamples, ReadOptions, ReadSummary, Reading, csv_header, parse_csv, read_csv,
+};
 pub use error::Error;
+pub use gaps::Gaps;
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};
-pub use record::{Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, Signal};
+pub use record::{Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, require_samples};
 pub use stationary_noise::{CovarianceSum, StationaryNoise};
 pub use stream::{BadLine, Line, Rows};
 pub use student::student_half_width;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::statistics::{Data, OrderStatistics};
 
-use crate::{Error, csv_file::constant};
+use crate::{Calendar, Error, csv::constant};
 
 /// The fewest rows that a record needs, whatever the model.
 pub const MIN_ROWS: usize = 20;
@@ -23,28 +23,49 @@ pub enum Hold {
     First,
 }
 
-/// One sampled signal with its name and unit as the file's header gives them.
+/// One sampled signal: name and unit as the file's header gives them, what happens between its samples, and its samples.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Signal {
+pub struct Channel {
     /// The header's name without its unit, for example `y`.
     pub name: String,
     /// The unit, for example `cm`; empty where the file does not say.
     pub unit: String,
-    /// One value for each sample, all finite.
+    /// What it does between two samples; of an output, which is only read, it means nothing.
+    #[serde(default)]
+    pub hold: Hold,
+    /// One value for each instant of the record; NaN where the sample is missing.
     pub values: Vec<f64>,
 }
 
-impl Signal {
-    /// A signal from its name, its unit (may be empty) and one value for each sample.
+impl Channel {
+    /// A channel from its name, its unit (may be empty) and one value for each instant, held between them.
     pub fn new(name: impl Into<String>, unit: impl Into<String>, values: Vec<f64>) -> Self {
-        Signal {
+        Channel {
             name: name.into(),
             unit: unit.into(),
+            hold: Hold::Zero,
             values,
         }
     }
 
-    /// Smallest and largest value, in the signal's unit; `(NaN, NaN)` when there are none.
+    /// The same with another course between the samples.
+    #[must_use]
+    pub fn with_hold(self, hold: Hold) -> Self {
+        Self { hold, ..self }
+    }
+
+    /// The same name, unit and hold with other values.
+    #[must_use]
+    pub fn with_values(&self, values: Vec<f64>) -> Self {
+        Self {
+            name: self.name.clone(),
+            unit: self.unit.clone(),
+            hold: self.hold,
+            values,
+        }
+    }
+
+    /// Smallest and largest value, in the channel's unit, missing samples aside; `(NaN, NaN)` when there are none.
     pub fn range(&self) -> (f64, f64) {
         self.values
             .iter()
@@ -52,28 +73,71 @@ impl Signal {
                 (low.min(v), high.max(v))
             })
     }
+
+    /// The samples that are there, in order.
+    pub fn present(&self) -> impl Iterator<Item = f64> + '_ {
+        self.values.iter().copied().filter(|value| !value.is_nan())
+    }
+
+    /// How many samples are missing.
+    #[must_use]
+    pub fn missing(&self) -> usize {
+        self.values.iter().filter(|value| value.is_nan()).count()
+    }
+
+    /// The values with straight lines in place of missing samples, and the nearest one before the first and behind the last that is
+    /// there; as they are where none is.
+    #[must_use]
+    pub fn interpolated(&self) -> Vec<f64> {
+        let mut values = self.values.clone();
+        let mut from = 0;
+        while let Some(gap) = values[from..].iter().position(|value| value.is_nan()) {
+            let begin = from + gap;
+            let end = values[begin..].iter().position(|value| !value.is_nan());
+            let end = end.map_or(values.len(), |length| begin + length);
+            let before = begin.checked_sub(1).map(|k| values[k]);
+            let after = values.get(end).copied();
+            let Some(start) = before.or(after) else {
+                break;
+            };
+            let stop = after.unwrap_or(start);
+            let steps = (end - begin + 1) as f64;
+            for (i, value) in values[begin..end].iter_mut().enumerate() {
+                *value = start + (stop - start) * (i + 1) as f64 / steps;
+            }
+            from = end;
+        }
+        values
+    }
+
+    /// The name with the unit in brackets, as a header has it; the name alone where there is no unit.
+    #[must_use]
+    pub fn header(&self) -> String {
+        match self.unit.as_str() {
+            "" => self.name.clone(),
+            unit => format!("{} [{unit}]", self.name),
+        }
+    }
 }
 
-/// One experiment: time, input, output, of a plant with two actuators the second input and, in a loop, the reference.
+/// One experiment: its instants and any number of inputs, outputs and references, on one clock.
 ///
-/// `y[k]` is read at `t[k]`, before `u[k]` acts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// `y[k]` is read at `t[k]`, before `u[k]` acts. Outputs at different rates are outputs of which samples are missing.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Record {
     /// Where it came from (a file's name), for messages.
     pub name: String,
     /// Sampling instants \[s\], strictly increasing.
     pub time: Vec<f64>,
-    /// The command to the actuator.
-    pub input: Signal,
-    /// The command to a second actuator, where there is one; it has what the first one has: the same instants, the same hold.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub input_2: Option<Signal>,
-    /// The sensor's reading.
-    pub output: Signal,
-    /// The set point, where there is a loop.
-    pub reference: Option<Signal>,
-    /// What the input does between samples.
-    pub hold: Hold,
+    /// The commands to the actuators and the disturbances that are measured.
+    pub inputs: Vec<Channel>,
+    /// The sensors' readings; samples may be missing.
+    pub outputs: Vec<Channel>,
+    /// The set points, where there is a loop.
+    pub references: Vec<Channel>,
+    /// When its clock stands at zero, where that is known.
+    #[serde(skip)]
+    pub calendar: Option<Calendar>,
 }
 
 impl Record {
@@ -93,20 +157,33 @@ impl Record {
     #[must_use]
     pub fn rows(&self, range: std::ops::Range<usize>) -> Self {
         let range = range.start.min(self.len())..range.end.min(self.len());
-        let part = |signal: &Signal| Signal {
-            name: signal.name.clone(),
-            unit: signal.unit.clone(),
-            values: signal.values[range.clone()].to_vec(),
+        let part = |channels: &[Channel]| {
+            let cut =
+                |channel: &Channel| channel.with_values(channel.values[range.clone()].to_vec());
+            channels.iter().map(cut).collect()
         };
         Self {
             name: self.name.clone(),
             time: self.time[range.clone()].to_vec(),
-            input: part(&self.input),
-            input_2: self.input_2.as_ref().map(part),
-            output: part(&self.output),
-            reference: self.reference.as_ref().map(part),
-            hold: self.hold,
+            inputs: part(&self.inputs),
+            outputs: part(&self.outputs),
+            references: part(&self.references),
+            calendar: self.calendar.clone(),
         }
+    }
+
+    /// All channels: inputs, outputs, references.
+    pub fn channels(&self) -> impl Iterator<Item = &Channel> {
+        self.inputs
+            .iter()
+            .chain(&self.outputs)
+            .chain(&self.references)
+    }
+
+    /// What the first input does between samples.
+    #[must_use]
+    pub fn hold(&self) -> Hold {
+        self.inputs.first().map_or(Hold::Zero, |input| input.hold)
     }
 
     /// The median step of the time \[s\]; 0 with fewer than two samples.
@@ -122,60 +199,63 @@ impl Record {
         }
     }
 
-    /// Smallest and largest input, in its unit; `(NaN, NaN)` when the record is empty.
+    /// Smallest and largest value of the first input, in its unit; `(NaN, NaN)` where there is none.
     pub fn input_range(&self) -> (f64, f64) {
-        self.input.range()
+        self.inputs
+            .first()
+            .map_or((f64::NAN, f64::NAN), Channel::range)
     }
 
-    /// Smallest and largest output, in its unit; `(NaN, NaN)` when the record is empty.
+    /// Smallest and largest value of the first output, in its unit; `(NaN, NaN)` where there is none.
     pub fn output_range(&self) -> (f64, f64) {
-        self.output.range()
+        self.outputs
+            .first()
+            .map_or((f64::NAN, f64::NAN), Channel::range)
     }
 
-    /// Checks that the input moves.
+    /// Checks that an input moves.
     ///
     /// # Errors
-    /// [`Error::ConstantInput`], which names the record and the column.
+    /// [`Error::ConstantInput`], which names the record and the first input's column.
     pub fn require_moving_input(&self) -> Result<(), Error> {
-        let Some(value) = constant(&self.input.values) else {
+        let Some(first) = self.inputs.first() else {
             return Ok(());
         };
-        let Signal { name, unit, .. } = &self.input;
-        let column = match unit.as_str() {
-            "" => name.clone(),
-            unit => format!("{name} [{unit}]"),
-        };
-        Err(Error::ConstantInput {
-            file: self.name.clone(),
-            column,
-            value,
-            rows: self.len(),
-        })
+        match constant(&first.values) {
+            Some(value) => Err(Error::ConstantInput {
+                file: self.name.clone(),
+                column: first.header(),
+                value,
+                rows: self.len(),
+            }),
+            None => Ok(()),
+        }
     }
 
-    /// Checks a record that was put together in code: equal lengths, finite values, increasing time.
+    /// Checks a record that was put together in code: equal lengths, values that are finite or missing (NaN), increasing time.
     ///
     /// [`read_csv`](crate::read_csv) has done this and more.
     ///
     /// # Errors
     /// [`Error::LengthMismatch`], [`Error::ValueNotFinite`], [`Error::TimeNotIncreasing`].
     pub fn validate(&self) -> Result<(), Error> {
-        let signals = [
-            Some(&self.input),
-            self.input_2.as_ref(),
-            Some(&self.output),
-            self.reference.as_ref(),
-        ];
-        for signal in signals.into_iter().flatten() {
-            if signal.values.len() != self.len() {
+        for channel in self.channels() {
+            if channel.values.len() != self.len() {
                 return Err(Error::LengthMismatch {
                     record: self.name.clone(),
-                    signal: signal.name.clone(),
+                    signal: channel.name.clone(),
                     expected: self.len(),
-                    found: signal.values.len(),
+                    found: channel.values.len(),
                 });
             }
-            check_finite(&self.name, &signal.name, &signal.values)?;
+            if let Some(index) = channel.values.iter().position(|v| v.is_infinite()) {
+                return Err(Error::ValueNotFinite {
+                    record: self.name.clone(),
+                    signal: channel.name.clone(),
+                    index,
+                    value: channel.values[index],
+                });
+            }
         }
         check_finite(&self.name, "time", &self.time)?;
         for (k, pair) in self.time.windows(2).enumerate() {
@@ -190,24 +270,31 @@ impl Record {
         }
         Ok(())
     }
+}
 
-    /// Checks that there are enough rows to fit `parameters` parameters (initial states included):
-    /// [`ROWS_PER_PARAMETER`] for each, and never fewer than [`MIN_ROWS`].
-    ///
-    /// # Errors
-    /// [`Error::TooFewRows`].
-    pub fn require_rows(&self, parameters: usize) -> Result<(), Error> {
-        let needed = MIN_ROWS.max(parameters.saturating_mul(ROWS_PER_PARAMETER));
-        if self.len() >= needed {
-            return Ok(());
-        }
-        Err(Error::TooFewRows {
-            record: self.name.clone(),
-            rows: self.len(),
-            needed,
-            why: format!(" to fit {parameters} parameters"),
-        })
+/// Checks that records have enough samples of an output to fit `parameters` parameters to all of them together (the initial states of
+/// each included): [`ROWS_PER_PARAMETER`] for each, and never fewer than [`MIN_ROWS`].
+///
+/// # Errors
+/// [`Error::TooFewRows`].
+pub fn require_samples(records: &[Record], parameters: usize) -> Result<(), Error> {
+    let needed = MIN_ROWS.max(parameters.saturating_mul(ROWS_PER_PARAMETER));
+    let samples = |record: &Record| {
+        let missing = record.outputs.iter().map(Channel::missing).min();
+        record.len() - missing.unwrap_or(0)
+    };
+    let rows: usize = records.iter().map(samples).sum();
+    if rows >= needed {
+        return Ok(());
     }
+    let mut names: Vec<&str> = records.iter().map(|record| record.name.as_str()).collect();
+    names.dedup();
+    Err(Error::TooFewRows {
+        record: names.join(" and "),
+        rows,
+        needed,
+        why: format!(" to fit {parameters} parameters"),
+    })
 }
 
 /// The median of the differences between neighbours; 0 when there are none.

@@ -36,8 +36,8 @@ pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
 /// -1..1. 0 at lags that the record is too short for, and at all when one of the two does not vary.
 /// Of two series of different lengths the end of the longer is left out.
 ///
-/// Where samples are missing (NaN) it is, at each lag, the correlation over the pairs that are there, times `(N - lag)/N` for the series' length
-/// `N`, as that of a whole series has it. Its standard deviation is then about `(N - lag)/N` over the root of
+/// Where samples are missing (NaN) it is, at each lag, the correlation over the pairs that are there, times
+/// `(N - lag)/N` for the series' length `N`, as that of a whole series has it. Its standard deviation is then about `(N - lag)/N` over the root of
 /// the number of [`pairs`], for white series.
 pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
     let n = u.len().min(e.len());

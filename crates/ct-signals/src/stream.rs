@@ -8,7 +8,7 @@
 use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
 use crate::columns::Layout;
-use crate::csv_file::{check_width, delimiter, is_number};
+use crate::csv::{check_width, delimiter, is_number};
 use crate::{Columns, Error, quoted, unit};
 
 /// The names of the columns in use, and which they are in a row without a header.
@@ -131,16 +131,15 @@ impl Rows {
                     });
                 }
             };
-            let named = [&columns.time, &columns.input, &columns.output];
+            let (input, output) = (columns.inputs.first(), columns.outputs.first());
+            let named = [columns.time.as_ref(), input, output];
             for ((name, role), given) in rows.names.iter_mut().zip(ROLES).zip(named) {
-                *name = given.clone().unwrap_or_else(|| role.to_string());
+                *name = given.cloned().unwrap_or_else(|| role.to_string());
             }
-            let unit = |given: &Option<String>| {
-                given
-                    .as_deref()
-                    .map_or(String::new(), |name| unit::split(name).1.to_string())
+            let unit = |given: Option<&String>| {
+                given.map_or(String::new(), |name| unit::split(name).1.to_string())
             };
-            rows.units = [unit(&columns.input), unit(&columns.output)];
+            rows.units = [unit(input), unit(output)];
             rows.seconds = columns.time_header().1;
             return Ok((rows, true));
         }
@@ -148,10 +147,12 @@ impl Rows {
         let Layout {
             time,
             seconds,
-            input,
-            output,
+            mut inputs,
+            mut outputs,
             ..
         } = columns.resolve(file, row, &cells)?;
+        // One of each at least.
+        let (input, output) = (inputs.swap_remove(0), outputs.swap_remove(0));
         rows.at = [time.index, input.index, output.index];
         rows.units = [input.unit, output.unit];
         rows.names = [time.header, input.header, output.header];

@@ -52,6 +52,11 @@ pub(crate) fn split_bracket(header: &str) -> Option<(&str, &str)> {
     None
 }
 
+/// The conversion of values in one unit to another, by their texts; `None` where either is unknown or they measure different things.
+pub(crate) fn conversion(from: &str, to: &str) -> Option<Conversion> {
+    Unit::parse(from)?.conversion_to(&Unit::parse(to)?)
+}
+
 /// Whether two units are the same, written differently or not.
 pub(crate) fn same(a: &str, b: &str) -> bool {
     canonical(a) == canonical(b)

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Hold, Record, Signal};
+use ct_signals::{ArModel, Channel, Record};
 use greybox::{Setup, Stopping, fit_from};
 use plants::{Command, EffectInfo, Known, Placed, Plant, Simulator, Structure};
 
@@ -67,12 +67,11 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
         });
         Some(Record {
             name: effect.id.into(),
-            output: Signal::new("y", "cm", readings.collect()),
+            outputs: vec![Channel::new("y", "cm", readings.collect())],
             time: (0..commands.len()).map(|k| k as f64 * INTERVAL).collect(),
-            input: Signal::new("u", "V", commands.clone()),
-            input_2: None,
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", commands.clone())],
+            references: Vec::new(),
+            calendar: None,
         })
     };
     let with_scales = |records: &[Record]| -> Option<Structure> {
@@ -98,8 +97,8 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
     let start = [own.as_slice(), &initial].concat();
     let fit = fit_from(&setup, &[start], &ArModel::white(1.0), STOPPING).ok()?;
     let residual = setup.residuals(&fit.x).ok()?.into_iter().next()?;
-    let [record] = records;
-    Some((record.output.values, residual))
+    let [mut record] = records;
+    Some((record.outputs.swap_remove(0).values, residual))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use ct_signals::ReadOptions;
 use missing_effect::{Diagnosis, Options, Problem, Verdict};
 
 use crate::commands::say;
@@ -78,8 +79,10 @@ fn problem() -> Result<Problem, Error> {
         data: vec![path(DATA.0)],
         test: vec![path(TEST.0)],
         model: path(MODEL.0),
+        options: ReadOptions::default(),
     }
     .read()
+    .map(|input| input.problem)
 }
 
 fn step(number: usize, title: &str, text: &str, look: Look) -> String {

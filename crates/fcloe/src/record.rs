@@ -110,16 +110,16 @@ impl LoopRecord {
                 });
             }
         }
-        let hold = match record.hold {
+        let hold = match record.hold() {
             ct_signals::Hold::Zero => Hold::Zero,
             ct_signals::Hold::First => Hold::First,
         };
         Ok(Self {
             name: record.name.clone(),
             step,
-            r: record.reference.as_ref().map(|r| r.values.clone()),
-            u: Some(record.input.values.clone()),
-            y: record.output.values.clone(),
+            r: record.references.first().map(|r| r.values.clone()),
+            u: Some(record.inputs[0].values.clone()),
+            y: record.outputs[0].values.clone(),
             r_hold: Hold::Zero,
             u_hold: hold,
             offsets,

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
+use ct_signals::{ArModel, Channel, Record, excitation, noise};
 use greybox::{FitOptions, Setup, coloured, fit_from, robust};
 use plants::controller::Controller;
 use plants::{Command, Plant, Scales, Simulator, Structure};
@@ -70,11 +70,10 @@ fn in_loop(
     Some(Record {
         name: "rig".into(),
         time: (0..SAMPLES).map(|k| k as f64 * INTERVAL).collect(),
-        input: Signal::new("u", "V", u),
-        output: Signal::new("y", "cm", y),
-        input_2: None,
-        reference: Some(Signal::new("r", "cm", r)),
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", u)],
+        outputs: vec![Channel::new("y", "cm", y)],
+        references: vec![Channel::new("r", "cm", r)],
+        calendar: None,
     })
 }
 

@@ -82,20 +82,19 @@ impl Clock {
 
 #[cfg(test)]
 mod tests {
-    use ct_signals::{Hold, Signal};
+    use ct_signals::Channel;
 
     use super::*;
 
     fn record(from: f64, to: f64) -> Record {
-        let signal = || Signal::new("", "", vec![0.0; 2]);
+        let signal = || Channel::new("", "", vec![0.0; 2]);
         Record {
             name: String::new(),
             time: vec![from, to],
-            input: signal(),
-            input_2: None,
-            output: signal(),
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![signal()],
+            outputs: vec![signal()],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 

@@ -51,22 +51,20 @@ const ROUNDS: usize = 6;
 /// # Errors
 /// Where the record has no reference, or its command is not held.
 pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error> {
-    let Some(reference) = &record.reference else {
+    let Some(reference) = record.references.first() else {
         return Err(Error::NoReference {
             record: record.name.clone(),
         });
     };
-    if record.hold != Hold::Zero {
+    if record.hold() != Hold::Zero {
         return Err(Error::CommandNotHeld {
             record: record.name.clone(),
         });
     }
     record.validate()?;
-    let (r, y, u) = (
-        &reference.values,
-        &record.output.values,
-        &record.input.values,
-    );
+    // The controller saw readings that the record lacks; a line between their neighbours stands for them.
+    let y = &record.outputs[0].interpolated();
+    let (r, u) = (&reference.values, &record.inputs[0].values);
     let n = controller.states();
     let run = |states: &[f64]| {
         let duals: Vec<Dual<MAX_CONTROLLER_STATES>> = states
@@ -189,7 +187,7 @@ impl Feedback {
         plant: LinearPlant,
     ) -> Result<Self, Error> {
         for record in records {
-            if let Some(reference) = &record.reference {
+            if let Some(reference) = record.references.first() {
                 let (low, high) = reference.range();
                 if low >= high {
                     return Err(Error::ConstantReference {

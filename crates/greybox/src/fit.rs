@@ -313,9 +313,11 @@ pub fn fit_onward(
     let log_det: f64 = setup
         .records
         .iter()
-        .map(|record| noise.log_det(record.len()))
+        .map(|record| noise.log_det_of(record.outputs[0].values.iter().map(|y| !y.is_nan())))
         .sum();
-    let squares: f64 = setup.residuals(&x)?.iter().flatten().map(|r| r * r).sum();
+    let residuals = setup.residuals(&x)?;
+    let observed = residuals.iter().flatten().filter(|r| !r.is_nan());
+    let squares: f64 = observed.map(|r| r * r).sum();
     Ok(Fit {
         x,
         cost,

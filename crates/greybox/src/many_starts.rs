@@ -225,8 +225,9 @@ fn scores_of_simulations(
 /// What a model leaves of the records, whitened.
 fn whitened(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<Vec<f64>> {
     let residuals = setup.disturbance(x).ok()?;
-    let series = residuals.iter();
-    Some(series.flat_map(|residual| noise.whiten(residual)).collect())
+    let series = residuals.iter().flat_map(|residual| noise.whiten(residual));
+    // Rows of missing samples take no part here as in the columns.
+    Some(series.filter(|value| !value.is_nan()).collect())
 }
 
 /// The model without an effect at the actuator, whitened.
@@ -259,6 +260,10 @@ impl WithoutEffect {
         for record in rows.records() {
             whitener.reset();
             for values in record.chunks_exact(rows.columns) {
+                if values[rows.columns - 1].is_nan() {
+                    whitener.skip();
+                    continue;
+                }
                 row.copy_from_slice(values);
                 whitener.push(&mut row);
                 for (column, value) in columns.iter_mut().zip(&row) {

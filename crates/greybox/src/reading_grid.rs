@@ -74,7 +74,7 @@ impl ReadingGrid {
 pub fn reading_grid(records: &[Record]) -> Option<ReadingGrid> {
     let mut sorted: Vec<f64> = records
         .iter()
-        .flat_map(|record| record.output.values.iter().copied())
+        .flat_map(|record| record.outputs[0].present())
         .collect();
     if sorted.len() < FEWEST_READINGS || sorted.iter().any(|y| !y.is_finite()) {
         return None;
@@ -85,8 +85,9 @@ pub fn reading_grid(records: &[Record]) -> Option<ReadingGrid> {
     let levels = levels(&sorted, SAME * reach);
     let mut changes: Vec<f64> = records
         .iter()
-        .flat_map(|record| record.output.values.windows(2))
+        .flat_map(|record| record.outputs[0].values.windows(2))
         .map(|pair| (pair[1] - pair[0]).abs())
+        .filter(|change| !change.is_nan())
         .collect();
     changes.sort_by(f64::total_cmp);
     let median_change = *changes.get(changes.len() / 2)?;
@@ -215,7 +216,7 @@ fn held_against(step: f64, readings: &[f64]) -> Option<(f64, f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ct_signals::{Hold, Signal, noise};
+    use ct_signals::{Channel, noise};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -225,11 +226,10 @@ mod tests {
         Record {
             name: "wave".into(),
             time: (0..y.len()).map(|k| k as f64).collect(),
-            input: Signal::new("u", "V", vec![1.0; y.len()]),
-            output: Signal::new("y", "cm", y),
-            input_2: None,
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", vec![1.0; y.len()])],
+            outputs: vec![Channel::new("y", "cm", y)],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 
@@ -267,7 +267,7 @@ mod tests {
         for (seed, ratio) in [0.5, 1.0, 3.0, 10.0].into_iter().enumerate() {
             let step = ratio * SIGMA;
             let mut wave = noisy(seed as u64, 900, |y| step * (y / step).round());
-            for (k, y) in wave.output.values.iter_mut().enumerate().step_by(25) {
+            for (k, y) in wave.outputs[0].values.iter_mut().enumerate().step_by(25) {
                 *y += (0.2 + 0.5 * (k as f64).sin().abs()) * step;
             }
             let grid = reading_grid(&[wave]).unwrap();
@@ -290,7 +290,7 @@ mod tests {
         let wide = |y: f64| (((60.0 * (y - 14.0)) / step).round() * step * 1e4).round() / 1e4;
         let smooth = noisy(8, 1500, |y| y);
         let ramped: Vec<f64> = (0..1500)
-            .map(|k| smooth.output.values[k] - smooth.output.values[0] + k as f64 * 0.02)
+            .map(|k| smooth.outputs[0].values[k] - smooth.outputs[0].values[0] + k as f64 * 0.02)
             .map(|y| wide(14.0 + y / 60.0))
             .collect();
         let grid = reading_grid(&[record(ramped)]).unwrap();

@@ -30,16 +30,20 @@ pub fn exact_reading_step(records: &[Record]) -> Option<f64> {
 
 /// The same where noise comes behind the steps.
 fn noisy_step(records: &[Record]) -> Option<f64> {
-    let all = || records.iter().flat_map(|record| &record.output.values);
+    let all = || {
+        records
+            .iter()
+            .flat_map(|record| record.outputs[0].present())
+    };
     let count = all().count();
-    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
+    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
         (low.min(y), high.max(y))
     });
     let (span, reach) = (high - low, low.abs().max(high.abs()));
     if !(span > 0.0 && reach.is_finite()) {
         return None;
     }
-    let all: Vec<f64> = all().copied().collect();
+    let all: Vec<f64> = all().collect();
     let some: Vec<f64> = all
         .iter()
         .copied()
@@ -91,7 +95,7 @@ fn climb(steps: f64, reach: f64, readings: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ct_signals::{Hold, Signal};
+    use ct_signals::Channel;
 
     fn record(reading: impl Fn(f64) -> f64) -> Record {
         let y: Vec<f64> = (0..900)
@@ -101,11 +105,10 @@ mod tests {
         Record {
             name: "wave".into(),
             time: (0..y.len()).map(|k| k as f64).collect(),
-            input: Signal::new("u", "V", vec![1.0; y.len()]),
-            output: Signal::new("y", "cm", y),
-            input_2: None,
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", vec![1.0; y.len()])],
+            outputs: vec![Channel::new("y", "cm", y)],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 
@@ -126,6 +129,6 @@ mod tests {
         assert_eq!(reading_step(&[record(|y| y)]), None);
         assert_eq!(reading_step(&[record(|y| (y / 0.01).round() * 0.01)]), None);
         assert_eq!(reading_step(&[record(|_| 3.0)]), None);
-        assert_eq!(reading_step(&[record(|_| f64::NAN)]), None);
+        assert_eq!(reading_step(&[record(|_| f64::INFINITY)]), None);
     }
 }

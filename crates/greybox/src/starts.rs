@@ -5,7 +5,7 @@
 //! in either order for two tanks (which fit almost as well with their time constants swapped), and the rest of the
 //! parameters follows from the mean of the record.
 
-use ct_signals::{Record, Signal};
+use ct_signals::{Channel, Record};
 use plants::{Outlet, Plant};
 use rand::RngExt;
 
@@ -39,7 +39,12 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     let scales = &structure.scales;
     let (mut u, mut y, mut uu, mut uy, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for record in setup.records {
-        for (a, b) in record.input.values.iter().zip(&record.output.values) {
+        for (a, b) in record.inputs[0]
+            .values
+            .iter()
+            .zip(&record.outputs[0].values)
+            .filter(|(_, reading)| !reading.is_nan())
+        {
             u += a;
             y += b;
             uu += a * a;
@@ -106,15 +111,15 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
 fn joined_tanks(setup: &Setup, mean: f64, flow: f64, heads: [f64; 2]) -> Vec<f64> {
     let scales = &setup.structure.scales;
     let second = scales.input_2.is_some();
-    let middle = |signal: fn(&Record) -> Option<&Signal>| {
+    let middle = |signal: fn(&Record) -> Option<&Channel>| {
         let values = || {
             let signals = setup.records.iter().filter_map(signal);
             signals.flat_map(|signal| &signal.values)
         };
         values().map(|u| u.abs()).sum::<f64>() / values().count().max(1) as f64
     };
-    let u = middle(|record| Some(&record.input));
-    let all = u + middle(|record| record.input_2.as_ref());
+    let u = middle(|record| Some(&record.inputs[0]));
+    let all = u + middle(|record| record.inputs.get(1));
     let gain = if all > 0.0 { flow / all } else { flow };
     // What goes through the valves comes from the first pump; where that hardly runs, any flow says as much.
     let through = (gain * u).max(0.1 * flow);
@@ -156,19 +161,24 @@ fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     let h3 = h2 + head(first, x[pumps + 1]);
     let mut levels = [h3 + head(first, x[pumps]), h3, h2];
     // They stand about the measured one as they would at rest.
-    let shift = record.output.values[0] - levels[scales.measured];
+    let shift = first_reading(record) - levels[scales.measured];
     for level in &mut levels {
         *level = (*level + shift).max(0.0);
     }
-    levels[scales.measured] = record.output.values[0];
+    levels[scales.measured] = first_reading(record);
     levels.to_vec()
+}
+
+/// The first reading that is there; zero of a record that has none.
+fn first_reading(record: &Record) -> f64 {
+    record.outputs[0].present().next().unwrap_or(0.0)
 }
 
 /// Appends initial states: the measured level from the first reading, the upper one and lags at rest under the first
 /// command, the controller's as they give the measured command.
 pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
     for (r, record) in setup.records.iter().enumerate() {
-        let (u0, y0) = (record.input.values[0], record.output.values[0]);
+        let (u0, y0) = (record.inputs[0].values[0], first_reading(record));
         match setup.structure.plant {
             Plant::CascadedTanks => x.push((x[0] * u0 / x[1]).powi(2)),
             Plant::CascadedTanksLinear => x.push(x[0] * u0),

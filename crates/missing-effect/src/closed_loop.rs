@@ -67,7 +67,7 @@ pub(crate) fn enclose<'a>(
     if part > OTHER_CONTROLLER {
         let why = format!(
             "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {} rms, {:.0} % of what it moves: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
-            problem.records[0].input.unit,
+            problem.records[0].inputs[0].unit,
             100.0 * part
         );
         return Ok((node, Some(not_simulated(&why, Some(mismatch)))));
@@ -75,7 +75,7 @@ pub(crate) fn enclose<'a>(
     let fit = fit_from(&setup, &[x], &node.fit.noise, STOPPING)?.continuing(&node.fit);
     let said = format!(
         "The loop is simulated from its reference: no noise that came back through the command is in the model. The measured command agrees with the controller's to {mismatch:.4} {} rms.",
-        problem.records[0].input.unit
+        problem.records[0].inputs[0].unit
     );
     let enclosed = Node { setup, fit, ..node };
     Ok((
@@ -122,8 +122,13 @@ fn feedback_p(node: &Node) -> Result<f64, Error> {
     let least = pairs
         .map(|(record, residual)| {
             // The first parameter of every plant is its gain.
-            let gain = record.reference.is_none().then_some(node.fit.x[0]);
-            feedback_test::feedback_p(&record.input.values, residual, gain)
+            let gain = record.references.is_empty().then_some(node.fit.x[0]);
+            // What was not read moved no controller.
+            let read: Vec<f64> = residual
+                .iter()
+                .map(|e| if e.is_nan() { 0.0 } else { *e })
+                .collect();
+            feedback_test::feedback_p(&record.inputs[0].values, &read, gain)
         })
         .fold(1.0, f64::min);
     Ok((least * residuals.len() as f64).min(1.0))

@@ -8,6 +8,7 @@ use crate::{
     ControlLoop, Diagnosis, Error, Options, Problem, Verdict,
     confirm::{BIC_MARGIN, beyond_chance},
     diagnose::{allow, assemble, effort, floor},
+    gaps::Mended,
     node::Node,
     noise_floor::{NOISE_ORDER, wanders},
     problem::{STOPPING, base},
@@ -28,6 +29,20 @@ const TRIED: f64 = 0.8;
 /// Where the records, the plant or the fit do not allow it.
 pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
     let begun = Instant::now();
+    let mut diagnosis = match Mended::of(problem, options)? {
+        None => compare_whole(problem, options)?,
+        Some(mended) => {
+            let mut diagnosis = compare_whole(&mended.problem, options)?;
+            mended.report(&mut diagnosis);
+            diagnosis
+        }
+    };
+    diagnosis.seconds = begun.elapsed().as_secs_f64();
+    Ok(diagnosis)
+}
+
+/// The same of records without gaps.
+fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
     // One model has to be fitted, and no sets of effects are searched.
     let options = &Options {
         time_limit: options.time_limit.map(|limit| limit.mul_f64(SHARE)),
@@ -78,6 +93,5 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     diagnosis.sentences.extend(more.into_iter().flatten());
     diagnosis.speak_of_the_loop(control_loop);
     diagnosis.effort = effort(&shown, options);
-    diagnosis.seconds = begun.elapsed().as_secs_f64();
     Ok(diagnosis)
 }

@@ -67,6 +67,24 @@ pub(crate) fn slowest_time_constant(node: &Node) -> Result<f64, Error> {
     })
 }
 
+/// The fastest time constant of a fitted plant at its operating point \[s\], a tenth of a sampling interval at least.
+pub(crate) fn fastest_time_constant(node: &Node) -> Result<f64, Error> {
+    let a = linearised(node)?.a;
+    let a = DMatrix::from_fn(a.len(), a.len(), |i, j| a[i][j]);
+    let least = a
+        .complex_eigenvalues()
+        .iter()
+        .map(|value| value.norm())
+        .fold(f64::INFINITY, f64::min);
+    let interval = node.setup.structure.scales.sample_interval;
+    let decay = -least.clamp(f64::MIN_POSITIVE, 1.0).ln();
+    Ok(if decay > 0.0 {
+        interval / decay.min(10.0)
+    } else {
+        f64::INFINITY
+    })
+}
+
 /// The plant at its operating point.
 fn linearised(node: &Node) -> Result<LinearPlant, Error> {
     let theta = &node.fit.x[..node.setup.parameter_count()];
@@ -80,7 +98,7 @@ fn mean_command(node: &Node) -> f64 {
         .setup
         .records
         .iter()
-        .flat_map(|record| &record.input.values)
+        .flat_map(|record| &record.inputs[0].values)
     {
         sum += u;
         count += 1.0;

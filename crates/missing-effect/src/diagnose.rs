@@ -11,6 +11,7 @@ use crate::{
     confirm::BIC_MARGIN,
     doubt::doubt,
     find::{Found, find, shortened},
+    gaps::Mended,
     judge::{Course, Grade, Judge, PART, WHOLE},
     node::Node,
     partial::largest_part,
@@ -41,6 +42,24 @@ pub fn diagnose(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Diagnosis, Error> {
     let begun = Instant::now();
+    let mut diagnosis = match Mended::of(problem, options)? {
+        None => diagnose_whole(problem, options, progress)?,
+        Some(mended) => {
+            let mut diagnosis = diagnose_whole(&mended.problem, options, progress)?;
+            mended.report(&mut diagnosis);
+            diagnosis
+        }
+    };
+    diagnosis.seconds = begun.elapsed().as_secs_f64();
+    Ok(diagnosis)
+}
+
+/// The same of records without gaps.
+fn diagnose_whole(
+    problem: &Problem,
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Diagnosis, Error> {
     let tell = |phase, done, total| progress(Progress { phase, done, total });
     tell("fitting the model", 0, 1);
     let (base, control_loop) = base(problem, options, FITTED)?;
@@ -136,7 +155,7 @@ pub fn diagnose(
             None if judged.grade != Grade::Whole => {
                 remark = Some(sentences::of_a_part(
                     course.last(),
-                    &problem.records[0].output.unit,
+                    &problem.records[0].outputs[0].unit,
                 ));
                 course = Course {
                     left: remains(&base, &doubted.own_base)?,
@@ -164,7 +183,7 @@ pub fn diagnose(
         rounding = Some(sentences::of_rounding(
             rounded.step,
             rounded.share,
-            &problem.records[0].output.unit,
+            &problem.records[0].outputs[0].unit,
         ));
         let longer = judge.longer(course.nodes.clone(), rounded.node)?;
         // What nothing explains stays unexplained where rounding leaves something that is not noise.
@@ -236,7 +255,6 @@ pub fn diagnose(
     diagnosis.sentences.extend(more.into_iter().flatten());
     diagnosis.speak_of_the_loop(control_loop);
     diagnosis.effort = effort(&base, options);
-    diagnosis.seconds = begun.elapsed().as_secs_f64();
     tell("done", 3, 3);
     Ok(diagnosis)
 }
@@ -347,9 +365,9 @@ pub(crate) fn assemble(
             name: record.name.clone(),
             held_out,
             time: record.time.clone(),
-            input: record.input.values.clone(),
-            input_2: record.input_2.as_ref().map(|second| second.values.clone()),
-            output: record.output.values.clone(),
+            input: record.inputs[0].values.clone(),
+            input_2: record.inputs.get(1).map(|second| second.values.clone()),
+            output: record.outputs[0].values.clone(),
         }
     };
     Diagnosis {
@@ -371,6 +389,7 @@ pub(crate) fn assemble(
         unknown: None,
         control_loop: None,
         sentences: Vec::new(),
+        gaps: None,
         plant: problem.plant.id().to_string(),
         known_effects: problem
             .effects
@@ -378,8 +397,8 @@ pub(crate) fn assemble(
             .map(|placed| placed.effect.id.to_string())
             .chain(problem.terms.iter().map(|term| term.name.clone()))
             .collect(),
-        input_unit: problem.records[0].input.unit.clone(),
-        output_unit: problem.records[0].output.unit.clone(),
+        input_unit: problem.records[0].inputs[0].unit.clone(),
+        output_unit: problem.records[0].outputs[0].unit.clone(),
         records: problem
             .records
             .iter()

@@ -4,7 +4,7 @@
 use ct_signals::ArModel;
 use serde::Serialize;
 
-use crate::Unknown;
+use crate::{MendedGaps, Unknown};
 
 /// What the search found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -311,6 +311,9 @@ pub struct Diagnosis {
     pub schema: u32,
     /// The finding.
     pub verdict: Verdict,
+    /// What was done about rows and samples of inputs that are missing; `None` where none are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gaps: Option<MendedGaps>,
     /// The effects that were added, in order.
     pub effects: Vec<String>,
     /// For each of them itself, then all that cannot be told apart from it on these data, best first.

@@ -93,6 +93,11 @@ fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
 
 /// Sum of squares of what a noise's past does not foretell, from where it has a whole past.
 fn innovations(series: &[f64], noise: &ArModel) -> f64 {
+    if series.iter().any(|value| value.is_nan()) {
+        let whitened = noise.whiten(series);
+        let present = whitened.iter().filter(|value| !value.is_nan());
+        return present.map(|value| value * value).sum();
+    }
     let mut new = series.to_vec();
     for (lag, coefficient) in (1..).zip(noise.coefficients()) {
         for (new, past) in new.iter_mut().skip(lag).zip(series) {

@@ -9,7 +9,7 @@ use crate::{
     Error, NoiseFloor, Problem, Step,
     confirm::confirm,
     groups::{Group, groups},
-    node::{FINE, Node, refine, without},
+    node::{FINE, Node, observed, refine, without},
     noise_floor::{NOISE_ORDER, longest_memory, residual_colour, slowness},
     problem::STOPPING,
     remains::{Left, Remains, remains},
@@ -263,7 +263,7 @@ impl<'a> Course<'a> {
 /// The share of the excess error, in mean square above the noise floor, that a model explains of its base.
 pub(crate) fn explained(base: &Node, last: &Node, floor: f64) -> Result<f64, Error> {
     let mean_square = |node: &Node| -> Result<f64, Error> {
-        let series = node.setup.disturbance(&node.fit.x)?.concat();
+        let series = observed(node.setup.records, node.setup.disturbance(&node.fit.x)?).concat();
         Ok(series.iter().map(|e| e * e).sum::<f64>() / series.len().max(1) as f64)
     };
     let (before, after) = (mean_square(base)?, mean_square(last)?);

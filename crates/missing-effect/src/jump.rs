@@ -4,8 +4,6 @@
 //! in part, and beside it a wide play of the sensor or a leak the rest: down to the noise, with three sizes or four for
 //! what is one. So whatever is claimed has to be better than a jump.
 
-use std::ops::Range;
-
 use ct_signals::{ArModel, Record};
 use greybox::fit_from;
 use plants::{Fitted, Place, Term, Variable};
@@ -57,12 +55,12 @@ pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> 
     // Beside all else that the model lacks, an instant stands out where the residual's own colour does not foretell it.
     let whitened = residual_colour(&residuals)?.whiten(residual);
     let mut instants: Vec<(f64, usize)> = (AROUND..residual.len().saturating_sub(AROUND))
+        .filter(|k| !whitened[*k].is_nan())
         .map(|k| (whitened[k].abs(), k))
         .collect();
     instants.sort_by(|a, b| b.0.total_cmp(&a.0));
     let fitted = |k: usize| -> Result<f64, Error> {
-        let sum = |range: Range<usize>| residual[range].iter().sum::<f64>();
-        let size = (sum(k..k + AROUND) - sum(k - AROUND..k)) / AROUND as f64;
+        let size = mean(&residual[k..k + AROUND]) - mean(&residual[k - AROUND..k]);
         let time = &record.time;
         let structure = node.setup.structure.with_term(Term {
             name: "jump_of_the_reading".to_string(),
@@ -89,6 +87,12 @@ pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> 
             })
         })
         .min_by(|a, b| a.bic.total_cmp(&b.bic)))
+}
+
+/// The mean of the samples that are there; zero where none is.
+fn mean(series: &[f64]) -> f64 {
+    let present = || series.iter().filter(|value| !value.is_nan());
+    present().sum::<f64>() / present().count().max(1) as f64
 }
 
 #[cfg(test)]
@@ -120,7 +124,9 @@ mod tests {
             let theta = [4.0, 90.0, 0.0];
             let mut record = simulated::record(&structure, &theta, (3.0, 5.0), SAMPLES, &mut rng);
             record.time.iter_mut().for_each(|t| *t += BEGIN);
-            record.output.values[AT..].iter_mut().for_each(|y| *y += by);
+            record.outputs[0].values[AT..]
+                .iter_mut()
+                .for_each(|y| *y += by);
             record
         });
         simulated::problem(plant, Known::default(), records.collect())

@@ -18,6 +18,7 @@ mod exhausted;
 mod feedback_test;
 mod find;
 mod floating;
+mod gaps;
 mod groups;
 mod hidden_step;
 mod judge;
@@ -53,6 +54,7 @@ pub use diagnosis::{
     PlaceScore, Rankings, ResidualTests, Score, Shown, Step, Verdict,
 };
 pub use error::Error;
+pub use gaps::{LONGEST_HOLD, MendedGaps};
 pub use groups::GROUP_MARGIN;
 pub use problem::{Options, Problem, Progress, TIME_LIMIT};
 pub use unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window};

@@ -1,6 +1,6 @@
 //! A set of effects with its fit, and the fits of what it is changed to.
 
-use ct_signals::ArModel;
+use ct_signals::{ArModel, Record};
 use greybox::{Fit, Setup, Start, Stopping, fit_from, fit_onward, random_starts};
 use plants::{ParameterInfo, Placed};
 
@@ -150,4 +150,16 @@ pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node
 pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
+}
+
+/// Series of records without the samples that the output lacks.
+pub(crate) fn observed(records: &[Record], series: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let of_one = |(record, series): (&Record, Vec<f64>)| {
+        let measured = record.outputs[0].values.iter();
+        let pairs = measured
+            .zip(series)
+            .filter(|(measured, _)| !measured.is_nan());
+        pairs.map(|(_, value)| value).collect()
+    };
+    records.iter().zip(series).map(of_one).collect()
 }

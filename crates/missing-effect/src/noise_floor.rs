@@ -48,8 +48,10 @@ pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
     let n = node.setup.samples() as f64;
     let (mut cost, mut log_det) = (0.0_f64, 0.0);
     for segment in &residuals {
-        cost += noise.whiten(segment).iter().map(|w| w * w).sum::<f64>();
-        log_det += noise.log_det(segment.len());
+        let whitened = noise.whiten(segment);
+        let present = whitened.iter().filter(|w| !w.is_nan());
+        cost += present.map(|w| w * w).sum::<f64>();
+        log_det += noise.log_det_of(segment.iter().map(|e| !e.is_nan()));
     }
     let price = node.setup.price(noise.order());
     Ok(n * (cost / n).max(f64::MIN_POSITIVE).ln() + log_det + price)

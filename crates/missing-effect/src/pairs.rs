@@ -140,6 +140,10 @@ fn whitened(
     for record in rows.records() {
         whitener.reset();
         for row in record.chunks_exact(rows.columns) {
+            if row[rows.columns - 1].is_nan() {
+                whitener.skip();
+                continue;
+            }
             for (value, &column) in values.iter_mut().zip(&chosen) {
                 *value = row[column];
             }

@@ -68,7 +68,7 @@ impl Node<'_> {
                 .concat()
                 .into_iter()
                 .zip(residual.concat())
-                .filter(|(level, _)| *level > limit)
+                .filter(|(level, residual)| *level > limit && !residual.is_nan())
                 .collect();
             (beyond.len() >= BEYOND).then(|| correlation(&beyond))
         };
@@ -113,9 +113,8 @@ impl Node<'_> {
             let (mut predicted, mut seen, mut noise, mut events, mut count) = (0.0, 0.0, 0.0, 0, 0);
             for ((with, without), record) in with.iter().zip(&without).zip(self.setup.records) {
                 let added: Vec<f64> = with.iter().zip(without).map(|(a, b)| a - b).collect();
-                let rest: Vec<f64> = record
-                    .output
-                    .values
+                let rest: Vec<f64> = record.outputs[0]
+                    .interpolated()
                     .iter()
                     .zip(without)
                     .map(|(y, model)| y - model)

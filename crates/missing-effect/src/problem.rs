@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, atomic::AtomicBool};
 use std::time::Duration;
 
-use ct_signals::{ArModel, Record};
+use ct_signals::{ArModel, Record, require_samples};
 use greybox::{Setup, Stopping, TimeLimit, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 use rayon::prelude::*;
@@ -131,9 +131,7 @@ pub(crate) fn base<'a>(
     let limit = Arc::new(TimeLimit::new(options.time_limit));
     limit.allow(share);
     setup.time_limit = Some(limit);
-    for record in &problem.records {
-        record.require_rows(setup.free().len())?;
-    }
+    require_samples(&problem.records, setup.free().len())?;
     let white = ArModel::white(1.0);
     let mut starts = options.starts.max(10);
     let one_by_one = one_by_one(&setup, options.seed)?;

@@ -283,6 +283,7 @@ fn keep_shown_periods(setup: &Setup, placed: Placed, starts: &mut Vec<Vec<f64>>,
 fn power_at(frequency: f64, series: &[(&Record, Vec<f64>)]) -> f64 {
     let of_one = |(record, values): &(&Record, Vec<f64>)| {
         let terms = record.time.iter().zip(values);
+        let terms = terms.filter(|(_, value)| !value.is_nan());
         let (sine, cosine) = terms.fold((0.0, 0.0), |(sine, cosine), (t, value)| {
             let (sin, cos) = (frequency * t).sin_cos();
             (sine + value * sin, cosine + value * cos)

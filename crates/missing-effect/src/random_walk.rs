@@ -83,8 +83,14 @@ impl Whitened {
     fn of(columns: usize, records: impl Iterator<Item = Vec<f64>>, noise: &ArModel) -> Self {
         let whiten = |mut rows: Vec<f64>| {
             let mut whitener = noise.whitener(columns);
-            rows.chunks_exact_mut(columns)
-                .for_each(|row| whitener.push(row));
+            for row in rows.chunks_exact_mut(columns) {
+                // The row of a missing sample stays one without a residual.
+                if row[columns - 1].is_nan() {
+                    whitener.skip();
+                } else {
+                    whitener.push(row);
+                }
+            }
             rows.split_off((noise.order() * columns).min(rows.len()))
         };
         Self {
@@ -117,13 +123,17 @@ impl Whitened {
             level.fill(0.0);
             // The first sample tells where it begins.
             if anywhere {
-                let Some(first) = rows.next() else {
+                let Some(first) = rows.find(|row| !row[last].is_nan()) else {
                     continue;
                 };
                 level.copy_from_slice(first);
                 variance = 1.0 + q;
             }
             for row in rows {
+                if row[last].is_nan() {
+                    variance += q;
+                    continue;
+                }
                 let whole = variance + 1.0;
                 let gain = variance / whole;
                 let scale = whole.sqrt().recip();
@@ -144,6 +154,7 @@ impl Whitened {
             .records
             .iter()
             .flat_map(|rows| rows.chunks_exact(self.columns))
+            .filter(|row| !row[last].is_nan())
         {
             for (to, value) in innovation.iter_mut().zip(&row[..last]) {
                 *to = value / bend;

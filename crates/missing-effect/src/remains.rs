@@ -145,11 +145,11 @@ fn least_p(
     for (k, (record, residual)) in node.setup.records.iter().zip(&residuals).enumerate() {
         let lags = (record.len() / 10).clamp(2, 25);
         let from_outside = record
-            .reference
-            .as_ref()
+            .references
+            .first()
             .filter(|_| in_loop)
-            .unwrap_or(&record.input);
-        let all = [Some(from_outside), record.input_2.as_ref()];
+            .unwrap_or(&record.inputs[0]);
+        let all = [Some(from_outside), record.inputs.get(1)];
         let all = all.into_iter().flatten();
         let all: Vec<Vec<f64>> = all.flat_map(|command| signals(&command.values)).collect();
         let tests: Vec<(Vec<f64>, f64)> = all
@@ -175,12 +175,18 @@ fn of_command(u: &[f64]) -> Vec<Vec<f64>> {
     vec![u.to_vec(), square, moves]
 }
 
-/// The whitened residual, of unit variance.
+/// The whitened residual, of unit variance; zero where the sample is missing, so that sums and products leave it out.
 fn standardised(noise: &ArModel, residual: &[f64]) -> Vec<f64> {
     let mut white = noise.whiten(residual);
-    let rms = (white.iter().map(|w| w * w).sum::<f64>() / white.len() as f64).sqrt();
+    let present = || white.iter().filter(|w| !w.is_nan());
+    let count = present().count().max(1);
+    let rms = (present().map(|w| w * w).sum::<f64>() / count as f64).sqrt();
     for w in &mut white {
-        *w /= rms.max(f64::MIN_POSITIVE);
+        *w = if w.is_nan() {
+            0.0
+        } else {
+            *w / rms.max(f64::MIN_POSITIVE)
+        };
     }
     white
 }
@@ -255,7 +261,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use ct_signals::{Hold, Signal, noise};
+    use ct_signals::{Channel, noise};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -265,11 +271,10 @@ mod tests {
         Record {
             name: "r".to_string(),
             time: (0..SAMPLES).map(|k| 2.0 * k as f64).collect(),
-            input: Signal::new("u", "V", vec![0.0; SAMPLES]),
-            output: Signal::new("y", "cm", vec![0.0; SAMPLES]),
-            input_2: None,
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", vec![0.0; SAMPLES])],
+            outputs: vec![Channel::new("y", "cm", vec![0.0; SAMPLES])],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 

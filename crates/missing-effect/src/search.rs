@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::{
     Error,
     exhausted::Rest,
-    node::{Node, ROUGH, best_first},
+    node::{Node, ROUGH, best_first, observed},
     pairs::joint_pairs,
     proposal::{Parent, Proposal, candidates, proposals, propose, realise_all},
 };
@@ -52,7 +52,10 @@ fn distinct<'n, 'a>(
     nodes: &'n [Node<'a>],
     most: usize,
 ) -> Result<Vec<&'n Node<'a>>, Error> {
-    let residual = |node: &Node| Ok::<_, Error>(node.setup.disturbance(&node.fit.x)?.concat());
+    let residual = |node: &Node| {
+        let series = node.setup.disturbance(&node.fit.x)?;
+        Ok::<_, Error>(observed(node.setup.records, series).concat())
+    };
     let before = residual(base)?;
     let mut chosen: Vec<(&Node, Vec<f64>)> = Vec::new();
     for node in nodes {

@@ -1,7 +1,7 @@
 //! Simulated records for the tests of this crate.
 #![allow(clippy::unwrap_used)]
 
-use ct_signals::{Hold, Record, Signal, excitation, noise};
+use ct_signals::{Channel, Record, excitation, noise};
 use plants::{Command, Known, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -74,11 +74,10 @@ fn through(
     Record {
         name: "simulated".to_string(),
         time,
-        input: Signal::new("u", "V", u),
-        input_2: None,
-        output: Signal::new("y", "cm", y),
-        reference: None,
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", u)],
+        outputs: vec![Channel::new("y", "cm", y)],
+        references: Vec::new(),
+        calendar: None,
     }
 }
 

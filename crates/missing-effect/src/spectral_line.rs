@@ -36,6 +36,10 @@ pub(crate) fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
     // Flat enough for neighbours to be compared, by a filter that has no room for a line.
     let mut flat = ArModel::fit(&[series], 1)?.whiten(series);
     for (k, value) in flat.iter_mut().enumerate() {
+        // A missing sample shows no line.
+        if value.is_nan() {
+            *value = 0.0;
+        }
         *value *= (PI * (k as f64 + 0.5) / n as f64).sin().powi(2);
     }
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);

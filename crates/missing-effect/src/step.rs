@@ -22,6 +22,15 @@ struct HeldOut {
     error: HeldOutError,
 }
 
+/// Rows until so many samples of the output are there: the initial levels follow from them.
+fn head(record: &Record) -> usize {
+    let present = record.outputs[0].values.iter().enumerate();
+    present
+        .filter(|(_, value)| !value.is_nan())
+        .nth(HEAD - 1)
+        .map_or(record.len(), |(last, _)| last + 1)
+}
+
 /// Initial levels from the first [`HEAD`] samples with everything else frozen; scored on the rest.
 fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
     if test.is_empty() {
@@ -31,8 +40,8 @@ fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
     let heads: Vec<Record> = test
         .iter()
         .map(|record| Record {
-            reference: None,
-            ..record.rows(0..HEAD)
+            references: Vec::new(),
+            ..record.rows(0..head(record))
         })
         .collect();
     let mut begun = node.setup.with_records(&heads)?;
@@ -50,10 +59,11 @@ fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
     let mut parts = [0.0; 4];
     let mut count = 0;
     for (record, model) in test.iter().zip(&simulated) {
-        let measured = record.output.values.iter().skip(HEAD);
+        let measured = record.outputs[0].values.iter().copied();
         let pairs: Vec<(f64, f64)> = measured
-            .copied()
-            .zip(model.iter().skip(HEAD).copied())
+            .zip(model.iter().copied())
+            .skip(head(record))
+            .filter(|(measured, _)| !measured.is_nan())
             .collect();
         for (sum, part) in parts.iter_mut().zip(error_parts(&pairs)) {
             *sum += part;
@@ -138,10 +148,12 @@ pub(crate) fn report(
     let simulated = setup.simulate(&fit.x)?.output;
     let residuals = setup.residuals(&fit.x)?;
     let (record, residual) = (&setup.records[0], &residuals[0]);
-    let lags = (record.len() / 10).clamp(2, 60);
-    let portmanteau = (record.len() / 10).clamp(2, 25);
-    let (cross, _) = residual_tests::prewhitened_input_test(&record.input.values, residual, lags)?;
-    let bound = 1.96 / (record.len() as f64).sqrt();
+    let samples = record.len() - record.outputs[0].missing();
+    let lags = (samples / 10).clamp(2, 60);
+    let portmanteau = (samples / 10).clamp(2, 25);
+    let (cross, _) =
+        residual_tests::prewhitened_input_test(&record.inputs[0].values, residual, lags)?;
+    let bound = 1.96 / (samples as f64).sqrt();
     let tests = ResidualTests {
         autocorrelation: residual_tests::autocorrelation(residual, lags),
         cross_correlation: cross,
@@ -158,7 +170,7 @@ pub(crate) fn report(
         .map(|((record, model), residual)| Series {
             name: &record.name,
             time: &record.time,
-            input: &record.input.values,
+            input: &record.inputs[0].values,
             model,
             residual,
         })
@@ -166,8 +178,8 @@ pub(crate) fn report(
     let failures = locate(&Located {
         series: &series,
         noise: judge,
-        output_unit: &record.output.unit,
-        input_unit: &record.input.unit,
+        output_unit: &record.outputs[0].unit,
+        input_unit: &record.inputs[0].unit,
     });
     let held_out = hold_out(node, test)?;
     let mut errors = std_errors(node)?;

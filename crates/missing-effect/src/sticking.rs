@@ -35,7 +35,7 @@ struct Shape {
 /// Whether some record has the shape of a valve that sticks.
 pub(crate) fn sticks(records: &[Record]) -> bool {
     records.iter().any(|record| {
-        let shape = shape(&record.input.values, &record.output.values);
+        let shape = shape(&record.inputs[0].values, &record.outputs[0].interpolated());
         shape.plateaus >= PLATEAUS
             && shape.plateaus as f64 >= OF_JUMPS * shape.jumps as f64
             && shape.share >= OF_RECORD

@@ -292,7 +292,7 @@ impl Search<'_> {
         .ok()?;
         begun.set_substeps(self.learned.substeps);
         let mut before: Option<&Kept> = None;
-        let readings = record.output.values.iter_mut();
+        let readings = record.outputs[0].values.iter_mut();
         for ((row, residual), reading) in rows.iter().zip(&self.residuals[from..]).zip(readings) {
             if let Some(before) = before {
                 let step = row.sample.time - before.sample.time;

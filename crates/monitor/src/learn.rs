@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Hold, Record, Signal};
+use ct_signals::{ArModel, Channel, Hold, Record};
 use greybox::{Fit, FitOptions, LinearPlant, Setup, coloured, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Scales, Structure, Term};
 use serde::{Deserialize, Serialize};
@@ -151,16 +151,15 @@ pub(crate) fn record<'a>(
     let mut record = Record {
         name: "the rows".to_string(),
         time: Vec::new(),
-        input: Signal::default(),
-        input_2: None,
-        output: Signal::new("", "", readings),
-        reference: None,
-        hold,
+        inputs: vec![Channel::default().with_hold(hold)],
+        outputs: vec![Channel::new("", "", readings)],
+        references: Vec::new(),
+        calendar: None,
     };
     let mut first = None;
     for row in rows {
         record.time.push(row.time - *first.get_or_insert(row.time));
-        record.input.values.push(row.input);
+        record.inputs[0].values.push(row.input);
     }
     record
 }
@@ -210,9 +209,7 @@ pub(crate) fn learn(
         .map_err(|error| said(&error))?;
     let mut setup = Setup::new(structure, records, fixed).map_err(|error| said(&error))?;
     let record = records.first().ok_or("no row")?;
-    record
-        .require_rows(setup.free().len())
-        .map_err(|error| said(&error))?;
+    ct_signals::require_samples(records, setup.free().len()).map_err(|error| said(&error))?;
     let (low, high) = record.input_range();
     if high - low <= STILL * high.abs().max(low.abs()) {
         return Err(format!(
@@ -285,7 +282,7 @@ pub(crate) fn learn(
     }
     let scatter = Limit::learned(&innovations, setup.free().len())
         .ok_or("the model leaves no noise to judge by: do the readings move?")?;
-    let commands = &record.input.values;
+    let commands = &record.inputs[0].values;
     let mean = commands.iter().sum::<f64>() / commands.len() as f64;
     let interval = record.sample_interval();
     let linear =
@@ -329,7 +326,7 @@ fn again(
         let mut expected = residual.clone();
         expect(&fit.noise, &mut expected, lost);
         for &k in lost {
-            records[0].output.values[k] += expected[k] - residual[k];
+            records[0].outputs[0].values[k] += expected[k] - residual[k];
         }
     }
     let setup = setup.with_records(&*records)?;

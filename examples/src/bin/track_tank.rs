@@ -15,7 +15,7 @@ use std::path::Path;
 
 use ct_lti::{Hold, Start, StateVariableFilter};
 use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};
-use ct_signals::{Columns, Record, Signal, excitation, noise, read_csv};
+use ct_signals::{Channel, Columns, ReadOptions, Record, excitation, noise, read_csv};
 use ctid_examples::picture::{self, Curve, Panel};
 use nalgebra::{SMatrix, SVector};
 use plants::{Command, Known, Plant, Scales, Simulator, Structure};
@@ -82,11 +82,10 @@ fn simulated() -> Result<Record, Box<dyn Error>> {
     let record = Record {
         name: "simulated tank".into(),
         time: (0..samples).map(|k| k as f64 * interval).collect(),
-        input: Signal::new("u", "V", inputs),
-        output: Signal::new("y", "cm", levels),
-        input_2: None,
-        reference: None,
-        hold: ct_signals::Hold::Zero,
+        inputs: vec![Channel::new("u", "V", inputs)],
+        outputs: vec![Channel::new("y", "cm", levels)],
+        references: Vec::new(),
+        calendar: None,
     };
     record.validate()?;
     Ok(record)
@@ -115,8 +114,8 @@ fn track(record: &Record, tracking: &Tracking) -> Result<Vec<Estimate>, Box<dyn 
 
     let mut estimates = Vec::with_capacity(record.len());
     let mut last: Option<(f64, Sample<3>)> = None;
-    let rows = record.time.iter().zip(&record.input.values);
-    for ((&time, &u), &y) in rows.zip(&record.output.values) {
+    let rows = record.time.iter().zip(&record.inputs[0].values);
+    for ((&time, &u), &y) in rows.zip(&record.outputs[0].values) {
         let step = last.map_or(0.0, |(before, _)| time - before);
         let u = filter_u.update(u, step)?;
         let y = filter_y.update(y, step)?;
@@ -180,7 +179,7 @@ impl Run {
             }
             Panel { title, curves }
         };
-        let unit = &self.record.output.unit;
+        let unit = &self.record.outputs[0].unit;
         let level = Panel {
             title: format!("level [{unit}]"),
             curves: vec![
@@ -218,7 +217,7 @@ impl Run {
                 .nice();
         }
 
-        let unit = &self.record.output.unit;
+        let unit = &self.record.outputs[0].unit;
         let levels = || self.estimates.iter().map(|e| e.remembered);
         let low = levels().fold(f64::INFINITY, f64::min);
         let high = levels().fold(f64::NEG_INFINITY, f64::max);
@@ -252,7 +251,10 @@ impl Run {
 /// The measured tanks where they lie beside the checkout, otherwise the tank of the tour.
 fn recorded() -> Result<Run, Box<dyn Error>> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let read = |file: &Path| read_csv(file, &Columns::default(), ct_signals::Hold::Zero);
+    let read = |file: &Path| {
+        let reading = read_csv(file, &Columns::default(), &ReadOptions::default());
+        reading.map(|reading| reading.record)
+    };
     let measured = here.join("../../shared/data/cascaded_tanks/estimation.csv");
     if measured.exists() {
         let mut record = read(&measured)?;

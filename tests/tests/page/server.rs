@@ -9,7 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use clap::Parser;
-use ct_signals::{Record, Signal};
+use ct_signals::{Channel, Record};
 use ctid::look::Look;
 use ctid::{Cli, run};
 use ctid_tests::http;
@@ -34,12 +34,7 @@ pub fn bundled(name: &str) -> PathBuf {
 
 /// A record as a file.
 pub fn csv(record: &Record) -> String {
-    let signals: Vec<&Signal> = [&record.input]
-        .into_iter()
-        .chain(&record.input_2)
-        .chain([&record.output])
-        .chain(&record.reference)
-        .collect();
+    let signals: Vec<&Channel> = record.channels().collect();
     let header = signals.iter().map(|s| format!(",{} [{}]", s.name, s.unit));
     let rows = record.time.iter().enumerate().map(|(k, t)| {
         let values = signals.iter().map(|s| format!(",{}", s.values[k]));

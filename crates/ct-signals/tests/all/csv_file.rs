@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use approx::assert_relative_eq;
-use ct_signals::{ColumnFault, Columns, Error, Hold, Record, parse_csv_any_input, read_csv};
+use ct_signals::{
+    ColumnFault, Columns, Error, ReadOptions, Record, parse_csv, read_csv, require_samples,
+};
 
 /// 40 rows of a plausible experiment: time step 2, input and output moving.
 fn rows() -> Vec<[f64; 3]> {
@@ -29,7 +31,11 @@ fn read_bytes(bytes: &[u8], columns: &Columns) -> Result<Record, Error> {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("tank.csv");
     std::fs::write(&path, bytes).unwrap();
-    let result = read_csv(&path, columns, Hold::Zero);
+    let strict = ReadOptions {
+        strict: true,
+        ..ReadOptions::default()
+    };
+    let result = read_csv(&path, columns, &strict).map(|reading| reading.record);
     assert_eq!(std::fs::read(&path).unwrap(), bytes, "the file was changed");
     result
 }
@@ -41,10 +47,9 @@ fn read(text: &str) -> Result<Record, Error> {
 fn named(time: &str, input: &str, output: &str) -> Columns {
     Columns {
         time: Some(time.into()),
-        input: Some(input.into()),
-        output: Some(output.into()),
-        input_2: None,
-        reference: None,
+        inputs: vec![input.into()],
+        outputs: vec![output.into()],
+        ..Columns::default()
     }
 }
 
@@ -87,21 +92,27 @@ fn plain_file() {
     assert_eq!(record.name, "tank.csv");
     assert_eq!(record.len(), 40);
     assert_eq!(
-        (record.input.name.as_str(), record.input.unit.as_str()),
+        (
+            record.inputs[0].name.as_str(),
+            record.inputs[0].unit.as_str()
+        ),
         ("u", "V")
     );
     assert_eq!(
-        (record.output.name.as_str(), record.output.unit.as_str()),
+        (
+            record.outputs[0].name.as_str(),
+            record.outputs[0].unit.as_str()
+        ),
         ("y", "cm")
     );
-    assert_eq!(record.reference, None);
+    assert_eq!(record.references, []);
     assert_eq!(record.sample_interval(), 2.0);
     assert_eq!(record.duration(), 78.0);
     for (k, row) in rows().into_iter().enumerate() {
         let [t, u, y] = [
             record.time[k],
-            record.input.values[k],
-            record.output.values[k],
+            record.inputs[0].values[k],
+            record.outputs[0].values[k],
         ];
         assert_eq!([t, u, y], row);
     }
@@ -145,9 +156,9 @@ fn quoted_headers_and_cells() {
 fn units_as_suffixes() {
     let text = text("t_s,u_pump_V,y_level2_V", &rows());
     let guessed = read(&text).unwrap();
-    assert_eq!(guessed.input.name, "u_pump");
-    assert_eq!(guessed.input.unit, "V");
-    assert_eq!(guessed.output.name, "y_level2");
+    assert_eq!(guessed.inputs[0].name, "u_pump");
+    assert_eq!(guessed.inputs[0].unit, "V");
+    assert_eq!(guessed.outputs[0].name, "y_level2");
     let columns = named("t_s", "u_pump", "y_level2 [V]");
     assert_eq!(read_bytes(text.as_bytes(), &columns).unwrap(), guessed);
     let columns = named("t_s", "u_pump_V", "y_level2_V");
@@ -158,15 +169,15 @@ fn units_as_suffixes() {
 fn a_unit_may_be_missing_on_either_side() {
     let bare = text("t,u,y", &rows());
     let record = read_bytes(bare.as_bytes(), &named("t [s]", "u", "y [cm]")).unwrap();
-    assert_eq!(record.output.unit, "cm");
-    assert_eq!(record.input.unit, "");
+    assert_eq!(record.outputs[0].unit, "cm");
+    assert_eq!(record.inputs[0].unit, "");
     let full = text(HEADER, &rows());
     let record = read_bytes(full.as_bytes(), &named("t", "u", "y")).unwrap();
-    assert_eq!(record.output.unit, "cm");
+    assert_eq!(record.outputs[0].unit, "cm");
     let round = text("t (s),u (V),y (cm)", &rows());
     let record = read_bytes(round.as_bytes(), &named("t [s]", "u [V]", "y [cm]")).unwrap();
-    assert_eq!(record.output.name, "y");
-    assert_eq!(record.output.unit, "cm");
+    assert_eq!(record.outputs[0].name, "y");
+    assert_eq!(record.outputs[0].unit, "cm");
 }
 
 #[test]
@@ -190,10 +201,10 @@ fn reference_is_optional_unless_named() {
         .map(|(k, line)| format!("{line},{}\n", if k == 0 { "r [cm]" } else { "10" }))
         .collect::<String>();
     let record = read(&with).unwrap();
-    assert_eq!(record.reference.unwrap().values, vec![10.0; 40]);
+    assert_eq!(record.references[0].values, vec![10.0; 40]);
 
     let columns = Columns {
-        reference: Some("r [cm]".into()),
+        references: vec!["r [cm]".into()],
         ..Columns::default()
     };
     let error = read_bytes(text(HEADER, &rows()).as_bytes(), &columns).unwrap_err();
@@ -229,8 +240,8 @@ fn columns_of_a_model_file() {
     };
     let columns = parse("time,output\nt [s],y [cm]\n").unwrap();
     assert_eq!(columns.time.as_deref(), Some("t [s]"));
-    assert_eq!(columns.output.as_deref(), Some("y [cm]"));
-    assert_eq!((columns.input, columns.reference), (None, None));
+    assert_eq!(columns.outputs, ["y [cm]"]);
+    assert!(columns.inputs.is_empty() && columns.references.is_empty());
     let misspelt = parse("time,outptu\nt,y\n").unwrap_err();
     assert!(misspelt.to_string().contains("outptu"), "{misspelt}");
 }
@@ -242,7 +253,7 @@ fn no_such_file() {
     let error = read_csv(
         Path::new("nowhere/tank.csv"),
         &Columns::default(),
-        Hold::Zero,
+        &ReadOptions::default(),
     );
     let error = error.unwrap_err();
     assert!(matches!(error, Error::CannotOpen { .. }));
@@ -546,19 +557,11 @@ fn a_missing_sample_is_found_in_jitter() {
 fn constant_signals() {
     let mut still = rows();
     still.iter_mut().for_each(|row| row[1] = 4.5);
-    let error = read(&text(HEADER, &still)).unwrap_err();
+    // An input that stands still is a matter of what the record is for.
+    let record = read(&text(HEADER, &still)).unwrap();
+    let error = record.require_moving_input().unwrap_err();
     assert!(matches!(error, Error::ConstantInput { rows: 40, .. }));
     says(&error, &["tank.csv", "\"u [V]\"", "4.5", "input"]);
-    // Where it may be constant the record says so itself, in the same words.
-    let still = parse_csv_any_input(
-        "tank.csv",
-        text(HEADER, &still).as_bytes(),
-        &Columns::default(),
-        Hold::Zero,
-    )
-    .unwrap();
-    let of_record = still.require_moving_input().unwrap_err();
-    assert!(error.to_string().ends_with(&of_record.to_string()));
 
     let mut still = rows();
     still.iter_mut().for_each(|row| row[2] = 0.0);
@@ -579,8 +582,8 @@ fn too_few_rows() {
     ));
     says(&error, &["tank.csv", "19 rows", "20 are needed"]);
     let record = read(&text(HEADER, &rows()[..20])).unwrap();
-    record.require_rows(4).unwrap();
-    let error = record.require_rows(5).unwrap_err();
+    require_samples(std::slice::from_ref(&record), 4).unwrap();
+    let error = require_samples(&[record], 5).unwrap_err();
     says(
         &error,
         &["tank.csv", "20 rows", "25 are needed", "5 parameters"],
@@ -661,7 +664,12 @@ fn a_row_of_units_below_the_header() {
 }
 
 fn refusal(content: &[u8]) -> String {
-    let read = ct_signals::parse_csv("a.csv", content, &Columns::default(), Hold::Zero);
+    let read = parse_csv(
+        "a.csv",
+        content,
+        &Columns::default(),
+        &ReadOptions::default(),
+    );
     read.unwrap_err().to_string()
 }
 
@@ -680,7 +688,11 @@ fn a_line_and_the_number_of_columns_have_a_limit() {
 #[cfg(unix)]
 #[test]
 fn a_device_is_refused_before_it_is_read() {
-    let read = ct_signals::read_csv("/dev/zero".as_ref(), &Columns::default(), Hold::Zero);
+    let read = read_csv(
+        "/dev/zero".as_ref(),
+        &Columns::default(),
+        &ReadOptions::default(),
+    );
     assert_eq!(
         read.unwrap_err().to_string(),
         "/dev/zero: it is a device; name a file or a pipe"

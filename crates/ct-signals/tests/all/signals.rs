@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use approx::assert_relative_eq;
-use ct_signals::{Error, Hold, Record, Signal, excitation, noise};
+use ct_signals::{Channel, Error, Record, excitation, noise};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
@@ -203,11 +203,10 @@ fn record() -> Record {
     Record {
         name: "made".into(),
         time: vec![0.0, 1.0, 2.0, 3.5],
-        input: Signal::new("u", "V", vec![1.0, 2.0, 0.5, 1.0]),
-        output: Signal::new("y", "cm", vec![10.0, 12.0, 9.0, 9.5]),
-        input_2: None,
-        reference: None,
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", vec![1.0, 2.0, 0.5, 1.0])],
+        outputs: vec![Channel::new("y", "cm", vec![10.0, 12.0, 9.0, 9.5])],
+        references: Vec::new(),
+        calendar: None,
     }
 }
 
@@ -228,8 +227,8 @@ fn an_empty_record_has_no_size() {
     let mut empty = record();
     for values in [
         &mut empty.time,
-        &mut empty.input.values,
-        &mut empty.output.values,
+        &mut empty.inputs[0].values,
+        &mut empty.outputs[0].values,
     ] {
         values.clear();
     }
@@ -243,7 +242,7 @@ fn an_empty_record_has_no_size() {
 #[test]
 fn a_record_that_is_wrong_is_refused() {
     let mut short = record();
-    short.output.values.pop();
+    short.outputs[0].values.pop();
     let error = short.validate().unwrap_err();
     assert!(matches!(
         error,
@@ -255,7 +254,7 @@ fn a_record_that_is_wrong_is_refused() {
     ));
 
     let mut hole = record();
-    hole.input.values[2] = f64::NAN;
+    hole.inputs[0].values[2] = f64::NAN;
     let error = hole.validate().unwrap_err();
     assert!(matches!(error, Error::ValueNotFinite { index: 2, .. }));
     assert_eq!(
@@ -271,7 +270,7 @@ fn a_record_that_is_wrong_is_refused() {
     }
 
     let mut reference = record();
-    reference.reference = Some(Signal::new("r", "cm", vec![1.0]));
+    reference.references = vec![Channel::new("r", "cm", vec![1.0])];
     assert!(reference.validate().is_err());
 }
 

@@ -4,19 +4,19 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use missing_effect::{Options, Problem};
+use missing_effect::Options;
 
 use super::{Results, finish};
 use crate::effort::EffortLevel;
-use crate::input::Files;
 use crate::input::excitation::{self, ExcitationWarning};
+use crate::input::{Files, Input, ReadArguments};
 use crate::interrupt;
 use crate::look::Look;
 use crate::progress::Bar;
 use crate::{Error, terminal};
 
 /// What waits in the model file, and all that was read.
-fn read(files: &Files) -> Result<(Vec<String>, Problem), Error> {
+fn read(files: &Files) -> Result<(Vec<String>, Input), Error> {
     let model = files.read_model()?;
     Ok((model.waiting.clone(), files.read_with(model)?))
 }
@@ -38,6 +38,8 @@ pub(super) struct Compare {
     /// Limit on the time of the search; Ctrl-C ends it earlier with the best result so far
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
+    #[command(flatten)]
+    reading: ReadArguments,
     #[command(flatten)]
     results: Results,
 }
@@ -66,11 +68,17 @@ impl Compare {
             data: self.data.clone(),
             test: self.test.clone(),
             model: self.model.clone(),
+            options: self.reading.options(),
         }
     }
 
     /// What stands in the model file and has no effect, and what the records cannot tell, where there is such.
-    fn notes(waiting: &[String], problem: &Problem, look: Look) -> String {
+    fn notes(waiting: &[String], input: &Input, look: Look) -> String {
+        let Input { problem, summaries } = input;
+        let read = summaries
+            .iter()
+            .filter(|summary| !summary.is_plain() || summary.calendar.is_some())
+            .map(|summary| look.paragraph("", &format!("note: {summary}")));
         let note = |table: &String| {
             let name = table.split_once('.').map_or("", |(_, name)| name);
             look.paragraph(
@@ -90,7 +98,7 @@ impl Compare {
             let what = "the time stamps continue from file to file, so drifts, steps and periods run through them";
             look.paragraph("", &format!("note: {}: {what}", names.join(", ")))
         });
-        let notes = waiting.iter().map(note).chain(clock);
+        let notes = read.chain(waiting.iter().map(note)).chain(clock);
         notes.chain(warnings.iter().map(warning)).collect()
     }
 
@@ -105,17 +113,17 @@ impl Compare {
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
-        let (waiting, problem) = read(&files)?;
+        let (waiting, input) = read(&files)?;
         let outputs = self.results.plan(&files.all(), None)?;
         let options = self.options();
         let bar = Bar::with_limit(options.time_limit);
         bar.phase("fitting the model");
-        let diagnosis = missing_effect::compare(&problem, &options);
+        let diagnosis = missing_effect::compare(&input.problem, &options);
         bar.clear();
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
-            &(Self::notes(&waiting, &problem, look) + &terminal::comparison(&diagnosis, look)),
+            &(Self::notes(&waiting, &input, look) + &terminal::comparison(&diagnosis, look)),
             &outputs,
             out,
             look,
@@ -126,7 +134,7 @@ impl Compare {
 impl Diagnose {
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
-        let (waiting, problem) = read(&files)?;
+        let (waiting, input) = read(&files)?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
         let mut options = self.compare.options();
@@ -135,12 +143,12 @@ impl Diagnose {
         }
         let bar = Bar::with_limit(options.time_limit);
         let diagnosis =
-            missing_effect::diagnose(&problem, &options, &|progress| bar.show(progress));
+            missing_effect::diagnose(&input.problem, &options, &|progress| bar.show(progress));
         bar.clear();
         let diagnosis = diagnosis.map_err(|error| files.blame(error))?;
         finish(
             &diagnosis,
-            &(Compare::notes(&waiting, &problem, look) + &terminal::diagnosis(&diagnosis, look)),
+            &(Compare::notes(&waiting, &input, look) + &terminal::diagnosis(&diagnosis, look)),
             &outputs,
             out,
             look,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use ct_signals::{Columns, Hold, Record, quoted, read_csv, read_csv_any_input};
+use ct_signals::{Columns, Hold, ReadOptions, Record, quoted, read_csv};
 use missing_effect::Progress;
 
 use super::{Results, finish};
@@ -13,6 +13,7 @@ use crate::Error;
 use crate::column_errors::of_option;
 use crate::identify::side_by_side::{self, Orders};
 use crate::identify::{self, DelayChoice, LevelChoice, Method, Request, side_by_side_text};
+use crate::input::ReadArguments;
 use crate::look::Look;
 use crate::model_file::{self, ControllerSettings};
 use crate::progress::Bar;
@@ -39,7 +40,7 @@ pub(super) struct Identify {
     /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
-    /// The columns' names, where their first letters do not tell; two inputs with + between them, for srivc and rivc. Without a fourth name there is
+    /// The columns' names, where their first letters do not tell; several inputs with + between them, for srivc and rivc. Without a fourth name there is
     /// no reference
     #[arg(long, value_name = "TIME,INPUT,OUTPUT[,REFERENCE]", value_parser = columns)]
     columns: Option<Columns>,
@@ -66,6 +67,8 @@ pub(super) struct Identify {
     #[arg(long, value_name = "ZETA", allow_negative_numbers = true)]
     sensor_filter: Option<f64>,
     #[command(flatten)]
+    reading: ReadArguments,
+    #[command(flatten)]
     results: Results,
 }
 
@@ -82,16 +85,15 @@ fn columns(text: &str) -> Result<Columns, String> {
             ));
         }
     };
-    let (input, second) = match input.split_once('+') {
-        Some((first, second)) => (first.trim(), Some(second.trim().to_owned())),
-        None => (input, None),
-    };
     Ok(Columns {
         time: Some(time.to_owned()),
-        input: Some(input.to_owned()),
-        output: Some(output.to_owned()),
-        input_2: second,
-        reference,
+        inputs: input
+            .split('+')
+            .map(|name| name.trim().to_owned())
+            .collect(),
+        outputs: vec![output.to_owned()],
+        references: reference.into_iter().collect(),
+        ..Columns::default()
     })
 }
 
@@ -109,22 +111,22 @@ impl Identify {
         if let Some(model) = &self.model {
             let path = model;
             let model = model_file::read(path)?;
-            if let Some(second) = &model.columns.input_2
+            if let Some(second) = model.columns.inputs.get(1)
                 && !self.methods().iter().all(|method| method.is_refined())
             {
                 return Err(Error::file(
                     path,
                     format!(
-                        "the model names a second input, \"{second}\", which of the methods srivc and rivc alone fit: choose one of them, use `ctid compare`, or delete input_2 where that pump stood still"
+                        "the model names a second input, \"{second}\", which of the methods srivc and rivc alone fit: choose one of them, use `ctid compare`, or delete it where that pump stood still"
                     ),
                 ));
             }
             return Ok((model.columns, model.hold, model.controller));
         }
-        let second = self.columns.as_ref().and_then(|c| c.input_2.as_ref());
+        let second = self.columns.as_ref().and_then(|c| c.inputs.get(1));
         if second.is_some() && !self.methods().iter().all(|method| method.is_refined()) {
             return Err(Error::Usage(
-                "--columns names two inputs, which srivc and rivc alone fit: choose one of them, or name one input".to_owned(),
+                "--columns names several inputs, which srivc and rivc alone fit: choose one of them, or name one input".to_owned(),
             ));
         }
         let hold = match self.hold {
@@ -233,11 +235,41 @@ impl Identify {
         let named = self
             .columns
             .as_ref()
-            .map(|columns| columns.reference.is_some());
+            .map(|columns| !columns.references.is_empty());
         if named == Some(false) {
-            record.reference = None;
+            record.references.clear();
         }
         record
+    }
+
+    /// A record as `--columns` and `--model` say. The methods take whole records: what is missing is refused.
+    fn read(&self, path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Error> {
+        let options = ReadOptions {
+            hold,
+            ..self.reading.options()
+        };
+        let reading = read_csv(path, columns, &options).map_err(self.named_by())?;
+        let record = self.without_unnamed(reading.record);
+        let missing = record.channels().find(|channel| channel.missing() > 0);
+        let rows = record.missing_rows();
+        let what = match missing {
+            Some(channel) => format!(
+                "column \"{}\": {} of {} samples are missing",
+                quoted(&channel.header()),
+                channel.missing(),
+                record.len()
+            ),
+            None if rows > 0 && !self.methods().iter().all(|method| method.is_refined()) => {
+                format!("{rows} rows are missing")
+            }
+            None => return Ok(record),
+        };
+        Err(Error::file(
+            path,
+            format!(
+                "{what}, and the methods of identify need whole records; choose a part with --from and --to, put the record on an even grid with --resample, or use compare, which leaves missing readings out"
+            ),
+        ))
     }
 
     /// A record that is simulated only, in the units of the one that is fitted.
@@ -247,13 +279,9 @@ impl Identify {
         (columns, hold): (&Columns, Hold),
         fitted: &Record,
     ) -> Result<Record, Error> {
-        let record = read_csv_any_input(path, columns, hold).map_err(self.named_by())?;
-        let record = self.without_unnamed(record);
-        let mut pairs = vec![
-            (&record.input, &fitted.input),
-            (&record.output, &fitted.output),
-        ];
-        pairs.extend(record.input_2.iter().zip(&fitted.input_2));
+        let record = self.read(path, columns, hold)?;
+        let inputs = record.inputs.iter().zip(&fitted.inputs);
+        let pairs = inputs.chain(record.outputs.iter().zip(&fitted.outputs));
         for (test, fitted) in pairs {
             if test.unit != fitted.unit {
                 return Err(Error::file(
@@ -302,8 +330,8 @@ impl Identify {
             .into_iter()
             .map(|method| self.request(method, controller.as_ref()))
             .collect::<Result<Vec<_>, _>>()?;
-        let record = read_csv(data, &columns, hold).map_err(self.named_by())?;
-        let record = self.without_unnamed(record);
+        let record = self.read(data, &columns, hold)?;
+        record.require_moving_input().map_err(self.named_by())?;
         let test = self
             .test
             .iter()
@@ -344,7 +372,7 @@ impl Identify {
                 total,
             });
         };
-        let moves = record.reference.as_ref().is_some_and(|reference| {
+        let moves = record.references.first().is_some_and(|reference| {
             let (low, high) = reference.range();
             high > low
         });

@@ -12,7 +12,7 @@ use plants::{EffectInfo, Placed, Plant};
 use serde::Serialize;
 
 use crate::effort::EffortLevel;
-use crate::input::Files;
+use crate::input::{Files, Input, ReadArguments};
 use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
@@ -48,6 +48,8 @@ pub struct Arguments {
     /// Where the experiment goes as CSV, if one is worth playing; without it next.csv, or next-2.csv where that is there
     #[arg(long, value_name = "F.csv")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadArguments,
     /// Write the result as JSON
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
@@ -192,6 +194,7 @@ impl Arguments {
             data: self.data.clone(),
             test: Vec::new(),
             model: self.model.clone(),
+            options: self.reading.options(),
         };
         let model = files.read_model()?;
         let mut between = Vec::with_capacity(2);
@@ -202,7 +205,7 @@ impl Arguments {
             return Err(Error::Usage("--between takes two effects".to_owned()));
         };
         let columns = model.columns.clone();
-        let problem = files.read_with(model)?;
+        let Input { problem, .. } = files.read_with(model)?;
         let mut outputs = self.outputs(&files.all())?;
         let options = Options {
             time_limit: Some(self.effort.limit()),

@@ -152,7 +152,7 @@ pub fn with_effect(
         effect,
         vessel: vessel.unwrap_or(effect.usual_site(model.plant)),
     };
-    model_file::any_structure(model.plant, model.columns.input_2.is_some())
+    model_file::any_structure(model.plant, model.columns.inputs.len() > 1)
         .with(placed)
         .map_err(|error| refuse(error.to_string()))?;
 

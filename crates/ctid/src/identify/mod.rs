@@ -49,7 +49,7 @@ pub mod side_by_side_text;
 mod simulation;
 pub mod text;
 
-use ct_signals::{Record, Signal};
+use ct_signals::{Channel, Record};
 use missing_effect::Parameter;
 use serde::Serialize;
 
@@ -301,9 +301,9 @@ pub struct Shown {
     /// Time, s.
     pub time: Vec<f64>,
     /// Input.
-    pub input: Signal,
+    pub input: Channel,
     /// Output.
-    pub output: Signal,
+    pub output: Channel,
     /// Simulated output.
     pub simulated: Vec<f64>,
 }
@@ -321,9 +321,9 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         return looped::identify(record, request);
     }
     let order = request.order;
-    record.require_rows(order.parameters() + order.n)?;
-    moves(record, &record.input)?;
-    moves(record, &record.output)?;
+    ct_signals::require_samples(std::slice::from_ref(record), order.parameters() + order.n)?;
+    moves(record, &record.inputs[0])?;
+    moves(record, &record.outputs[0])?;
     positive("--memory", "s", request.memory)?;
     positive("--bandwidth", "1/s", request.bandwidth)?;
 
@@ -359,13 +359,13 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
     }
     warnings.extend(too_fast(&time_constants, record, order));
     warnings.extend(initial);
-    let residual = record.output.values.iter().zip(&simulated);
+    let residual = record.outputs[0].values.iter().zip(&simulated);
     let rmse = rms(residual.map(|(y, model)| y - model));
     warnings.extend(worse_than_first_order(
         (request.method, order),
         rmse,
         &scaled.settings(),
-        &record.output.unit,
+        &record.outputs[0].unit,
     ));
     Ok(Identification {
         schema: 1,
@@ -386,8 +386,8 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         plant,
         shown: Shown {
             time: record.time.clone(),
-            input: record.input.clone(),
-            output: record.output.clone(),
+            input: record.inputs[0].clone(),
+            output: record.outputs[0].clone(),
             simulated,
         },
     })
@@ -401,7 +401,7 @@ pub fn identify_together(records: &[Record], request: &Request) -> Result<Identi
     refined::identify(records, request)
 }
 
-fn moves(record: &Record, signal: &Signal) -> Result<(), Error> {
+fn moves(record: &Record, signal: &Channel) -> Result<(), Error> {
     let (low, high) = signal.range();
     if high > low {
         return Ok(());
@@ -431,14 +431,14 @@ fn unusable(record: &Record, order: Order, why: &str) -> Error {
 
 /// Names and units.
 fn names(order: Order, record: &Record) -> Vec<(String, String)> {
-    let gain = gain_unit(&record.output.unit, &record.input.unit);
+    let gain = gain_unit(&record.outputs[0].unit, &record.inputs[0].unit);
     let a = (1..=order.n).map(|i| (format!("a{i}"), power_of_time(i)));
     let mut names: Vec<_> = a.collect();
     names.extend((0..=order.m).map(|j| {
         let unit = format!("{} {gain}", power_of_time(j)).trim().to_owned();
         (format!("b{j}"), unit)
     }));
-    names.push(("offset".to_owned(), record.output.unit.clone()));
+    names.push(("offset".to_owned(), record.outputs[0].unit.clone()));
     names
 }
 

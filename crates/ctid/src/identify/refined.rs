@@ -92,12 +92,12 @@ pub struct RecordNoise {
 
 /// A record as the crate takes it; its reference only where it moves.
 pub(super) fn data(record: &Record) -> Data {
-    let hold = match record.hold {
+    let hold = match record.hold() {
         ct_signals::Hold::Zero => ct_lti::Hold::Zero,
         ct_signals::Hold::First => ct_lti::Hold::First,
     };
-    let inputs = std::iter::once(&record.input).chain(&record.input_2);
-    let reference = record.reference.as_ref().filter(|reference| {
+    let inputs = record.inputs.iter();
+    let reference = record.references.first().filter(|reference| {
         let (low, high) = reference.range();
         high > low
     });
@@ -110,7 +110,7 @@ pub(super) fn data(record: &Record) -> Data {
                 hold,
             })
             .collect(),
-        output: record.output.values.clone(),
+        output: record.outputs[0].values.clone(),
         reference: reference.map(|reference| reference.values.clone()),
     }
 }
@@ -194,11 +194,11 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             });
         }
     }
-    let is_constant = |reference: &&ct_signals::Signal| {
+    let is_constant = |reference: &&ct_signals::Channel| {
         let (low, high) = reference.range();
         low == high
     };
-    if let Some(reference) = first.reference.as_ref().filter(is_constant) {
+    if let Some(reference) = first.references.first().filter(is_constant) {
         warnings.push(format!(
             "\"{}\" is constant: if a controller moved the input, these estimates, which take it for open loop, are biased",
             quoted(&reference.name)
@@ -240,7 +240,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             .plant
             .fitted(data)
             .map_err(|error| named(records, error))?;
-        let output = &record.output.values;
+        let output = &record.outputs[0].values;
         let error: Vec<f64> = output.iter().zip(&fitted).map(|(y, m)| y - m).collect();
         visible.test(record, data.reference.is_some(), &error)?;
         errors.extend(error);
@@ -258,7 +258,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does); the input may answer to the output alone, through a controller whose reference is not there or does not move; or order or --integrator do not belong".to_owned(),
         );
     }
-    let input_names = std::iter::once(&first.input).chain(&first.input_2);
+    let input_names = first.inputs.iter();
     Ok(Identification {
         schema: 1,
         method: request.method,
@@ -296,8 +296,8 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
         plant: found.plant,
         shown: Shown {
             time: first.time.clone(),
-            input: first.input.clone(),
-            output: first.output.clone(),
+            input: first.inputs[0].clone(),
+            output: first.outputs[0].clone(),
             simulated,
         },
     })
@@ -313,12 +313,10 @@ struct Visible {
 impl Visible {
     /// In open loop every input is held against the error, in a loop the reference, as the input answers to the noise there.
     fn test(&mut self, record: &Record, in_loop: bool, error: &[f64]) -> Result<(), Error> {
-        let signals: Vec<&ct_signals::Signal> = match record.reference.as_ref().filter(|_| in_loop)
+        let signals: Vec<&ct_signals::Channel> = match record.references.first().filter(|_| in_loop)
         {
             Some(reference) => vec![reference],
-            None => std::iter::once(&record.input)
-                .chain(&record.input_2)
-                .collect(),
+            None => record.inputs.iter().collect(),
         };
         let lags = (error.len() / 10).clamp(2, 25);
         for signal in signals {
@@ -354,15 +352,15 @@ fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, Stri
         0 => name,
         index => format!("{name}_{}", index + 1),
     };
-    let output = &record.output.unit;
+    let output = &record.outputs[0].unit;
     // With an integrator A begins with p: everything is divided by a time.
     let lower = usize::from(integrator);
     match kind {
         Kind::A { power } => (format!("a{power}"), super::power_of_time(power - lower)),
         Kind::B { input, power } => {
-            let signal = match (input, &record.input_2) {
+            let signal = match (input, &record.inputs.get(1)) {
                 (1, Some(second)) => second,
-                _ => &record.input,
+                _ => &record.inputs[0],
             };
             let unit = match power.checked_sub(lower) {
                 Some(power) => {

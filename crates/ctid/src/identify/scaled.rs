@@ -57,20 +57,20 @@ impl Scaled {
     pub fn new(record: &Record, request: &Request) -> (Self, Vec<String>) {
         let begin = record.time.first().copied().unwrap_or(0.0);
         let (duration, step) = (record.duration(), record.sample_interval());
-        let hold = match record.hold {
+        let hold = match record.hold() {
             ct_signals::Hold::Zero => Hold::Zero,
             ct_signals::Hold::First => Hold::First,
         };
         let (input, output) = (
-            moments(&record.input.values),
-            moments(&record.output.values),
+            moments(&record.inputs[0].values),
+            moments(&record.outputs[0].values),
         );
         let scale = |values: &[f64], (mean, deviation): (f64, f64)| -> Vec<f64> {
             values.iter().map(|v| (v - mean) / deviation).collect()
         };
         let (u, y) = (
-            scale(&record.input.values, input),
-            scale(&record.output.values, output),
+            scale(&record.inputs[0].values, input),
+            scale(&record.outputs[0].values, output),
         );
         let (unit, first_order, first_order_error, at_edge) = first_order(record, &u, &y, hold);
         let mut warnings = Vec::new();

@@ -21,7 +21,7 @@
 
 use std::time::Instant;
 
-use ct_signals::{ArModel, Record, Signal, residual_tests};
+use ct_signals::{ArModel, Channel, Record, residual_tests};
 use missing_effect::Parameter;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -224,8 +224,8 @@ pub fn compare(
         orders: if orders.len() > 1 { rows } else { Vec::new() },
         shown: Shown {
             time: record.time.clone(),
-            input: record.input.clone(),
-            output: record.output.clone(),
+            input: record.inputs[0].clone(),
+            output: record.outputs[0].clone(),
             simulated: Vec::new(),
         },
     })
@@ -271,7 +271,7 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
             .plant
             .fitted(&data(record))
             .map_err(|error| Error::Usage(error.to_string()))?;
-        let output = record.output.values.iter();
+        let output = record.outputs[0].values.iter();
         let error = output.zip(&simulated).map(|(y, model)| y - model);
         Ok((error.collect(), simulated))
     };
@@ -311,9 +311,7 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
     });
     let lags = (error.len() / 10).clamp(2, 25);
     let mut input_p = 1.0_f64;
-    let inputs: Vec<&Signal> = std::iter::once(&record.input)
-        .chain(&record.input_2)
-        .collect();
+    let inputs: Vec<&Channel> = record.inputs.iter().collect();
     for input in &inputs {
         let (_, p) = residual_tests::prewhitened_input_test(&input.values, &error, lags)?;
         input_p = input_p.min(p * inputs.len() as f64);
@@ -343,12 +341,14 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
 
 /// Standard deviation of the outputs, each record about its own mean.
 fn spread(records: &[Record]) -> f64 {
-    let about_mean = |output: &Signal| {
+    let about_mean = |output: &Channel| {
         let mean = output.values.iter().sum::<f64>() / output.values.len().max(1) as f64;
         let values = output.values.iter();
         values.map(|y| y - mean).collect::<Vec<f64>>()
     };
-    rms(records.iter().flat_map(|record| about_mean(&record.output)))
+    rms(records
+        .iter()
+        .flat_map(|record| about_mean(&record.outputs[0])))
 }
 
 fn violated(

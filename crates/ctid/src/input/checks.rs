@@ -1,6 +1,6 @@
 //! Whether records fit each other, the model's units and sizes, and its parameters.
 
-use ct_signals::{ROWS_PER_PARAMETER, Record};
+use ct_signals::Record;
 use plants::controller::Controller;
 use plants::{Outlet, Place, Plant, Scales};
 
@@ -28,16 +28,16 @@ pub(super) fn controller(
 ) -> Result<Controller, Error> {
     let interval = records.first().map_or(1.0, Record::sample_interval);
     for record in records {
-        if let Some(reference) = &record.reference
+        if let Some(reference) = record.references.first()
             && !reference.unit.is_empty()
-            && !record.output.unit.is_empty()
-            && reference.unit != record.output.unit
+            && !record.outputs[0].unit.is_empty()
+            && reference.unit != record.outputs[0].unit
         {
             return Err(Error::File {
                 file: record.name.clone(),
                 what: format!(
                     "the reference is in {}, the output in {}: a controller compares the two; convert one of them, or correct its header",
-                    reference.unit, record.output.unit
+                    reference.unit, record.outputs[0].unit
                 ),
             });
         }
@@ -73,21 +73,21 @@ pub(super) fn check_units(records: &[Record], test: &[Record]) -> Result<(), Err
         ));
     };
     for record in std::iter::once(first).chain(others).chain(test) {
-        if let Some(second) = &record.input_2
-            && second.unit != record.input.unit
+        if let Some(second) = record.inputs.get(1)
+            && second.unit != record.inputs[0].unit
         {
             return Err(Error::File {
                 file: record.name.clone(),
                 what: format!(
                     "column \"{}\" is in \"{}\" and column \"{}\" in \"{}\": convert one of the two commands, or correct its header",
-                    record.input.name, record.input.unit, second.name, second.unit
+                    record.inputs[0].name, record.inputs[0].unit, second.name, second.unit
                 ),
             });
         }
     }
     for other in others.iter().chain(test) {
-        let mut pairs = vec![(&other.input, &first.input), (&other.output, &first.output)];
-        pairs.extend(other.input_2.as_ref().zip(first.input_2.as_ref()));
+        let inputs = other.inputs.iter().zip(&first.inputs);
+        let pairs = inputs.chain(other.outputs.iter().zip(&first.outputs));
         for (here, there) in pairs {
             if here.unit != there.unit {
                 let named = |unit: &str| match unit {
@@ -147,10 +147,10 @@ pub(super) fn check_height<'a>(
                 file: model_name.to_string(),
                 what: format!(
                     "tank_height = {height}, but column \"{}\" of {} reaches {}{}; give the height in the output's unit{mend}",
-                    record.output.name,
+                    record.outputs[0].name,
                     record.name,
                     numbers::significant(highest, 3),
-                    after_space(&record.output.unit)
+                    after_space(&record.outputs[0].unit)
                 ),
             });
         }
@@ -168,7 +168,7 @@ pub(super) fn check_input<'a>(
         return Ok(());
     };
     for record in records {
-        for input in std::iter::once(&record.input).chain(&record.input_2) {
+        for input in record.inputs.iter() {
             let (low, high) = input.range();
             let furthest = if -low > high { low } else { high };
             if furthest.abs() > BEYOND_THE_RANGE * range {
@@ -216,14 +216,14 @@ pub(super) fn check_levels<'a>(
     let Some((record, low)) = below else {
         return Ok(());
     };
-    let unit = after_space(&record.output.unit);
+    let unit = after_space(&record.outputs[0].unit);
     Err(Error::File {
         file: record.name.clone(),
         what: format!(
             "column \"{}\" falls to {}{unit}, but {} lets out by the square root of the level, which is not below zero: \
              add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, where the \
              offset is to be fitted, run `ctid add sensor_offset`",
-            record.output.name,
+            record.outputs[0].name,
             numbers::significant(low, 3),
             model.plant.id()
         ),
@@ -243,7 +243,7 @@ pub(super) fn check_terms(
             (&own.at_unit, own.term.variable.unit(), "at"),
             (&own.unit, own.term.unit(), "value"),
         ] {
-            let here = unit.label(&record.output.unit, &record.input.unit, area_known);
+            let here = unit.label(&record.outputs[0].unit, &record.inputs[0].unit, area_known);
             if !written.is_empty() && *written != here {
                 return Err(Error::File {
                     file: model_name.to_string(),
@@ -260,7 +260,7 @@ pub(super) fn check_terms(
 
 /// Enough rows for the parameters; every record brings initial levels of its own.
 pub(super) fn check_rows(model: &ModelFile, records: &[Record]) -> Result<(), Error> {
-    let [first, others @ ..] = records else {
+    let Some(first) = records.first() else {
         return Ok(());
     };
     let mut scales = Scales::from_ranges(
@@ -269,21 +269,8 @@ pub(super) fn check_rows(model: &ModelFile, records: &[Record]) -> Result<(), Er
         first.sample_interval(),
         first.duration(),
     );
-    scales.input_2 = first.input_2.as_ref().map(|second| second.range());
+    scales.input_2 = first.inputs.get(1).map(|second| second.range());
     let parameters = model.structure(scales)?.parameters().len() - model.fixed.len();
     let needed = parameters + records.len() * Plant::vessels(model.plant);
-    if others.is_empty() {
-        return Ok(first.require_rows(needed)?);
-    }
-    let rows: usize = records.iter().map(Record::len).sum();
-    if rows >= needed * ROWS_PER_PARAMETER {
-        return Ok(());
-    }
-    let names: Vec<&str> = records.iter().map(|record| record.name.as_str()).collect();
-    Err(Error::Record(ct_signals::Error::TooFewRows {
-        record: names.join(" and "),
-        rows,
-        needed: needed * ROWS_PER_PARAMETER,
-        why: format!(" to fit {needed} parameters"),
-    }))
+    Ok(ct_signals::require_samples(records, needed)?)
 }

@@ -9,7 +9,7 @@
 
 use std::fmt;
 
-use ct_signals::{Record, Signal, residual_tests::prewhitened_input_test};
+use ct_signals::{Channel, Record, residual_tests::prewhitened_input_test};
 use missing_effect::Problem;
 
 use crate::numbers;
@@ -120,7 +120,7 @@ pub(crate) fn of_records<'a>(
                 record: record.name.clone(),
                 range,
                 difference,
-                unit: record.output.unit.clone(),
+                unit: record.outputs[0].unit.clone(),
             });
         }
     }
@@ -135,8 +135,8 @@ fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<
     let least = MOVE * (high - low);
     let second = |record: &Record| {
         record
-            .input_2
-            .as_ref()
+            .inputs
+            .get(1)
             .is_some_and(|u| u.range().0 < u.range().1)
     };
     let mut found = None;
@@ -144,14 +144,14 @@ fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<
         if second(record) {
             return None;
         }
-        for levels in moves(&record.input, least) {
+        for levels in moves(&record.inputs[0], least) {
             if found.is_some() {
                 return None;
             }
             found = Some(ExcitationWarning::SingleStep {
                 record: record.name.clone(),
                 levels,
-                unit: record.input.unit.clone(),
+                unit: record.inputs[0].unit.clone(),
             });
         }
     }
@@ -159,7 +159,7 @@ fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<
 }
 
 /// The moves of a signal by more than `least`: from where it stood, to where it went.
-fn moves(signal: &Signal, least: f64) -> Vec<(f64, f64)> {
+fn moves(signal: &Channel, least: f64) -> Vec<(f64, f64)> {
     let mut moves = Vec::new();
     let mut values = signal.values.iter().copied();
     let Some(mut stood) = values.next() else {
@@ -176,7 +176,7 @@ fn moves(signal: &Signal, least: f64) -> Vec<(f64, f64)> {
 
 /// Range of the output and median of its first differences, where it does not answer to the command.
 fn no_answer(record: &Record) -> Option<(f64, f64)> {
-    let (input, output) = (&record.input.values, &record.output.values);
+    let (input, output) = (&record.inputs[0].values, &record.outputs[0].values);
     let (low, high) = record.output_range();
     let mut differences: Vec<f64> = output.windows(2).map(|y| (y[1] - y[0]).abs()).collect();
     let middle = differences.len() / 2;
@@ -185,7 +185,7 @@ fn no_answer(record: &Record) -> Option<(f64, f64)> {
     }
     let (_, &mut difference, _) = differences.select_nth_unstable_by(middle, f64::total_cmp);
     let range = high - low;
-    let silent = record.input_2.is_none()
+    let silent = record.inputs.get(1).is_none()
         && range < NOISE_RANGE * difference
         && uncorrelated(input, output)
         && uncorrelated_behind_lags(input, output);
@@ -233,7 +233,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use ct_signals::{Hold, noise};
+    use ct_signals::noise;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -257,11 +257,10 @@ mod tests {
         Record {
             name: name.to_string(),
             time: (0..n).map(|k| k as f64).collect(),
-            input: Signal::new("u", "V", command.to_vec()),
-            output: Signal::new("y", "cm", output),
-            input_2: None,
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", command.to_vec())],
+            outputs: vec![Channel::new("y", "cm", output)],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 

@@ -5,7 +5,8 @@ pub mod excitation;
 
 use std::path::{Path, PathBuf};
 
-use ct_signals::{Record, read_csv_any_input};
+use clap::Args;
+use ct_signals::{Hold, ReadOptions, ReadSummary, Reading, Record, read_csv};
 use missing_effect::Problem;
 
 use self::checks::{
@@ -39,6 +40,56 @@ pub struct Files {
     pub test: Vec<PathBuf>,
     /// The model file.
     pub model: PathBuf,
+    /// How the records are read, the hold aside, which the model says.
+    pub options: ReadOptions,
+}
+
+/// Which part of a record is read, and how.
+#[derive(Debug, Clone, Default, Args)]
+pub struct ReadArguments {
+    /// Leave out rows before this: a date such as "2026-01-31 14:25", or a number in the unit of the time column
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    from: Option<String>,
+    /// Leave out rows behind this
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    to: Option<String>,
+    /// Refuse missing samples and missing rows
+    #[arg(long)]
+    strict: bool,
+    /// Put the records on an even grid of this interval [s]
+    #[arg(long, value_name = "S", value_parser = interval, allow_negative_numbers = true)]
+    resample: Option<f64>,
+}
+
+/// A number of seconds above zero.
+fn interval(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
+        _ => Err("it has to be a number of seconds above zero".to_string()),
+    }
+}
+
+impl ReadArguments {
+    /// As the reader takes them; what the inputs do between samples is for others to say.
+    #[must_use]
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions {
+            hold: Hold::Zero,
+            from: self.from.clone(),
+            to: self.to.clone(),
+            strict: self.strict,
+            resample: self.resample,
+        }
+    }
+}
+
+/// A problem, and how its records were read.
+#[derive(Debug, Clone)]
+pub struct Input {
+    /// Model and records.
+    pub problem: Problem,
+    /// Of each record, fitted ones first.
+    pub summaries: Vec<ReadSummary>,
 }
 
 impl Files {
@@ -53,7 +104,7 @@ impl Files {
     ///
     /// # Errors
     /// One line that names the file, the place and the mend.
-    pub fn read(&self) -> Result<Problem, Error> {
+    pub fn read(&self) -> Result<Input, Error> {
         self.read_with(self.read_model()?)
     }
 
@@ -70,20 +121,30 @@ impl Files {
     ///
     /// # Errors
     /// As [`Files::read`].
-    pub(crate) fn read_with(&self, model: ModelFile) -> Result<Problem, Error> {
-        let read = |paths: &[PathBuf]| -> Result<Vec<Record>, Error> {
-            paths
-                .iter()
-                .map(|path| {
-                    let mut record = read_csv_any_input(path, &model.columns, model.hold)
-                        .map_err(|error| perhaps_a_model(path, error))?;
-                    record.name = self.name_of(path);
-                    Ok(record)
-                })
-                .collect()
+    pub(crate) fn read_with(&self, model: ModelFile) -> Result<Input, Error> {
+        let options = ReadOptions {
+            hold: model.hold,
+            ..self.options.clone()
         };
-        let (records, test) = (read(&self.data)?, read(&self.test)?);
-        problem(&self.model.display().to_string(), model, records, test)
+        let read = |path: &PathBuf| -> Result<Reading, Error> {
+            let mut reading = read_csv(path, &model.columns, &options)
+                .map_err(|error| perhaps_a_model(path, error))?;
+            reading.record.name = self.name_of(path);
+            reading.summary.file.clone_from(&reading.record.name);
+            Ok(reading)
+        };
+        let all = self.data.iter().chain(&self.test).map(read);
+        let (mut records, summaries): (Vec<Record>, Vec<ReadSummary>) = all
+            .collect::<Result<Vec<Reading>, Error>>()?
+            .into_iter()
+            .map(|reading| (reading.record, reading.summary))
+            .unzip();
+        on_one_clock(&mut records);
+        let test = records.split_off(self.data.len());
+        Ok(Input {
+            problem: problem(&self.model.display().to_string(), model, records, test)?,
+            summaries,
+        })
     }
 
     /// An error of the computation, with the file that is to blame where that is known.
@@ -150,6 +211,47 @@ impl Files {
     }
 }
 
+/// Counts the times of all records with dates from the first of these dates.
+pub(crate) fn on_one_clock(records: &mut [Record]) {
+    let starts = records.iter().filter_map(|record| record.calendar.as_ref());
+    let Some(first) = starts.map(|calendar| calendar.start).min() else {
+        return;
+    };
+    for record in records {
+        if let Some(calendar) = &mut record.calendar {
+            let later = calendar.start.seconds_since(first);
+            record.time.iter_mut().for_each(|time| *time += later);
+            calendar.start = first;
+        }
+    }
+}
+
+/// Fitted records with dates are given in the order of their dates, and do not overlap: a clock that runs backwards between files tells
+/// nothing of drifts.
+fn check_clocks(model_name: &str, records: &[Record]) -> Result<(), Error> {
+    for pair in records.windows(2) {
+        let [before, after] = pair else { continue };
+        let (Some(calendar), Some(_)) = (&before.calendar, &after.calendar) else {
+            continue;
+        };
+        let (Some(&end), Some(&begin)) = (before.time.last(), after.time.first()) else {
+            continue;
+        };
+        if begin <= end {
+            return Err(Error::File {
+                file: after.name.clone(),
+                what: format!(
+                    "row 2, column of the time: it begins at {}, before {} ends at {}; give the files in the order of their dates, and once what they share (--from, --to), or correct time_zone under [columns] in {model_name}",
+                    calendar.at(begin),
+                    before.name,
+                    calendar.at(end)
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
 /// A problem from what has been read; `model_name` names the model file in messages.
 ///
 /// # Errors
@@ -160,6 +262,7 @@ pub fn problem(
     records: Vec<Record>,
     test: Vec<Record>,
 ) -> Result<Problem, Error> {
+    check_clocks(model_name, &records)?;
     check_units(&records, &test)?;
     check_movement(&records)?;
     check_height(model_name, &model, records.iter().chain(&test))?;
@@ -188,18 +291,17 @@ pub fn problem(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ct_signals::{Hold, Signal};
+    use ct_signals::Channel;
 
     fn record(name: &str, rows: usize, unit: &str) -> Record {
         let values = |scale: f64| (0..rows).map(|k| scale * (1.0 + (k % 7) as f64)).collect();
         Record {
             name: name.to_string(),
             time: (0..rows).map(|k| k as f64).collect(),
-            input: Signal::new("u", "V", values(1.0)),
-            output: Signal::new("y", unit, values(2.0)),
-            input_2: None,
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", values(1.0))],
+            outputs: vec![Channel::new("y", unit, values(2.0))],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 
@@ -269,7 +371,10 @@ mod tests {
         // The command runs from 1 to 7 V.
         let taken = |range: f64, sign: f64| {
             let mut records = records();
-            records[0].input.values.iter_mut().for_each(|u| *u *= sign);
+            records[0].inputs[0]
+                .values
+                .iter_mut()
+                .for_each(|u| *u *= sign);
             let model = model_file::parse("tank.toml", &model(range)).unwrap();
             problem("tank.toml", model, records, vec![]).is_ok()
         };
@@ -282,7 +387,7 @@ mod tests {
     fn a_level_below_the_outlet_is_refused_where_its_root_is_taken() {
         let lowered = |by: f64| {
             let mut record = record("a.csv", 50, "cm");
-            record.output.values.iter_mut().for_each(|y| *y -= by);
+            record.outputs[0].values.iter_mut().for_each(|y| *y -= by);
             record
         };
         assert_eq!(
@@ -334,6 +439,7 @@ mod tests {
             data: data.iter().map(PathBuf::from).collect(),
             test: test.iter().map(PathBuf::from).collect(),
             model: "tank.toml".into(),
+            options: ReadOptions::default(),
         };
         let message = |files: Files| files.read().unwrap_err().to_string();
         assert!(message(files(&["a.csv"], &["./a.csv"])).contains("both fitted and held out"));

@@ -183,7 +183,7 @@ impl Source<'_> {
         model: &mut ModelFile,
         raw: &BTreeMap<Spanned<String>, Spanned<Number>>,
     ) -> Result<(), Error> {
-        let structure = model.structure(any_scales(model.columns.input_2.is_some()))?;
+        let structure = model.structure(any_scales(model.columns.inputs.len() > 1))?;
         let infos = structure.parameters();
         let names = structure.parameter_names();
         for (name, number) in raw {

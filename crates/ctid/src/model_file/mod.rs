@@ -189,7 +189,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
             model.terms.push(term.clone());
             continue;
         }
-        let site = (plant, model.columns.input_2.is_some());
+        let site = (plant, model.columns.inputs.len() > 1);
         let placed = source.placed(site, &model.effects, name, &settings)?;
         model.effects.push(placed);
     }

@@ -133,16 +133,21 @@ impl Source<'_> {
 
     /// A second input is for a plant with a second pump.
     pub(super) fn check_input_2(&self, plant: Plant, columns: &Columns) -> Result<(), Error> {
-        if columns.input_2.is_none() || plant.pumps() > 1 {
+        if columns.inputs.len() <= plant.pumps() {
             return Ok(());
         }
-        let at = self.text.find("input_2").unwrap_or(0);
+        let at = self.text.find("input_2").or(self.text.find("input"));
+        let pumps = match plant.pumps() {
+            1 => "one pump",
+            _ => "two pumps",
+        };
+        let or = match plant.pumps() {
+            1 => ", or take plant = \"three-tank\"",
+            _ => "",
+        };
         Err(self.at(
-            at,
-            format!(
-                "plant {} has one pump; delete input_2, or take plant = \"three-tank\"",
-                plant.id()
-            ),
+            at.unwrap_or(0),
+            format!("plant {} has {pumps}; delete input_2{or}", plant.id()),
         ))
     }
 

@@ -250,6 +250,7 @@ pub(crate) fn two_tanks() -> Diagnosis {
     let deadzone = ("pump_deadzone", zone.clone());
     let volt = |value: f64| Some(parameter("size", value, Some(0.06 * value.abs()), "V"));
     Diagnosis {
+        gaps: None,
         schema: 1,
         verdict: Verdict::Undecided,
         effects: vec!["overflow".into(), "pump_deadzone".into()],

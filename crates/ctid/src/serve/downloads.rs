@@ -33,20 +33,23 @@ async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Res
     let session = find(&app, &tab.session)?;
     let text = aside(move || {
         let mut session = lock(&session);
-        let (columns, hold) = session.layout();
+        let (columns, options) = session.layout();
         let (mut shown, mut units) = (Vec::new(), None);
         for upload in &mut session.records {
-            let Ok(record) = upload.record(&columns, hold) else {
+            let Ok(record) = upload.record(&columns, &options) else {
                 continue;
             };
-            units.get_or_insert((record.input.unit.clone(), record.output.unit.clone()));
+            units.get_or_insert((
+                record.inputs[0].unit.clone(),
+                record.outputs[0].unit.clone(),
+            ));
             shown.push(Shown {
                 name: record.name.clone(),
                 held_out: upload.held_out,
                 time: record.time.clone(),
-                input: record.input.values.clone(),
-                input_2: record.input_2.as_ref().map(|second| second.values.clone()),
-                output: record.output.values.clone(),
+                input: record.inputs[0].values.clone(),
+                input_2: record.inputs.get(1).map(|second| second.values.clone()),
+                output: record.outputs[0].values.clone(),
             });
         }
         let (input, output) = units.unwrap_or_default();

@@ -10,9 +10,8 @@ fn bytes<'a>(series: impl IntoIterator<Item = &'a Vec<f64>>) -> usize {
 
 /// The numbers of a record.
 pub(super) fn of_record(record: &Record) -> usize {
-    let always = [&record.time, &record.input.values, &record.output.values];
-    let sometimes = [&record.input_2, &record.reference];
-    bytes(always) + bytes(sometimes.into_iter().flatten().map(|signal| &signal.values))
+    let channels = record.channels().map(|channel| &channel.values);
+    bytes(std::iter::once(&record.time).chain(channels))
 }
 
 /// Its copy of the records, what its models give on them, and the path of what nothing explains.

@@ -9,7 +9,7 @@ use std::thread;
 use std::time::Instant;
 
 use axum::http::StatusCode;
-use ct_signals::Columns;
+use ct_signals::{Columns, ReadOptions};
 use missing_effect::design::{Design, Limits, design};
 use missing_effect::{Diagnosis, Options, Problem, Progress, Verdict, compare, diagnose};
 
@@ -70,9 +70,11 @@ impl Work {
             data: Vec::new(),
             test: Vec::new(),
             model: PathBuf::from(&name),
+            options: ReadOptions::default(),
         };
+        let options = ReadOptions::from(model.hold);
         for upload in &mut session.records {
-            let record = upload.record(&model.columns, model.hold);
+            let record = upload.record(&model.columns, &options);
             let record = record.map_err(Refusal::input)?.as_ref().clone();
             let (to, names) = match upload.held_out {
                 true => (&mut test, &mut files.test),
@@ -86,6 +88,10 @@ impl Work {
                 "there is no record to fit; drop a CSV file first",
             ));
         }
+        let fitted = records.len();
+        records.append(&mut test);
+        input::on_one_clock(&mut records);
+        let test = records.split_off(fitted);
         let problem = input::problem(&name, model.clone(), records, test)?;
         Ok(Self {
             text,

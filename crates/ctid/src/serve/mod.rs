@@ -83,6 +83,8 @@ use self::sessions::Sessions;
 use self::upload::Upload;
 use crate::Error;
 use crate::commands::say;
+use ct_signals::ReadOptions;
+
 use crate::input::Files;
 
 /// Where the page is, if nothing else is there.
@@ -149,6 +151,7 @@ impl Arguments {
             data: self.data.clone(),
             test: self.test.clone(),
             model: self.model.clone().unwrap_or_default(),
+            options: ReadOptions::default(),
         };
         if self.model.is_some() {
             let model = files.read_model()?;

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
-use ct_signals::{Columns, Hold};
+use ct_signals::{Columns, ReadOptions};
 use missing_effect::design::Design;
 use missing_effect::{Diagnosis, Progress};
 
@@ -228,10 +228,10 @@ impl Session {
     }
 
     /// Columns and hold as the model names them; what can be guessed where there is no model yet.
-    pub(super) fn layout(&self) -> (Columns, Hold) {
+    pub(super) fn layout(&self) -> (Columns, ReadOptions) {
         match self.model() {
-            Ok(model) => (model.columns, model.hold),
-            Err(_) => (Columns::default(), Hold::Zero),
+            Ok(model) => (model.columns, model.hold.into()),
+            Err(_) => (Columns::default(), ReadOptions::default()),
         }
     }
 

@@ -128,12 +128,28 @@ impl Settings {
             let word = word.as_deref().filter(|w| !w.trim().is_empty());
             word.map(Value::from)
         };
+        let names = |names: &[String]| -> Option<Value> {
+            let mut given = names.iter().filter(|name| !name.trim().is_empty());
+            let first = given.next()?;
+            let others: Vec<&String> = given.collect();
+            if others.is_empty() {
+                return Some(first.as_str().into());
+            }
+            Some(
+                std::iter::once(first)
+                    .chain(others)
+                    .collect::<Array>()
+                    .into(),
+            )
+        };
         let columns = [
             ("time", word(&self.columns.time)),
-            ("input", word(&self.columns.input)),
-            ("input_2", word(&self.columns.input_2)),
-            ("output", word(&self.columns.output)),
-            ("reference", word(&self.columns.reference)),
+            ("input", names(&self.columns.inputs)),
+            ("input_2", None),
+            ("output", names(&self.columns.outputs)),
+            ("reference", names(&self.columns.references)),
+            ("time_format", word(&self.columns.time_format)),
+            ("time_zone", word(&self.columns.time_zone)),
         ];
         section(&mut document, file, "columns", columns)?;
         let number = |value: Option<f64>| value.map(Value::from);
@@ -317,7 +333,7 @@ rim = 20.0
     fn a_changed_number_keeps_its_comment_and_a_new_table_is_appended() {
         let mut settings = Settings::of(COMMENTED);
         settings.known.area = Some(150.5);
-        settings.columns.output = Some("y [cm]".into());
+        settings.columns.outputs = vec!["y [cm]".into()];
         let text = settings.written_into("m.toml", COMMENTED).unwrap().text;
         let expected = COMMENTED.replace("154 ", "150.5 ");
         assert!(text.contains("[columns]\noutput = \"y [cm]\"\n"), "{text}");
@@ -368,8 +384,7 @@ rim = 20.0
         let settings = Settings {
             plant: "three-tank".into(),
             columns: Columns {
-                input: Some("u1 [V]".into()),
-                input_2: Some("u2 [V]".into()),
+                inputs: vec!["u1 [V]".into(), "u2 [V]".into()],
                 ..Columns::default()
             },
             known: Known {

@@ -38,12 +38,12 @@ pub(super) fn job(session: &Session) -> Value {
 
 /// Everything but curves.
 pub(super) fn state(session: &mut Session) -> Value {
-    let (columns, hold) = session.layout();
+    let (columns, options) = session.layout();
     let records: Vec<Value> = session
         .records
         .iter_mut()
         .map(|upload| {
-            let read = upload.record(&columns, hold);
+            let read = upload.record(&columns, &options);
             json!({
                 "name": upload.name,
                 "held_out": upload.held_out,
@@ -117,7 +117,7 @@ fn is_of<T>(found: &Found<T>, session: &Session) -> bool {
 
 /// What a record holds, in words.
 fn about(record: &Record) -> Value {
-    let signal = |signal: &ct_signals::Signal| {
+    let signal = |signal: &ct_signals::Channel| {
         let (low, high) = signal.range();
         let unit = &signal.unit;
         let range = format!(
@@ -131,10 +131,10 @@ fn about(record: &Record) -> Value {
         "samples": record.len(),
         "length": numbers::duration(record.duration()),
         "interval": numbers::duration(record.sample_interval()),
-        "input": signal(&record.input),
-        "input_2": record.input_2.as_ref().map(signal),
-        "output": signal(&record.output),
-        "reference": record.reference.as_ref().map(signal),
+        "input": signal(&record.inputs[0]),
+        "input_2": record.inputs.get(1).map(signal),
+        "output": signal(&record.outputs[0]),
+        "reference": record.references.first().map(signal),
     })
 }
 

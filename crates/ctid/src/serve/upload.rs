@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::body::Bytes;
-use ct_signals::{Columns, Heading, Hold, Record, csv_header, parse_csv_any_input};
+use ct_signals::{Columns, Heading, ReadOptions, Record, csv_header, parse_csv};
 
 use super::guard::Refusal;
 use super::held::of_record;
@@ -21,7 +21,7 @@ pub(super) struct Upload {
     pub headings: Vec<Heading>,
     pub content: Bytes,
     /// As it was read last, and with which columns.
-    read: Option<(Columns, Hold, Result<Arc<Record>, String>)>,
+    read: Option<(Columns, ReadOptions, Result<Arc<Record>, String>)>,
 }
 
 impl Upload {
@@ -64,14 +64,19 @@ impl Upload {
     }
 
     /// The record, read again only where the columns have changed.
-    pub(super) fn record(&mut self, columns: &Columns, hold: Hold) -> Result<Arc<Record>, String> {
+    pub(super) fn record(
+        &mut self,
+        columns: &Columns,
+        options: &ReadOptions,
+    ) -> Result<Arc<Record>, String> {
         match &self.read {
-            Some((c, h, record)) if c == columns && *h == hold => record.clone(),
+            Some((c, o, record)) if c == columns && o == options => record.clone(),
             _ => {
                 // Whether a fitted record has to move depends on the others.
-                let record = parse_csv_any_input(&self.name, &self.content, columns, hold);
-                let record = record.map(Arc::new).map_err(|error| error.to_string());
-                self.read = Some((columns.clone(), hold, record.clone()));
+                let reading = parse_csv(&self.name, &self.content, columns, options);
+                let record = reading.map(|reading| Arc::new(reading.record));
+                let record = record.map_err(|error| error.to_string());
+                self.read = Some((columns.clone(), options.clone(), record.clone()));
                 record
             }
         }
@@ -113,20 +118,21 @@ mod tests {
         assert_eq!(upload.held(), sent);
         let columns = Columns {
             time: Some("t".into()),
-            input: Some("u".into()),
-            input_2: Some("u2".into()),
-            output: Some("y".into()),
-            reference: Some("r".into()),
+            inputs: vec!["u".into(), "u2".into()],
+            outputs: vec!["y".into()],
+            references: vec!["r".into()],
+            ..Columns::default()
         };
-        upload.record(&columns, Hold::Zero).unwrap();
+        let options = ReadOptions::default();
+        upload.record(&columns, &options).unwrap();
         assert_eq!(upload.held(), sent + 2000 * 5 * 8);
         assert!(upload.held() <= 5 * sent);
         // What cannot be read takes nothing.
         let columns = Columns {
-            input: Some("no such".into()),
+            inputs: vec!["no such".into()],
             ..columns
         };
-        upload.record(&columns, Hold::Zero).unwrap_err();
+        upload.record(&columns, &options).unwrap_err();
         assert_eq!(upload.held(), sent);
     }
 }

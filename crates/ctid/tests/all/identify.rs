@@ -4,7 +4,7 @@
 
 use crate::common::{Place, bundled};
 use ct_lti::{Simulator, StateSpace, TransferFunction};
-use ct_signals::{Hold, Record, Signal, excitation, noise};
+use ct_signals::{Channel, Hold, ReadOptions, Reading, Record, excitation, noise, read_csv};
 use ctid::identify::{Identification, Method, Order, Request, identify};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
@@ -58,17 +58,19 @@ impl Plant {
         let y = (0..rows).map(|k| self.rest.1 + plant.update(u[k], before(k)).unwrap() + v[k]);
         Record {
             name: "simulated".into(),
-            output: Signal::new("y", "cm", y.collect()),
+            outputs: vec![Channel::new("y", "cm", y.collect())],
             time: (0..rows)
                 .scan(100.0, |time, k| {
                     *time += before(k);
                     Some(*time)
                 })
                 .collect(),
-            input: Signal::new("u", "V", u.iter().map(|u| u + self.rest.0).collect()),
-            input_2: None,
-            reference: None,
-            hold: self.hold,
+            inputs: vec![
+                Channel::new("u", "V", u.iter().map(|u| u + self.rest.0).collect())
+                    .with_hold(self.hold),
+            ],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 
@@ -287,7 +289,7 @@ fn drift_with_the_operating_point_leaves_the_band() {
         ..FIRST
     };
     let mut record = plant.record(4000, 5);
-    for y in &mut record.output.values[2000..] {
+    for y in &mut record.outputs[0].values[2000..] {
         *y = 40.0 + 2.0 * (*y - 40.0);
     }
     let found = found(&record, Method::StabilizedOe, plant.order());
@@ -323,11 +325,10 @@ fn wandering(linear: bool, seed: u64) -> Record {
     Record {
         name: "tank".into(),
         time: (0..rows).map(|k| k as f64 * STEP).collect(),
-        input: Signal::new("u", "V", input),
-        output: Signal::new("y", "cm", output),
-        input_2: None,
-        reference: None,
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", input)],
+        outputs: vec![Channel::new("y", "cm", output)],
+        references: Vec::new(),
+        calendar: None,
     }
 }
 
@@ -496,7 +497,7 @@ fn what_cannot_be_is_refused() {
 #[test]
 fn no_order_below_the_first_is_advised() {
     let mut record = FIRST.record(4000, 5);
-    for y in &mut record.output.values[2000..] {
+    for y in &mut record.outputs[0].values[2000..] {
         *y = 40.0 + 2.0 * (*y - 40.0);
     }
     let warnings = |order| {
@@ -518,7 +519,7 @@ fn a_record_too_short_to_tell_is_called_so() {
     let tanks = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../../../shared/data/cascaded_tanks/estimation.csv");
     let columns = ct_signals::Columns::default();
-    let Ok(record) = ct_signals::read_csv(&tanks, &columns, Hold::Zero) else {
+    let Ok(Reading { record, .. }) = read_csv(&tanks, &columns, &ReadOptions::default()) else {
         eprintln!("skipped: {} is not there", tanks.display());
         return;
     };
@@ -536,7 +537,7 @@ fn a_record_too_short_to_tell_is_called_so() {
 #[test]
 fn a_record_that_stands_still_is_refused() {
     let mut record = FIRST.record(200, 1);
-    record.input.values.fill(1.5);
+    record.inputs[0].values.fill(1.5);
     let request = Request::new(Method::CtRls, FIRST.order());
     let error = identify(&record, &request).unwrap_err().to_string();
     assert!(error.contains("\"u\" stands at 1.5"), "{error}");

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::common::Place;
-use ct_signals::{Hold, Record, Signal, excitation};
+use ct_signals::{Channel, Record, excitation};
 use ctid::identify::{Identification, LevelChoice, Method, Order, Request, identify};
 use fcloe::{Controller, LoopData, Noise, PlantModel, continuous_loop, noise_at_snr, sampled_loop};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -54,17 +54,19 @@ fn with_bits(
     Record {
         name: "loop".into(),
         time: (0..r.len()).map(|k| k as f64).collect(),
-        input: Signal::new("u", "V", raised(u, 4.0)),
-        output: Signal::new("y", "cm", raised(y, 20.0)),
-        input_2: None,
-        reference: (!open).then(|| Signal::new("r", "cm", raised(r, 20.0))),
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", raised(u, 4.0))],
+        outputs: vec![Channel::new("y", "cm", raised(y, 20.0))],
+        references: (!open)
+            .then(|| Channel::new("r", "cm", raised(r, 20.0)))
+            .into_iter()
+            .collect(),
+        calendar: None,
     }
 }
 
 fn found(record: &Record, method: Method, order: Order, levels: LevelChoice) -> Identification {
     let request = Request {
-        controller: record.reference.as_ref().map(|_| controller()),
+        controller: record.references.first().map(|_| controller()),
         levels,
         ..Request::new(method, order)
     };
@@ -163,8 +165,8 @@ fn the_levels_are_those_at_rest() {
 /// The record from a row on.
 fn cut(record: &Record, rows: usize) -> Record {
     let mut cut = record.clone();
-    let reference = cut.reference.as_mut();
-    for signal in [&mut cut.input, &mut cut.output]
+    let reference = cut.references.first_mut();
+    for signal in [&mut cut.inputs[0], &mut cut.outputs[0]]
         .into_iter()
         .chain(reference)
     {
@@ -250,11 +252,14 @@ fn drifting(from: f64, to: f64, rows: usize) -> Record {
     Record {
         name: "drift".into(),
         time: (0..rows).map(|k| k as f64).collect(),
-        input: Signal::new("u", "V", u),
-        output: Signal::new("y", "cm", outputs),
-        input_2: None,
-        reference: Some(Signal::new("r", "cm", r.iter().map(|r| 20.0 + r).collect())),
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", u)],
+        outputs: vec![Channel::new("y", "cm", outputs)],
+        references: vec![Channel::new(
+            "r",
+            "cm",
+            r.iter().map(|r| 20.0 + r).collect(),
+        )],
+        calendar: None,
     }
 }
 
@@ -342,9 +347,9 @@ fn the_condition_of_the_start_is_told() {
 
 fn csv(record: &Record) -> String {
     let mut text = "t [s],u [V],y [cm],r [cm]\n".to_owned();
-    let r = &record.reference.as_ref().unwrap().values;
+    let r = &record.references.first().unwrap().values;
     for (k, time) in record.time.iter().enumerate() {
-        let (u, y) = (record.input.values[k], record.output.values[k]);
+        let (u, y) = (record.inputs[0].values[k], record.outputs[0].values[k]);
         text += &format!("{time},{u:.6},{y:.6},{}\n", r[k]);
     }
     text
@@ -494,11 +499,10 @@ fn a_loop_that_is_not_stable_is_refused() {
     let record = Record {
         name: "loop".into(),
         time: (0..r.len()).map(|k| k as f64).collect(),
-        input: Signal::new("u", "V", data.u),
-        output: Signal::new("y", "cm", data.y),
-        input_2: None,
-        reference: Some(Signal::new("r", "cm", r)),
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", data.u)],
+        outputs: vec![Channel::new("y", "cm", data.y)],
+        references: vec![Channel::new("r", "cm", r)],
+        calendar: None,
     };
     for method in METHODS {
         let request = Request {

@@ -76,8 +76,8 @@ fixed = ["rim"]
         .map(|e| (e.effect.id, e.vessel))
         .collect();
     assert_eq!(effects, [("pump_deadzone", 0), ("overflow", 1)]);
-    assert_eq!(model.columns.output.as_deref(), Some("y [cm]"));
-    assert_eq!(model.columns.input, None);
+    assert_eq!(model.columns.outputs, ["y [cm]"]);
+    assert!(model.columns.inputs.is_empty());
     assert_eq!(model.known.area, [Some(154.0), Some(154.0), None]);
     assert_eq!(model.known.input_range, Some(10.0));
     assert_eq!(model.start["alpha_upper"], 11.0);
@@ -492,7 +492,10 @@ fn three_tanks_are_understood() {
                 [effect.pump_lag]\nwhere = \"pump_2\"\n";
     let model = parse(text);
     assert_eq!(model.plant, Plant::ThreeTank);
-    assert_eq!(model.columns.input_2.as_deref(), Some("u2 [V]"));
+    assert_eq!(
+        model.columns.inputs.last().map(String::as_str),
+        Some("u2 [V]")
+    );
     assert_eq!(model.known.measured, Some(2));
     assert_eq!(model.known.area, [Some(154.0); 3]);
     let orifice = model.known.orifice.unwrap();

@@ -153,16 +153,15 @@ fn records_may_have_steps_of_their_own() {
 
 #[test]
 fn a_file_becomes_a_record() {
-    use ct_signals::{Record, Signal};
+    use ct_signals::{Channel, Record};
     let n = 40;
     let record = |time: Vec<f64>| Record {
         name: "loop.csv".into(),
         time,
-        input: Signal::new("u", "V", vec![1.0; n]),
-        output: Signal::new("y", "cm", vec![2.0; n]),
-        input_2: None,
-        reference: Some(Signal::new("r", "cm", vec![3.0; n])),
-        hold: ct_signals::Hold::Zero,
+        inputs: vec![Channel::new("u", "V", vec![1.0; n])],
+        outputs: vec![Channel::new("y", "cm", vec![2.0; n])],
+        references: vec![Channel::new("r", "cm", vec![3.0; n])],
+        calendar: None,
     };
     let even = record((0..n).map(|k| 0.5 * k as f64).collect());
     let found = LoopRecord::from_record(&even, Offsets::Means).unwrap();

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use ct_signals::{Hold, Record, Signal};
+use ct_signals::{Channel, Hold, Record};
 use plants::{
     Command, MAX_VESSELS, Place, Placed, Scales, Structure, controller::Controller, deciles,
 };
@@ -69,7 +69,7 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
     let input = records.iter().map(Record::input_range).reduce(wider)?;
     let input_2 = records
         .iter()
-        .filter_map(|record| Some(record.input_2.as_ref()?.range()))
+        .filter_map(|record| Some(record.inputs.get(1)?.range()))
         .reduce(wider);
     let output = records.iter().map(Record::output_range).reduce(wider)?;
     let sample = records
@@ -78,16 +78,18 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
         .fold(f64::INFINITY, f64::min);
     let mut scales = Scales::from_ranges(input, output, sample, span(records));
     scales.input_2 = input_2;
-    let commands = |signal: fn(&Record) -> Option<&Signal>| {
+    let commands = |signal: fn(&Record) -> Option<&Channel>| {
         let signals = records.iter().filter_map(signal);
         deciles(signals.flat_map(|signal| &signal.values).copied().collect())
     };
     scales.input_deciles = [
-        commands(|record| Some(&record.input)),
-        commands(|record| record.input_2.as_ref()),
+        commands(|record| Some(&record.inputs[0])),
+        commands(|record| record.inputs.get(1)),
     ];
-    let readings = records.iter().flat_map(|record| &record.output.values);
-    scales.level_deciles = [deciles(readings.copied().collect()); MAX_VESSELS];
+    let readings = records
+        .iter()
+        .flat_map(|record| record.outputs[0].present());
+    scales.level_deciles = [deciles(readings.collect()); MAX_VESSELS];
     if let Some((low, high)) = input_2 {
         scales.input_range = scales.input_range.max(low.abs()).max(high.abs());
     }
@@ -216,7 +218,7 @@ impl<'a> Setup<'a> {
         let (sum, count) = self
             .records
             .iter()
-            .flat_map(|record| &record.input.values)
+            .flat_map(|record| &record.inputs[0].values)
             .fold((0.0, 0.0), |(sum, count), u| (sum + u, count + 1.0));
         let plant = LinearPlant::at(&self.structure, &x[..self.parameter_count()], sum / count)?;
         let feedback = Feedback::new(controller, self.records, plant)?;
@@ -359,7 +361,7 @@ impl<'a> Setup<'a> {
     #[must_use]
     pub fn unit_labels(&self) -> Vec<String> {
         let record = &self.records[0];
-        let (level, input) = (&record.output.unit, &record.input.unit);
+        let (level, input) = (&record.outputs[0].unit, &record.inputs[0].unit);
         let parameters = self.structure.parameters();
         let mut units: Vec<String> = parameters
             .iter()
@@ -415,10 +417,13 @@ impl<'a> Setup<'a> {
         self.free.retain(|&i| i < count);
     }
 
-    /// Samples in all records.
+    /// Samples of the output in all records, missing ones aside.
     #[must_use]
     pub fn samples(&self) -> usize {
-        self.records.iter().map(Record::len).sum()
+        self.records
+            .iter()
+            .map(|record| record.len() - record.outputs[0].missing())
+            .sum()
     }
 
     /// Positions of the initial states of record `r`.
@@ -444,29 +449,28 @@ impl<'a> Setup<'a> {
 
 /// The commands from sample `k` to the next one, that to a second pump zero where there is none.
 pub fn commands(record: &Record, k: usize) -> [Command; 2] {
-    let held = |u: &[f64]| match record.hold {
-        Hold::Zero => Command::held(u[k]),
-        Hold::First => Command::ramp(u[k], u[k + 1]),
+    let command = |u: &Channel| match u.hold {
+        Hold::Zero => Command::held(u.values[k]),
+        Hold::First => Command::ramp(u.values[k], u.values[k + 1]),
     };
-    [held(&record.input.values), second(record, held)]
+    [command(&record.inputs[0]), second(record, command)]
 }
 
 /// The held command to a second pump at sample `k`; zero where there is none.
 fn second_command(record: &Record, k: usize) -> Command {
-    second(record, |u| Command::held(u[k]))
+    second(record, |u| Command::held(u.values[k]))
 }
 
-fn second(record: &Record, command: impl Fn(&[f64]) -> Command) -> Command {
-    let second = record.input_2.as_ref();
-    second.map_or(Command::held(0.0), |signal| command(&signal.values))
+fn second(record: &Record, command: impl Fn(&Channel) -> Command) -> Command {
+    record.inputs.get(1).map_or(Command::held(0.0), command)
 }
 
 /// What the pumps were told before a record began: its first commands.
 #[must_use]
 pub fn at_rest(record: &Record) -> [f64; 2] {
-    let second = record.input_2.as_ref();
+    let second = record.inputs.get(1);
     [
-        record.input.values[0],
+        record.inputs[0].values[0],
         second.map_or(0.0, |signal| signal.values[0]),
     ]
 }
@@ -482,5 +486,5 @@ fn pump_of(lag: Placed) -> usize {
 
 /// The set point at sample `k`; not a number where the record has none.
 fn reference(record: &Record, k: usize) -> f64 {
-    record.reference.as_ref().map_or(f64::NAN, |r| r.values[k])
+    record.references.first().map_or(f64::NAN, |r| r.values[k])
 }

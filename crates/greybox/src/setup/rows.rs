@@ -20,6 +20,15 @@ pub struct Rows {
     pub values: Vec<f64>,
 }
 
+/// What is known of a row's sample before it is simulated.
+#[derive(Clone, Copy)]
+struct Sample {
+    /// It is the first one of its record.
+    first: bool,
+    /// The output's sample is missing: the row has no residual.
+    missing: bool,
+}
+
 impl Rows {
     /// The rows of one record after the other, each a slice of `length x columns` values.
     pub fn records(&self) -> impl Iterator<Item = &[f64]> {
@@ -29,6 +38,36 @@ impl Rows {
             rest = after;
             record
         })
+    }
+
+    /// The same without the rows whose sample is missing.
+    #[must_use]
+    pub fn observed(self) -> Self {
+        let residual = self.columns - 1;
+        if !self
+            .values
+            .chunks_exact(self.columns)
+            .any(|row| row[residual].is_nan())
+        {
+            return self;
+        }
+        let mut observed = Self {
+            columns: self.columns,
+            lengths: Vec::with_capacity(self.lengths.len()),
+            values: Vec::with_capacity(self.values.len()),
+        };
+        for record in self.records() {
+            let before = observed.values.len();
+            for row in record.chunks_exact(self.columns) {
+                if !row[residual].is_nan() {
+                    observed.values.extend_from_slice(row);
+                }
+            }
+            observed
+                .lengths
+                .push((observed.values.len() - before) / self.columns);
+        }
+        observed
     }
 
     /// The folded rows, whitened by a noise model, with columns chosen and put in this order. Rows whose residual is NaN are
@@ -79,9 +118,13 @@ impl Setup<'_> {
         // The triangle's cost is a sum in another order.
         let limit = limit * (1.0 + ROUNDING);
         let mut cost = 0.0;
-        self.each_row(x, |first, row| {
-            if first {
+        self.each_row(x, |sample, row| {
+            if sample.first {
                 whitener.reset();
+            }
+            if sample.missing {
+                whitener.skip();
+                return true;
             }
             whitener.push(row);
             cost += row[columns - 1] * row[columns - 1];
@@ -97,9 +140,13 @@ impl Setup<'_> {
         let mut whitener = noise.whitener(1);
         let limit = limit * (1.0 + ROUNDING);
         let mut cost = 0.0;
-        let within = self.each_row_in_lanes::<0>(x, &[], |first, row| {
-            if first {
+        let within = self.each_row_in_lanes::<0>(x, &[], |sample, row| {
+            if sample.first {
                 whitener.reset();
+            }
+            if sample.missing {
+                whitener.skip();
+                return true;
             }
             whitener.push(row);
             cost += row[0] * row[0];
@@ -108,8 +155,8 @@ impl Setup<'_> {
         within.is_none()
     }
 
-    /// The rows `[d model/d x_free, measured - model]`, one for each sample of all records, as they are; `None` where
-    /// the simulation is not finite.
+    /// The rows `[d model/d x_free, measured - model]`, one for each sample of all records, as they are, the residual NaN where the
+    /// output's sample is missing; `None` where the simulation is not finite.
     #[must_use]
     pub fn rows(&self, x: &[f64]) -> Option<Rows> {
         let columns = self.free.len() + 1;
@@ -125,8 +172,8 @@ impl Setup<'_> {
         })
     }
 
-    /// Shows every row, and whether it is the first one of its record, until `each` has seen enough; `None` then too.
-    fn each_row(&self, x: &[f64], each: impl FnMut(bool, &mut [f64]) -> bool) -> Option<()> {
+    /// Shows every row with what is known of its sample, until `each` has seen enough; `None` then too.
+    fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
         // Parameters and one record's initial states; a few lane counts, so that short vectors stay cheap.
         let parameters = self
             .free
@@ -149,7 +196,7 @@ impl Setup<'_> {
         &self,
         x: &[f64],
         by: &[usize],
-        mut each: impl FnMut(bool, &mut [f64]) -> bool,
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
     ) -> Option<()> {
         if self.stopped() {
             return None;
@@ -228,22 +275,28 @@ impl Setup<'_> {
                                 for (lane, &column) in chunk.iter().enumerate() {
                                     commands[column] = -u.eps[lane];
                                 }
-                                commands[columns - 1] = u.re - record.input.values[k];
+                                commands[columns - 1] = u.re - record.inputs[0].values[k];
                             }
                             simulator.advance_held(u, second_command(record, k), h);
                         }
                         _ => simulator.advance_both(commands(record, k), h),
                     }
                 }
-                row[columns - 1] = record.output.values[k] - model;
+                row[columns - 1] = record.outputs[0].values[k] - model;
                 if let Some((response, commands)) = &mut response {
                     response.add_to(&mut row);
                     response.advance(commands);
                 }
-                if !row.iter().all(|value| value.is_finite()) {
+                let sample = Sample {
+                    first: k == 0,
+                    missing: record.outputs[0].values[k].is_nan(),
+                };
+                let derivatives = row[..columns - 1].iter().all(|value| value.is_finite());
+                let residual = row[columns - 1].is_finite() || sample.missing;
+                if !(derivatives && residual && model.is_finite()) {
                     return None;
                 }
-                if !each(k == 0, &mut row) {
+                if !each(sample, &mut row) {
                     return None;
                 }
             }
@@ -258,7 +311,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use ct_signals::{Hold, Signal};
+    use ct_signals::Channel;
     use plants::{Known, Plant};
 
     #[test]
@@ -267,11 +320,14 @@ mod tests {
         let record = Record {
             name: "wave".into(),
             time: (0..300).map(|k| 2.0 * k as f64).collect(),
-            input: Signal::new("u", "V", (0..300).map(wave).collect()),
-            output: Signal::new("y", "cm", (0..300).map(|k| 2.0 * wave(k + 40)).collect()),
-            input_2: None,
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", (0..300).map(wave).collect())],
+            outputs: vec![Channel::new(
+                "y",
+                "cm",
+                (0..300).map(|k| 2.0 * wave(k + 40)).collect(),
+            )],
+            references: Vec::new(),
+            calendar: None,
         };
         let records = [record];
         let fixed = BTreeMap::new();

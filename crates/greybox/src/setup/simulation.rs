@@ -1,6 +1,6 @@
 //! What a setup shows at a vector: simulations on the measured command or in the loop, and what is left of the records.
 
-use ct_signals::{Record, Signal};
+use ct_signals::{Channel, Record};
 use plants::{MAX_VESSELS, Scalar, Scales, Simulator, deciles};
 
 use super::{Setup, at_rest, commands, reference, second_command};
@@ -90,9 +90,9 @@ impl Setup<'_> {
             });
             simulated.output.push(output);
         }
-        let samples = self.samples() as f64;
+        let rows = self.records.iter().map(Record::len).sum::<usize>() as f64;
         for mean in &mut simulated.mean_level {
-            *mean /= samples;
+            *mean /= rows;
         }
         Ok(simulated)
     }
@@ -137,7 +137,7 @@ impl Setup<'_> {
     }
 
     /// What is taken for noise, a series for each record: measured minus model or, where the loop is simulated, the
-    /// disturbance at the plant's output that explains it.
+    /// disturbance at the plant's output that explains it. NaN where the sample is missing.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
@@ -150,7 +150,10 @@ impl Setup<'_> {
         Ok(series
             .map(|((record, model), command)| {
                 response.reset();
-                let measured = record.output.values.iter().zip(&record.input.values);
+                let measured = record.outputs[0]
+                    .values
+                    .iter()
+                    .zip(&record.inputs[0].values);
                 measured
                     .zip(model.iter().zip(&command))
                     .map(|((y, u), (ym, um))| {
@@ -164,7 +167,7 @@ impl Setup<'_> {
             .collect())
     }
 
-    /// Measured minus model, both on the measured command, a series for each record.
+    /// Measured minus model, both on the measured command, a series for each record; NaN where the sample is missing.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
@@ -175,8 +178,7 @@ impl Setup<'_> {
             .iter()
             .zip(simulated.output)
             .map(|(record, model)| {
-                record
-                    .output
+                record.outputs[0]
                     .values
                     .iter()
                     .zip(model)
@@ -260,7 +262,7 @@ impl Setup<'_> {
                 scales.level_deciles[vessel] = deciles(visited);
             }
         }
-        let mean = |signal: fn(&Record) -> Option<&Signal>| {
+        let mean = |signal: fn(&Record) -> Option<&Channel>| {
             let (sum, n) = self
                 .records
                 .iter()
@@ -269,9 +271,9 @@ impl Setup<'_> {
                 .fold((0.0, 0usize), |(sum, n), u| (sum + u.abs(), n + 1));
             sum / n as f64
         };
-        scales.flow = (x[0] * mean(|record| Some(&record.input))).abs();
+        scales.flow = (x[0] * mean(|record| Some(&record.inputs[0]))).abs();
         if scales.input_2.is_some() {
-            scales.flow += (x[1] * mean(|record| record.input_2.as_ref())).abs();
+            scales.flow += (x[1] * mean(|record| record.inputs.get(1))).abs();
         }
         Ok(scales)
     }

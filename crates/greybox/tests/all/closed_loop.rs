@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::support::Rig;
-use ct_signals::{ArModel, Record, Signal, excitation, noise};
+use ct_signals::{ArModel, Channel, Record, excitation, noise};
 use greybox::{Error, FitOptions, Setup, coloured, fit_from, replay, robust};
 use plants::controller::Controller;
 use plants::{Command, Plant, Scales, Simulator, Structure};
@@ -55,11 +55,10 @@ fn in_loop(rig: &Rig, controller: &Controller, r: &[f64], noise: &[f64]) -> Reco
     Record {
         name: "loop.csv".into(),
         time: (0..r.len()).map(|k| k as f64 * rig.interval).collect(),
-        input: Signal::new("u", "V", u),
-        output: Signal::new("y", "cm", y),
-        input_2: None,
-        reference: Some(Signal::new("r", "cm", r.to_vec())),
-        hold: ct_signals::Hold::Zero,
+        inputs: vec![Channel::new("u", "V", u)],
+        outputs: vec![Channel::new("y", "cm", y)],
+        references: vec![Channel::new("r", "cm", r.to_vec())],
+        calendar: None,
     }
 }
 
@@ -184,12 +183,12 @@ fn a_replay_finds_the_controller_states_and_what_is_not_the_controller() {
         let exact = replay(&controller, &record).unwrap();
         assert!(exact.rms < 1e-10 && exact.moves > 0.1, "{exact:?}");
         // A converter of 10 bits does not matter, an operator's hand does and is found.
-        for u in &mut record.input.values {
+        for u in &mut record.inputs[0].values {
             *u = (*u * 102.3).round() / 102.3;
         }
         let rounded = replay(&controller, &record).unwrap();
         assert!(rounded.rms < 0.02 * rounded.moves, "{}", rounded.rms);
-        for u in &mut record.input.values[100..200] {
+        for u in &mut record.inputs[0].values[100..200] {
             *u += 1.0;
         }
         let moved = replay(&controller, &record).unwrap();
@@ -214,22 +213,23 @@ fn a_loop_that_cannot_be_simulated_says_why() {
         error
     };
     let error = said(Record {
-        reference: None,
+        references: Vec::new(),
         ..good.clone()
     });
     assert!(matches!(error, Error::NoReference { .. }));
     assert!(error.to_string().contains("[columns]"), "{error}");
-    let constant = Signal::new("r", "cm", vec![14.0; good.len()]);
+    let constant = Channel::new("r", "cm", vec![14.0; good.len()]);
     let error = said(Record {
-        reference: Some(constant),
+        references: vec![constant],
         ..good.clone()
     });
     assert!(matches!(
         error,
         Error::ConstantReference { value: 14.0, .. }
     ));
+    let ramps = good.inputs[0].clone().with_hold(ct_signals::Hold::First);
     let error = said(Record {
-        hold: ct_signals::Hold::First,
+        inputs: vec![ramps],
         ..good
     });
     assert!(matches!(error, Error::CommandNotHeld { .. }));
@@ -256,8 +256,7 @@ fn the_disturbance_of_a_linear_loop_is_the_noise() {
         };
         assert!(most(&found[0]) < 1e-9, "{}", most(&found[0]));
         // Without the filter it is not.
-        let bare: Vec<f64> = records[0]
-            .output
+        let bare: Vec<f64> = records[0].outputs[0]
             .values
             .iter()
             .zip(simulated)
@@ -274,7 +273,7 @@ fn what_is_added_to_the_command_is_simulated_with_the_loop() {
     let (record, _) = record(&rig, &pi(), 0.0, 0.0, 5);
     let mut by_hand = record.clone();
     // The plant ran on the command with the hand's part, which is played to it anew.
-    for (k, u) in by_hand.input.values.iter_mut().enumerate() {
+    for (k, u) in by_hand.inputs[0].values.iter_mut().enumerate() {
         *u += if (100..140).contains(&k) { 0.2 } else { 0.0 };
     }
     let records = [by_hand];
@@ -282,12 +281,12 @@ fn what_is_added_to_the_command_is_simulated_with_the_loop() {
     let truth = rig.truth(1);
     let open = setup.simulate(&truth).unwrap().output;
     let records = [Record {
-        output: Signal::new("y", "cm", open[0].clone()),
+        outputs: vec![Channel::new("y", "cm", open[0].clone())],
         ..records[0].clone()
     }];
     let (setup, x) = rig.setup(&records).in_loop(&pi(), &truth).unwrap();
     let run = setup.simulate_loop(&x).unwrap().unwrap();
-    for (model, measured) in run.output[0].iter().zip(&records[0].output.values) {
+    for (model, measured) in run.output[0].iter().zip(&records[0].outputs[0].values) {
         assert!((model - measured).abs() < 1e-9);
     }
 }
@@ -382,7 +381,7 @@ fn a_command_at_its_limits_is_no_disturbance() {
     let e = noise::ar1(rig.samples, 0.05, 0.8, &mut rng);
     let record = in_loop(&rig, &controller, &r, &e);
     let limited = |u: &&f64| **u <= LIMITS.0 || **u >= LIMITS.1;
-    let at_limit = record.input.values.iter().filter(limited).count();
+    let at_limit = record.inputs[0].values.iter().filter(limited).count();
     assert!(at_limit > rig.samples / 10, "{at_limit}");
     let records = [record];
     let (setup, x) = rig

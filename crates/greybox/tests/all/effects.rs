@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::support::known;
-use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
+use ct_signals::{ArModel, Channel, Record, excitation, noise};
 use greybox::{Setup, Stopping, fit_from, keep_best_simulated, with_other_speeds};
 use plants::{Command, EffectInfo, Placed, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
@@ -145,11 +145,10 @@ impl Case {
         Record {
             name: self.id.into(),
             time: (0..u.len()).map(|k| k as f64 * INTERVAL).collect(),
-            input: Signal::new("u", "V", u.to_vec()),
-            output: Signal::new("y", "cm", y),
-            input_2: None,
-            reference: None,
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", u.to_vec())],
+            outputs: vec![Channel::new("y", "cm", y)],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 }

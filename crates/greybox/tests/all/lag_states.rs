@@ -18,8 +18,8 @@ const LAGS: [&str; 2] = ["pump_lag", "sensor_lag"];
 /// A record whose beginning was not kept.
 fn cut(mut record: Record) -> Record {
     record.time.drain(..BEFORE);
-    record.input.values.drain(..BEFORE);
-    record.output.values.drain(..BEFORE);
+    record.inputs[0].values.drain(..BEFORE);
+    record.outputs[0].values.drain(..BEFORE);
     record
 }
 
@@ -45,7 +45,7 @@ fn with_lag(rig: &Rig, record: &Record, lag: &str, free: bool) -> Fit {
             if rig.levels.len() > 1 {
                 start[last] *= upper;
             }
-            start.extend([record.output.values[0], 0.0]);
+            start.extend([record.outputs[0].values[0], 0.0]);
             start
         })
         .collect();
@@ -111,7 +111,7 @@ fn a_pump_that_starts_with_the_record_is_a_lag() {
                 .into_par_iter()
                 .map(|seed| {
                     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                    let mut u = rig.record(seed).input.values;
+                    let mut u = rig.record(seed).inputs.swap_remove(0).values;
                     u[BEFORE - 45..BEFORE].fill(0.0);
                     let record = cut(rig.run(&u, &noise::white(rig.samples, rig.noise, &mut rng)));
                     let [own, other] = LAGS.map(|lag| with_lag(&rig, &record, lag, true));

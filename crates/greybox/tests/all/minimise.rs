@@ -89,7 +89,7 @@ fn ends_where_another_implementation_ends() {
 fn a_parameter_that_ends_at_its_bound_has_no_error() {
     let rig = Rig::single_tank();
     let mut record = rig.record(5);
-    for u in &mut record.input.values {
+    for u in &mut record.inputs[0].values {
         *u -= 0.5;
     }
     let records = [record];
@@ -276,7 +276,7 @@ fn a_simulation_that_is_not_finite_is_no_fit() {
     assert_eq!((found.starts, found.agree), (2, 1));
     // Numbers that no arithmetic holds.
     let mut record = rig.record(1);
-    for y in &mut record.output.values {
+    for y in &mut record.outputs[0].values {
         *y *= 1e200;
     }
     let records = [record];

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Hold, Record, Signal, excitation, noise};
+use ct_signals::{ArModel, Channel, Record, excitation, noise};
 use greybox::{Setup, Stopping, fit_from};
 use plants::{
     Command, EffectInfo, Fitted, Known, Place, Placed, Plant, Scales, Simulator, Structure, Term,
@@ -81,29 +81,16 @@ fn whole(structure: &Structure, own: &[f64], seed: u64) -> (Record, f64) {
     let record = Record {
         name: "whole".into(),
         time: (0..SAMPLES).map(|k| BEGIN + k as f64 * INTERVAL).collect(),
-        input: Signal::new("u", "V", u),
-        output: Signal::new("y", "cm", y),
-        input_2: None,
-        reference: None,
-        hold: Hold::Zero,
+        inputs: vec![Channel::new("u", "V", u)],
+        outputs: vec![Channel::new("y", "cm", y)],
+        references: Vec::new(),
+        calendar: None,
     };
     (record, at_cut)
 }
 
 fn parts(whole: &Record) -> [Record; 2] {
-    let cut = |range: std::ops::Range<usize>| {
-        let signal = |signal: &Signal| Signal {
-            values: signal.values[range.clone()].to_vec(),
-            ..signal.clone()
-        };
-        Record {
-            time: whole.time[range.clone()].to_vec(),
-            input: signal(&whole.input),
-            output: signal(&whole.output),
-            ..whole.clone()
-        }
-    };
-    [cut(0..CUT), cut(CUT..SAMPLES)]
+    [whole.rows(0..CUT), whole.rows(CUT..SAMPLES)]
 }
 
 /// Largest difference of two series.
@@ -135,7 +122,7 @@ fn what_follows_time_runs_through_the_parts() {
         let name = structure.parameter_names().join(" ");
         let together = simulated(&parts);
         assert!(
-            apart(&together.concat(), &whole.output.values) < 1e-9,
+            apart(&together.concat(), &whole.outputs[0].values) < 1e-9,
             "{name}"
         );
         // From its own zero the second part is another experiment.
@@ -163,13 +150,13 @@ fn a_held_out_record_continues_the_clock_where_it_lies_after() {
         let own = own.with_structure(own.structure.clone()).unwrap();
         own.simulate(&x).unwrap().output.concat()
     };
-    assert!(apart(&held_out(&second), &whole.output.values[CUT..]) < 1e-9);
+    assert!(apart(&held_out(&second), &whole.outputs[0].values[CUT..]) < 1e-9);
     let mut unrelated = second.clone();
     unrelated
         .time
         .iter_mut()
         .for_each(|t| *t -= whole.time[CUT]);
-    assert!(apart(&held_out(&unrelated), &whole.output.values[CUT..]) > 1e-3);
+    assert!(apart(&held_out(&unrelated), &whole.outputs[0].values[CUT..]) > 1e-3);
 }
 
 #[test]
@@ -177,7 +164,7 @@ fn the_same_drift_is_found_in_the_parts_and_in_the_whole() {
     let change = -0.1;
     let (mut whole, at_cut) = whole(&with("valve_drift"), &[change], 1);
     let noise = noise::white(SAMPLES, 0.05, &mut ChaCha8Rng::seed_from_u64(2));
-    for (y, e) in whole.output.values.iter_mut().zip(noise) {
+    for (y, e) in whole.outputs[0].values.iter_mut().zip(noise) {
         *y += e;
     }
     let parts = parts(&whole);

@@ -2,7 +2,7 @@
 
 use crate::support::{PRECISE, Rig};
 use approx::assert_relative_eq;
-use ct_signals::{ArModel, Record};
+use ct_signals::{ArModel, Channel, Record};
 use greybox::{FitOptions, fit, fit_from, fit_initial_levels};
 
 #[test]
@@ -40,18 +40,17 @@ fn two_records_together_say_more_than_either() {
 
     // One after the other as if they were one record: the levels jump, and the model cannot.
     let [first, second] = records;
+    let joined = |a: &[Channel], b: &[Channel]| {
+        let both =
+            |(a, b): (&Channel, &Channel)| a.with_values([&a.values[..], &b.values].concat());
+        a.iter().zip(b).map(both).collect()
+    };
     let joined = Record {
         time: (0..first.len() + second.len())
             .map(|k| k as f64 * rig.interval)
             .collect(),
-        input: ct_signals::Signal {
-            values: [first.input.values, second.input.values].concat(),
-            ..first.input
-        },
-        output: ct_signals::Signal {
-            values: [first.output.values, second.output.values].concat(),
-            ..first.output
-        },
+        inputs: joined(&first.inputs, &second.inputs),
+        outputs: joined(&first.outputs, &second.outputs),
         ..first
     };
     let joined = [joined];
@@ -158,19 +157,7 @@ fn initial_levels_are_found_on_a_short_head() {
             ..rig
         };
         let record = rig.record(seed);
-        let head = Record {
-            time: record.time[..5].to_vec(),
-            input: ct_signals::Signal {
-                values: record.input.values[..5].to_vec(),
-                ..record.input
-            },
-            output: ct_signals::Signal {
-                values: record.output.values[..5].to_vec(),
-                ..record.output
-            },
-            ..record
-        };
-        let records = [head];
+        let records = [record.rows(0..5)];
         let setup = rig.setup(&records);
         let x = fit_initial_levels(&setup, &rig.theta, PRECISE).unwrap();
         assert_eq!(x[..3], rig.theta[..]);

@@ -58,9 +58,9 @@ impl Search<'_, '_> {
     pub fn again(&self, bounds: &Bounds, before: &Before) -> Option<Candidate> {
         let records = self.problem.records.iter();
         let record = records.max_by_key(|record| record.len())?;
-        let played = match (&self.into, &record.reference) {
+        let played = match (&self.into, record.references.first()) {
             (Loop::Closed(_), Some(reference)) => reference,
-            _ => &record.input,
+            _ => &record.inputs[0],
         };
         let (low, high) = played.range();
         let sequence = Sequence {

@@ -206,7 +206,7 @@ pub struct Bounds {
 
 /// What the records visited of what is played.
 fn visited(records: &[Record], looped: bool) -> (f64, f64) {
-    let played = |record: &Record| match (&record.reference, looped) {
+    let played = |record: &Record| match (record.references.first(), looped) {
         (Some(reference), true) => reference.range(),
         _ => record.input_range(),
     };

@@ -30,6 +30,7 @@ use crate::{
     Error, Options, Problem, Progress,
     control_loop::slowest_time_constant,
     diagnose::{allow, effort},
+    gaps::Mended,
     groups::GROUP_MARGIN,
     node::{FINE, Node, refine},
     noise_floor::colour,
@@ -88,15 +89,17 @@ pub fn design(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Design, Error> {
     let begun = Instant::now();
+    let mended = Mended::of(problem, options)?;
+    let problem = mended.as_ref().map_or(problem, |mended| &mended.problem);
     if between[0].is_that_of(between[1]) {
         let effect = between[0].effect.id.to_string();
         return Err(Refused::SameEffect { effect }.into());
     }
     for record in &problem.records {
-        if let Some(second) = &record.input_2 {
+        if let Some(second) = record.inputs.get(1) {
             return Err(Refused::TwoCommands {
                 record: record.name.clone(),
-                first: record.input.name.clone(),
+                first: record.inputs[0].name.clone(),
                 second: second.name.clone(),
             }
             .into());
@@ -104,7 +107,7 @@ pub fn design(
     }
     // What is wrong with the limits is said before anything is computed, as far as it can be.
     let looped = problem.controller.is_some() && options.simulate_loop;
-    let has_reference = problem.records.iter().all(|r| r.reference.is_some());
+    let has_reference = problem.records.iter().all(|r| !r.references.is_empty());
     Bounds::new(problem, limits, looped && has_reference, 0)?;
     progress(Progress {
         phase: "fitting both effects",
@@ -128,9 +131,9 @@ pub fn design(
         progress,
     };
     let found = search.run(&bounds, limits.seed)?;
-    let of_played = match (&problem.records[0].reference, in_loop) {
+    let of_played = match (problem.records[0].references.first(), in_loop) {
         (Some(reference), true) => reference,
-        _ => &problem.records[0].input,
+        _ => &problem.records[0].inputs[0],
     };
     let mut design = Design {
         schema: 1,
@@ -163,7 +166,7 @@ pub fn design(
         sentences: Vec::new(),
         effort: effort(&fitted.base, options),
         plant: problem.plant.id().to_string(),
-        output_unit: problem.records[0].output.unit.clone(),
+        output_unit: problem.records[0].outputs[0].unit.clone(),
         seconds: 0.0,
     };
     design.sentences = words::of(&design);
@@ -246,6 +249,7 @@ fn apart([a, b]: [&Node; 2]) -> f64 {
         return f64::INFINITY;
     };
     let pairs = a.iter().flatten().zip(b.iter().flatten());
+    let pairs = pairs.filter(|(a, _)| !a.is_nan());
     pairs.map(|(a, b)| (a - b) * (a - b)).sum()
 }
 

@@ -1,6 +1,6 @@
 //! An experiment played on a fitted model: without noise, from rest, in the loop where there is one.
 
-use ct_signals::{Hold, Record, Signal};
+use ct_signals::{Hold, Record};
 use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller};
 
 use crate::node::Node;
@@ -138,7 +138,7 @@ pub(crate) fn play(
                 at_limit |= regulator.limited();
                 Command::held(command)
             }
-            None if of.hold == Hold::First => {
+            None if of.hold() == Hold::First => {
                 Command::ramp(value, values.get(k + 1).copied().unwrap_or(value))
             }
             None => Command::held(value),
@@ -151,19 +151,17 @@ pub(crate) fn play(
     if !(finite(&input) && finite(&output) && finite(&initial)) {
         return None;
     }
-    let signal = |of: &Signal, values| Signal::new(of.name.clone(), of.unit.clone(), values);
     Some(Played {
         record: Record {
             name: "the experiment".to_string(),
             time: (0..values.len()).map(|k| k as f64 * interval).collect(),
-            input: signal(&of.input, input),
-            output: signal(&of.output, output),
-            input_2: None,
-            reference: match (into, &of.reference) {
-                (Loop::Closed(_), Some(reference)) => Some(signal(reference, values.to_vec())),
-                _ => None,
+            inputs: vec![of.inputs[0].with_values(input)],
+            outputs: vec![of.outputs[0].with_values(output)],
+            references: match (into, of.references.first()) {
+                (Loop::Closed(_), Some(reference)) => vec![reference.with_values(values.to_vec())],
+                _ => Vec::new(),
             },
-            hold: of.hold,
+            calendar: None,
         },
         initial,
         at_limit,

@@ -113,7 +113,7 @@ pub(crate) fn imagined(truth: &Node) -> Result<Vec<Record>, Error> {
     Ok(records
         .map(|(record, output)| {
             let mut record = record.clone();
-            record.output.values = output;
+            record.outputs[0].values = output;
             record
         })
         .collect())

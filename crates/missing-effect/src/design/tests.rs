@@ -119,7 +119,7 @@ fn noisy(records: &[Record], seed: u64) -> Vec<Record> {
     let mut records = records.to_vec();
     for record in &mut records {
         let e = noise::white(record.len(), NOISE, &mut rng);
-        for (y, e) in record.output.values.iter_mut().zip(e) {
+        for (y, e) in record.outputs[0].values.iter_mut().zip(e) {
             *y += e;
         }
     }
@@ -202,7 +202,7 @@ fn for_a_small_effect_the_power_is_that_of_the_signatures() {
     let records = std::slice::from_ref(&played.record).to_vec();
     let setup = a.setup.with_records(&records).unwrap();
     let shown = setup.simulate(&vector(a, &setup, &played)).unwrap().output;
-    played.record.output.values = shown[0].clone();
+    played.record.outputs[0].values = shown[0].clone();
     let found = linear(&played, b, &Triangle::new(0), &fitted.metric).unwrap();
 
     let both = b.setup.structure.with(a.added[0]).unwrap();

@@ -36,7 +36,7 @@ pub(crate) struct Located<'a> {
 
 fn bin(from: f64, to: f64, values: impl Iterator<Item = f64>, expected: &Expected) -> Bin {
     let (mut count, mut sum, mut squares) = (0, 0.0, 0.0);
-    for value in values {
+    for value in values.filter(|value| !value.is_nan()) {
         count += 1;
         sum += value;
         squares += value * value;
@@ -112,7 +112,8 @@ fn by_direction(rate: &[f64], residual: &[f64], expected: &Expected) -> Vec<Bin>
 fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
     /// One line of one record: its frequency, its part of the mean square, and the noise's.
     struct Line(f64, f64, f64);
-    let samples: usize = series.iter().map(|one| one.residual.len()).sum();
+    let present = |one: &Series| one.residual.iter().filter(|e| !e.is_nan()).count();
+    let samples: usize = series.iter().map(present).sum();
     let mut lines: Vec<Line> = Vec::new();
     let mut lowest = f64::INFINITY;
     for (one, expected) in series.iter().zip(expected) {
@@ -122,13 +123,20 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
         lowest = lowest.min(step);
         // Both signs of a frequency count.
         let part = 2.0 / samples as f64;
-        for (k, (line, noise)) in transform(one.residual)
+        // A missing sample shows no line, and what is there stands for it.
+        let present = present(one);
+        let zeroed: Vec<f64> = one
+            .residual
+            .iter()
+            .map(|e| if e.is_nan() { 0.0 } else { *e })
+            .collect();
+        for (k, (line, noise)) in transform(&zeroed)
             .iter()
             .zip(&expected.lines)
             .enumerate()
             .skip(1)
         {
-            let own = line.norm_sqr() / n as f64;
+            let own = line.norm_sqr() / present.max(1) as f64;
             lines.push(Line(k as f64 * step, part * own, part * noise));
         }
     }

@@ -5,7 +5,8 @@ use crate::{Bin, Failures};
 
 /// The worst of each kind, the worst first.
 pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures) -> Vec<String> {
-    let total: f64 = residual.iter().map(|r| r * r).sum();
+    let present = residual.iter().filter(|r| !r.is_nan());
+    let total: f64 = present.map(|r| r * r).sum();
     let (y, u) = (located.output_unit, located.input_unit);
     let share = |bin: &Bin| bin.rms * bin.rms * bin.count as f64 / total.max(f64::MIN_POSITIVE);
     let mut found: Vec<(f64, String)> = Vec::new();

@@ -245,7 +245,7 @@ fn report(
     let label = |unit: plants::Unit| {
         let area_known = structure.plant.outlet() == plants::Outlet::Torricelli
             && structure.known.area[0].is_some();
-        unit.label(&record.output.unit, &record.input.unit, area_known)
+        unit.label(&record.outputs[0].unit, &record.inputs[0].unit, area_known)
     };
     let term = Term {
         name: "unknown".to_string(),

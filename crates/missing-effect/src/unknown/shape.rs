@@ -16,7 +16,11 @@ use super::{
     PART,
     smooth::{Smoothed, Spot, carrier},
 };
-use crate::{Error, node::Node, noise_floor::slowness};
+use crate::{
+    Error,
+    node::{Node, observed},
+    noise_floor::slowness,
+};
 
 /// Knots of a polyline.
 const KNOTS: usize = 16;
@@ -56,7 +60,7 @@ fn visited(node: &Node, smoothed: &Smoothed, variable: Variable) -> Result<Vec<f
     let mut values = Vec::with_capacity(setup.samples());
     for (record, path) in setup.records.iter().zip(&smoothed.paths) {
         if variable == Variable::Input {
-            values.extend(&record.input.values);
+            values.extend(&record.inputs[0].values);
             continue;
         }
         let structure = setup
@@ -234,7 +238,7 @@ struct Fit {
 fn fit(setup: &Setup, start: Vec<f64>, ordinates: Range<usize>, size: f64) -> Option<Fit> {
     let mean = x_free(setup, &start);
     let rows = |x: &[f64]| {
-        let rows = setup.rows(x)?;
+        let rows = setup.rows(x)?.observed();
         let samples = rows.values.len() / rows.columns;
         let j = DMatrix::from_row_slice(samples, rows.columns, &rows.values);
         let residual = j.column(rows.columns - 1).into_owned();
@@ -332,7 +336,7 @@ fn unseen(
     free: &DVector<f64>,
     states: usize,
 ) -> Result<(f64, f64), Error> {
-    let before: Vec<f64> = node.setup.residuals(&node.fit.x)?.concat();
+    let before = observed(node.setup.records, node.setup.residuals(&node.fit.x)?).concat();
     let j = j.columns(0, states);
     let weights = weights.view((0, 0), (states, states)).into_owned();
     let target = residual + j * (free - mean).rows(0, states);

@@ -22,7 +22,10 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use plants::{Fitted, Place, Term, Variable};
 
 use super::PART;
-use crate::{Error, node::Node};
+use crate::{
+    Error,
+    node::{Node, observed},
+};
 
 /// Instants of a path: at most so many, and so many samples for each at least.
 const INSTANTS: usize = 96;
@@ -173,7 +176,7 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
                 let (low, high) = setup.bounds()[position];
                 x[position] = solved[m + k].clamp(low, high);
             }
-            let residual = setup.residuals(x)?.remove(0);
+            let residual = observed(setup.records, setup.residuals(x)?).remove(0);
             paths.push(Path {
                 time: time.clone(),
                 value,
@@ -203,7 +206,7 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
 
 /// The normal equations about `x`, in steps of the path and in states as they are (not as changes).
 fn block(setup: &greybox::Setup, x: &[f64], count: usize, time: &[f64]) -> Option<Block> {
-    let rows = setup.rows(x)?;
+    let rows = setup.rows(x)?.observed();
     let m = time.len();
     let columns = rows.columns - 1;
     let samples = rows.values.len() / rows.columns;

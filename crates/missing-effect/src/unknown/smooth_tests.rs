@@ -3,7 +3,7 @@
 
 use std::ops::RangeInclusive;
 
-use ct_signals::{ArModel, Hold, Record, Signal, noise};
+use ct_signals::{ArModel, Channel, Record, noise};
 use greybox::{Setup, Stopping, fit_from};
 use nalgebra::{Matrix3, Vector3};
 use plants::{Command, Known, Place, Plant, Simulator, Term, Variable};
@@ -44,22 +44,21 @@ fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
     let e = noise::white(N, NOISE, rng);
     let mut record = Record {
         name: "r".to_string(),
-        output: Signal::new("y", "cm", vec![0.0; N]),
-        input: Signal::new("u", "V", u.clone()),
+        outputs: vec![Channel::new("y", "cm", vec![0.0; N])],
+        inputs: vec![Channel::new("u", "V", u.clone())],
         time,
-        input_2: None,
-        reference: None,
-        hold: Hold::Zero,
+        references: Vec::new(),
+        calendar: None,
     };
     // Any output will do to have a structure; what is simulated on it does not depend on it.
-    record.output.values = (0..N).map(|k| 10.0 + (k % 7) as f64).collect();
+    record.outputs[0].values = (0..N).map(|k| 10.0 + (k % 7) as f64).collect();
     let records = [record.clone()];
     let setup = setup(&records);
     let structure = setup.structure.with_term(term.clone()).unwrap();
     let theta: Vec<f64> = THETA.iter().chain(&term.ordinates).copied().collect();
     let mut simulator = Simulator::<f64>::new(&structure, &theta, &[14.0], u[0]).unwrap();
     for k in 0..N {
-        record.output.values[k] = simulator.read() + e[k];
+        record.outputs[0].values[k] = simulator.read() + e[k];
         simulator.advance(Command::held(u[k]), H);
     }
     record

@@ -187,7 +187,7 @@ impl Task<'_> {
             .collect();
         let plant = super::plant(&parameters, order);
         let (time_constants, oscillations) = poles(&plant.a)?;
-        let output = &record.output.values;
+        let output = &record.outputs[0].values;
         let rmse = rms(output.iter().zip(&simulated).map(|(y, model)| y - model));
         let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
         let deviation = rms(output.iter().map(|y| y - mean));
@@ -205,7 +205,7 @@ impl Task<'_> {
         let doubt = found
             .recursion
             .as_ref()
-            .and_then(|run| self.astray(&run.health, rmse, deviation, &record.output.unit));
+            .and_then(|run| self.astray(&run.health, rmse, deviation, &record.outputs[0].unit));
         let convergence = match self.request.method {
             Method::Ls | Method::Iv => None,
             _ if doubt.is_some() => None,
@@ -246,8 +246,8 @@ impl Task<'_> {
             plant,
             shown: Shown {
                 time: record.time.clone(),
-                input: record.input.clone(),
-                output: record.output.clone(),
+                input: record.inputs[0].clone(),
+                output: record.outputs[0].clone(),
                 simulated,
             },
         })
@@ -271,7 +271,7 @@ impl Task<'_> {
         let simulated = self
             .simulated(&batch.record, &batch.plant, batch.levels)
             .ok()?;
-        let output = self.record.output.values.iter();
+        let output = self.record.outputs[0].values.iter();
         let best = rms(output.zip(&simulated).map(|(y, model)| y - model));
         (rmse > MUCH_WORSE * best).then(|| {
             format!(
@@ -301,7 +301,7 @@ impl Task<'_> {
                     "the measured command disagrees with the controller of the model file, R/S (r - y), by {} {} rms, {:.0} % of what it moves: \
                      check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
                     crate::numbers::significant(mismatch, 3),
-                    self.record.input.unit,
+                    self.record.inputs[0].unit,
                     100.0 * mismatch / size
                 ),
             },
@@ -331,7 +331,7 @@ fn missed(mismatch: &Mismatch) -> Option<String> {
 
 /// The command stands at its limits, where the loop is not linear.
 fn limited(record: &Record, (low, high): (f64, f64)) -> Option<String> {
-    let values = &record.input.values;
+    let values = &record.inputs[0].values;
     let at = values.iter().filter(|u| **u <= low || **u >= high).count();
     let share = at as f64 / values.len().max(1) as f64;
     (share > LIMITED).then(|| {

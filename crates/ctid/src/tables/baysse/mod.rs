@@ -10,7 +10,7 @@ mod rig;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use ct_signals::{Record, Signal};
+use ct_signals::{Channel, Record};
 use fcloe::{Coordinates, Damping, Fit, Method, Settings};
 use missing_effect::Progress;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -265,10 +265,7 @@ fn generator(seed: u64, table: u64, run: usize) -> ChaCha8Rng {
 /// A record as text that [`ct_signals::read_csv`] reads.
 pub fn csv(record: &Record) -> String {
     let column = |name: &str, unit: &str| format!("{name} [{unit}]");
-    let signals: Vec<&Signal> = [&record.input, &record.output]
-        .into_iter()
-        .chain(&record.reference)
-        .collect();
+    let signals: Vec<&Channel> = record.channels().collect();
     let mut header = vec![column("t", "s")];
     header.extend(
         signals
@@ -325,26 +322,28 @@ mod tests {
             ..Rig::default()
         };
         let record = quiet.record(1, 0).unwrap();
-        let moved = |signal: &Signal| signal.range().1 - signal.range().0;
-        assert!(moved(&record.output) < 2e-3 && moved(&record.input) < 2e-3);
+        let moved = |signal: &Channel| signal.range().1 - signal.range().0;
+        assert!(moved(&record.outputs[0]) < 2e-3 && moved(&record.inputs[0]) < 2e-3);
 
         let record = Rig::default().record(1, 0).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rig.csv");
         std::fs::write(&path, csv(&record)).unwrap();
         let columns = ct_signals::Columns::default();
-        let read = ct_signals::read_csv(&path, &columns, record.hold).unwrap();
+        let read = ct_signals::read_csv(&path, &columns, &record.hold().into())
+            .unwrap()
+            .record;
         assert_eq!(
-            (&read.time, &read.output.unit),
-            (&record.time, &record.output.unit)
+            (&read.time, &read.outputs[0].unit),
+            (&record.time, &record.outputs[0].unit)
         );
-        let pairs = |a: &Signal, b: &Signal| -> f64 {
+        let pairs = |a: &Channel, b: &Channel| -> f64 {
             let off = a.values.iter().zip(&b.values).map(|(a, b)| (a - b).abs());
             off.fold(0.0, f64::max)
         };
-        assert!(pairs(&read.output, &record.output) < 6e-5);
-        assert!(pairs(&read.input, &record.input) < 6e-5);
-        let [there, here] = [&read, &record].map(|r| r.reference.clone().unwrap());
+        assert!(pairs(&read.outputs[0], &record.outputs[0]) < 6e-5);
+        assert!(pairs(&read.inputs[0], &record.inputs[0]) < 6e-5);
+        let [there, here] = [&read, &record].map(|r| r.references[0].clone());
         assert!(pairs(&there, &here) < 6e-5);
     }
 }

@@ -9,7 +9,7 @@
 //! The tangent at the operating point is `K = 2 k sqrt(H0)/alpha`, `tau = 2 S sqrt(H0)/alpha`. What instruments find in raw levels is
 //! the secant `H0/u0` instead: the paper's own 2.60.
 
-use ct_signals::{Hold, Record, Signal, excitation, noise};
+use ct_signals::{Channel, Record, excitation, noise};
 use fcloe::start::first_order::{self, Discretisation, Form};
 use fcloe::{
     Controller, Coordinates, Damping, LoopRecord, LoopSimulator, Offsets, OperatingPoint,
@@ -196,11 +196,10 @@ impl Rig {
         Ok(Record {
             name: "emulated rig".to_owned(),
             time: (0..r.len()).map(|k| k as f64 * STEP).collect(),
-            input: Signal::new("u", "V", u),
-            input_2: None,
-            output: Signal::new("y", "cm", y),
-            reference: Some(Signal::new("r", "cm", r)),
-            hold: Hold::Zero,
+            inputs: vec![Channel::new("u", "V", u)],
+            outputs: vec![Channel::new("y", "cm", y)],
+            references: vec![Channel::new("r", "cm", r)],
+            calendar: None,
         })
     }
 
@@ -448,11 +447,11 @@ impl Figure {
     fn new(rig: &Rig, run: &Run) -> Result<Self, Error> {
         let [_, fit] = &run.fits;
         let record = &run.record;
-        let reference = record.reference.as_ref().map(|r| r.values.clone());
+        let reference = record.references.first().map(|r| r.values.clone());
         let reference = reference.unwrap_or_default();
         Ok(Self {
             time: record.time.clone(),
-            measured: record.output.values.clone(),
+            measured: record.outputs[0].values.clone(),
             instruments: rig.simulated(&run.start, &reference)?,
             output_error: rig.simulated(&fit.plant, &reference)?,
             reference,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{Hold, Record, Signal, excitation, noise};
+use ct_signals::{Channel, Hold, Record, excitation, noise};
 use greybox::{Setup, Stopping};
 use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
@@ -203,11 +203,17 @@ impl Rig {
         Record {
             name: "rig".into(),
             time: (0..u.len()).map(|k| k as f64 * self.interval).collect(),
-            input: Signal::new("u", "V", u.to_vec()),
-            output: Signal::new("y", "cm", y),
-            input_2: second.map(|values| Signal::new("u2", "V", values)),
-            reference: None,
-            hold: self.hold,
+            inputs: [
+                Some(Channel::new("u", "V", u.to_vec())),
+                second.map(|values| Channel::new("u2", "V", values)),
+            ]
+            .into_iter()
+            .flatten()
+            .map(|input| input.with_hold(self.hold))
+            .collect(),
+            outputs: vec![Channel::new("y", "cm", y)],
+            references: Vec::new(),
+            calendar: None,
         }
     }
 

@@ -1,0 +1,191 @@
+//! What can only be seen in a whole record.
+
+use std::collections::HashMap;
+
+use super::{ReadOptions, Table, text::line_number};
+use crate::columns::{Found, Layout};
+use crate::record::{MIN_ROWS, median_step};
+use crate::{Error, quoted};
+
+/// A record is refused when more than this share of the output sits exactly at its limits ...
+const SATURATED_SHARE: f64 = 1.0 / 3.0;
+
+/// ... and that is more than this many times what the commonest other value has: a coarsely
+/// quantised output has many samples at every level, a saturated one only at its limits.
+const SATURATED_RATIO: usize = 4;
+
+/// Inputs, outputs and sampling intervals between its inverse and this can be raised to the powers
+/// that a fit takes, with many digits to spare.
+const LARGEST: f64 = 1e15;
+
+impl Table {
+    pub(super) fn check(
+        &self,
+        file: &str,
+        text: &str,
+        layout: &Layout,
+        options: &ReadOptions,
+    ) -> Result<(), Error> {
+        let rows = self.time.len();
+        if rows < MIN_ROWS {
+            let why = match self.outside {
+                0 => String::new(),
+                outside => format!(" (--from and --to leave out {outside})"),
+            };
+            return Err(Error::TooFewRows {
+                record: file.into(),
+                rows,
+                needed: MIN_ROWS,
+                why,
+            });
+        }
+        if options.strict {
+            self.check_gaps(file, text, &layout.time)?;
+        }
+        let channels = || layout.channels().zip(&self.values).zip(&self.missing);
+        for ((column, values), words) in channels() {
+            if values.iter().all(|value| value.is_nan()) {
+                let words = words.iter().map(|(word, _)| format!("\"{word}\""));
+                return Err(Error::NoSample {
+                    file: file.into(),
+                    row: line_number(text, self.ends[0]),
+                    column: quoted(&column.header),
+                    rows,
+                    words: words.collect::<Vec<_>>().join(", "),
+                });
+            }
+        }
+        let outputs = layout.inputs.len()..layout.inputs.len() + layout.outputs.len();
+        for ((column, values), _) in channels().take(outputs.end).skip(outputs.start) {
+            if let Some(value) = constant(values) {
+                return Err(Error::ConstantOutput {
+                    file: file.into(),
+                    column: quoted(&column.header),
+                    value,
+                    rows,
+                });
+            }
+        }
+        self.check_scale(file, text, layout)?;
+        channels()
+            .take(outputs.end)
+            .skip(outputs.start)
+            .try_for_each(|((column, values), _)| check_saturation(file, column, values))
+    }
+
+    fn check_scale(&self, file: &str, text: &str, layout: &Layout) -> Result<(), Error> {
+        let interval = median_step(&self.time);
+        if !(1.0 / LARGEST..=LARGEST).contains(&interval) {
+            return Err(Error::InvalidInterval {
+                file: file.into(),
+                column: quoted(&layout.time.header),
+                interval: rounded(interval),
+                low: 1.0 / LARGEST,
+                high: LARGEST,
+            });
+        }
+        let own = layout.inputs.len() + layout.outputs.len();
+        for (column, values) in layout.channels().zip(&self.values).take(own) {
+            if let Some(k) = values.iter().position(|value| value.abs() > LARGEST) {
+                return Err(Error::TooLarge {
+                    file: file.into(),
+                    row: line_number(text, self.ends[k]),
+                    column: quoted(&column.header),
+                    value: values[k],
+                    limit: LARGEST,
+                });
+            }
+            let largest = values.iter().fold(0.0, |high: f64, v| high.max(v.abs()));
+            if largest < 1.0 / LARGEST {
+                return Err(Error::TooSmall {
+                    file: file.into(),
+                    column: quoted(&column.header),
+                    value: rounded(largest),
+                    limit: 1.0 / LARGEST,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_gaps(&self, file: &str, text: &str, column: &Found) -> Result<(), Error> {
+        let Some((k, missing)) = crate::gaps::first_gap(&self.time) else {
+            return Ok(());
+        };
+        let shown = |time: f64| self.shown(time, column);
+        Err(Error::Gap {
+            file: file.into(),
+            row: line_number(text, self.ends[k + 1]),
+            column: quoted(&column.header),
+            missing: missing as u64,
+            previous: shown(self.time[k]),
+            time: shown(self.time[k + 1]),
+            interval: rounded(median_step(&self.time)),
+        })
+    }
+
+    /// A time as the file writes it: in its unit, or as a date.
+    fn shown(&self, time: f64, column: &Found) -> String {
+        match &self.calendar {
+            Some(calendar) => calendar.at(time),
+            None => {
+                let seconds = crate::unit::seconds(&column.unit).unwrap_or(1.0);
+                crate::shown(rounded(time / seconds)).to_string()
+            }
+        }
+    }
+}
+
+fn check_saturation(file: &str, column: &Found, values: &[f64]) -> Result<(), Error> {
+    let present = || values.iter().copied().filter(|value| !value.is_nan());
+    let rows = present().count();
+    let low = present().fold(f64::INFINITY, f64::min);
+    let high = present().fold(f64::NEG_INFINITY, f64::max);
+    // The one lowest or highest sample of any record is no limit.
+    let at = |value: f64| Some(present().filter(|v| *v == value).count()).filter(|n| *n > 1);
+    let (at_low, at_high) = (at(low).unwrap_or(0), at(high).unwrap_or(0));
+    let count = at_low + at_high;
+    if count as f64 <= SATURATED_SHARE * rows as f64 {
+        return Ok(());
+    }
+    let mut counts: HashMap<u64, usize> = HashMap::new();
+    for value in present().filter(|value| *value != low && *value != high) {
+        *counts.entry(value.to_bits()).or_default() += 1;
+    }
+    let commonest = counts.values().copied().max().unwrap_or(0);
+    if count <= SATURATED_RATIO * commonest {
+        return Ok(());
+    }
+    let unit = if column.unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {}", quoted(&column.unit))
+    };
+    let limits = [(at_low, low), (at_high, high)]
+        .iter()
+        .filter(|(samples, _)| *samples > 0)
+        .map(|(samples, value)| format!("{samples} at {value}{unit}"))
+        .collect::<Vec<_>>()
+        .join(", ");
+    Err(Error::Saturated {
+        file: file.into(),
+        column: quoted(&column.header),
+        count,
+        rows,
+        limits,
+    })
+}
+
+/// A number without the last digits, which are an accident of binary arithmetic.
+pub(super) fn rounded(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
+}
+
+/// The value of a signal that stays the same to a part in a billion, missing samples aside.
+pub(crate) fn constant(values: &[f64]) -> Option<f64> {
+    let first = *values.iter().find(|value| !value.is_nan())?;
+    values
+        .iter()
+        .all(|v| v.is_nan() || (v - first).abs() <= 1e-9 * first.abs())
+        .then_some(first)
+}

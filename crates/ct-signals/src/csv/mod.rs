@@ -1,0 +1,318 @@
+//! Reads a record from a CSV file, says in one line what it read, what was missing and what it did, and in one line what is wrong with
+//! one that it refuses.
+//!
+//! Understood: commas, semicolons or tabs (found from the header); a decimal comma where commas do not separate; a byte-order mark, CRLF,
+//! blank lines, lines that begin with `#`, and blanks around a cell; times as numbers in a unit, or as dates and times; words such as `Bad`
+//! and `null`, and empty cells, where a sample is missing; rows that are missing; units that are not those of the model. Only the columns in
+//! use are read. Nothing is ever written.
+
+mod cells;
+mod checks;
+mod place;
+mod summary;
+mod text;
+mod time;
+
+use std::path::Path;
+
+use csv::StringRecord;
+use serde::{Deserialize, Serialize};
+
+pub use self::summary::{Converted, MissingSamples, ReadSummary};
+use self::{
+    cells::{Cell, Numbers, is_word, says_missing},
+    place::Place,
+    text::{check_header, decode, delimiter_name, line_number, read, reader},
+    time::{Bounds, Times},
+};
+pub(crate) use self::{
+    checks::constant,
+    text::{check_width, delimiter, is_number},
+};
+use crate::columns::{Columns, Found, Heading, Layout};
+use crate::{Calendar, Channel, Error, Hold, LARGEST_RECORD, Record, quoted, read_file, unit};
+
+/// How a record is read.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReadOptions {
+    /// What the inputs do between samples.
+    pub hold: Hold,
+    /// Rows before this are left out: a date, or a number in the unit of the time column.
+    pub from: Option<String>,
+    /// Rows behind this are left out, as [`ReadOptions::from`].
+    pub to: Option<String>,
+    /// Refuses missing samples and missing rows.
+    pub strict: bool,
+    /// The record is put on an even grid of this interval \[s\]; `None`: it stays as it was sampled.
+    pub resample: Option<f64>,
+}
+
+impl From<Hold> for ReadOptions {
+    fn from(hold: Hold) -> Self {
+        Self {
+            hold,
+            ..Self::default()
+        }
+    }
+}
+
+/// A record and what was done to read it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// The record.
+    pub record: Record,
+    /// What was read, what was missing and what was done.
+    pub summary: ReadSummary,
+}
+
+/// Reads a record; `columns` says which column is what.
+///
+/// The time is converted to seconds. Its steps may vary. Samples may be missing, and are NaN then; rows may be missing
+/// ([`Record::without_gaps`]). Row numbers in messages are line numbers of the file. Whether the input moves says
+/// [`Record::require_moving_input`].
+///
+/// # Errors
+/// [`Error::CannotOpen`], [`Error::Folder`], [`Error::NotText`], [`Error::EmptyFile`],
+/// [`Error::NoHeader`], [`Error::Column`], [`Error::UnknownTimeUnit`], [`Error::WrongFieldCount`],
+/// [`Error::UnitRow`], [`Error::TextInCell`], [`Error::MixedDecimalMarks`], [`Error::Timestamp`],
+/// [`Error::RepeatedTime`], [`Error::BackwardTime`], [`Error::Bound`], [`Error::TooFewRows`] (below
+/// [`MIN_ROWS`](crate::MIN_ROWS)), [`Error::NoSample`], [`Error::ConstantOutput`], [`Error::InvalidInterval`], [`Error::TooLarge`],
+/// [`Error::TooSmall`], [`Error::Saturated`]; where it is to be strict [`Error::EmptyCell`], [`Error::NotFinite`] and [`Error::Gap`] too.
+pub fn read_csv(path: &Path, columns: &Columns, options: &ReadOptions) -> Result<Reading, Error> {
+    let file = path.display().to_string();
+    let bytes = read_file(path, LARGEST_RECORD)?;
+    let mut reading = parse_csv(&file, &bytes, columns, options)?;
+    if let Some(name) = path.file_name() {
+        reading.record.name = name.to_string_lossy().into_owned();
+        reading.summary.file.clone_from(&reading.record.name);
+    }
+    Ok(reading)
+}
+
+/// As [`read_csv`], from the content of a file; `file` names it in messages and is the record's name.
+///
+/// # Errors
+/// As [`read_csv`], but for those of opening.
+pub fn parse_csv(
+    file: &str,
+    content: &[u8],
+    columns: &Columns,
+    options: &ReadOptions,
+) -> Result<Reading, Error> {
+    let text = decode(file, content)?;
+    let (layout, table) = read_table(file, text, columns, options)?;
+    table.check(file, text, &layout, options)?;
+    Ok(table.into_reading(file, layout, options))
+}
+
+/// The header of a file: what there is to choose from, before anything is read.
+///
+/// # Errors
+/// Where the file is not text, is empty, or has no header.
+pub fn csv_header(file: &str, content: &[u8]) -> Result<Vec<Heading>, Error> {
+    let text = decode(file, content)?;
+    let mut reader = reader(text);
+    let mut record = StringRecord::new();
+    while read(file, &mut reader, &mut record)? {
+        if !record.iter().all(str::is_empty) {
+            check_header(file, || line_number(text, end_of(&reader)), &record)?;
+            return Ok(record.iter().map(Heading::of).collect());
+        }
+    }
+    Err(Error::EmptyFile { file: file.into() })
+}
+
+fn end_of(reader: &csv::Reader<&[u8]>) -> usize {
+    usize::try_from(reader.position().byte()).unwrap_or(usize::MAX)
+}
+
+/// The columns in use, with where each row ends in the file.
+#[derive(Default)]
+struct Table {
+    ends: Vec<usize>,
+    /// \[s\], from zero of the column, or from the first row where these are dates.
+    time: Vec<f64>,
+    /// Of every channel, in the order of [`Layout::channels`], its values in the units that are wanted.
+    values: Vec<Vec<f64>>,
+    /// Of every channel the words that stand in cells whose sample is missing, with their number.
+    missing: Vec<Vec<(String, usize)>>,
+    calendar: Option<Calendar>,
+    /// Rows before or behind what is wanted.
+    outside: usize,
+    /// Rows without a time.
+    without_time: usize,
+}
+
+fn read_table(
+    file: &str,
+    text: &str,
+    columns: &Columns,
+    options: &ReadOptions,
+) -> Result<(Layout, Table), Error> {
+    let delimiter = delimiter(text);
+    let mut reader = reader(text);
+    let mut record = StringRecord::new();
+    let mut header: Option<(Layout, usize)> = None;
+    let mut times: Option<(Times, Bounds)> = None;
+    let mut numbers = Numbers::new(delimiter != b',', options.strict, &columns.missing);
+    let mut table = Table::default();
+
+    while read(file, &mut reader, &mut record)? {
+        let end = end_of(&reader);
+        if record.iter().all(str::is_empty) {
+            continue;
+        }
+        let Some((layout, fields)) = &header else {
+            let row = || line_number(text, end);
+            check_header(file, row, &record)?;
+            let headers: Vec<String> = record.iter().map(str::to_string).collect();
+            let layout = columns.resolve(file, row(), &headers)?;
+            let channels = layout.channels().count();
+            table.values.resize_with(channels, Vec::new);
+            table.missing.resize_with(channels, Vec::new);
+            header = Some((layout, record.len()));
+            continue;
+        };
+        if record.len() != *fields {
+            return Err(Error::WrongFieldCount {
+                file: file.into(),
+                row: line_number(text, end),
+                expected: *fields,
+                found: record.len(),
+                delimiter: delimiter_name(delimiter),
+            });
+        }
+        let at = |column: &'_ Found| -> Place<'_> {
+            Place {
+                name: file,
+                text,
+                end,
+                // Lives as long as the layout does.
+                header: header_of(layout, column.index),
+            }
+        };
+        if table.time.is_empty() && table.outside == 0 && record.iter().all(is_word) {
+            let (name, unit) = unit::split(&layout.time.header);
+            let below = &record[layout.time.index];
+            let unit = if below.is_empty() { unit } else { below };
+            return Err(Error::UnitRow {
+                file: file.into(),
+                row: line_number(text, end),
+                header: quoted(&format!("{name} [{unit}]")),
+            });
+        }
+        let cell = &record[layout.time.index];
+        let place = at(&layout.time);
+        if !options.strict && says_missing(cell) {
+            table.without_time += 1;
+            continue;
+        }
+        let (times, bounds) = match &mut times {
+            Some(known) => known,
+            none => {
+                let found = Times::of(place, cell, &layout.time, layout.seconds, columns)?;
+                let bounds = Bounds::of(&found, layout.seconds, options)?;
+                none.insert((found, bounds))
+            }
+        };
+        let time = times.read(place, cell, &mut numbers)?;
+        if !bounds.contain(time) {
+            table.outside += 1;
+            continue;
+        }
+        if let Some(&previous) = table.time.last() {
+            times.check_order(place, previous, time)?;
+        }
+        table.time.push(time);
+        table.ends.push(end);
+        for (k, column) in layout.channels().enumerate() {
+            let cell = &record[column.index];
+            let value = match numbers.sample(at(column), cell)? {
+                Cell::Number(value) => match &column.converted {
+                    Some((_, conversion)) => conversion.apply(value),
+                    None => value,
+                },
+                Cell::Missing => {
+                    match table.missing[k].iter_mut().find(|(word, _)| word == cell) {
+                        Some((_, count)) => *count += 1,
+                        None => table.missing[k].push((quoted(cell), 1)),
+                    }
+                    f64::NAN
+                }
+            };
+            table.values[k].push(value);
+        }
+    }
+    table.calendar = times.and_then(|(times, _)| times.calendar());
+    match header {
+        Some((layout, _)) => Ok((layout, table)),
+        None => Err(Error::EmptyFile { file: file.into() }),
+    }
+}
+
+fn header_of(layout: &Layout, index: usize) -> &str {
+    let mut all = std::iter::once(&layout.time).chain(layout.channels());
+    all.find(|column| column.index == index)
+        .map_or("", |column| &column.header)
+}
+
+impl Table {
+    fn into_reading(mut self, file: &str, layout: Layout, options: &ReadOptions) -> Reading {
+        // Times begin at the first row in use where they are dates.
+        if let (Some(calendar), Some(&first)) = (&mut self.calendar, self.time.first()) {
+            calendar.start = calendar.start.after(first);
+            self.time.iter_mut().for_each(|time| *time -= first);
+        }
+        let mut values = self.values.into_iter();
+        let mut channels = |columns: &[Found]| -> Vec<Channel> {
+            let channel = |(column, values): (&Found, Vec<f64>)| {
+                Channel::new(&*column.name, &*column.unit, values)
+            };
+            columns.iter().zip(values.by_ref()).map(channel).collect()
+        };
+        let inputs = channels(&layout.inputs).into_iter();
+        let mut record = Record {
+            name: file.into(),
+            time: self.time,
+            inputs: inputs.map(|u| u.with_hold(options.hold)).collect(),
+            outputs: channels(&layout.outputs),
+            references: channels(&layout.references),
+            calendar: self.calendar,
+        };
+        let named = layout.channels().zip(&self.missing);
+        let missing = named
+            .filter(|(_, words)| !words.is_empty())
+            .map(|(column, words)| MissingSamples {
+                column: column.name.clone(),
+                samples: words.iter().map(|(_, count)| count).sum(),
+                words: words.clone(),
+            });
+        let missing: Vec<MissingSamples> = missing.collect();
+        let converted = layout.channels().filter_map(|column| {
+            let (from, _) = column.converted.as_ref()?;
+            Some(Converted {
+                column: column.name.clone(),
+                from: from.clone(),
+                to: column.unit.clone(),
+            })
+        });
+        let summary = ReadSummary {
+            file: file.into(),
+            rows: record.len(),
+            outside: self.outside,
+            without_time: self.without_time,
+            missing_rows: record.missing_rows(),
+            interval: record.sample_interval(),
+            duration: record.duration(),
+            calendar: record.calendar.clone(),
+            missing,
+            converted: converted.collect(),
+            resampled: options.resample,
+        };
+        if let Some(interval) = options.resample {
+            record = record.resampled(interval);
+        }
+        Reading { record, summary }
+    }
+}

@@ -1,0 +1,139 @@
+//! What was read, what was missing and what was done, in one line.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::{Calendar, duration};
+
+/// Samples of a column that are missing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MissingSamples {
+    /// The column's name.
+    pub column: String,
+    /// How many.
+    pub samples: usize,
+    /// What stands in their cells, with the number of each; empty for an empty cell.
+    pub words: Vec<(String, usize)>,
+}
+
+/// A column that the file has in another unit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Converted {
+    /// The column's name.
+    pub column: String,
+    /// The file's unit.
+    pub from: String,
+    /// The unit of the values.
+    pub to: String,
+}
+
+/// What was read of a file; [`fmt::Display`] says it in one line.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReadSummary {
+    /// The file.
+    pub file: String,
+    /// Rows in use.
+    pub rows: usize,
+    /// Rows before or behind what is wanted.
+    pub outside: usize,
+    /// Rows without a time, which are not used.
+    pub without_time: usize,
+    /// Rows that are missing between the first and the last.
+    pub missing_rows: usize,
+    /// The median step of the time \[s\].
+    pub interval: f64,
+    /// Time from the first to the last row in use \[s\].
+    pub duration: f64,
+    /// When it began, where the file has dates.
+    #[serde(skip)]
+    pub calendar: Option<Calendar>,
+    /// Samples that are missing, by column.
+    pub missing: Vec<MissingSamples>,
+    /// Columns that were converted.
+    pub converted: Vec<Converted>,
+    /// The interval of the grid on which the record was put \[s\].
+    pub resampled: Option<f64>,
+}
+
+impl ReadSummary {
+    /// Whether the file was read as it stands: nothing was missing, left out or converted.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.outside == 0
+            && self.without_time == 0
+            && self.missing_rows == 0
+            && self.missing.is_empty()
+            && self.converted.is_empty()
+            && self.resampled.is_none()
+    }
+}
+
+fn rows(count: usize) -> String {
+    match count {
+        1 => "1 row".to_string(),
+        count => format!("{count} rows"),
+    }
+}
+
+impl fmt::Display for ReadSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.file, rows(self.rows))?;
+        if let Some(calendar) = &self.calendar {
+            let (first, last) = (calendar.at(0.0), calendar.at(self.duration));
+            write!(f, " from {first} to {last} ({})", calendar.zone.name())?;
+        } else {
+            write!(f, " over {}", duration(self.duration))?;
+        }
+        write!(f, ", every {}", duration(self.interval))?;
+        if self.outside > 0 {
+            write!(
+                f,
+                "; {} outside --from and --to left out",
+                rows(self.outside)
+            )?;
+        }
+        if self.without_time > 0 {
+            write!(f, "; {} without a time left out", rows(self.without_time))?;
+        }
+        if self.missing_rows > 0 {
+            let are = if self.missing_rows == 1 { "is" } else { "are" };
+            write!(f, "; {} {are} missing", rows(self.missing_rows))?;
+        }
+        for column in &self.missing {
+            let part = 100.0 * column.samples as f64 / self.rows.max(1) as f64;
+            let words = column
+                .words
+                .iter()
+                .map(|(word, count)| match word.as_str() {
+                    "" => format!("{count} empty"),
+                    word => format!("{count} \"{word}\""),
+                });
+            let words: Vec<String> = words.collect();
+            let part = if part < 1.0 {
+                "below 1".to_string()
+            } else {
+                format!("{part:.0}")
+            };
+            let samples = if column.samples == 1 {
+                "sample"
+            } else {
+                "samples"
+            };
+            write!(
+                f,
+                "; {} {samples} of \"{}\" missing ({}; {part} %)",
+                column.samples,
+                column.column,
+                words.join(", ")
+            )?;
+        }
+        for Converted { column, from, to } in &self.converted {
+            write!(f, "; \"{column}\" converted from {from} to {to}")?;
+        }
+        if let Some(interval) = self.resampled {
+            write!(f, "; resampled to one row every {}", duration(interval))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,129 @@
+//! The text of a CSV file: its encoding, its delimiter, its rows, and the line numbers of these.
+
+use csv::{Reader, ReaderBuilder, StringRecord, Trim};
+
+use crate::{Error, LONGEST_LINE, MOST_COLUMNS, quoted};
+
+/// The content of a file as text, without a byte-order mark.
+pub(super) fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Error> {
+    let not_text = |found| Error::NotText {
+        file: file.into(),
+        found,
+    };
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(not_text("UTF-16"));
+    }
+    if bytes.starts_with(b"PK\x03\x04") {
+        return Err(not_text("a zip archive or a spreadsheet"));
+    }
+    if bytes.contains(&0) {
+        return Err(not_text("binary data"));
+    }
+    let text = std::str::from_utf8(bytes).map_err(|_| not_text("in another encoding"))?;
+    let mut begin = 0;
+    for line in bytes.split(|byte| *byte == b'\n' || *byte == b'\r') {
+        if line.len() > LONGEST_LINE {
+            return Err(Error::LongLine {
+                file: file.into(),
+                row: line_number(text, begin + line.len()),
+                longest: LONGEST_LINE,
+            });
+        }
+        begin += line.len() + 1;
+    }
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
+}
+
+/// The line number of the row that the reader finished at the byte `end`. A line ends as it does for the reader: at a line feed, a carriage
+/// return, or the two together.
+pub(super) fn line_number(text: &str, end: usize) -> u64 {
+    let read = text.as_bytes().get(..end).unwrap_or(text.as_bytes());
+    let last = read
+        .iter()
+        .rposition(|byte| *byte != b'\r' && *byte != b'\n');
+    let row = &read[..last.map_or(0, |last| last + 1)];
+    let mut before = 0;
+    let mut ends = 0;
+    for &byte in row {
+        ends += u64::from(byte == b'\r' || byte == b'\n' && before != b'\r');
+        before = byte;
+    }
+    ends + 1
+}
+
+pub(super) fn reader(text: &str) -> Reader<&[u8]> {
+    ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(delimiter(text))
+        .comment(Some(b'#'))
+        .trim(Trim::All)
+        .from_reader(text.as_bytes())
+}
+
+/// The next row, if there is one.
+pub(super) fn read(
+    file: &str,
+    reader: &mut Reader<&[u8]>,
+    row: &mut StringRecord,
+) -> Result<bool, Error> {
+    reader.read_record(row).map_err(|error| Error::CannotOpen {
+        file: file.into(),
+        source: error.into(),
+    })
+}
+
+/// A header names so many columns at most.
+pub(crate) fn check_width(file: &str, row: u64, found: usize) -> Result<(), Error> {
+    if found > MOST_COLUMNS {
+        return Err(Error::ManyColumns {
+            file: file.into(),
+            row,
+            found,
+            most: MOST_COLUMNS,
+        });
+    }
+    Ok(())
+}
+
+/// A cell that names no column: a number, with a decimal comma too, or nothing.
+pub(crate) fn is_number(cell: &str) -> bool {
+    cell.is_empty() || cell.replace(',', ".").parse::<f64>().is_ok()
+}
+
+/// Numbers alone are no header, and neither are too many columns.
+pub(super) fn check_header(
+    file: &str,
+    row: impl Fn() -> u64,
+    record: &StringRecord,
+) -> Result<(), Error> {
+    check_width(file, row(), record.len())?;
+    if record.iter().all(is_number) {
+        return Err(Error::NoHeader {
+            file: file.into(),
+            row: row(),
+            first: quoted(&record.iter().collect::<Vec<_>>().join(", ")),
+        });
+    }
+    Ok(())
+}
+
+/// The one of comma, semicolon and tab that the first row has most of.
+pub(crate) fn delimiter(text: &str) -> u8 {
+    let header = text
+        .split(['\n', '\r'])
+        .find(|line| !line.trim().is_empty() && !line.starts_with('#'))
+        .unwrap_or_default();
+    let count = |delimiter: &u8| header.bytes().filter(|byte| byte == delimiter).count();
+    // `max_by_key` takes the last of equals: a comma, where none occurs.
+    b";\t,".iter().copied().max_by_key(count).unwrap_or(b',')
+}
+
+/// What a delimiter is called.
+pub(super) fn delimiter_name(delimiter: u8) -> &'static str {
+    match delimiter {
+        b';' => "semicolon",
+        b'\t' => "tab",
+        _ => "comma",
+    }
+}

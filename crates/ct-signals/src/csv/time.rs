@@ -1,0 +1,189 @@
+//! The time of rows: numbers in a unit, or dates and times.
+
+use super::{ReadOptions, cells::Numbers, checks::rounded, place::Place, text::delimiter};
+use crate::columns::{Columns, Found};
+use crate::{Calendar, Error, Timestamp, TimestampReader, quoted};
+
+/// How a column writes the time.
+pub(super) enum Times {
+    /// Numbers, so many seconds for one.
+    Numbers(f64),
+    /// Dates and times, counted from the first row of the file.
+    Dates {
+        reader: Box<TimestampReader>,
+        first: Timestamp,
+    },
+}
+
+impl Times {
+    /// From the first cell.
+    pub fn of(
+        place: Place,
+        cell: &str,
+        column: &Found,
+        seconds: f64,
+        columns: &Columns,
+    ) -> Result<Self, Error> {
+        let format = columns.time_format.as_deref();
+        if format.is_none() && !TimestampReader::understands(cell) && cell_is_number(cell) {
+            return Ok(Self::Numbers(seconds));
+        }
+        let zone = columns.time_zone.as_deref();
+        let reader = TimestampReader::new(format, zone, cells(place, column.index))
+            .map_err(|error| refused(place, error))?;
+        // It is read once more with its row.
+        let first = reader
+            .clone()
+            .read(cell)
+            .map_err(|error| refused(place, error))?;
+        Ok(Self::Dates {
+            reader: Box::new(reader),
+            first,
+        })
+    }
+
+    /// The time of a row \[s\].
+    pub fn read(&mut self, place: Place, cell: &str, numbers: &mut Numbers) -> Result<f64, Error> {
+        match self {
+            Self::Numbers(seconds) => Ok(numbers.time(place, cell)? * *seconds),
+            Self::Dates { reader, first } => reader
+                .read(cell)
+                .map(|instant| instant.seconds_since(*first))
+                .map_err(|error| refused(place, error)),
+        }
+    }
+
+    /// The calendar whose zero the times count from; `None` where these are numbers.
+    pub fn calendar(&self) -> Option<Calendar> {
+        match self {
+            Self::Dates { reader, first } if reader.has_dates() => Some(Calendar {
+                start: *first,
+                zone: reader.zone().clone(),
+            }),
+            _ => None,
+        }
+    }
+
+    /// A time as the file writes it.
+    fn shown(&self, time: f64) -> String {
+        match self {
+            Self::Numbers(seconds) => crate::shown(rounded(time / seconds)).to_string(),
+            Self::Dates { reader, first } => reader.format(first.after(time)),
+        }
+    }
+
+    pub fn check_order(&self, place: Place, previous: f64, time: f64) -> Result<(), Error> {
+        if time > previous {
+            return Ok(());
+        }
+        let (file, row, column) = (place.file(), place.row(), place.column());
+        if time == previous {
+            return Err(Error::RepeatedTime {
+                file,
+                row,
+                column,
+                time: self.shown(time),
+            });
+        }
+        let mend = match self {
+            // An hour comes twice where clocks are set back.
+            Self::Dates { .. } if previous - time <= 3600.0 => {
+                "name the zone with time_zone = \"...\" under [columns] where clocks were set back, or sort the rows by time"
+            }
+            _ => "sort the rows by time, or split the file there: each part is a record of its own",
+        };
+        Err(Error::BackwardTime {
+            file,
+            row,
+            column,
+            time: self.shown(time),
+            previous: self.shown(previous),
+            mend,
+        })
+    }
+}
+
+fn cell_is_number(cell: &str) -> bool {
+    cell.replace(',', ".").parse::<f64>().is_ok()
+}
+
+fn refused(place: Place, error: crate::TimestampError) -> Error {
+    Error::Timestamp {
+        file: place.file(),
+        row: place.row(),
+        column: place.column(),
+        error: Box::new(error),
+    }
+}
+
+/// The cells of a column from this row on.
+fn cells<'a>(place: Place<'a>, column: usize) -> impl Iterator<Item = &'a str> {
+    let mut from = place.end;
+    // Back to the beginning of the row.
+    let bytes = place.text.as_bytes();
+    while from > 0 && matches!(bytes[from - 1], b'\n' | b'\r') {
+        from -= 1;
+    }
+    while from > 0 && !matches!(bytes[from - 1], b'\n' | b'\r') {
+        from -= 1;
+    }
+    let separator = char::from(delimiter(place.text));
+    place.text[from..]
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .filter_map(move |line| {
+            let cell = line.split(separator).nth(column)?;
+            Some(cell.trim().trim_matches('"').trim())
+        })
+}
+
+/// The part of a file that is wanted \[s\].
+pub(super) struct Bounds {
+    from: f64,
+    to: f64,
+}
+
+impl Bounds {
+    pub fn of(times: &Times, seconds: f64, options: &ReadOptions) -> Result<Self, Error> {
+        let bound = |option: &'static str,
+                     text: &Option<String>,
+                     none: f64|
+         -> Result<f64, Error> {
+            let Some(text) = text else {
+                return Ok(none);
+            };
+            let refused = |mend: String| Error::Bound {
+                option,
+                text: quoted(text),
+                mend,
+            };
+            match times {
+                Times::Numbers(_) => {
+                    let number = text.trim().replace(',', ".").parse::<f64>().ok();
+                    let number = number.filter(|number| number.is_finite());
+                    number.map(|number| number * seconds).ok_or_else(|| {
+                        refused("the file has times as numbers: give a number in their unit".into())
+                    })
+                }
+                Times::Dates { reader, first } => reader
+                    .bound(text)
+                    .map(|instant| instant.seconds_since(*first))
+                    .map_err(|error| refused(error.to_string())),
+            }
+        };
+        let from = bound("--from", &options.from, f64::NEG_INFINITY)?;
+        let to = bound("--to", &options.to, f64::INFINITY)?;
+        if from >= to {
+            return Err(Error::Bound {
+                option: "--to",
+                text: quoted(options.to.as_deref().unwrap_or_default()),
+                mend: "it is not behind --from: give a later one".into(),
+            });
+        }
+        Ok(Self { from, to })
+    }
+
+    pub fn contain(&self, time: f64) -> bool {
+        (self.from..=self.to).contains(&time)
+    }
+}

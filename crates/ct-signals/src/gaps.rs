@@ -1,0 +1,381 @@
+//! Records in which rows or samples of an input are missing: held for a while, cut where that is too long.
+//!
+//! A missing sample of an *output* costs nothing but itself: a likelihood leaves it out. What an *input* did while nothing was
+//! recorded is not known. For a short while it is taken to have stayed as it was (or, of a [`Hold::First`] input, to have run in a
+//! straight line), and what that does to the plant is small beside its response. For longer the record is cut: its parts keep their time
+//! stamps, so that they share a clock, and each begins with states of its own.
+
+use serde::{Deserialize, Serialize};
+
+use crate::record::quantile_of_steps;
+use crate::{Channel, Hold, Record};
+
+/// A step of the time is this many sampling intervals or more where rows are missing: half-way between one and two.
+const GAP: f64 = 1.5;
+/// Steps of an evenly sampled record differ from whole intervals by at most this part of one ...
+const EVEN: f64 = 0.25;
+/// ... at this share of them.
+const MOST: f64 = 0.98;
+/// Of uneven steps a gap is one that is longer than 1.5 times the one that this share of them does not exceed.
+const USUAL: f64 = 0.95;
+/// A part with fewer samples of an output says less than its initial states take.
+const SHORTEST: usize = 8;
+
+/// What was done about rows and samples of inputs that are missing.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Gaps {
+    /// Rows that are missing between the first and the last.
+    pub rows: usize,
+    /// Stretches in which rows are missing, or samples of an input.
+    pub places: usize,
+    /// Of these places those through which the inputs were held.
+    pub held: usize,
+    /// Of these places those where the record is cut, and begins anew behind.
+    pub cut: usize,
+    /// Rows of parts that were too short to be used.
+    pub unused: usize,
+    /// The longest time for which an input was held \[s\].
+    pub longest_hold: f64,
+}
+
+impl Gaps {
+    /// Together with those of another record.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            rows: self.rows + other.rows,
+            places: self.places + other.places,
+            held: self.held + other.held,
+            cut: self.cut + other.cut,
+            unused: self.unused + other.unused,
+            longest_hold: self.longest_hold.max(other.longest_hold),
+        }
+    }
+}
+
+/// The sampling of a record, rows that are missing aside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sampling {
+    /// The interval \[s\].
+    interval: f64,
+    /// A longer step is a gap \[s\].
+    usual: f64,
+}
+
+impl Sampling {
+    /// Where the steps are whole multiples of one interval, that is the interval; otherwise their median.
+    fn of(time: &[f64]) -> Self {
+        let short = quantile_of_steps(time, 0.1);
+        let near: Vec<f64> = steps(time).filter(|step| *step < GAP * short).collect();
+        let interval = near.iter().sum::<f64>() / near.len().max(1) as f64;
+        let whole = |step: &f64| {
+            let intervals = (step / interval).round().max(1.0);
+            (step / interval - intervals).abs() <= EVEN
+        };
+        let even = steps(time).filter(whole).count() as f64;
+        if even >= MOST * time.len().saturating_sub(1) as f64 {
+            Self {
+                interval,
+                usual: interval,
+            }
+        } else {
+            Self {
+                interval: quantile_of_steps(time, 0.5),
+                usual: quantile_of_steps(time, USUAL),
+            }
+        }
+    }
+
+    /// Rows that are missing in a step of the time.
+    fn missing(&self, step: f64) -> usize {
+        if step > GAP * self.usual {
+            ((step / self.interval).round() as usize).saturating_sub(1)
+        } else {
+            0
+        }
+    }
+}
+
+/// The first row behind which rows are missing, and how many.
+pub(crate) fn first_gap(time: &[f64]) -> Option<(usize, usize)> {
+    let sampling = Sampling::of(time);
+    let missing = steps(time).map(|step| sampling.missing(step));
+    missing.enumerate().find(|(_, missing)| *missing > 0)
+}
+
+fn steps(time: &[f64]) -> impl Iterator<Item = f64> + '_ {
+    time.windows(2).map(|pair| pair[1] - pair[0])
+}
+
+impl Record {
+    /// Rows that are missing between the first and the last, by the steps of the time.
+    #[must_use]
+    pub fn missing_rows(&self) -> usize {
+        let sampling = Sampling::of(&self.time);
+        steps(&self.time).map(|step| sampling.missing(step)).sum()
+    }
+
+    /// Whether rows are missing, or samples of an input or a reference.
+    #[must_use]
+    pub fn has_gaps(&self) -> bool {
+        let mut known = self.inputs.iter().chain(&self.references);
+        known.any(|channel| channel.missing() > 0) || self.missing_rows() > 0
+    }
+
+    /// The record without gaps, as the head of this file says: inputs are held for at most `longest` \[s\] (from 0 on, infinite: for as long
+    /// as it takes), and the parts between longer gaps are records of their own, under one name and on one clock. A missing row that is
+    /// held through becomes a row without outputs. A reference is held for as long as it takes, as a set point is.
+    ///
+    /// A record without gaps comes back as it is. No part comes back where no row has all inputs.
+    #[must_use]
+    pub fn without_gaps(&self, longest: f64) -> (Vec<Record>, Gaps) {
+        if !self.has_gaps() {
+            return (vec![self.clone()], Gaps::default());
+        }
+        let mut gaps = Gaps::default();
+        let whole = self.with_missing_rows(longest, &mut gaps);
+        let mut parts = Vec::new();
+        for rows in whole.stretches(longest, &mut gaps) {
+            let mut part = whole.rows(rows);
+            part.inputs.iter_mut().for_each(hold);
+            part.references.iter_mut().for_each(hold);
+            let samples = part.outputs.iter().map(|y| part.len() - y.missing());
+            if part.outputs.is_empty() || samples.max().unwrap_or(0) >= SHORTEST {
+                parts.push(part);
+            } else {
+                gaps.unused += part.len();
+            }
+        }
+        (parts, gaps)
+    }
+
+    /// Puts rows without a sample where rows are missing for at most `longest`.
+    fn with_missing_rows(&self, longest: f64, gaps: &mut Gaps) -> Record {
+        let sampling = Sampling::of(&self.time);
+        // Of every row the one that it was, none for one that is put in.
+        let mut from: Vec<Option<usize>> = Vec::with_capacity(self.len());
+        let mut time = Vec::with_capacity(self.len());
+        for (k, &t) in self.time.iter().enumerate() {
+            if let Some(before) = k.checked_sub(1) {
+                let begin = self.time[before];
+                let missing = sampling.missing(t - begin);
+                gaps.rows += missing;
+                let known = self.inputs.iter().all(|u| !u.values[before].is_nan());
+                if missing > 0 && (!known || t - begin - sampling.interval <= longest) {
+                    let step = (t - begin) / (missing + 1) as f64;
+                    if (missing as f64) < MOST_PUT_IN {
+                        time.extend((1..=missing).map(|i| begin + step * i as f64));
+                        from.extend((0..missing).map(|_| None));
+                    }
+                }
+            }
+            time.push(t);
+            from.push(Some(k));
+        }
+        let put = |channel: &Channel| {
+            let values = from
+                .iter()
+                .map(|k| k.map_or(f64::NAN, |k| channel.values[k]));
+            channel.with_values(values.collect())
+        };
+        let all = |channels: &[Channel]| channels.iter().map(put).collect();
+        Record {
+            name: self.name.clone(),
+            time,
+            inputs: all(&self.inputs),
+            outputs: all(&self.outputs),
+            references: all(&self.references),
+            calendar: self.calendar.clone(),
+        }
+    }
+
+    /// Rows between gaps that are too long to be held through.
+    fn stretches(&self, longest: f64, gaps: &mut Gaps) -> Vec<std::ops::Range<usize>> {
+        let sampling = Sampling::of(&self.time);
+        let known = |k: usize| self.inputs.iter().all(|u| !u.values[k].is_nan());
+        let lines = self.hold() == Hold::First;
+        let mut stretches = Vec::new();
+        let Some(mut begin) = (0..self.len()).find(|&k| known(k)) else {
+            gaps.unused += self.len();
+            return stretches;
+        };
+        gaps.unused += begin;
+        // The last row of which all inputs are known.
+        let mut last = begin;
+        for k in begin + 1..=self.len() {
+            let end = k == self.len();
+            if !end && !known(k) {
+                continue;
+            }
+            let unknown = if end {
+                0.0
+            } else {
+                self.time[k] - self.time[last] - sampling.interval
+            };
+            if !end && (k > last + 1 || sampling.missing(self.time[k] - self.time[last]) > 0) {
+                gaps.places += 1;
+                if unknown <= longest {
+                    gaps.held += 1;
+                    gaps.longest_hold = gaps.longest_hold.max(unknown);
+                } else {
+                    gaps.cut += 1;
+                    // A held input acts until its next sample should have come: that row's outputs are still known to follow from it.
+                    let next = last + 1;
+                    let acts = !lines
+                        && next < k
+                        && self.time[next] - self.time[last] <= GAP * sampling.usual;
+                    stretches.push(begin..last + 1 + usize::from(acts));
+                    begin = k;
+                }
+            }
+            if end {
+                // Behind the last known input: what follows from it, and no more.
+                let next = last + 1;
+                let acts = !lines && next < self.len();
+                stretches.push(begin..next + usize::from(acts));
+                gaps.unused += self.len() - next - usize::from(acts);
+            } else {
+                last = k;
+            }
+        }
+        stretches
+    }
+}
+
+/// More rows are never put in: what was not recorded for so long is cut out.
+const MOST_PUT_IN: f64 = 1e5;
+
+/// Fills missing samples: the value before, or a line where the channel runs in lines; the first ones with the first that is there.
+fn hold(channel: &mut Channel) {
+    if channel.hold == Hold::First {
+        channel.values = channel.interpolated();
+        return;
+    }
+    let first = channel.present().next();
+    let mut before = first.unwrap_or(0.0);
+    for value in &mut channel.values {
+        if value.is_nan() {
+            *value = before;
+        } else {
+            before = *value;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(rows: impl Iterator<Item = usize>) -> Record {
+        let rows: Vec<f64> = rows.map(|k| k as f64).collect();
+        Record {
+            name: "rig".into(),
+            time: rows.iter().map(|k| 100.0 + 2.0 * k).collect(),
+            inputs: vec![Channel::new("u", "V", rows.clone())],
+            outputs: vec![Channel::new(
+                "y",
+                "cm",
+                rows.iter().map(|k| 10.0 * k).collect(),
+            )],
+            ..Record::default()
+        }
+    }
+
+    #[test]
+    fn a_record_without_gaps_stays_as_it_is() {
+        let whole = record(0..50);
+        assert_eq!(
+            whole.without_gaps(0.0),
+            (vec![whole.clone()], Gaps::default())
+        );
+        // Samples of an output may be missing.
+        let mut whole = whole;
+        whole.outputs[0].values[7] = f64::NAN;
+        let (parts, gaps) = whole.without_gaps(0.0);
+        assert_eq!((parts.len(), gaps), (1, Gaps::default()));
+        assert_eq!(parts[0].outputs[0].missing(), 1);
+    }
+
+    #[test]
+    fn short_gaps_are_held_through_and_long_ones_cut() {
+        // Two rows are missing in one place and ten in another.
+        let gappy = record((0..20).chain(22..40).chain(50..80));
+        let (parts, gaps) = gappy.without_gaps(4.0);
+        assert_eq!(
+            gaps,
+            Gaps {
+                rows: 12,
+                places: 2,
+                held: 1,
+                cut: 1,
+                unused: 0,
+                longest_hold: 4.0
+            }
+        );
+        let [first, second] = &parts[..] else {
+            panic!("{}", parts.len())
+        };
+        assert_eq!((first.len(), second.len()), (40, 30));
+        assert_eq!(first.time[20..22], [140.0, 142.0]);
+        assert_eq!(first.inputs[0].values[19..23], [19.0, 19.0, 19.0, 22.0]);
+        assert!(first.outputs[0].values[20].is_nan() && first.outputs[0].values[22] == 220.0);
+        assert_eq!(second.time[0], 200.0);
+        // Held for as long as it takes, and not at all.
+        assert_eq!(gappy.without_gaps(f64::INFINITY).0[0].len(), 80);
+        assert_eq!(gappy.without_gaps(0.0).0.len(), 3);
+    }
+
+    #[test]
+    fn a_missing_input_is_held_or_ends_a_part() {
+        let mut record = record(0..60);
+        record.inputs[0].values[..3].fill(f64::NAN);
+        record.inputs[0].values[10..12].fill(f64::NAN);
+        record.inputs[0].values[30..40].fill(f64::NAN);
+        let (parts, gaps) = record.without_gaps(4.0);
+        assert_eq!(
+            (gaps.places, gaps.held, gaps.cut, gaps.unused),
+            (2, 1, 1, 3)
+        );
+        assert_eq!(parts[0].inputs[0].values[6..10], [9.0, 9.0, 9.0, 12.0]);
+        // What row 29 does is read at row 30.
+        assert_eq!(
+            (parts[0].time[0], parts[0].time.last()),
+            (106.0, Some(&160.0))
+        );
+        assert_eq!((parts[1].time[0], parts[1].len()), (180.0, 20));
+        // An input that runs in lines is not known behind its last sample.
+        record.inputs[0].hold = Hold::First;
+        let (parts, _) = record.without_gaps(4.0);
+        assert_eq!(parts[0].time.last(), Some(&158.0));
+        assert_eq!(parts[0].inputs[0].values[6..10], [9.0, 10.0, 11.0, 12.0]);
+    }
+
+    #[test]
+    fn rows_that_are_missing_at_random_leave_the_interval() {
+        let some = record((0..300).filter(|k| (k * 7919) % 10 >= 3));
+        assert!(some.missing_rows() > 60);
+        let (parts, _) = some.without_gaps(f64::INFINITY);
+        assert_eq!(parts.len(), 1);
+        assert!(
+            parts[0]
+                .time
+                .windows(2)
+                .all(|pair| (pair[1] - pair[0] - 2.0).abs() < 1e-9)
+        );
+        // Uneven steps are not full of gaps.
+        let mut uneven = record(0..100);
+        for (k, t) in uneven.time.iter_mut().enumerate() {
+            *t += 0.9 * (k as f64 * 1.7).sin();
+        }
+        assert!(!uneven.has_gaps());
+    }
+
+    #[test]
+    fn nothing_is_left_of_a_record_without_inputs() {
+        let mut record = record(0..40);
+        record.inputs[0].values.fill(f64::NAN);
+        let (parts, gaps) = record.without_gaps(f64::INFINITY);
+        assert!(parts.is_empty());
+        assert_eq!(gaps.unused, 40);
+    }
+}

@@ -1,0 +1,128 @@
+//! Records in which rows or samples of an input are missing: how long an input may be held is a matter of the plant, so a first fit says it.
+//!
+//! Through a gap that is short beside the fastest time constant of the plant the input is held; at a longer one the record is cut, and the
+//! simulation begins anew behind it with states of its own ([`ct_signals::Gaps`]). The parts keep their time stamps and so their clock: a
+//! drift runs through them. What is reported is joined again to the records that were given.
+
+use ct_signals::{Gaps, Record};
+use serde::Serialize;
+
+use crate::{
+    Diagnosis, Error, Options, Problem, Shown, control_loop::fastest_time_constant, problem::base,
+};
+
+/// An input is held through a gap of at most this part of the fastest time constant.
+pub const LONGEST_HOLD: f64 = 0.1;
+/// For the first fit it is held for so many sampling intervals.
+const FIRST_HOLD: f64 = 20.0;
+/// Share of the time limit that the first fit has.
+const FITTED: f64 = 0.1;
+
+/// What was done about gaps in records.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MendedGaps {
+    /// Rows and places.
+    #[serde(flatten)]
+    pub gaps: Gaps,
+    /// The fastest time constant of the plant \[s\], by a first fit.
+    pub time_constant: f64,
+    /// The longest time for which an input would have been held \[s\].
+    pub limit: f64,
+}
+
+/// A problem whose records have no gaps.
+pub(crate) struct Mended {
+    pub problem: Problem,
+    pub gaps: MendedGaps,
+    /// Parts of each record, fitted ones first.
+    parts: Vec<usize>,
+}
+
+/// All records with the parts that they fall into.
+fn cut(records: &[Record], longest: f64) -> (Vec<Record>, Vec<usize>, Gaps) {
+    let (mut all, mut counts, mut gaps) = (Vec::new(), Vec::new(), Gaps::default());
+    for record in records {
+        let (parts, own) = record.without_gaps(longest);
+        gaps = gaps.and(own);
+        counts.push(parts.len());
+        all.extend(parts);
+    }
+    (all, counts, gaps)
+}
+
+impl Mended {
+    /// `None` where no record has a gap.
+    pub fn of(problem: &Problem, options: &Options) -> Result<Option<Self>, Error> {
+        let mut records = problem.records.iter().chain(&problem.test);
+        if !records.any(Record::has_gaps) {
+            return Ok(None);
+        }
+        let interval = problem.records.iter().map(Record::sample_interval);
+        let first = FIRST_HOLD * interval.fold(0.0, f64::max);
+        let trial = Problem {
+            records: cut(&problem.records, first).0,
+            test: Vec::new(),
+            ..problem.clone()
+        };
+        let (node, _) = base(&trial, options, FITTED)?;
+        let time_constant = fastest_time_constant(&node)?;
+        let limit = LONGEST_HOLD * time_constant;
+        let (fitted, mut parts, gaps) = cut(&problem.records, limit);
+        let (test, of_test, of_tests) = cut(&problem.test, limit);
+        parts.extend(of_test);
+        Ok(Some(Self {
+            problem: Problem {
+                records: fitted,
+                test,
+                ..problem.clone()
+            },
+            gaps: MendedGaps {
+                gaps: gaps.and(of_tests),
+                time_constant,
+                limit,
+            },
+            parts,
+        }))
+    }
+
+    /// Joins what is shown of parts to the records that they are of, and says what was done.
+    pub fn report(&self, diagnosis: &mut Diagnosis) {
+        diagnosis.records = self.joined(&diagnosis.records, |whole: &mut Shown, part| {
+            whole.time.extend(part.time);
+            whole.input.extend(part.input);
+            if let (Some(whole), Some(part)) = (&mut whole.input_2, part.input_2) {
+                whole.extend(part);
+            }
+            whole.output.extend(part.output);
+        });
+        for step in &mut diagnosis.steps {
+            step.simulated = self.joined(&step.simulated, |whole: &mut Vec<f64>, part| {
+                whole.extend(part);
+            });
+            for bin in &mut step.failures.by_time {
+                bin.record = bin.record.map(|part| self.record_of(part));
+            }
+        }
+        diagnosis.gaps = Some(self.gaps);
+    }
+
+    fn joined<T: Clone>(&self, parts: &[T], join: impl Fn(&mut T, T)) -> Vec<T> {
+        let mut parts = parts.iter().cloned();
+        let of_one = |count: &usize| {
+            let mut own = parts.by_ref().take(*count);
+            let mut whole = own.next()?;
+            own.for_each(|part| join(&mut whole, part));
+            Some(whole)
+        };
+        self.parts.iter().filter_map(of_one).collect()
+    }
+
+    /// The record that a part is of.
+    fn record_of(&self, part: usize) -> usize {
+        let ends = self.parts.iter().scan(0, |end, count| {
+            *end += count;
+            Some(*end)
+        });
+        ends.take_while(|end| *end <= part).count()
+    }
+}

@@ -16,6 +16,8 @@ const GAP: f64 = 1.5;
 const EVEN: f64 = 0.25;
 /// ... at this share of them.
 const MOST: f64 = 0.98;
+/// ... and rows are missing, instead of steps being uneven, where this share of them is one interval.
+const SINGLE: f64 = 0.6;
 /// Of uneven steps a gap is one that is longer than 1.5 times the one that this share of them does not exceed.
 const USUAL: f64 = 0.95;
 /// A part with fewer samples of an output says less than its initial states take.
@@ -73,7 +75,8 @@ impl Sampling {
             (step / interval - intervals).abs() <= EVEN
         };
         let even = steps(time).filter(whole).count() as f64;
-        if even >= MOST * time.len().saturating_sub(1) as f64 {
+        let all = time.len().saturating_sub(1) as f64;
+        if even >= MOST * all && near.len() as f64 >= SINGLE * all {
             Self {
                 interval,
                 usual: interval,

@@ -5,3 +5,4 @@ mod ar;
 mod csv_file;
 mod residual_tests;
 mod signals;
+mod tolerant_reading;

@@ -1,6 +1,6 @@
-//! When a record began, and times in the unit that fits their length.
+//! When a record began, and times for people: dates, or numbers in the unit that fits their length.
 
-use crate::{Timestamp, Zone};
+use crate::{Record, Timestamp, Zone};
 
 /// The date and time at which the clock of a record stands at zero, and the zone in which people read it.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,18 +19,86 @@ impl Calendar {
     }
 }
 
-/// The unit in which a time of this length is read most easily, and the seconds in it: below two minutes s, below two hours min, below two
-/// days h, above d.
-#[must_use]
-pub fn time_unit(seconds: f64) -> (&'static str, f64) {
-    const MINUTE: f64 = 60.0;
+/// How the times of records are said: as dates where these are known, otherwise in the unit that fits their length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clock {
+    calendar: Option<Calendar>,
+    unit: &'static str,
+    seconds: f64,
+}
+
+impl Clock {
+    /// Of records that are shown together.
+    #[must_use]
+    pub fn of<'a>(records: impl IntoIterator<Item = &'a Record>) -> Self {
+        let (mut calendar, mut longest) = (None, 0.0_f64);
+        for record in records {
+            calendar = calendar.or_else(|| record.calendar.clone());
+            longest = longest.max(record.time.last().map_or(0.0, |time| time.abs()));
+        }
+        let (unit, seconds) = time_unit(longest);
+        Self {
+            calendar,
+            unit,
+            seconds,
+        }
+    }
+
+    /// The unit of times that are no dates, and the seconds in it.
+    #[must_use]
+    pub fn unit(&self) -> (&'static str, f64) {
+        (self.unit, self.seconds)
+    }
+
+    /// Milliseconds from 1970-01-01 00:00 to the zero of the times, on the clocks of the record's zone; `None` where they are no dates.
+    #[must_use]
+    pub fn civil_milliseconds(&self) -> Option<f64> {
+        let Calendar { start, zone } = self.calendar.as_ref()?;
+        let civil = start.seconds() + i64::from(zone.seconds_ahead(*start));
+        Some(1e3 * civil as f64 + 1e-6 * f64::from(start.nanoseconds()))
+    }
+
+    /// A time \[s\].
+    #[must_use]
+    pub fn at(&self, time: f64) -> String {
+        match &self.calendar {
+            Some(calendar) => calendar.at(time.round()),
+            None => format!("{} {}", self.number(time), self.unit),
+        }
+    }
+
+    /// From one time to another \[s\]: `from 450 to 599 s`.
+    #[must_use]
+    pub fn span(&self, from: f64, to: f64) -> String {
+        match &self.calendar {
+            Some(_) => format!("from {} to {}", self.at(from), self.at(to)),
+            None => format!(
+                "from {} to {} {}",
+                self.number(from),
+                self.number(to),
+                self.unit
+            ),
+        }
+    }
+
+    /// Whole seconds, and as many decimals of other units as stand for them.
+    fn number(&self, time: f64) -> String {
+        let digits = match self.unit {
+            "s" => 0,
+            "min" => 1,
+            _ => 2,
+        };
+        format!("{:.digits$}", time / self.seconds)
+    }
+}
+
+/// The unit in which times of this length are read most easily, and the seconds in it: below two hours s, below two days h, above d.
+fn time_unit(seconds: f64) -> (&'static str, f64) {
     const HOUR: f64 = 3600.0;
     const DAY: f64 = 86400.0;
     let length = seconds.abs();
-    if length < 2.0 * MINUTE || !length.is_finite() {
+    if length < 2.0 * HOUR || !length.is_finite() {
         ("s", 1.0)
-    } else if length < 2.0 * HOUR {
-        ("min", MINUTE)
     } else if length < 2.0 * DAY {
         ("h", HOUR)
     } else {
@@ -38,23 +106,23 @@ pub fn time_unit(seconds: f64) -> (&'static str, f64) {
     }
 }
 
-/// A time in the unit that fits its length, with three digits: `1.5 min`, `26 h`.
+/// A duration, from milliseconds to days, with three digits.
 #[must_use]
 pub fn duration(seconds: f64) -> String {
-    let (unit, size) = time_unit(seconds);
-    let value = seconds / size;
-    let digits = if value == 0.0 || !value.is_finite() {
-        0
-    } else {
-        (2 - value.abs().log10().floor() as i32).max(0) as usize
+    let (value, unit) = match seconds.abs() {
+        s if s >= 2.0 * 86_400.0 => (seconds / 86_400.0, "days"),
+        s if s >= 2.0 * 3_600.0 => (seconds / 3_600.0, "h"),
+        s if s >= 600.0 => (seconds / 60.0, "min"),
+        s if s >= 1.0 || s == 0.0 => (seconds, "s"),
+        _ => (seconds * 1e3, "ms"),
     };
-    let text = format!("{value:.digits$}");
-    let text = if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        &text
-    };
-    format!("{text} {unit}")
+    let whole = (value - value.round()).abs() <= 1e-9 * value.abs();
+    if whole || !value.is_finite() {
+        return format!("{value:.0} {unit}");
+    }
+    // All digits of a number of thousands, and three of a smaller one.
+    let digits = (2 - value.abs().log10().floor() as i32).max(0) as usize;
+    format!("{value:.digits$} {unit}")
 }
 
 #[cfg(test)]
@@ -62,17 +130,43 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_said_in_the_unit_that_fits_them() {
+    fn durations_are_said_in_the_unit_that_fits_them() {
         for (seconds, said) in [
             (0.0, "0 s"),
-            (0.0125, "0.0125 s"),
+            (0.0125, "12.5 ms"),
             (4.0, "4 s"),
             (119.6, "120 s"),
-            (150.0, "2.5 min"),
+            (900.0, "15 min"),
+            (1000.0, "16.7 min"),
             (93_600.0, "26 h"),
-            (1e6, "11.6 d"),
+            (1e6, "11.6 days"),
         ] {
             assert_eq!(duration(seconds), said);
         }
+    }
+
+    #[test]
+    fn times_are_said_in_one_unit_or_as_dates() {
+        let record = |last: f64| Record {
+            time: vec![0.0, last],
+            ..Record::default()
+        };
+        let short = Clock::of([&record(1800.0)]);
+        assert_eq!(short.span(450.0, 599.0), "from 450 to 599 s");
+        let long = Clock::of([&record(93_600.0)]);
+        assert_eq!(
+            (long.at(8_460.0), long.unit().0),
+            ("2.35 h".to_string(), "h")
+        );
+        let zone = Zone::named("Europe/Berlin").unwrap();
+        let mut dated = record(93_600.0);
+        let start = zone.bound("2026-03-02 06:00").unwrap();
+        dated.calendar = Some(Calendar { start, zone });
+        let clock = Clock::of([&dated]);
+        assert_eq!(
+            clock.span(60.0, 3600.0),
+            "from 2026-03-02 06:01 to 2026-03-02 07:00"
+        );
+        assert_eq!(clock.civil_milliseconds(), Some(1_772_431_200_000.0));
     }
 }

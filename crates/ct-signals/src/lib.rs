@@ -82,7 +82,7 @@ mod unit;
 mod whitener;
 
 pub use ar::ArModel;
-pub use calendar::{Calendar, duration, time_unit};
+pub use calendar::{Calendar, Clock, duration};
 pub use column_fault::ColumnFault;
 pub use columns::{Columns, Heading};
 pub use csv::{

@@ -2,7 +2,7 @@
 
 use std::{sync::atomic::Ordering, time::Instant};
 
-use ct_signals::{ArModel, Record};
+use ct_signals::{ArModel, Clock, Record};
 use plants::Placed;
 
 use crate::{
@@ -390,6 +390,7 @@ pub(crate) fn assemble(
         control_loop: None,
         sentences: Vec::new(),
         gaps: None,
+        clock: Clock::of(problem.records.iter().chain(&problem.test)),
         plant: problem.plant.id().to_string(),
         known_effects: problem
             .effects

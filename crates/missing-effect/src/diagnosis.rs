@@ -1,7 +1,7 @@
 //! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
 //! printed or plotted is derived from them.
 
-use ct_signals::ArModel;
+use ct_signals::{ArModel, Clock};
 use serde::Serialize;
 
 use crate::{MendedGaps, Unknown};
@@ -311,6 +311,9 @@ pub struct Diagnosis {
     pub schema: u32,
     /// The finding.
     pub verdict: Verdict,
+    /// How the times of the records are said.
+    #[serde(skip)]
+    pub clock: Clock,
     /// What was done about rows and samples of inputs that are missing; `None` where none are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<MendedGaps>,

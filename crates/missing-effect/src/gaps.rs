@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::{
     Diagnosis, Error, Options, Problem, Shown, control_loop::fastest_time_constant, problem::base,
+    sentences::of_gaps,
 };
 
 /// An input is held through a gap of at most this part of the fastest time constant.
@@ -103,6 +104,7 @@ impl Mended {
                 bin.record = bin.record.map(|part| self.record_of(part));
             }
         }
+        diagnosis.sentences.push(of_gaps(&self.gaps));
         diagnosis.gaps = Some(self.gaps);
     }
 

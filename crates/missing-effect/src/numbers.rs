@@ -1,5 +1,7 @@
 //! Numbers for people: as many digits as they deserve, and columns of them.
 
+pub use ct_signals::duration;
+
 /// A number with this many significant digits, `-` where there is none.
 #[must_use]
 pub fn significant(value: f64, digits: i32) -> String {
@@ -70,24 +72,6 @@ pub fn column(values: &[Option<f64>]) -> Vec<String> {
             None => "-".to_string(),
         })
         .collect()
-}
-
-/// A duration, from milliseconds to days.
-#[must_use]
-pub fn duration(seconds: f64) -> String {
-    let (value, unit) = match seconds.abs() {
-        s if s >= 2.0 * 86_400.0 => (seconds / 86_400.0, "days"),
-        s if s >= 2.0 * 3_600.0 => (seconds / 3_600.0, "h"),
-        s if s >= 600.0 => (seconds / 60.0, "min"),
-        s if s >= 1.0 || s == 0.0 => (seconds, "s"),
-        _ => (seconds * 1e3, "ms"),
-    };
-    let whole = (value - value.round()).abs() <= 1e-9 * value.abs();
-    if whole {
-        format!("{value:.0} {unit}")
-    } else {
-        format!("{} {unit}", significant(value, 3))
-    }
 }
 
 /// The power of ten of the first digit.
@@ -167,15 +151,5 @@ mod tests {
         assert_eq!(column(&[1e-9, 1.0]), ["1.00e-9", "1.00"]);
         assert_eq!(super::column(&[None, Some(0.5)]), ["-", "0.50"]);
         assert_eq!(column(&[0.0, f64::NAN]), ["0", "-"]);
-    }
-
-    #[test]
-    fn durations_have_fitting_units() {
-        assert_eq!(duration(0.012), "12 ms");
-        assert_eq!(duration(0.0), "0 s");
-        assert_eq!(duration(90.0), "90 s");
-        assert_eq!(duration(1798.0), "30.0 min");
-        assert_eq!(duration(36_000.0), "10 h");
-        assert_eq!(duration(864_000.0), "10 days");
     }
 }

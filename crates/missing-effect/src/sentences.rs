@@ -1,9 +1,11 @@
 //! The findings in words.
 
+use ct_signals::{Clock, Gaps, duration};
 use plants::Placed;
 
 use crate::{
-    Acceptance, Diagnosis, Parameter, Problem, Rankings, Step, Unknown, Verdict,
+    Acceptance, Diagnosis, LONGEST_HOLD, MendedGaps, Parameter, Problem, Rankings, Step, Unknown,
+    Verdict,
     node::Node,
     numbers::{significant, value_and_error},
     remains::{Left, Remains},
@@ -59,28 +61,28 @@ fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
     match left.what {
         Remains::Input => format!("the input still shows in {residual}"),
         Remains::Period(period) => format!(
-            "{residual} swings with a period of about {} s, which noise does not: it may be a disturbance or {effect}",
-            significant(period, 2)
+            "{residual} swings with a period of about {}, which noise does not: it may be a disturbance or {effect}",
+            about(period)
         ),
         Remains::Instant(at, length) => format!(
-            "{residual} holds something sudden, {} s, which noise does not: it may be a disturbance, a fault of the sensor or {effect}",
+            "{residual} holds something sudden, {}, which noise does not: it may be a disturbance, a fault of the sensor or {effect}",
             if length > 0.0 {
-                format!("from {at:.0} to {:.0}", at + length)
+                diagnosis.clock.span(at, at + length)
             } else {
-                format!("at {at:.0}")
+                format!("at {}", diagnosis.clock.at(at))
             }
         ),
         Remains::Level => format!(
             "{residual} follows the level, which noise does not: the balance lacks {effect}"
         ),
         Remains::Slow(wander, process) => format!(
-            "{residual} wanders as slowly as the process, or more: its correlation lasts {}, the slowest time constant is {} s; it may be a disturbance or {effect}",
+            "{residual} wanders as slowly as the process, or more: its correlation lasts {}, the slowest time constant is {}; it may be a disturbance or {effect}",
             if wander < record {
-                format!("{} s", significant(wander, 2))
+                about(wander)
             } else {
                 "longer than the record".to_string()
             },
-            significant(process, 2)
+            about(process)
         ),
     }
 }
@@ -239,7 +241,10 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
         return Vec::new();
     };
     let mut said = Vec::new();
-    let shaped = diagnosis.unknown.as_ref().map(of_unknown);
+    let shaped = diagnosis
+        .unknown
+        .as_ref()
+        .map(|unknown| of_unknown(unknown, &diagnosis.clock));
     let held_out = |step: &Step| {
         step.rmse_test.map_or(String::new(), |e| {
             format!(", {e:.3} {unit} on held-out data")
@@ -402,7 +407,7 @@ fn next_experiment(group: &[String], added: usize) -> String {
 }
 
 /// Where what is missing acts, on what it depends, and what it looks like.
-fn of_unknown(unknown: &Unknown) -> String {
+fn of_unknown(unknown: &Unknown, clock: &Clock) -> String {
     let place = |name: &str| match name {
         "actuator" => "at the actuator".to_string(),
         "sensor" => "at the sensor".to_string(),
@@ -428,9 +433,8 @@ fn of_unknown(unknown: &Unknown) -> String {
         said += " and follows no variable of the plant, so that it is a function of time";
         if let Some(window) = unknown.windows.first() {
             said += &format!(
-                ": most from {:.0} to {:.0} s, {} {} on average",
-                window.from,
-                window.to,
+                ": most {}, {} {} on average",
+                clock.span(window.from, window.to),
                 significant(window.mean, 2),
                 unknown.unit
             );
@@ -490,4 +494,56 @@ fn of_unknown(unknown: &Unknown) -> String {
         None => said += "; no simple shape comes near",
     }
     said + "."
+}
+/// A time of which two digits are known: in seconds below two hours.
+fn about(seconds: f64) -> String {
+    if seconds.abs() < 7200.0 {
+        format!("{} s", significant(seconds, 2))
+    } else {
+        duration(seconds)
+    }
+}
+
+/// What was done about rows and samples of inputs that are missing.
+pub(crate) fn of_gaps(mended: &MendedGaps) -> String {
+    let Gaps {
+        rows,
+        places,
+        held,
+        cut,
+        unused,
+        longest_hold,
+    } = mended.gaps;
+    let count = |count: usize, one: &str, several: &str| match count {
+        1 => format!("1 {one}"),
+        count => format!("{count} {several}"),
+    };
+    let mut text = match rows {
+        0 => format!(
+            "Samples of an input are missing in {}",
+            count(places, "place", "places")
+        ),
+        rows => format!(
+            "{} missing in {}",
+            count(rows, "row is", "rows are"),
+            count(places, "place", "places")
+        ),
+    };
+    if held > 0 {
+        text += &format!(
+            "; the input is held through {held} of them, for at most {}",
+            duration(longest_hold)
+        );
+    }
+    if cut > 0 {
+        text += &format!(
+            "; the simulation begins anew behind {cut}, where holding would take longer than {:.0} % of the fastest time constant ({})",
+            100.0 * LONGEST_HOLD,
+            duration(mended.time_constant)
+        );
+    }
+    if unused > 0 {
+        text += &format!("; {} not used", count(unused, "row is", "rows are"));
+    }
+    text + "."
 }

@@ -1,6 +1,6 @@
 //! From a fitted node to what is reported of it.
 
-use ct_signals::{ArModel, Record, residual_tests};
+use ct_signals::{ArModel, Clock, Record, residual_tests};
 use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
 
 use crate::{
@@ -180,6 +180,7 @@ pub(crate) fn report(
         noise: judge,
         output_unit: &record.outputs[0].unit,
         input_unit: &record.inputs[0].unit,
+        clock: &Clock::of(setup.records),
     });
     let held_out = hold_out(node, test)?;
     let mut errors = std_errors(node)?;

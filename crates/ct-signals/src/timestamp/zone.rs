@@ -115,17 +115,21 @@ impl Zone {
         &self.name
     }
 
+    /// Seconds that its clocks are ahead of UTC at an instant.
+    #[must_use]
+    pub fn seconds_ahead(&self, instant: Timestamp) -> i32 {
+        match (&self.rules, Instant::from_second(instant.seconds())) {
+            (Rules::Fixed(offset), _) => *offset,
+            (Rules::Changing(zone), Ok(utc)) => zone.to_offset(utc).seconds(),
+            (Rules::Changing(_), Err(_)) => 0,
+        }
+    }
+
     /// An instant for people: `2026-01-31 14:25`, with seconds and a fraction only where they are not zero.
     #[must_use]
     pub fn format(&self, instant: Timestamp) -> String {
         let beyond = || format!("{} s since 1970", instant.seconds());
-        let Ok(utc) = Instant::from_second(instant.seconds()) else {
-            return beyond();
-        };
-        let offset = match &self.rules {
-            Rules::Fixed(offset) => *offset,
-            Rules::Changing(zone) => zone.to_offset(utc).seconds(),
-        };
+        let offset = self.seconds_ahead(instant);
         let local = instant.seconds().saturating_add(offset.into());
         let Ok(local) = Instant::from_second(local) else {
             return beyond();

@@ -1,5 +1,6 @@
 //! What the report's script draws, as JSON: the curves thinned for display, the rest as it stands.
 
+use ct_signals::Clock;
 use missing_effect::{Diagnosis, Failures, ResidualTests, Score, Shown, Step, Unknown};
 use serde::Serialize;
 
@@ -12,6 +13,7 @@ const POINTS: usize = 5_000;
 
 #[derive(Serialize)]
 struct Report<'a> {
+    clock: Axis,
     input_unit: &'a str,
     output_unit: &'a str,
     noise_floor: f64,
@@ -24,6 +26,27 @@ struct Report<'a> {
     equal: Vec<bool>,
     /// What nothing explains.
     unknown: Option<&'a Unknown>,
+}
+
+/// How times are drawn: as numbers in this unit or, where the records have dates, as those.
+#[derive(Serialize)]
+pub(crate) struct Axis {
+    unit: &'static str,
+    /// In one of the unit.
+    seconds: f64,
+    /// From 1970-01-01 00:00, on the clocks of the records, to the zero of their times \[ms\].
+    start_ms: Option<f64>,
+}
+
+impl From<&Clock> for Axis {
+    fn from(clock: &Clock) -> Self {
+        let (unit, seconds) = clock.unit();
+        Self {
+            unit,
+            seconds,
+            start_ms: clock.civil_milliseconds(),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -73,6 +96,7 @@ struct Curve {
 /// The JSON of the report, safe inside a `<script>` element. What is not finite becomes `null`.
 pub(crate) fn json(diagnosis: &Diagnosis) -> String {
     let report = Report {
+        clock: (&diagnosis.clock).into(),
         input_unit: &diagnosis.input_unit,
         output_unit: &diagnosis.output_unit,
         noise_floor: diagnosis.noise_floor,
@@ -91,8 +115,14 @@ pub(crate) fn json(diagnosis: &Diagnosis) -> String {
 }
 
 /// The same of records alone, before there is a model.
-pub(crate) fn records(records: &[Shown], input_unit: &str, output_unit: &str) -> String {
+pub(crate) fn records(
+    records: &[Shown],
+    input_unit: &str,
+    output_unit: &str,
+    clock: &Clock,
+) -> String {
     script_safe(&Report {
+        clock: clock.into(),
         input_unit,
         output_unit,
         noise_floor: f64::NAN,

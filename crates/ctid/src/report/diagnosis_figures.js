@@ -30,12 +30,20 @@ const diagnosisFigures = (report, view) => {
   const seen = () => (view.sameAxes ? steps : [steps[view.chosen]]);
   const level = () => (report.noise_floor > 0 ? report.noise_floor : null);
 
+  // Times as they are drawn: numbers in the unit that fits the records' length, or dates.
+  const clock = report.clock;
+  const DATED = clock.start_ms !== null;
+  const at = (t) => (DATED ? clock.start_ms + 1000 * t : t / clock.seconds);
+  const timeAxis = (more) => (DATED
+    ? axis("", { type: "date", hoverformat: "%Y-%m-%d %H:%M:%S", ...more })
+    : axis(`time [${clock.unit}]`, { exponentformat: "none", hoverformat: ".6~g", ...more }));
+
   // The windows of a record in which the chosen step fails: the larger the error, the stronger.
   function failingWindows(r) {
     if (!steps.length) return [];
     const most = largest(seen().flatMap((s) => s.failures.by_time.map((b) => b.rms))) || 1;
     return steps[view.chosen].failures.by_time.filter((b) => b.fails && b.record === r).map((b) => ({
-      type: "rect", xref: "x", yref: "paper", x0: b.from, x1: b.to, y0: 0, y1: 1, layer: "below",
+      type: "rect", xref: "x", yref: "paper", x0: at(b.from), x1: at(b.to), y0: 0, y1: 1, layer: "below",
       fillcolor: theme().failing, opacity: 0.08 + 0.37 * ((b.rms || 0) / most), line: { width: 0 },
     }));
   }
@@ -63,7 +71,7 @@ const diagnosisFigures = (report, view) => {
     const record = records[r];
     const c = theme();
     const data = [{
-      name: "measured", x: record.output.t, y: record.output.y, mode: "lines", line: { color: c.measured, width: 1.3 }, opacity: 0.75,
+      name: "measured", x: record.output.t.map(at), y: record.output.y, mode: "lines", line: { color: c.measured, width: 1.3 }, opacity: 0.75,
       hovertemplate: `%{y:.4~g} ${OUT}`,
     }];
     steps.forEach((step, k) => {
@@ -71,7 +79,7 @@ const diagnosisFigures = (report, view) => {
       if (!run) return;
       const main = k === view.chosen;
       data.push({
-        name: plain(step.label), x: run.output.t, y: run.output.y, mode: "lines",
+        name: plain(step.label), x: run.output.t.map(at), y: run.output.y, mode: "lines",
         line: { color: stepColour(k), width: main ? 2.6 : 1.6, dash: main ? "solid" : DASHES[k % DASHES.length] },
         visible: main || k === 0 ? true : "legendonly", legendrank: 1001 + k, zorder: main ? 2 : 1,
         hovertemplate: `%{y:.4~g} ${OUT}`,
@@ -80,13 +88,13 @@ const diagnosisFigures = (report, view) => {
     const inputs = record.input_2 ? [["input 1", record.input, c.faint, "solid"], ["input 2", record.input_2, c.text, "dot"]] : [["input", record.input, c.faint, "solid"]];
     for (const [name, input, color, dash] of inputs) {
       data.push({
-        name, x: input.t, y: input.y, yaxis: "y2", mode: "lines", showlegend: inputs.length > 1, legendrank: 2000,
+        name, x: input.t.map(at), y: input.y, yaxis: "y2", mode: "lines", showlegend: inputs.length > 1, legendrank: 2000,
         line: { color, width: 1.2, dash, shape: "hv" }, hovertemplate: `%{y:.4~g} ${IN}`,
       });
     }
     return { data, layout: layout(narrow.matches ? 400 : 460, {
       showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: failingWindows(r),
-      xaxis: axis("time [s]", { anchor: "y2", exponentformat: "none", hoverformat: ".6~g", showspikes: false }),
+      xaxis: timeAxis({ anchor: "y2", showspikes: false }),
       yaxis: axis(named("output", OUT), { domain: [0.33, 1] }),
       yaxis2: axis(named("input", IN), { domain: [0, 0.24], nticks: 4 }),
     }) };
@@ -98,11 +106,11 @@ const diagnosisFigures = (report, view) => {
     const most = 1.05 * largest(seen().flatMap((s) => (s.runs[view.residualRecord] ? s.runs[view.residualRecord].residual.y : []))) || 1;
     const floor = level() === null ? [] : [across(level(), "y", theme().text, "dash"), across(-level(), "y", theme().text, "dash")];
     return { data: [{
-      x: run.residual.t, y: run.residual.y, mode: "lines", line: { color: stepColour(view.chosen), width: 1.4 }, name: "residual",
-      hovertemplate: `%{x:.6~g} s: %{y:.3~g} ${OUT}<extra></extra>`,
+      x: run.residual.t.map(at), y: run.residual.y, mode: "lines", line: { color: stepColour(view.chosen), width: 1.4 }, name: "residual",
+      hovertemplate: `${DATED ? "%{x}" : `%{x:.6~g} ${clock.unit}`}: %{y:.3~g} ${OUT}<extra></extra>`,
     }], layout: layout(narrow.matches ? 240 : 280, {
       hovermode: "x", shapes: failingWindows(view.residualRecord).concat(floor),
-      xaxis: axis("time [s]", { exponentformat: "none", hoverformat: ".6~g" }), yaxis: axis(named("residual", OUT), { range: [-most, most] }),
+      xaxis: timeAxis({}), yaxis: axis(named("residual", OUT), { range: [-most, most] }),
     }) };
   }
 
@@ -246,9 +254,10 @@ const diagnosisFigures = (report, view) => {
 
   function unknownPath() {
     const u = report.unknown;
-    const made = banded(u.time, u.value, u.std_error, "time [s]", "missing term");
+    const made = banded(u.time.map(at), u.value, u.std_error, "", "missing term");
+    made.layout.xaxis = timeAxis({});
     made.layout.shapes = u.windows.map((w) => ({
-      type: "rect", xref: "x", yref: "paper", x0: w.from, x1: w.to, y0: 0, y1: 1, layer: "below", fillcolor: theme().failing, opacity: 0.12, line: { width: 0 },
+      type: "rect", xref: "x", yref: "paper", x0: at(w.from), x1: at(w.to), y0: 0, y1: 1, layer: "below", fillcolor: theme().failing, opacity: 0.12, line: { width: 0 },
     }));
     return made;
   }

@@ -251,6 +251,7 @@ pub(crate) fn two_tanks() -> Diagnosis {
     let volt = |value: f64| Some(parameter("size", value, Some(0.06 * value.abs()), "V"));
     Diagnosis {
         gaps: None,
+        clock: ct_signals::Clock::of([]),
         schema: 1,
         verdict: Verdict::Undecided,
         effects: vec!["overflow".into(), "pump_deadzone".into()],

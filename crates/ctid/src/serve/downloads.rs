@@ -9,6 +9,7 @@ use axum::extract::{Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use ct_signals::{Clock, Record};
 use missing_effect::Shown;
 use serde::Deserialize;
 
@@ -35,6 +36,7 @@ async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Res
         let mut session = lock(&session);
         let (columns, options) = session.layout();
         let (mut shown, mut units) = (Vec::new(), None);
+        let mut read: Vec<Arc<Record>> = Vec::new();
         for upload in &mut session.records {
             let Ok(record) = upload.record(&columns, &options) else {
                 continue;
@@ -51,11 +53,13 @@ async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Res
                 input_2: record.inputs.get(1).map(|second| second.values.clone()),
                 output: record.outputs[0].values.clone(),
             });
+            read.push(record);
         }
         let (input, output) = units.unwrap_or_default();
         // As in the report, those that are fitted come first.
         shown.sort_by_key(|record| record.held_out);
-        Ok(report::drawing_of_records(&shown, &input, &output))
+        let clock = Clock::of(read.iter().map(AsRef::as_ref));
+        Ok(report::drawing_of_records(&shown, &input, &output, &clock))
     });
     Ok(as_json(text.await?.into()))
 }

@@ -38,7 +38,7 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
             .filter(|_| located.series.len() > 1)
             .and_then(|k| located.series.get(k));
         let record = record.map_or(String::new(), |one| format!("in {}, ", one.name));
-        format!("{record}from {:.0} to {:.0} s", bin.from, bin.to)
+        record + &located.clock.span(bin.from, bin.to)
     });
     worst(&failures.by_level, &|bin| {
         format!("at levels of {:.3} to {:.3} {y}", bin.from, bin.to)

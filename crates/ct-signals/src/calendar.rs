@@ -81,6 +81,17 @@ impl Clock {
         }
     }
 
+    /// Two lengths of time \[s\] in one unit: `450 to 900 s`.
+    #[must_use]
+    pub fn lengths(&self, short: f64, long: f64) -> String {
+        format!(
+            "{} to {} {}",
+            self.number(short),
+            self.number(long),
+            self.unit
+        )
+    }
+
     /// Whole seconds, and as many decimals of other units as stand for them.
     fn number(&self, time: f64) -> String {
         let digits = match self.unit {

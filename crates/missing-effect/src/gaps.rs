@@ -37,6 +37,8 @@ pub(crate) struct Mended {
     pub gaps: MendedGaps,
     /// Parts of each record, fitted ones first.
     parts: Vec<usize>,
+    /// Records that are fitted.
+    fitted: usize,
 }
 
 /// All records with the parts that they fall into.
@@ -83,6 +85,7 @@ impl Mended {
                 limit,
             },
             parts,
+            fitted: problem.records.len(),
         }))
     }
 
@@ -103,6 +106,9 @@ impl Mended {
             for bin in &mut step.failures.by_time {
                 bin.record = bin.record.map(|part| self.record_of(part));
             }
+            for parameter in &mut step.parameters {
+                parameter.name = self.named(&parameter.name);
+            }
         }
         diagnosis.sentences.push(of_gaps(&self.gaps));
         diagnosis.gaps = Some(self.gaps);
@@ -117,6 +123,26 @@ impl Mended {
             Some(whole)
         };
         self.parts.iter().filter_map(of_one).collect()
+    }
+
+    /// The name of an initial state, `level(0), record 3`, by the record and the part of it, where it is cut.
+    fn named(&self, name: &str) -> String {
+        let Some((state, number)) = name.rsplit_once(", record ") else {
+            return name.to_string();
+        };
+        let Some(part) = number.parse::<usize>().ok().and_then(|n| n.checked_sub(1)) else {
+            return name.to_string();
+        };
+        let record = self.record_of(part);
+        let before: usize = self.parts[..record].iter().sum();
+        let mut named = state.to_string();
+        if self.fitted > 1 {
+            named += &format!(", record {}", record + 1);
+        }
+        if self.parts[record] > 1 {
+            named += &format!(", part {}", part - before + 1);
+        }
+        named
     }
 
     /// The record that a part is of.

@@ -2,7 +2,7 @@
 //! noise's colour, which the fit is not told.
 
 use crate::support::Rig;
-use ct_signals::ArModel;
+use ct_signals::{ArModel, Record};
 use greybox::{FitOptions, Setup, coloured, fit, fit_from, random_starts, robust};
 use rayon::prelude::*;
 
@@ -23,12 +23,22 @@ fn band(deviations: f64, records: u64) -> std::ops::RangeInclusive<f64> {
 type Intervals = (Vec<f64>, Vec<Option<f64>>);
 
 fn check(rig: &Rig, intervals: impl Fn(&Setup) -> Intervals + Sync) {
+    check_of(rig, |_| {}, intervals);
+}
+
+/// The same of records that are changed before.
+fn check_of(
+    rig: &Rig,
+    change: impl Fn(&mut Record) + Sync,
+    intervals: impl Fn(&Setup) -> Intervals + Sync,
+) {
     let truth = rig.truth(1);
     let count = records();
     let hits: Vec<Vec<bool>> = (0..count)
         .into_par_iter()
         .map(|seed| {
-            let records = [rig.record(seed)];
+            let mut records = [rig.record(seed)];
+            change(&mut records[0]);
             let (x, half_widths) = intervals(&rig.setup(&records));
             x.iter()
                 .zip(half_widths)
@@ -129,6 +139,30 @@ fn simulation_error_under_coloured_noise() {
         let robust = robust(&setup, &fit, 6).unwrap();
         for (wide, narrow) in robust.std_errors.iter().zip(fit.std_errors()) {
             assert!(wide.unwrap() > 1.5 * narrow.unwrap());
+        }
+    }
+}
+
+/// Readings that are missing are left out of the likelihood, whatever the noise's colour: 30 % of them at random, and in blocks.
+#[test]
+fn missing_readings() {
+    let at_random = |k: usize| (k * 7919 + 13) % 101 < 30;
+    let in_blocks = |k: usize| k % 60 >= 42;
+    for rho in [0.0, 0.8] {
+        for missing in [at_random as fn(usize) -> bool, in_blocks] {
+            let rig = Rig {
+                rho,
+                ..Rig::single_tank()
+            };
+            let change = |record: &mut Record| {
+                let readings = record.outputs[0].values.iter_mut().enumerate();
+                readings
+                    .filter(|(k, _)| missing(*k))
+                    .for_each(|(_, y)| *y = f64::NAN);
+                let share = record.outputs[0].missing() as f64 / record.len() as f64;
+                assert!((0.25..0.35).contains(&share), "{share}");
+            };
+            check_of(&rig, change, whole_fit);
         }
     }
 }

@@ -66,9 +66,8 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
         .max_by(|a, b| a.rms.total_cmp(&b.rms));
     if let Some(bin) = band {
         sentences.push(format!(
-            "most at periods of {:.0} to {:.0} s: {:.3} {y} rms",
-            1.0 / bin.to,
-            1.0 / bin.from,
+            "most at periods of {}: {:.3} {y} rms",
+            located.clock.lengths(1.0 / bin.to, 1.0 / bin.from),
             bin.rms
         ));
     }

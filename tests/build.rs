@@ -1,16 +1,34 @@
-//! Sets `cfg(measured_records)` where the measured records lie beside the checkout: tests that read them are ignored elsewhere.
+//! Says what this machine has beside the checkout, so that a test that needs it is ignored where it is not there, and not passed unchecked:
+//! `cfg(measured_records)` and `cfg(blind_records)` for the records in `../shared`, `cfg(chromium)` for the browser.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 fn main() {
-    println!("cargo::rustc-check-cfg=cfg(measured_records)");
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-env-changed=PATH");
     let shared = Path::new("../../shared");
-    let needed = ["real", "data/cascaded_tanks"].map(|folder| shared.join(folder));
-    if needed.iter().all(|folder| folder.exists()) {
-        for folder in &needed {
-            println!("cargo::rerun-if-changed={}", folder.display());
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let browsers: Vec<PathBuf> = std::env::split_paths(&path)
+        .map(|folder| folder.join("chromium"))
+        .collect();
+    let browser = browsers.iter().find(|browser| browser.exists());
+    let has = [
+        (
+            "measured_records",
+            ["real", "data/cascaded_tanks"]
+                .map(|folder| shared.join(folder))
+                .to_vec(),
+        ),
+        ("blind_records", vec![shared.join("blind/public")]),
+        ("chromium", browser.cloned().into_iter().collect()),
+    ];
+    for (name, needed) in has {
+        println!("cargo::rustc-check-cfg=cfg({name})");
+        if !needed.is_empty() && needed.iter().all(|path| path.exists()) {
+            for path in &needed {
+                println!("cargo::rerun-if-changed={}", path.display());
+            }
+            println!("cargo::rustc-cfg={name}");
         }
-        println!("cargo::rustc-cfg=measured_records");
     }
 }

@@ -304,6 +304,14 @@ pub struct Shown {
     pub output: Vec<f64>,
 }
 
+impl Shown {
+    /// Readings that are there.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.output.iter().filter(|y| !y.is_nan()).count()
+    }
+}
+
 /// What a diagnosis found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {

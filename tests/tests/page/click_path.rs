@@ -171,12 +171,11 @@ fn look_around(browser: &mut Browser, name: &str) {
 
 /// The bundled record: everything but a second effect, which it does not have.
 #[test]
+#[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn the_bundled_record_with_the_mouse() {
     let address = serve(&[]).to_string();
     let _alone = alone();
-    let Some(mut browser) = Browser::open(&address) else {
-        return;
-    };
+    let mut browser = Browser::open(&address);
     browser.picture("empty");
     browser.drop_files("#drop-fitted", &[&bundled("tour.csv")]);
     browser.until("document.querySelector('#records li')");
@@ -240,6 +239,7 @@ fn the_bundled_record_with_the_mouse() {
 
 /// A record that leaves two lags open: the page proposes what tells them apart.
 #[test]
+#[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn two_undecided_effects_show_their_experiment() {
     let rig = Rig {
         samples: 300,
@@ -248,9 +248,7 @@ fn two_undecided_effects_show_their_experiment() {
     };
     let address = serve(&[]).to_string();
     let _alone = alone();
-    let Some(mut browser) = Browser::open(&address) else {
-        return;
-    };
+    let mut browser = Browser::open(&address);
     let file = browser.folder.path().join("lag.csv");
     std::fs::write(&file, csv(&rig.run(&mut ChaCha8Rng::seed_from_u64(1)))).unwrap();
     browser.drop_files("#drop-fitted", &[&file]);
@@ -298,6 +296,7 @@ fn two_undecided_effects_show_their_experiment() {
 
 /// Page and commands edit one file, and its comments stay.
 #[test]
+#[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn page_and_commands_are_mixed() {
     let folder = tempfile::tempdir().unwrap();
     let (model, data) = (folder.path().join("tank.toml"), bundled("tour.csv"));
@@ -306,9 +305,7 @@ fn page_and_commands_are_mixed() {
     let (model, data) = (model.display().to_string(), data.display().to_string());
     let address = serve(&[&data, "--model", &model]).to_string();
     let _alone = alone();
-    let Some(mut browser) = Browser::open(&address) else {
-        return;
-    };
+    let mut browser = Browser::open(&address);
     wait_for_models(&mut browser, 1);
     command(&["add", "overflow", "--model", &model]);
     wait_for_models(&mut browser, 2);
@@ -325,6 +322,7 @@ fn page_and_commands_are_mixed() {
 
 /// What a form has no field for yet stays in the file.
 #[test]
+#[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn the_form_deletes_nothing_that_it_does_not_show() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("tank.toml");
@@ -334,9 +332,7 @@ fn the_form_deletes_nothing_that_it_does_not_show() {
     let path = file.display().to_string();
     let address = serve(&["--model", &path]).to_string();
     let _alone = alone();
-    let Some(mut browser) = Browser::open(&address) else {
-        return;
-    };
+    let mut browser = Browser::open(&address);
     browser.until("document.getElementById('known-area')?.value === '154'");
     browser.evaluate("const box = document.getElementById('known-area'); box.value = '155'; box.dispatchEvent(new Event('change', { bubbles: true }))");
     browser.until("document.getElementById('text').textContent.includes('155')");
@@ -349,20 +345,17 @@ fn the_form_deletes_nothing_that_it_does_not_show() {
 
 /// The measured benchmark, where it lies beside the checkout: two effects, one after the other.
 #[test]
+#[cfg_attr(not(chromium), ignore = "chromium is not installed")]
+#[cfg_attr(
+    not(measured_records),
+    ignore = "no measured records beside the checkout"
+)]
 fn the_measured_tanks_with_the_mouse() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/cascaded_tanks");
-    let Ok(data) = folder.join("estimation.csv").canonicalize() else {
-        println!(
-            "skipped: the measured Cascaded Tanks data are not at {}",
-            folder.display()
-        );
-        return;
-    };
+    let data = folder.join("estimation.csv").canonicalize().unwrap();
     let address = serve(&[]).to_string();
     let _alone = alone();
-    let Some(mut browser) = Browser::open(&address) else {
-        return;
-    };
+    let mut browser = Browser::open(&address);
     browser.drop_files("#drop-fitted", &[&data]);
     browser.until("document.querySelector('#records li')");
     choose_plant(&mut browser, "cascaded-tanks");

@@ -97,7 +97,7 @@ pub(super) fn check_units(records: &[Record], test: &[Record]) -> Result<(), Err
                 return Err(Error::File {
                     file: other.name.clone(),
                     what: format!(
-                        "column \"{}\" is {}, but {} has it {}; convert one of them, or write the unit in its header",
+                        "column \"{}\" is {}, but {} has it {}; write the unit in its header, and name under [columns] the one to which both are converted",
                         here.name,
                         named(&here.unit),
                         first.name,

@@ -321,7 +321,7 @@ mod tests {
                 vec![record("a.csv", 50, "cm")],
                 vec![record("b.csv", 50, "m")]
             ),
-            "b.csv: column \"y\" is in m, but a.csv has it in cm; convert one of them, or write the unit in its header"
+            "b.csv: column \"y\" is in m, but a.csv has it in cm; write the unit in its header, and name under [columns] the one to which both are converted"
         );
         let message = refused(
             plant,

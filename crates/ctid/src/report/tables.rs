@@ -21,7 +21,7 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
         } else {
             "Fitted to"
         };
-        let mut text = format!("{}: {} samples", escape(&record.name), record.time.len());
+        let mut text = format!("{}: {} samples", escape(&record.name), record.samples());
         if let (Some(first), Some(last)) = (record.time.first(), record.time.last()) {
             text.push_str(&format!(" over {}", duration(last - first)));
         }

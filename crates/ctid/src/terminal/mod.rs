@@ -67,7 +67,7 @@ pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
                 "fitted"
             }
             .to_string(),
-            record.time.len().to_string(),
+            record.samples().to_string(),
             numbers::duration(length(record)),
             range(&record.input, &diagnosis.input_unit),
             range(&record.output, &diagnosis.output_unit),

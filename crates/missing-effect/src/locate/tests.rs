@@ -30,6 +30,7 @@ fn located(noise: &ArModel, records: &[(&[f64], &[f64], &[f64])]) -> Failures {
         noise,
         output_unit: "cm",
         input_unit: "V",
+        clock: &ct_signals::Clock::of([]),
     })
 }
 

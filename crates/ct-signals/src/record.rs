@@ -232,6 +232,17 @@ impl Record {
         }
     }
 
+    /// Checks that no sample of an input is missing: a simulation needs them all ([`Record::without_gaps`]).
+    ///
+    /// # Errors
+    /// [`Error::ValueNotFinite`], which names the input and the first sample that is missing.
+    pub fn require_whole_inputs(&self) -> Result<(), Error> {
+        let inputs = self.inputs.iter();
+        inputs
+            .map(|input| check_finite(&self.name, &input.name, &input.values))
+            .collect()
+    }
+
     /// Checks a record that was put together in code: equal lengths, values that are finite or missing (NaN), increasing time.
     ///
     /// [`read_csv`](crate::read_csv) has done this and more.

@@ -55,7 +55,10 @@ pub(super) fn state(session: &mut Session) -> Value {
     let fitted = session.records.iter().filter(|upload| !upload.held_out);
     let fitted: Vec<&Record> = fitted.filter_map(Upload::as_read).collect();
     let warnings = excitation::of_records(fitted.into_iter());
-    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let remarks = session.records.iter().filter_map(Upload::remark);
+    let warnings: Vec<String> = remarks
+        .chain(warnings.iter().map(ToString::to_string))
+        .collect();
     // The form offers the columns of the first file; all have to have the same.
     let headings = session
         .records

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::body::Bytes;
-use ct_signals::{Columns, Heading, ReadOptions, Record, csv_header, parse_csv};
+use ct_signals::{Columns, Heading, ReadOptions, ReadSummary, Record, csv_header, parse_csv};
 
 use super::guard::Refusal;
 use super::held::of_record;
@@ -21,7 +21,11 @@ pub(super) struct Upload {
     pub headings: Vec<Heading>,
     pub content: Bytes,
     /// As it was read last, and with which columns.
-    read: Option<(Columns, ReadOptions, Result<Arc<Record>, String>)>,
+    read: Option<(
+        Columns,
+        ReadOptions,
+        Result<(Arc<Record>, ReadSummary), String>,
+    )>,
 }
 
 impl Upload {
@@ -54,13 +58,20 @@ impl Upload {
             .read
             .as_ref()
             .and_then(|(_, _, read)| read.as_ref().ok());
-        self.content.len() + read.map_or(0, |record| of_record(record))
+        self.content.len() + read.map_or(0, |(record, _)| of_record(record))
     }
 
     /// The record as it was read last.
     pub(super) fn as_read(&self) -> Option<&Record> {
         let (_, _, read) = self.read.as_ref()?;
-        read.as_ref().ok().map(AsRef::as_ref)
+        read.as_ref().ok().map(|(record, _)| record.as_ref())
+    }
+
+    /// What was missing and what was done when it was read last; `None` where it was read as it stands.
+    pub(super) fn remark(&self) -> Option<String> {
+        let (_, _, read) = self.read.as_ref()?;
+        let (_, summary) = read.as_ref().ok()?;
+        (!summary.is_plain()).then(|| summary.to_string())
     }
 
     /// The record, read again only where the columns have changed.
@@ -70,14 +81,16 @@ impl Upload {
         options: &ReadOptions,
     ) -> Result<Arc<Record>, String> {
         match &self.read {
-            Some((c, o, record)) if c == columns && o == options => record.clone(),
+            Some((c, o, read)) if c == columns && o == options => {
+                read.clone().map(|(record, _)| record)
+            }
             _ => {
                 // Whether a fitted record has to move depends on the others.
                 let reading = parse_csv(&self.name, &self.content, columns, options);
-                let record = reading.map(|reading| Arc::new(reading.record));
-                let record = record.map_err(|error| error.to_string());
-                self.read = Some((columns.clone(), options.clone(), record.clone()));
-                record
+                let read = reading.map(|reading| (Arc::new(reading.record), reading.summary));
+                let read = read.map_err(|error| error.to_string());
+                self.read = Some((columns.clone(), options.clone(), read.clone()));
+                read.map(|(record, _)| record)
             }
         }
     }

@@ -104,7 +104,7 @@ impl<'a> Setup<'a> {
     /// A structure against records.
     ///
     /// # Errors
-    /// Where there is no record, a record is not sound, or `fixed` names a parameter that there is not.
+    /// Where there is no record, a record is not sound or lacks samples of an input, or `fixed` names a parameter that there is not.
     pub fn new(
         structure: Structure,
         records: &'a [Record],
@@ -124,6 +124,7 @@ impl<'a> Setup<'a> {
         }
         for record in records {
             record.validate()?;
+            record.require_whole_inputs()?;
         }
         let plant = structure.plant;
         let mut names = structure.parameter_names();

@@ -25,22 +25,35 @@ pub struct Clock {
     calendar: Option<Calendar>,
     unit: &'static str,
     seconds: f64,
+    decimals: usize,
 }
 
 impl Clock {
     /// Of records that are shown together.
     #[must_use]
     pub fn of<'a>(records: impl IntoIterator<Item = &'a Record>) -> Self {
-        let (mut calendar, mut longest) = (None, 0.0_f64);
+        let (mut calendar, mut interval) = (None, f64::INFINITY);
+        let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
         for record in records {
             calendar = calendar.or_else(|| record.calendar.clone());
-            longest = longest.max(record.time.last().map_or(0.0, |time| time.abs()));
+            if let [begin, .., end] = record.time[..] {
+                (first, last) = (first.min(begin), last.max(end));
+                interval = interval.min(record.sample_interval());
+            }
         }
-        let (unit, seconds) = time_unit(longest);
+        let (unit, seconds) = time_unit(last - first);
+        // As many decimals as tell neighbouring samples apart.
+        let share = if interval.is_finite() {
+            interval / seconds
+        } else {
+            1.0
+        };
+        let decimals = (-share.max(1e-3).log10() - 1e-9).ceil().max(0.0) as usize;
         Self {
             calendar,
             unit,
             seconds,
+            decimals,
         }
     }
 
@@ -62,7 +75,8 @@ impl Clock {
     #[must_use]
     pub fn at(&self, time: f64) -> String {
         match &self.calendar {
-            Some(calendar) => calendar.at(time.round()),
+            Some(calendar) if self.decimals == 0 || self.unit != "s" => calendar.at(time.round()),
+            Some(calendar) => calendar.at(time),
             None => format!("{} {}", self.number(time), self.unit),
         }
     }
@@ -81,25 +95,19 @@ impl Clock {
         }
     }
 
-    /// Two lengths of time \[s\] in one unit: `450 to 900 s`.
+    /// Two lengths of time \[s\]: `450 to 900 s`.
     #[must_use]
     pub fn lengths(&self, short: f64, long: f64) -> String {
-        format!(
-            "{} to {} {}",
-            self.number(short),
-            self.number(long),
-            self.unit
-        )
+        match self.unit {
+            "s" if self.calendar.is_none() => {
+                format!("{} to {} s", self.number(short), self.number(long))
+            }
+            _ => format!("{} to {}", duration(short), duration(long)),
+        }
     }
 
-    /// Whole seconds, and as many decimals of other units as stand for them.
     fn number(&self, time: f64) -> String {
-        let digits = match self.unit {
-            "s" => 0,
-            "min" => 1,
-            _ => 2,
-        };
-        format!("{:.digits$}", time / self.seconds)
+        format!("{:.*}", self.decimals, time / self.seconds)
     }
 }
 

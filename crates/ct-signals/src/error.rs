@@ -267,6 +267,20 @@ pub enum Error {
         /// What to do.
         mend: String,
     },
+    /// A grid of too many rows.
+    #[error(
+        "{record}: one row every {interval:e} s would be {rows:.3e} rows, and {most:e} are the most; give a longer interval with --resample, or check the dates of the first and the last row"
+    )]
+    Resampled {
+        /// The record.
+        record: String,
+        /// The interval \[s\].
+        interval: f64,
+        /// Rows that it would have.
+        rows: f64,
+        /// The most that it may have.
+        most: f64,
+    },
     /// A column without any sample.
     #[error(
         "{file}, row {row}, column \"{column}\": from here on the samples of all {rows} rows are missing ({words}); name another column under [columns], or choose another part with --from and --to"

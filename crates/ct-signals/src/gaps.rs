@@ -18,8 +18,12 @@ const EVEN: f64 = 0.25;
 const MOST: f64 = 0.98;
 /// ... and rows are missing, instead of steps being uneven, where this share of them is one interval.
 const SINGLE: f64 = 0.6;
+/// Rounded stamps make steps of two intervals at more than this share; rows that are lost so often leave longer steps too.
+const ROUNDED: f64 = 0.05;
 /// Of uneven steps a gap is one that is longer than 1.5 times the one that this share of them does not exceed.
 const USUAL: f64 = 0.95;
+/// More rows are never put in.
+const MOST_PUT_IN: usize = 100_000;
 /// A part with fewer samples of an output says less than its initial states take.
 const SHORTEST: usize = 8;
 
@@ -76,7 +80,11 @@ impl Sampling {
         };
         let even = steps(time).filter(whole).count() as f64;
         let all = time.len().saturating_sub(1) as f64;
-        if even >= MOST * all && near.len() as f64 >= SINGLE * all {
+        // Where more than a few steps are two intervals long and none is longer, stamps were rounded.
+        let double = all - near.len() as f64;
+        let longest = steps(time).fold(0.0, f64::max);
+        let rounded = double > ROUNDED * all && longest < 2.5 * interval;
+        if even >= MOST * all && near.len() as f64 >= SINGLE * all && !rounded {
             Self {
                 interval,
                 usual: interval,
@@ -118,11 +126,10 @@ impl Record {
         steps(&self.time).map(|step| sampling.missing(step)).sum()
     }
 
-    /// Whether rows are missing, or samples of an input or a reference.
+    /// Whether rows are missing, or samples of an input.
     #[must_use]
     pub fn has_gaps(&self) -> bool {
-        let mut known = self.inputs.iter().chain(&self.references);
-        known.any(|channel| channel.missing() > 0) || self.missing_rows() > 0
+        self.inputs.iter().any(|u| u.missing() > 0) || self.missing_rows() > 0
     }
 
     /// The record without gaps, as the head of this file says: inputs are held for at most `longest` \[s\] (from 0 on, infinite: for as long
@@ -132,18 +139,19 @@ impl Record {
     /// A record without gaps comes back as it is. No part comes back where no row has all inputs.
     #[must_use]
     pub fn without_gaps(&self, longest: f64) -> (Vec<Record>, Gaps) {
-        if !self.has_gaps() {
+        if !self.has_gaps() && self.references.iter().all(|r| r.missing() == 0) {
             return (vec![self.clone()], Gaps::default());
         }
         let mut gaps = Gaps::default();
-        let whole = self.with_missing_rows(longest, &mut gaps);
+        let sampling = Sampling::of(&self.time);
+        let whole = self.with_missing_rows(sampling, longest, &mut gaps);
         let mut parts = Vec::new();
-        for rows in whole.stretches(longest, &mut gaps) {
+        for rows in whole.stretches(sampling, longest, &mut gaps) {
             let mut part = whole.rows(rows);
             part.inputs.iter_mut().for_each(hold);
             part.references.iter_mut().for_each(hold);
             let samples = part.outputs.iter().map(|y| part.len() - y.missing());
-            if part.outputs.is_empty() || samples.max().unwrap_or(0) >= SHORTEST {
+            if samples.min().is_none_or(|samples| samples >= SHORTEST) {
                 parts.push(part);
             } else {
                 gaps.unused += part.len();
@@ -153,8 +161,7 @@ impl Record {
     }
 
     /// Puts rows without a sample where rows are missing for at most `longest`.
-    fn with_missing_rows(&self, longest: f64, gaps: &mut Gaps) -> Record {
-        let sampling = Sampling::of(&self.time);
+    fn with_missing_rows(&self, sampling: Sampling, longest: f64, gaps: &mut Gaps) -> Record {
         // Of every row the one that it was, none for one that is put in.
         let mut from: Vec<Option<usize>> = Vec::with_capacity(self.len());
         let mut time = Vec::with_capacity(self.len());
@@ -166,7 +173,7 @@ impl Record {
                 let known = self.inputs.iter().all(|u| !u.values[before].is_nan());
                 if missing > 0 && (!known || t - begin - sampling.interval <= longest) {
                     let step = (t - begin) / (missing + 1) as f64;
-                    if (missing as f64) < MOST_PUT_IN {
+                    if missing < MOST_PUT_IN {
                         time.extend((1..=missing).map(|i| begin + step * i as f64));
                         from.extend((0..missing).map(|_| None));
                     }
@@ -193,8 +200,12 @@ impl Record {
     }
 
     /// Rows between gaps that are too long to be held through.
-    fn stretches(&self, longest: f64, gaps: &mut Gaps) -> Vec<std::ops::Range<usize>> {
-        let sampling = Sampling::of(&self.time);
+    fn stretches(
+        &self,
+        sampling: Sampling,
+        longest: f64,
+        gaps: &mut Gaps,
+    ) -> Vec<std::ops::Range<usize>> {
         let known = |k: usize| self.inputs.iter().all(|u| !u.values[k].is_nan());
         let lines = self.hold() == Hold::First;
         let mut stretches = Vec::new();
@@ -244,9 +255,6 @@ impl Record {
         stretches
     }
 }
-
-/// More rows are never put in: what was not recorded for so long is cut out.
-const MOST_PUT_IN: f64 = 1e5;
 
 /// Fills missing samples: the value before, or a line where the channel runs in lines; the first ones with the first that is there.
 fn hold(channel: &mut Channel) {

@@ -291,7 +291,7 @@ impl Record {
 pub fn require_samples(records: &[Record], parameters: usize) -> Result<(), Error> {
     let needed = MIN_ROWS.max(parameters.saturating_mul(ROWS_PER_PARAMETER));
     let samples = |record: &Record| {
-        let missing = record.outputs.iter().map(Channel::missing).min();
+        let missing = record.outputs.iter().map(Channel::missing).max();
         record.len() - missing.unwrap_or(0)
     };
     let rows: usize = records.iter().map(samples).sum();
@@ -304,7 +304,12 @@ pub fn require_samples(records: &[Record], parameters: usize) -> Result<(), Erro
         record: names.join(" and "),
         rows,
         needed,
-        why: format!(" to fit {parameters} parameters"),
+        why: match records.iter().any(|record| samples(record) < record.len()) {
+            true => format!(
+                " to fit {parameters} parameters, and readings that are missing do not count"
+            ),
+            false => format!(" to fit {parameters} parameters"),
+        },
     })
 }
 

@@ -1,18 +1,34 @@
 //! A record on an even grid: done only where somebody asks for it, as it changes the data.
 
-use crate::{Channel, Hold, Record};
+use crate::{Channel, Error, Hold, Record};
+
+/// Most rows of a grid.
+const MOST_ROWS: f64 = 1e7;
+/// A held sample acts for so many sampling intervals at most: what the command did behind it is not known.
+const ACTS: f64 = 1.5;
 
 impl Record {
     /// The record on an even grid of this interval \[s\] from its first instant on.
     ///
     /// Inputs and references that are held are averaged over each interval of the grid, as they act through it; those that run in lines,
     /// and outputs, are read at its instants, on the line between two samples that are no farther apart than the longer of 1.5 sampling
-    /// intervals and one of the grid. Otherwise they are missing.
-    #[must_use]
-    pub fn resampled(&self, interval: f64) -> Record {
+    /// intervals and one of the grid. Otherwise they are missing: a gap stays a gap.
+    ///
+    /// # Errors
+    /// [`Error::Resampled`] where the grid would have more than ten million rows.
+    pub fn resampled(&self, interval: f64) -> Result<Record, Error> {
         let (Some(&first), Some(&last)) = (self.time.first(), self.time.last()) else {
-            return self.clone();
+            return Ok(self.clone());
         };
+        let rows = (last - first) / interval + 1.0;
+        if rows.is_nan() || rows > MOST_ROWS {
+            return Err(Error::Resampled {
+                record: self.name.clone(),
+                interval,
+                rows,
+                most: MOST_ROWS,
+            });
+        }
         let rows = ((last - first) / interval + 1e-9).floor() as usize + 1;
         let time: Vec<f64> = (0..rows).map(|k| first + interval * k as f64).collect();
         let apart = (1.5 * self.sample_interval()).max(interval);
@@ -22,20 +38,25 @@ impl Record {
             Hold::Zero => held(channel),
             Hold::First => read(channel),
         };
-        Record {
+        Ok(Record {
             name: self.name.clone(),
             inputs: self.inputs.iter().map(acting).collect(),
             outputs: self.outputs.iter().map(read).collect(),
             references: self.references.iter().map(acting).collect(),
             calendar: self.calendar.clone(),
             time,
-        }
+        })
     }
 
     /// Means of a held channel over the intervals of a grid; missing where a part of it is.
     fn means(&self, channel: &Channel, grid: &[f64], interval: f64) -> Vec<f64> {
         let mut k = 0;
         let end = |k: usize| self.time.get(k + 1).copied().unwrap_or(f64::INFINITY);
+        let acts = ACTS * self.sample_interval();
+        let known = |k: usize, until: f64| {
+            // The last sample goes on to the end of its interval of the grid.
+            k + 1 >= self.len() || until - self.time[k] <= acts
+        };
         grid.iter()
             .map(|&from| {
                 let to = from + interval;
@@ -45,7 +66,11 @@ impl Record {
                 let (mut at, mut sum, mut row) = (from, 0.0, k);
                 loop {
                     let until = end(row).min(to);
-                    sum += channel.values[row] * (until - at);
+                    if known(row, until) {
+                        sum += channel.values[row] * (until - at);
+                    } else {
+                        sum = f64::NAN;
+                    }
                     if until >= to {
                         break;
                     }
@@ -100,13 +125,17 @@ mod tests {
             )],
             ..Record::default()
         };
-        let coarse = record.resampled(2.0);
+        let coarse = record.resampled(2.0).unwrap();
         assert_eq!(coarse.time, [0.0, 2.0, 4.0, 6.0, 8.0]);
-        assert_eq!(coarse.inputs[0].values, [2.0, 5.0, 2.0, 2.0, 0.0]);
+        assert_eq!(coarse.inputs[0].values[..2], [2.0, 5.0]);
+        // What the command did between 5.5 and 8 is not known.
+        assert!(coarse.inputs[0].values[2..4].iter().all(|u| u.is_nan()));
+        assert_eq!(coarse.inputs[0].values[4], 0.0);
         // Between 4 and 8 nothing was read.
         assert_eq!(coarse.outputs[0].values[..3], [0.0, 2.0, 4.0]);
         assert!(coarse.outputs[0].values[3].is_nan() && coarse.outputs[0].values[4] == 8.0);
-        let fine = record.resampled(0.5);
+        assert!(record.resampled(1e-9).is_err());
+        let fine = record.resampled(0.5).unwrap();
         assert_eq!(fine.inputs[0].values[..5], [1.0, 1.0, 3.0, 3.0, 5.0]);
         assert_eq!(fine.outputs[0].values[1], 0.5);
     }

@@ -34,12 +34,27 @@ pub fn common_clock(records: &[Record]) -> Option<Vec<f64>> {
     })
 }
 
+/// When each record begins on its own clock \[s\]: at zero, but for the parts into which one record was cut, which keep its name
+/// and go on with its clock.
+fn of_each(records: &[Record]) -> Vec<f64> {
+    let mut begins: Vec<f64> = Vec::with_capacity(records.len());
+    for (k, record) in records.iter().enumerate() {
+        let continued = k.checked_sub(1).and_then(|before| {
+            let part = &records[before];
+            let goes_on = part.name == record.name && part.time.last() < record.time.first();
+            goes_on.then(|| begins[before] + begin(record) - begin(part))
+        });
+        begins.push(continued.unwrap_or(0.0));
+    }
+    begins
+}
+
 /// What the clock shows in all records together \[s\]: their whole span, or the longest of them.
 pub(crate) fn span(records: &[Record]) -> f64 {
-    match (common_clock(records), records.last()) {
-        (Some(begins), Some(last)) => begins.last().unwrap_or(&0.0) + last.duration(),
-        _ => records.iter().map(Record::duration).fold(0.0, f64::max),
-    }
+    let begins = common_clock(records).unwrap_or_else(|| of_each(records));
+    let ends = begins.iter().zip(records);
+    ends.map(|(begin, record)| begin + record.duration())
+        .fold(0.0, f64::max)
 }
 
 fn begin(record: &Record) -> f64 {
@@ -58,7 +73,7 @@ impl Clock {
         Self {
             origin: records.first().map_or(0.0, begin),
             end,
-            begins: shared.unwrap_or_else(|| vec![0.0; records.len()]),
+            begins: shared.unwrap_or_else(|| of_each(records)),
         }
     }
 

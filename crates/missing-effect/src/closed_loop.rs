@@ -54,6 +54,14 @@ pub(crate) fn enclose<'a>(
     if !options.simulate_loop {
         return Ok((node, Some(not_simulated("as was asked for", None))));
     }
+    let lacking = problem.records.iter().find(|r| r.outputs[0].missing() > 0);
+    if let Some(record) = lacking {
+        let why = format!(
+            "readings are missing in {}, so the controller cannot be checked against its commands",
+            record.name
+        );
+        return Ok((node, Some(not_simulated(&why, None))));
+    }
     let (setup, x) = match node.setup.in_loop(controller, &node.fit.x) {
         Ok(closed) => closed,
         Err(

@@ -57,13 +57,27 @@ impl Mended {
     /// `None` where no record has a gap.
     pub fn of(problem: &Problem, options: &Options) -> Result<Option<Self>, Error> {
         let mut records = problem.records.iter().chain(&problem.test);
-        if !records.any(Record::has_gaps) {
+        let in_loop = problem.controller.is_some();
+        let lacks_reference = |record: &Record| record.references.iter().any(|r| r.missing() > 0);
+        if !records.any(|record| record.has_gaps() || in_loop && lacks_reference(record)) {
             return Ok(None);
         }
         let interval = problem.records.iter().map(Record::sample_interval);
         let first = FIRST_HOLD * interval.fold(0.0, f64::max);
+        let (records, parts, _) = cut(&problem.records, first);
+        if let Some((record, _)) = problem
+            .records
+            .iter()
+            .zip(&parts)
+            .find(|(_, parts)| **parts == 0)
+        {
+            return Err(Error::Shreds {
+                record: record.name.clone(),
+                limit: first,
+            });
+        }
         let trial = Problem {
-            records: cut(&problem.records, first).0,
+            records,
             test: Vec::new(),
             ..problem.clone()
         };
@@ -73,6 +87,13 @@ impl Mended {
         let (fitted, mut parts, gaps) = cut(&problem.records, limit);
         let (test, of_test, of_tests) = cut(&problem.test, limit);
         parts.extend(of_test);
+        let all = problem.records.iter().chain(&problem.test);
+        if let Some((record, _)) = all.zip(&parts).find(|(_, parts)| **parts == 0) {
+            return Err(Error::Shreds {
+                record: record.name.clone(),
+                limit,
+            });
+        }
         Ok(Some(Self {
             problem: Problem {
                 records: fitted,
@@ -110,7 +131,7 @@ impl Mended {
                 parameter.name = self.named(&parameter.name);
             }
         }
-        diagnosis.sentences.push(of_gaps(&self.gaps));
+        diagnosis.sentences.extend(of_gaps(&self.gaps));
         diagnosis.gaps = Some(self.gaps);
     }
 

@@ -143,7 +143,8 @@ fn least_p(
     let in_loop = !node.setup.replays().is_empty();
     let (mut least, mut at, mut count) = (1.0, None, 0.0);
     for (k, (record, residual)) in node.setup.records.iter().zip(&residuals).enumerate() {
-        let lags = (record.len() / 10).clamp(2, 25);
+        let samples = record.len() - record.outputs[0].missing();
+        let lags = (samples / 10).clamp(2, 25);
         let from_outside = record
             .references
             .first()
@@ -154,7 +155,13 @@ fn least_p(
         let all: Vec<Vec<f64>> = all.flat_map(|command| signals(&command.values)).collect();
         let tests: Vec<(Vec<f64>, f64)> = all
             .par_iter()
-            .map(|signal| prewhitened_input_test(signal, residual, lags))
+            .map(
+                |signal| match prewhitened_input_test(signal, residual, lags) {
+                    // Too few pairs of samples are there: it says nothing.
+                    Err(ct_signals::Error::TooFewSamples { .. }) => Ok((Vec::new(), 1.0)),
+                    tested => tested,
+                },
+            )
             .collect::<Result<_, _>>()?;
         for (_, p) in tests {
             if p < least {
@@ -205,7 +212,8 @@ fn level_p(model: &[f64], white: &[f64]) -> f64 {
     // Hats, which sum to one: at a sample two neighbours are not zero.
     let mut gram = DMatrix::<f64>::zeros(KNOTS, KNOTS);
     let mut moment = DVector::<f64>::zeros(KNOTS);
-    for (y, w) in model.iter().zip(&white[1..]) {
+    // Zero where the sample is missing.
+    for (y, w) in model.iter().zip(&white[1..]).filter(|(_, w)| **w != 0.0) {
         let at = (y - low) / width;
         let left = (at as usize).min(KNOTS - 2);
         let hats = [(left, left as f64 + 1.0 - at), (left + 1, at - left as f64)];

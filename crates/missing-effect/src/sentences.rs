@@ -505,7 +505,7 @@ fn about(seconds: f64) -> String {
 }
 
 /// What was done about rows and samples of inputs that are missing.
-pub(crate) fn of_gaps(mended: &MendedGaps) -> String {
+pub(crate) fn of_gaps(mended: &MendedGaps) -> Option<String> {
     let Gaps {
         rows,
         places,
@@ -518,6 +518,14 @@ pub(crate) fn of_gaps(mended: &MendedGaps) -> String {
         1 => format!("1 {one}"),
         count => format!("{count} {several}"),
     };
+    if places == 0 {
+        return (unused > 0).then(|| {
+            format!(
+                "{} not used: an input is not known there.",
+                count(unused, "row is", "rows are")
+            )
+        });
+    }
     let mut text = match rows {
         0 => format!(
             "Samples of an input are missing in {}",
@@ -545,5 +553,5 @@ pub(crate) fn of_gaps(mended: &MendedGaps) -> String {
     if unused > 0 {
         text += &format!("; {} not used", count(unused, "row is", "rows are"));
     }
-    text + "."
+    Some(text + ".")
 }

@@ -133,6 +133,14 @@ pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -
         .collect()
 }
 
+/// A test; `None` where too few pairs of samples are there for it.
+fn testable<T>(test: Result<T, ct_signals::Error>) -> Result<Option<T>, ct_signals::Error> {
+    match test {
+        Err(ct_signals::Error::TooFewSamples { .. }) => Ok(None),
+        test => test.map(Some),
+    }
+}
+
 /// The report of one node; `bic` is its criterion under the colour of its own residual, `judge` the noise
 /// against which its residual is judged; `widen`: the standard errors allow
 /// for the bias of feedback.
@@ -147,19 +155,37 @@ pub(crate) fn report(
     let last = added.last();
     let simulated = setup.simulate(&fit.x)?.output;
     let residuals = setup.residuals(&fit.x)?;
-    let (record, residual) = (&setup.records[0], &residuals[0]);
-    let samples = record.len() - record.outputs[0].missing();
+    // Of a record that is cut the longest part.
+    let samples_of = |record: &Record| record.len() - record.outputs[0].missing();
+    let parts = setup.records.iter().zip(&residuals);
+    let parts = parts.take_while(|(record, _)| record.name == setup.records[0].name);
+    let (record, residual) = parts
+        .reduce(|a, b| {
+            if samples_of(b.0) > samples_of(a.0) {
+                b
+            } else {
+                a
+            }
+        })
+        .unwrap_or((&setup.records[0], &residuals[0]));
+    let samples = samples_of(record);
     let lags = (samples / 10).clamp(2, 60);
     let portmanteau = (samples / 10).clamp(2, 25);
-    let (cross, _) =
-        residual_tests::prewhitened_input_test(&record.inputs[0].values, residual, lags)?;
-    let bound = 1.96 / (samples as f64).sqrt();
+    let (cross, _) = testable(residual_tests::prewhitened_input_test(
+        &record.inputs[0].values,
+        residual,
+        lags,
+    ))?
+    .unwrap_or((vec![f64::NAN; lags + 1], f64::NAN));
+    // As many pairs of samples are there as the square of the share of samples.
+    let bound = 1.96 * (record.len() as f64).sqrt() / samples.max(1) as f64;
     let tests = ResidualTests {
         autocorrelation: residual_tests::autocorrelation(residual, lags),
         cross_correlation: cross,
         autocorrelation_bound: bound,
         cross_correlation_bound: bound,
-        whiteness_p: residual_tests::ljung_box(residual, portmanteau, 0)?,
+        whiteness_p: testable(residual_tests::ljung_box(residual, portmanteau, 0))?
+            .unwrap_or(f64::NAN),
         input_p: input_p(node)?,
     };
     let series: Vec<Series> = setup

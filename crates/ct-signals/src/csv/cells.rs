@@ -46,10 +46,6 @@ const MISSING: &[&str] = &[
     "over",
     "calc",
     "pt",
-    "inf",
-    "+inf",
-    "-inf",
-    "infinity",
 ];
 
 /// Words that are meant only where another follows.
@@ -61,12 +57,15 @@ pub(super) fn says_missing(cell: &str) -> bool {
         return true;
     }
     let lower = cell.to_lowercase();
-    let first = lower
-        .split([' ', ':', ';', ',', '(', '_'])
-        .next()
-        .unwrap_or_default();
-    let alone = first.len() == lower.len();
-    MISSING.contains(&first) && !(alone && BEGINNINGS.contains(&first))
+    let end = lower.find([' ', ':', ';', ',', '(']).unwrap_or(lower.len());
+    let (first, rest) = lower.split_at(end);
+    let alone = rest.is_empty();
+    // A sign in front of a number is no word.
+    let number = rest.trim_start().starts_with(|c: char| c.is_ascii_digit());
+    let is_sign = !first.contains(|c: char| c.is_alphanumeric());
+    MISSING.contains(&first)
+        && !(alone && BEGINNINGS.contains(&first))
+        && !(!alone && (is_sign || number))
 }
 
 /// Whether a cell may be a unit: no number, and nothing that begins as a date or a number does.
@@ -120,19 +119,29 @@ impl<'a> Numbers<'a> {
                 .any(|(word, number)| *word == cell || value.is_some() && *number == value)
         };
         match value {
-            Ok(value) if own(Some(value)) => Ok(Cell::Missing),
-            Ok(value) if value.is_finite() => {
-                self.check_mark(place, cell)?;
-                Ok(Cell::Number(value))
-            }
-            Ok(_) if self.strict => Err(Error::NotFinite {
+            Ok(value) if own(Some(value)) && !self.strict => Ok(Cell::Missing),
+            Ok(value) if value.is_finite() && own(Some(value)) => Err(Error::TextInCell {
                 file: place.file(),
                 row: place.row(),
                 column: place.column(),
                 text: quoted(cell),
+                mend: "[columns] says that it stands for a missing sample; leave out --strict to read on over it",
             }),
+            Ok(value) if value.is_finite() => {
+                self.check_mark(place, cell)?;
+                Ok(Cell::Number(value))
+            }
+            // A number too large to be one is no word.
+            Ok(_) if self.strict || cell.contains(|c: char| c.is_ascii_digit()) => {
+                Err(Error::NotFinite {
+                    file: place.file(),
+                    row: place.row(),
+                    column: place.column(),
+                    text: quoted(cell),
+                })
+            }
             Ok(_) => Ok(Cell::Missing),
-            Err(()) if own(None) => Ok(Cell::Missing),
+            Err(()) if own(None) && !self.strict => Ok(Cell::Missing),
             Err(()) if self.strict && cell.is_empty() => Err(Error::EmptyCell {
                 file: place.file(),
                 row: place.row(),
@@ -247,7 +256,9 @@ mod tests {
         ] {
             assert!(says_missing(word), "{word}");
         }
-        for word in ["open", "12 cm", "on", "no", "over", "Badger"] {
+        for word in [
+            "- 1.95", "no_flow", "bad 3", "open", "12 cm", "on", "no", "over", "Badger",
+        ] {
             assert!(!says_missing(word), "{word}");
         }
     }

@@ -30,7 +30,9 @@ impl Table {
         if rows < MIN_ROWS {
             let why = match self.outside {
                 0 => String::new(),
-                outside => format!(" (--from and --to leave out {outside})"),
+                outside => format!(
+                    " (--from and --to leave out {outside}; dates without a zone are those of time_zone, or UTC)"
+                ),
             };
             return Err(Error::TooFewRows {
                 record: file.into(),

@@ -30,7 +30,9 @@ pub(crate) use self::{
     text::{check_width, delimiter, is_number},
 };
 use crate::columns::{Columns, Found, Heading, Layout};
-use crate::{Calendar, Channel, Error, Hold, LARGEST_RECORD, Record, quoted, read_file, unit};
+use crate::{
+    Calendar, Channel, Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, quoted, read_file, unit,
+};
 
 /// How a record is read.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -103,7 +105,7 @@ pub fn parse_csv(
     let text = decode(file, content)?;
     let (layout, table) = read_table(file, text, columns, options)?;
     table.check(file, text, &layout, options)?;
-    Ok(table.into_reading(file, layout, options))
+    table.into_reading(file, layout, options)
 }
 
 /// The header of a file: what there is to choose from, before anything is read.
@@ -183,16 +185,16 @@ fn read_table(
                 delimiter: delimiter_name(delimiter),
             });
         }
-        let at = |column: &'_ Found| -> Place<'_> {
+        fn at<'a>((name, text, end): (&'a str, &'a str, usize), column: &'a Found) -> Place<'a> {
             Place {
-                name: file,
+                name,
                 text,
                 end,
-                // Lives as long as the layout does.
-                header: header_of(layout, column.index),
+                header: &column.header,
             }
-        };
-        if table.time.is_empty() && table.outside == 0 && record.iter().all(is_word) {
+        }
+        let row = (file, text, end);
+        if table.time.is_empty() && table.outside == 0 && is_row_of_units(&record) {
             let (name, unit) = unit::split(&layout.time.header);
             let below = &record[layout.time.index];
             let unit = if below.is_empty() { unit } else { below };
@@ -203,7 +205,7 @@ fn read_table(
             });
         }
         let cell = &record[layout.time.index];
-        let place = at(&layout.time);
+        let place = at(row, &layout.time);
         if !options.strict && says_missing(cell) {
             table.without_time += 1;
             continue;
@@ -228,16 +230,13 @@ fn read_table(
         table.ends.push(end);
         for (k, column) in layout.channels().enumerate() {
             let cell = &record[column.index];
-            let value = match numbers.sample(at(column), cell)? {
+            let value = match numbers.sample(at(row, column), cell)? {
                 Cell::Number(value) => match &column.converted {
                     Some((_, conversion)) => conversion.apply(value),
                     None => value,
                 },
                 Cell::Missing => {
-                    match table.missing[k].iter_mut().find(|(word, _)| word == cell) {
-                        Some((_, count)) => *count += 1,
-                        None => table.missing[k].push((quoted(cell), 1)),
-                    }
+                    count_word(&mut table.missing[k], cell);
                     f64::NAN
                 }
             };
@@ -251,14 +250,40 @@ fn read_table(
     }
 }
 
-fn header_of(layout: &Layout, index: usize) -> &str {
-    let mut all = std::iter::once(&layout.time).chain(layout.channels());
-    all.find(|column| column.index == index)
-        .map_or("", |column| &column.header)
+/// Whether a row below the header holds units: words alone, and none that says that a sample is missing.
+fn is_row_of_units(row: &StringRecord) -> bool {
+    let says = |cell: &str| !cell.is_empty() && cell != "-" && says_missing(cell);
+    row.iter().all(is_word) && !row.iter().any(says)
+}
+
+/// Counts what stands in a cell whose sample is missing: the first words that occur by themselves, the others together.
+fn count_word(words: &mut Vec<(String, usize)>, cell: &str) {
+    const MOST: usize = 6;
+    const LONGEST: usize = 24;
+    let end = cell
+        .char_indices()
+        .nth(LONGEST)
+        .map_or(cell.len(), |(at, _)| at);
+    let cell = &cell[..end];
+    if let Some((_, count)) = words.iter_mut().find(|(word, _)| word == cell) {
+        *count += 1;
+    } else if words.len() < MOST {
+        words.push((cell.to_string(), 1));
+    } else {
+        match words.get_mut(MOST) {
+            Some((_, count)) => *count += 1,
+            None => words.push(("...".to_string(), 1)),
+        }
+    }
 }
 
 impl Table {
-    fn into_reading(mut self, file: &str, layout: Layout, options: &ReadOptions) -> Reading {
+    fn into_reading(
+        mut self,
+        file: &str,
+        layout: Layout,
+        options: &ReadOptions,
+    ) -> Result<Reading, Error> {
         // Times begin at the first row in use where they are dates.
         if let (Some(calendar), Some(&first)) = (&mut self.calendar, self.time.first()) {
             calendar.start = calendar.start.after(first);
@@ -286,7 +311,10 @@ impl Table {
             .map(|(column, words)| MissingSamples {
                 column: column.name.clone(),
                 samples: words.iter().map(|(_, count)| count).sum(),
-                words: words.clone(),
+                words: words
+                    .iter()
+                    .map(|(word, count)| (quoted(word), *count))
+                    .collect(),
             });
         let missing: Vec<MissingSamples> = missing.collect();
         let converted = layout.channels().filter_map(|column| {
@@ -311,8 +339,16 @@ impl Table {
             resampled: options.resample,
         };
         if let Some(interval) = options.resample {
-            record = record.resampled(interval);
+            record = record.resampled(interval)?;
+            if record.len() < MIN_ROWS {
+                return Err(Error::TooFewRows {
+                    record: file.into(),
+                    rows: record.len(),
+                    needed: MIN_ROWS,
+                    why: " on the grid of --resample".into(),
+                });
+            }
         }
-        Reading { record, summary }
+        Ok(Reading { record, summary })
     }
 }

@@ -1,8 +1,16 @@
 //! The time of rows: numbers in a unit, or dates and times.
 
-use super::{ReadOptions, cells::Numbers, checks::rounded, place::Place, text::delimiter};
+use csv::StringRecord;
+
+use super::{
+    ReadOptions,
+    cells::Numbers,
+    checks::rounded,
+    place::Place,
+    text::{read, reader},
+};
 use crate::columns::{Columns, Found};
-use crate::{Calendar, Error, Timestamp, TimestampReader, quoted};
+use crate::{Calendar, Error, Timestamp, TimestampError, TimestampReader, quoted};
 
 /// How a column writes the time.
 pub(super) enum Times {
@@ -29,8 +37,15 @@ impl Times {
             return Ok(Self::Numbers(seconds));
         }
         let zone = columns.time_zone.as_deref();
-        let reader = TimestampReader::new(format, zone, cells(place, column.index))
-            .map_err(|error| refused(place, error))?;
+        let reader = match TimestampReader::new(format, zone, [cell]) {
+            // The rest of the column tells day and month apart.
+            Err(TimestampError::DayOrMonth { .. }) => {
+                let cells = cells(place, column.index);
+                TimestampReader::new(format, zone, cells.iter().map(String::as_str))
+            }
+            reader => reader,
+        };
+        let reader = reader.map_err(|error| refused(place, error))?;
         // It is read once more with its row.
         let first = reader
             .clone()
@@ -107,7 +122,7 @@ fn cell_is_number(cell: &str) -> bool {
     cell.replace(',', ".").parse::<f64>().is_ok()
 }
 
-fn refused(place: Place, error: crate::TimestampError) -> Error {
+fn refused(place: Place, error: TimestampError) -> Error {
     Error::Timestamp {
         file: place.file(),
         row: place.row(),
@@ -116,25 +131,17 @@ fn refused(place: Place, error: crate::TimestampError) -> Error {
     }
 }
 
-/// The cells of a column from this row on.
-fn cells<'a>(place: Place<'a>, column: usize) -> impl Iterator<Item = &'a str> {
-    let mut from = place.end;
-    // Back to the beginning of the row.
-    let bytes = place.text.as_bytes();
-    while from > 0 && matches!(bytes[from - 1], b'\n' | b'\r') {
-        from -= 1;
+/// The cells of a column.
+fn cells(place: Place, column: usize) -> Vec<String> {
+    let mut reader = reader(place.text);
+    let mut row = StringRecord::new();
+    let mut cells = Vec::new();
+    while let Ok(true) = read(place.name, &mut reader, &mut row) {
+        cells.extend(row.get(column).map(str::to_string));
     }
-    while from > 0 && !matches!(bytes[from - 1], b'\n' | b'\r') {
-        from -= 1;
-    }
-    let separator = char::from(delimiter(place.text));
-    place.text[from..]
-        .lines()
-        .filter(|line| !line.starts_with('#'))
-        .filter_map(move |line| {
-            let cell = line.split(separator).nth(column)?;
-            Some(cell.trim().trim_matches('"').trim())
-        })
+    // The first is the header.
+    cells.drain(..1.min(cells.len()));
+    cells
 }
 
 /// The part of a file that is wanted \[s\].

@@ -181,7 +181,7 @@ fn a_part_is_read_by_dates_and_by_numbers() {
         &numbers,
         &default,
         &part("48", "60"),
-        &["4 rows of data", "--from and --to leave out 96"],
+        &["4 rows of data", "--from and --to leave out 96;"],
     );
     refused(
         &dated,

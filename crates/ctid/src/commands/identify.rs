@@ -260,7 +260,10 @@ impl Identify {
                 record.len()
             ),
             None if rows > 0 && !self.methods().iter().all(|method| method.is_refined()) => {
-                format!("{rows} rows are missing")
+                match rows {
+                    1 => "1 row is missing".to_string(),
+                    rows => format!("{rows} rows are missing"),
+                }
             }
             None => return Ok(record),
         };

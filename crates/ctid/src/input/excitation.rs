@@ -161,7 +161,7 @@ fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<
 /// The moves of a signal by more than `least`: from where it stood, to where it went.
 fn moves(signal: &Channel, least: f64) -> Vec<(f64, f64)> {
     let mut moves = Vec::new();
-    let mut values = signal.values.iter().copied();
+    let mut values = signal.present();
     let Some(mut stood) = values.next() else {
         return moves;
     };
@@ -176,9 +176,10 @@ fn moves(signal: &Channel, least: f64) -> Vec<(f64, f64)> {
 
 /// Range of the output and median of its first differences, where it does not answer to the command.
 fn no_answer(record: &Record) -> Option<(f64, f64)> {
-    let (input, output) = (&record.inputs[0].values, &record.outputs[0].values);
+    let (input, output) = (&record.inputs[0].interpolated(), &record.outputs[0].values);
     let (low, high) = record.output_range();
-    let mut differences: Vec<f64> = output.windows(2).map(|y| (y[1] - y[0]).abs()).collect();
+    let differences = output.windows(2).map(|y| (y[1] - y[0]).abs());
+    let mut differences: Vec<f64> = differences.filter(|d| !d.is_nan()).collect();
     let middle = differences.len() / 2;
     if differences.is_empty() {
         return None;
@@ -200,7 +201,8 @@ fn uncorrelated(input: &[f64], output: &[f64]) -> bool {
 
 /// The input, as it is and behind first-order lags of one sample to a third of the record, is not correlated with the output.
 fn uncorrelated_behind_lags(input: &[f64], output: &[f64]) -> bool {
-    let bound = STANDARD_ERRORS / (input.len() as f64).sqrt();
+    let samples = output.iter().filter(|y| !y.is_nan()).count();
+    let bound = STANDARD_ERRORS / (samples as f64).sqrt();
     let mut lag = 1.0;
     let mut filtered = input.to_vec();
     loop {
@@ -220,11 +222,15 @@ fn uncorrelated_behind_lags(input: &[f64], output: &[f64]) -> bool {
     }
 }
 
+/// Of the pairs of which both samples are there.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let (mean_a, mean_b) = (mean(a), mean(b));
+    let pairs = || a.iter().zip(b).filter(|(a, b)| !a.is_nan() && !b.is_nan());
+    let count = pairs().count() as f64;
+    let (mean_a, mean_b) = pairs().fold((0.0, 0.0), |sum, (a, b)| {
+        (sum.0 + a / count, sum.1 + b / count)
+    });
     let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
+    for (a, b) in pairs() {
         let (a, b) = (a - mean_a, b - mean_b);
         (aa, bb, ab) = (aa + a * a, bb + b * b, ab + a * b);
     }

@@ -226,9 +226,24 @@ pub(crate) fn on_one_clock(records: &mut [Record]) {
     }
 }
 
+/// The plants have one sensor each.
+fn check_outputs(model_name: &str, model: &ModelFile, records: &[Record]) -> Result<(), Error> {
+    let outputs = records.first().map_or(0, |record| record.outputs.len());
+    if outputs <= 1 {
+        return Ok(());
+    }
+    Err(Error::File {
+        file: model_name.to_string(),
+        what: format!(
+            "[columns] names {outputs} outputs, and {} is fitted to one; name the one to be fitted",
+            model.plant.id()
+        ),
+    })
+}
+
 /// Fitted records with dates are given in the order of their dates, and do not overlap: a clock that runs backwards between files tells
 /// nothing of drifts.
-fn check_clocks(model_name: &str, records: &[Record]) -> Result<(), Error> {
+fn check_clocks(records: &[Record]) -> Result<(), Error> {
     for pair in records.windows(2) {
         let [before, after] = pair else { continue };
         let (Some(calendar), Some(_)) = (&before.calendar, &after.calendar) else {
@@ -241,7 +256,7 @@ fn check_clocks(model_name: &str, records: &[Record]) -> Result<(), Error> {
             return Err(Error::File {
                 file: after.name.clone(),
                 what: format!(
-                    "row 2, column of the time: it begins at {}, before {} ends at {}; give the files in the order of their dates, and once what they share (--from, --to), or correct time_zone under [columns] in {model_name}",
+                    "the first row, column of the time: it begins at {}, before {} ends at {}; give the files in the order of their dates, and once what they share (--from, --to), or correct time_zone under [columns]",
                     calendar.at(begin),
                     before.name,
                     calendar.at(end)
@@ -262,7 +277,8 @@ pub fn problem(
     records: Vec<Record>,
     test: Vec<Record>,
 ) -> Result<Problem, Error> {
-    check_clocks(model_name, &records)?;
+    check_outputs(model_name, &model, &records)?;
+    check_clocks(&records)?;
     check_units(&records, &test)?;
     check_movement(&records)?;
     check_height(model_name, &model, records.iter().chain(&test))?;

@@ -9,7 +9,7 @@ use axum::extract::{Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use ct_signals::{Clock, Record};
+use ct_signals::Clock;
 use missing_effect::Shown;
 use serde::Deserialize;
 
@@ -19,6 +19,7 @@ use super::guard::Refusal;
 use super::session::{UNNAMED, lock};
 use super::words;
 use crate::design::Proposal;
+use crate::input;
 use crate::output::Found as _;
 use crate::report;
 
@@ -35,30 +36,31 @@ async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Res
     let text = aside(move || {
         let mut session = lock(&session);
         let (columns, options) = session.layout();
-        let (mut shown, mut units) = (Vec::new(), None);
-        let mut read: Vec<Arc<Record>> = Vec::new();
+        let (mut read, mut held_out) = (Vec::new(), Vec::new());
         for upload in &mut session.records {
-            let Ok(record) = upload.record(&columns, &options) else {
-                continue;
-            };
-            units.get_or_insert((
-                record.inputs[0].unit.clone(),
-                record.outputs[0].unit.clone(),
-            ));
-            shown.push(Shown {
-                name: record.name.clone(),
-                held_out: upload.held_out,
-                time: record.time.clone(),
-                input: record.inputs[0].values.clone(),
-                input_2: record.inputs.get(1).map(|second| second.values.clone()),
-                output: record.outputs[0].values.clone(),
-            });
-            read.push(record);
+            if let Ok(record) = upload.record(&columns, &options) {
+                read.push(record.as_ref().clone());
+                held_out.push(upload.held_out);
+            }
         }
+        input::on_one_clock(&mut read);
+        let units = read.first().map(|record| {
+            let [input, output] = [&record.inputs[0], &record.outputs[0]];
+            (input.unit.clone(), output.unit.clone())
+        });
+        let shown = read.iter().zip(held_out).map(|(record, held_out)| Shown {
+            name: record.name.clone(),
+            held_out,
+            time: record.time.clone(),
+            input: record.inputs[0].values.clone(),
+            input_2: record.inputs.get(1).map(|second| second.values.clone()),
+            output: record.outputs[0].values.clone(),
+        });
+        let mut shown: Vec<Shown> = shown.collect();
         let (input, output) = units.unwrap_or_default();
         // As in the report, those that are fitted come first.
         shown.sort_by_key(|record| record.held_out);
-        let clock = Clock::of(read.iter().map(AsRef::as_ref));
+        let clock = Clock::of(&read);
         Ok(report::drawing_of_records(&shown, &input, &output, &clock))
     });
     Ok(as_json(text.await?.into()))

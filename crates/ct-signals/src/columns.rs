@@ -18,7 +18,7 @@ use crate::{ColumnFault, Error, quoted, unit, unit::Conversion};
 pub struct Columns {
     /// Sampling instants, in us, ms, s, min, h or d, without a unit in s; or dates and times. Guessed: `t...`.
     pub time: Option<String>,
-    /// The commands to the actuators and the measured disturbances. Guessed, one: `u...`, `input`.
+    /// The commands to the actuators and the measured disturbances. Guessed, one: `u...`, `input`; so is a first one that is empty.
     pub inputs: Vec<String>,
     /// The sensors' readings. Guessed, one: `y...`, `output`.
     pub outputs: Vec<String>,
@@ -85,7 +85,13 @@ impl Names {
 impl From<Named> for Columns {
     fn from(named: Named) -> Self {
         let mut inputs = Names::all(named.input);
-        inputs.extend(named.input_2);
+        if let Some(second) = named.input_2 {
+            // The first one is guessed where only the second is named.
+            if inputs.is_empty() {
+                inputs.push(String::new());
+            }
+            inputs.push(second);
+        }
         Self {
             time: named.time,
             inputs,
@@ -99,11 +105,14 @@ impl From<Named> for Columns {
 }
 
 impl From<Columns> for Named {
-    fn from(columns: Columns) -> Self {
+    fn from(mut columns: Columns) -> Self {
+        let guessed = columns.inputs.first().is_some_and(String::is_empty);
+        let input_2 = (guessed && columns.inputs.len() > 1).then(|| columns.inputs.remove(1));
+        columns.inputs.retain(|name| !name.is_empty());
         Self {
             time: columns.time,
             input: Names::of(columns.inputs),
-            input_2: None,
+            input_2,
             output: Names::of(columns.outputs),
             reference: Names::of(columns.references),
             time_format: columns.time_format,
@@ -256,7 +265,8 @@ impl Columns {
         };
         // The named ones first, so that none of them is guessed for another role.
         let named = |role: &Role, wanted: &[String]| {
-            let found = wanted.iter().map(|wanted| header.named(role, wanted));
+            let wanted = wanted.iter().filter(|wanted| !wanted.is_empty());
+            let found = wanted.map(|wanted| header.named(role, wanted));
             found.collect::<Result<Vec<Found>, Error>>()
         };
         let time: Vec<String> = self.time.iter().cloned().collect();
@@ -291,9 +301,10 @@ impl Columns {
             (&INPUT, &mut inputs),
             (&OUTPUT, &mut outputs),
         ] {
-            if columns.is_empty() {
+            let first_input = self.inputs.first().is_some_and(String::is_empty);
+            if columns.is_empty() || role.name == INPUT.name && first_input {
                 let guessed = header.guess(role, &taken)?;
-                columns.push(guessed.ok_or_else(|| header.missing(role, None))?);
+                columns.insert(0, guessed.ok_or_else(|| header.missing(role, None))?);
             }
         }
         let time = time.swap_remove(0);

@@ -7,9 +7,9 @@
 
 use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
-use crate::columns::Layout;
+use crate::columns::{Found, Layout};
 use crate::csv::{check_width, delimiter, is_number};
-use crate::{Columns, Error, quoted, unit};
+use crate::{Columns, Conversion, Error, quoted, unit};
 
 /// The names of the columns in use, and which they are in a row without a header.
 const ROLES: [&str; 3] = ["time", "input", "output"];
@@ -28,6 +28,8 @@ pub struct Rows {
     names: [String; 3],
     /// Units of input and output.
     units: [String; 2],
+    /// How input and output are converted to these, where the header has other ones.
+    conversions: [Option<Conversion>; 2],
     /// Seconds in one unit of the time.
     seconds: f64,
     /// The decimal mark seen so far.
@@ -115,6 +117,7 @@ impl Rows {
             at: [0; 3],
             names: Default::default(),
             units: Default::default(),
+            conversions: [None; 2],
             seconds: 1.0,
             mark: None,
             scratch: String::new(),
@@ -131,15 +134,20 @@ impl Rows {
                     });
                 }
             };
-            let (input, output) = (columns.inputs.first(), columns.outputs.first());
-            let named = [columns.time.as_ref(), input, output];
-            for ((name, role), given) in rows.names.iter_mut().zip(ROLES).zip(named) {
-                *name = given.cloned().unwrap_or_else(|| role.to_string());
-            }
-            let unit = |given: Option<&String>| {
-                given.map_or(String::new(), |name| unit::split(name).1.to_string())
+            let named = |names: &'_ [String]| -> Option<String> {
+                names.first().filter(|name| !name.is_empty()).cloned()
             };
-            rows.units = [unit(input), unit(output)];
+            let (input, output) = (named(&columns.inputs), named(&columns.outputs));
+            let unit = |given: &Option<String>| {
+                given
+                    .as_deref()
+                    .map_or(String::new(), |name| unit::split(name).1.to_string())
+            };
+            rows.units = [unit(&input), unit(&output)];
+            let named = [columns.time.clone(), input, output];
+            for ((name, role), given) in rows.names.iter_mut().zip(ROLES).zip(named) {
+                *name = given.unwrap_or_else(|| role.to_string());
+            }
             rows.seconds = columns.time_header().1;
             return Ok((rows, true));
         }
@@ -154,6 +162,8 @@ impl Rows {
         // One of each at least.
         let (input, output) = (inputs.swap_remove(0), outputs.swap_remove(0));
         rows.at = [time.index, input.index, output.index];
+        let conversion = |found: &Found| found.converted.as_ref().map(|(_, by)| *by);
+        rows.conversions = [conversion(&input), conversion(&output)];
         rows.units = [input.unit, output.unit];
         rows.names = [time.header, input.header, output.header];
         rows.seconds = seconds;
@@ -237,6 +247,11 @@ impl Rows {
             }
             // A row that is not whole has wrong cells too.
             self.check_count(found)?;
+        }
+        for (value, conversion) in values[1..].iter_mut().zip(&self.conversions) {
+            if let (Ok(value), Some(conversion)) = (value, conversion) {
+                *value = conversion.apply(*value);
+            }
         }
         let [time, input, output] = values;
         let (time, input) = (time? * self.seconds, input?);

@@ -142,10 +142,22 @@ impl Settings {
                     .into(),
             )
         };
+        // The first one is guessed where only the second is named.
+        let second = match &self.columns.inputs[..] {
+            [first, second] if first.trim().is_empty() => Some(second.as_str().into()),
+            _ => None,
+        };
         let columns = [
             ("time", word(&self.columns.time)),
-            ("input", names(&self.columns.inputs)),
-            ("input_2", None),
+            (
+                "input",
+                names(if second.is_some() {
+                    &[]
+                } else {
+                    &self.columns.inputs
+                }),
+            ),
+            ("input_2", second),
             ("output", names(&self.columns.outputs)),
             ("reference", names(&self.columns.references)),
             ("time_format", word(&self.columns.time_format)),

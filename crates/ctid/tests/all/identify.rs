@@ -489,7 +489,7 @@ fn what_cannot_be_is_refused() {
     );
     bad(
         "nan.csv --method stabilized-oe",
-        &["nan.csv, row 9", "\"u\""],
+        &["nan.csv: column \"u\": 1 of 200 samples", "--resample"],
     );
 }
 

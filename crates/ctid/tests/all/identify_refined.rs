@@ -199,7 +199,7 @@ fn what_cannot_be_is_refused() {
     );
     place.refuses(
         "identify tour.csv --columns t,u+r,y --method fcloe",
-        &["two inputs", "srivc and rivc"],
+        &["several inputs", "srivc and rivc"],
     );
     place.refuses(
         "identify tour.csv tour.csv --model tour.toml --method srivc",

@@ -333,7 +333,7 @@ fn a_header_that_comes_again_in_other_units_than_the_model_names_ends_it() {
         format!("{MODEL}[columns]\ntime = \"t [s]\"\ninput = \"u [V]\"\noutput = \"y [cm]\"\n"),
     );
     for header in [
-        "t [s],r [cm],u [V],y [mm]",
+        "t [s],r [cm],u [V],y [bar]",
         "t [parsec],r [cm],u [V],y [cm]",
     ] {
         let outcome = fed(

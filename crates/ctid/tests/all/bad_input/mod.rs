@@ -57,6 +57,20 @@ fn record_refused(content: impl AsRef<[u8]>, says: &[&str]) {
     both_refuse(&place, "tour.csv bad.csv --model tour.toml", says);
 }
 
+/// A record is refused with these words where it is to be read strictly.
+fn record_refused_strictly(content: impl AsRef<[u8]>, says: &[&str]) {
+    let place = place();
+    place.write("bad.csv", content);
+    both_refuse(&place, "bad.csv --model tour.toml --strict", says);
+    both_refuse(
+        &place,
+        "tour.csv --model tour.toml --test bad.csv --strict",
+        says,
+    );
+    both_refuse(&place, "tour.csv bad.csv --model tour.toml --strict", says);
+    place.succeeds("compare bad.csv --model tour.toml");
+}
+
 /// A model file is refused with these words, by `compare`, `diagnose`, `add` and `remove`.
 fn model_refused(content: impl AsRef<[u8]>, says: &[&str]) {
     let place = place();

@@ -5,10 +5,10 @@ use super::{Rows, both_refuse, model_with, place, record_refused};
 #[test]
 fn a_unit_that_contradicts_the_model() {
     record_refused(
-        Rows::new().with(1, 2, "y [m]").text(),
+        Rows::new().with(1, 2, "y [bar]").text(),
         &[
-            "bad.csv, row 1, column \"y [m]\"",
-            "the file says m but the model says cm",
+            "bad.csv, row 1, column \"y [bar]\"",
+            "the file says bar but the model says cm",
             "convert the column",
         ],
     );
@@ -45,7 +45,7 @@ fn records_in_different_units() {
             &[
                 "bad.csv: column \"u\" is in mV",
                 "tour.csv has it in V",
-                "convert one of them",
+                "name under [columns] the one to which both are converted",
             ],
         );
     }
@@ -71,14 +71,10 @@ fn a_time_in_no_unit_of_time() {
 fn a_time_in_another_unit_than_the_model_says() {
     let place = place();
     place.write("bad.csv", Rows::new().with(1, 0, "t [min]").text());
-    both_refuse(
-        &place,
-        "bad.csv --model tour.toml",
-        &[
-            "bad.csv, row 1, column \"t [min]\": the file says min but the model says s",
-            "or write \"t [min]\" under [columns]: us, ms, s, min, h and d are understood",
-        ],
-    );
+    // The file knows best: its times are minutes, whatever the model calls the column.
+    let found = place.result("compare bad.csv --model tour.toml");
+    let time = found["records"][0]["time"].as_array().unwrap();
+    assert_eq!(time[1].as_f64().unwrap() - time[0].as_f64().unwrap(), 120.0);
 }
 
 #[test]

@@ -137,12 +137,13 @@ fn columns_that_the_option_has_to_name() {
         let rows = Rows::new().with(1, 0, names[0]).with(1, 1, names[1]);
         rows.with(1, 2, names[2]).text()
     };
+    place.write("volts.csv", header(["t", "u [V]", "y"]));
     place.write("minutes.csv", header(["t [min]", "u", "y"]));
     place.write("inputs.csv", header(["t", "u_1", "u_2"]));
     for (words, says) in [
         (
-            "minutes.csv --columns t[s],u,y",
-            "the file says min but --columns says s; write \"t [min]\" in --columns TIME,INPUT,OUTPUT",
+            "volts.csv --columns t,u[m],y",
+            "the file says V but --columns says m; write \"u [V]\" in --columns TIME,INPUT,OUTPUT",
         ),
         ("inputs.csv", "say which with --columns TIME,INPUT,OUTPUT"),
         ("minutes.csv --columns t,U,z", "--columns TIME,INPUT,OUTPUT"),

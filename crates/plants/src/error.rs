@@ -38,6 +38,16 @@ pub enum Error {
         /// What the plant has instead.
         why: &'static str,
     },
+    /// A hydraulic effect for an output that is no level.
+    #[error(
+        "{effect} is an effect of tanks, and the output is in {unit}, which is no level: take a general effect (`ctid effects --model MODEL.toml` lists them), or, where the output is a level, give its column a unit of length, of volume or %"
+    )]
+    NotHydraulic {
+        /// The effect.
+        effect: &'static str,
+        /// Unit of the output.
+        unit: String,
+    },
     /// The effect is one of a pump that does not run.
     #[error(
         "effect `{effect}` cannot act at pump_2, which is off: name the column of its command as input_2 under [columns]"

@@ -31,6 +31,7 @@
 mod actuator;
 pub mod controller;
 mod damped;
+mod domain;
 pub mod effects;
 mod error;
 mod inflow;
@@ -47,6 +48,7 @@ mod term;
 mod unit;
 mod vessels;
 
+pub use domain::Domain;
 pub use effects::{CATALOGUE, EffectInfo, Place};
 pub use error::Error;
 pub use law::{Balance, Law, Rim, Side};

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Error, ParameterInfo, Plant, Term,
+    Domain, Error, ParameterInfo, Plant, Term,
     effects::{self, EffectInfo, Place},
     plant::Outlet,
 };
@@ -259,10 +259,12 @@ pub struct Structure {
     pub(crate) terms: Vec<Term>,
     /// What the data visit.
     pub scales: Scales,
+    /// Which effects are candidates. An effect that is on already stays, whatever the domain.
+    pub domain: Domain,
 }
 
 impl Structure {
-    /// A plant without effects.
+    /// A plant without effects, in the domain of an output whose unit is not known.
     #[must_use]
     pub fn new(plant: Plant, known: Known, scales: Scales) -> Self {
         let mut structure = Self {
@@ -272,6 +274,7 @@ impl Structure {
             widened: Vec::new(),
             terms: Vec::new(),
             scales,
+            domain: Domain::of(plant, ""),
         };
         let scales = &mut structure.scales;
         scales.measured = structure.known.measured.unwrap_or(plant.vessels() - 1);
@@ -353,11 +356,12 @@ impl Structure {
         without
     }
 
-    /// Every effect of the catalogue that may act on this plant and is not on, at every place it may take.
+    /// Every effect of the catalogue that the domain offers, that may act on this plant and is not on, at every place it may take.
     #[must_use]
     pub fn candidates(&self) -> Vec<Placed> {
         effects::CATALOGUE
             .iter()
+            .filter(|effect| self.domain.offers(effect))
             .filter(|effect| self.effects.iter().all(|on| on.effect.id != effect.id))
             .flat_map(|&effect| {
                 effect

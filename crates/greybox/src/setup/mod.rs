@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_signals::{Channel, Hold, Record};
 use plants::{
-    Command, MAX_VESSELS, Place, Placed, Scales, Structure, controller::Controller, deciles,
+    Command, Domain, MAX_VESSELS, Place, Placed, Scales, Structure, controller::Controller, deciles,
 };
 
 pub use self::{
@@ -260,7 +260,7 @@ impl<'a> Setup<'a> {
         self.feedback.as_ref().map_or(&[], |f| &f.replays)
     }
 
-    /// A setup from records alone: the scales are taken from them.
+    /// A setup from records alone: the scales and the domain are taken from them.
     ///
     /// # Errors
     /// As [`Setup::new`].
@@ -273,6 +273,9 @@ impl<'a> Setup<'a> {
     ) -> Result<Self, Error> {
         let scales = scales_of(records, known.input_range).ok_or(Error::NoRecord)?;
         let mut structure = Structure::new(plant, known, scales);
+        if let Some(output) = records.first().and_then(|record| record.outputs.first()) {
+            structure.domain = Domain::of(plant, &output.unit);
+        }
         for &effect in effects {
             structure = structure.with(effect)?;
         }

@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Vessel,
     by_clock: false,
     physics: "The vessel widens or narrows with the level, as a cone does.",
+    general: None,
     equation: "S(H) = S (1 + c (H - H_op)/H_op)^2",
     applies: any_plant,
     parameters,

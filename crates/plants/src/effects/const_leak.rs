@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Vessel,
     by_clock: false,
     physics: "A constant flow leaves the vessel beside the outlet: a leak, or a consumer that nobody recorded.",
+    general: Some("a constant unknown load acts on the process"),
     equation: "S dH/dt = ... - q0",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Vessel,
     by_clock: false,
     physics: "Another body of water pushes back: a side tank fills and empties with an only tank; of two tanks the outflow of the upper one feels the lower level.",
+    general: None,
     equation: "one tank: S_b dH_b/dt = c (H - H_b), S dH/dt = ... - c (H - H_b), S_b = share S, c = S_b/T_b; two tanks: the head of the upper outflow is max(H_1 - b H_2, 0)",
     applies: first_vessel,
     parameters,

@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Vessel,
     by_clock: false,
     physics: "A part of the outflow is laminar and grows in proportion to the level, as through a long thin pipe.",
+    general: None,
     equation: "Q_out = a H + b sqrt(H)",
     applies: torricelli_plant,
     parameters,

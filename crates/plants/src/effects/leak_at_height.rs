@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Vessel,
     by_clock: false,
     physics: "Water leaves through a hole in the wall, or over a side outlet, once the level stands above it.",
+    general: None,
     equation: "S dH/dt = ... - c sqrt(max(H - h_leak, 0))",
     applies: any_plant,
     parameters,

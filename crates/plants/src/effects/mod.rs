@@ -1,7 +1,7 @@
 //! The catalogue: one file per effect. To add an effect, write its file and name it in the list below,
 //! at its position in the chain.
 
-use crate::{Law, ParameterInfo, Plant, Scalar, Site};
+use crate::{Domain, Law, ParameterInfo, Plant, Scalar, Site};
 
 /// Where in the chain an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,8 +35,12 @@ pub struct EffectInfo {
     pub place: Place,
     /// It follows the time alone, whatever the command and the level do. Such effects fit courses of any origin.
     pub by_clock: bool,
-    /// Its physics in a sentence.
+    /// Its physics in a sentence, for tanks.
     pub physics: &'static str,
+    /// What it is outside hydraulics, as a clause; `None` for an effect that is offered in hydraulics only.
+    ///
+    /// A drift and a step of the outflow coefficient are general: every linear plant has the coefficient, as its loss `1/tau`.
+    pub general: Option<&'static str>,
     /// Its equation.
     pub equation: &'static str,
     /// The plants, and their vessels (or pumps), it makes sense in; the sensor asks for vessel zero.
@@ -56,6 +60,15 @@ impl EffectInfo {
     #[must_use]
     pub fn find(id: &str) -> Option<&'static Self> {
         CATALOGUE.iter().copied().find(|effect| effect.id == id)
+    }
+
+    /// What it is, in the words of a domain: the sentence of its physics, or the general clause.
+    #[must_use]
+    pub fn in_words(&self, domain: Domain) -> &'static str {
+        match domain {
+            Domain::Hydraulic => self.physics,
+            Domain::General => self.general.unwrap_or(self.physics),
+        }
     }
 
     /// The bound of its size is one of physics, not of what is plausible: a limit or a rim beyond all that was visited does nothing, a

@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Vessel,
     by_clock: false,
     physics: "The vessel overflows at its rim; what spills is lost, or a part of it reaches the next tank.",
+    general: None,
     equation: "H <= h_rim; at the rim the spill is the net inflow, and a fraction of it runs into the next tank",
     applies: any_plant,
     parameters,

@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Vessel,
     by_clock: true,
     physics: "A flow that nobody measures comes and goes with a period: a consumer that switches, a pump that pulsates.",
+    general: Some("a periodic unknown load acts on the process"),
     equation: "S dH/dt = ... + A sin(2 pi t/P + phi) = ... + s sin(2 pi t/P) + c cos(2 pi t/P); A = sqrt(s^2 + c^2), phi = atan2(c, s)",
     applies: any_plant,
     parameters,

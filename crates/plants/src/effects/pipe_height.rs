@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Vessel,
     by_clock: false,
     physics: "The outlet pipe leads down: its height adds to the level that drives the outflow.",
+    general: None,
     equation: "Q_out = alpha sqrt(H + h_pipe)",
     applies: measured_vessel,
     parameters,

@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Actuator,
     by_clock: false,
     physics: "The inflow follows the command with a time constant: the pump has to spin up.",
+    general: Some("the actuator lags behind the input"),
     equation: "T dq/dt = k u - q",
     applies: any_plant,
     parameters,

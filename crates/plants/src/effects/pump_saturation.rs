@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Actuator,
     by_clock: false,
     physics: "The pump delivers no more above a limit of the command, which lies below the largest recorded one.",
+    general: Some("the actuator saturates"),
     equation: "q = k min(u, u_max)",
     applies: any_plant,
     parameters,

@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Sensor,
     by_clock: true,
     physics: "The zero of the sensor drifts over the record, with temperature or with dirt.",
+    general: Some("the zero of the sensor drifts"),
     equation: "y = H + D t/T_rec",
     applies: any_plant,
     parameters,

@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Sensor,
     by_clock: false,
     physics: "The reading follows the level with a time constant: a filter in the transmitter, or a stilling tube.",
+    general: Some("the sensor lags behind what it measures"),
     equation: "T dy/dt = H - y",
     applies: any_plant,
     parameters,

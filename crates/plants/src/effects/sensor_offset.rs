@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Sensor,
     by_clock: false,
     physics: "The reading is shifted: the sensor's zero is not the level of the outlet.",
+    general: Some("the zero of the sensor is shifted"),
     equation: "y = H + b",
     applies: any_plant,
     parameters,

@@ -8,6 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     place: Place::Actuator,
     by_clock: false,
     physics: "The inflow follows the command after a dead time: the water takes time to run through the pipe.",
+    general: Some("a dead time passes before the input acts"),
     equation: "q(t) = k u(t - delay)",
     applies: any_plant,
     parameters,

@@ -2,6 +2,7 @@
 //! printed or plotted is derived from them.
 
 use ct_signals::{ArModel, Clock};
+use plants::{Domain, Plant};
 use serde::Serialize;
 
 use crate::{MendedGaps, Unknown};
@@ -374,6 +375,12 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// The domain of the model, which says what things are called.
+    #[must_use]
+    pub fn domain(&self) -> Domain {
+        domain_of(&self.plant, &self.output_unit)
+    }
+
     /// Adds what is known of the loop, and what there is to say of it.
     pub(crate) fn speak_of_the_loop(&mut self, known: Option<ControlLoop>) {
         if let Some(known) = &known {
@@ -381,4 +388,10 @@ impl Diagnosis {
         }
         self.control_loop = known;
     }
+}
+
+/// The domain of a plant by its name and of its output's unit.
+pub(crate) fn domain_of(plant: &str, output_unit: &str) -> Domain {
+    let plant: Result<Plant, _> = plant.parse();
+    plant.map_or(Domain::Hydraulic, |plant| Domain::of(plant, output_unit))
 }

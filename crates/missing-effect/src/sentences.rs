@@ -1,7 +1,7 @@
 //! The findings in words.
 
 use ct_signals::{Clock, Gaps, duration};
-use plants::Placed;
+use plants::{Domain, EffectInfo, Placed};
 
 use crate::{
     Acceptance, Diagnosis, LONGEST_HOLD, MendedGaps, Parameter, Problem, Rankings, Step, Unknown,
@@ -28,6 +28,12 @@ fn list(names: &[String], last_word: &str) -> String {
         [one] => one.clone(),
         [most @ .., last] => format!("{} {last_word} {last}", most.join(", ")),
     }
+}
+
+/// What an effect is outside hydraulics; `None` within, where its name says it, and for a term of the user's own.
+fn in_general(effect: &str, domain: Domain) -> Option<&'static str> {
+    let effect = EffectInfo::find(effect).filter(|_| domain == Domain::General)?;
+    effect.general
 }
 
 /// What is left in the residual of a step, as the end of a sentence.
@@ -73,7 +79,8 @@ fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
             }
         ),
         Remains::Level => format!(
-            "{residual} follows the level, which noise does not: the balance lacks {effect}"
+            "{residual} follows the {}, which noise does not: the balance lacks {effect}",
+            diagnosis.domain().level_words("level")
         ),
         Remains::Slow(wander, process) => format!(
             "{residual} wanders as slowly as the process, or more: its correlation lasts {}, the slowest time constant is {}; it may be a disturbance or {effect}",
@@ -241,10 +248,8 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
         return Vec::new();
     };
     let mut said = Vec::new();
-    let shaped = diagnosis
-        .unknown
-        .as_ref()
-        .map(|unknown| of_unknown(unknown, &diagnosis.clock));
+    let unknown = diagnosis.unknown.as_ref();
+    let shaped = unknown.map(|unknown| of_unknown(unknown, &diagnosis.clock, diagnosis.domain()));
     let held_out = |step: &Step| {
         step.rmse_test.map_or(String::new(), |e| {
             format!(", {e:.3} {unit} on held-out data")
@@ -314,6 +319,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
 
 /// A sentence for each effect of the answer: its group, its place and its size.
 fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
+    let domain = diagnosis.domain();
     let added = diagnosis.effects.iter().zip(&diagnosis.groups);
     added
         .zip(diagnosis.steps.iter().skip(1))
@@ -327,29 +333,40 @@ fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
             let size = size_of(effect, last);
             let place = match diagnosis.places.get(k).map(Vec::as_slice) {
                 Some([best, other, ..]) if other.relative_likelihood > SAME_PLACE_LIKELIHOOD => {
+                    let (which, kind) = domain.vessel_words(&best.place);
                     format!(
-                        " (in the {} tank or the {} one: the place cannot be told)",
-                        best.place, other.place
+                        " (in the {which} {kind} or the {} one: the place cannot be told)",
+                        domain.vessel_words(&other.place).0
                     )
                 }
                 _ => step
                     .place
                     .as_ref()
-                    .map_or(String::new(), |place| format!(" in the {place} tank")),
+                    .map_or(String::new(), |place| {
+                        let (which, kind) = domain.vessel_words(place);
+                        format!(" in the {which} {kind}")
+                    }),
             };
             let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
                 " In doubt: its size stands at a bound of what is plausible, so it describes the data rather than explains them."
             } else {
                 ""
             };
+            let named = |effect: &String| match in_general(effect, domain) {
+                Some(clause) => format!("{effect} ({clause})"),
+                None => effect.clone(),
+            };
             if group.len() > 1 {
+                let group_named: Vec<String> = group.iter().map(named).collect();
                 format!(
                     "{it_is} {}: these data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
-                    list(group, "or"),
+                    list(&group_named, "or"),
                     next_experiment(group, diagnosis.effects.len())
                 )
             } else {
-                format!("{it_is} {effect}{place}{size}.{doubt}")
+                let clause = in_general(effect, domain);
+                let clause = clause.map_or(String::new(), |clause| format!(": {clause}"));
+                format!("{it_is} {effect}{place}{size}{clause}.{doubt}")
             }
         })
         .collect()
@@ -407,12 +424,16 @@ fn next_experiment(group: &[String], added: usize) -> String {
 }
 
 /// Where what is missing acts, on what it depends, and what it looks like.
-fn of_unknown(unknown: &Unknown, clock: &Clock) -> String {
+fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> String {
     let place = |name: &str| match name {
         "actuator" => "at the actuator".to_string(),
         "sensor" => "at the sensor".to_string(),
+        "vessel" if domain == Domain::General => "in the balance".to_string(),
         "vessel" => "in the vessel's balance".to_string(),
-        which => format!("in the balance of the {which} tank"),
+        which => {
+            let (which, kind) = domain.vessel_words(which);
+            format!("in the balance of the {which} {kind}")
+        }
     };
     let mut said = format!("What is missing acts {}", place(&unknown.place));
     let others: Vec<String> = unknown
@@ -442,9 +463,10 @@ fn of_unknown(unknown: &Unknown, clock: &Clock) -> String {
     } else {
         let variable = match (unknown.variable, unknown.place.as_str()) {
             ("input", _) => "the command",
+            ("rate", _) if domain == Domain::General => "the rate of change",
             ("rate", _) => "the net inflow",
             (_, "sensor") => "the reading",
-            _ => "the level",
+            _ => &format!("the {}", domain.level_words("level")),
         };
         said += &format!(" and depends on {variable}");
         if let Some(share) = unknown.shares.first() {

@@ -207,6 +207,7 @@ pub(crate) fn report(
         output_unit: &record.outputs[0].unit,
         input_unit: &record.inputs[0].unit,
         clock: &Clock::of(setup.records),
+        domain: setup.structure.domain,
     });
     let held_out = hold_out(node, test)?;
     let mut errors = std_errors(node)?;

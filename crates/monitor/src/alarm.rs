@@ -1,7 +1,7 @@
 //! An alarm, and its sentence.
 
 use missing_effect::numbers::significant;
-use plants::Structure;
+use plants::{Domain, Structure};
 use serde::{Deserialize, Serialize};
 
 use crate::isolate::Suspect;
@@ -147,7 +147,7 @@ pub(crate) fn alarm(
                 .map(str::to_string),
         });
     }
-    alarm.sentence = sentence(&alarm, raised);
+    alarm.sentence = sentence(&alarm, raised, structure.domain);
     alarm
 }
 
@@ -159,7 +159,7 @@ pub fn instant(time: f64) -> String {
     if time.abs() < 1e12 { rounded } else { time }.to_string()
 }
 
-fn sentence(alarm: &Alarm, raised: f64) -> String {
+fn sentence(alarm: &Alarm, raised: f64, domain: Domain) -> String {
     let (Some(since), Some(evidence), Some(size)) = (alarm.since, alarm.evidence, &alarm.size)
     else {
         return format!(
@@ -174,10 +174,10 @@ fn sentence(alarm: &Alarm, raised: f64) -> String {
     } else {
         format!(" {}", size.unit)
     };
-    let vessel = size
-        .vessel
-        .as_ref()
-        .map_or(String::new(), |vessel| format!(", {vessel} tank"));
+    let vessel = size.vessel.as_ref().map_or(String::new(), |vessel| {
+        let (which, kind) = domain.vessel_words(vessel);
+        format!(", {which} {kind}")
+    });
     let against = alarm.next.as_ref().map_or(String::new(), |next| {
         format!(
             ", {:.1} against {:.1} for {}",

@@ -20,7 +20,7 @@ mod tests;
 use std::time::Instant;
 
 use ct_signals::ArModel;
-use plants::{EffectInfo, Placed};
+use plants::{Domain, EffectInfo, Placed};
 
 pub use limits::{Bounds, Limits, Refused};
 pub use plan::{Candidate, Design, Power, Prospect, Reach, Rival, SecondSensor, Sequence, Wider};
@@ -104,6 +104,13 @@ pub fn design(
             }
             .into());
         }
+    }
+    let unit = problem
+        .records
+        .first()
+        .map(|record| &record.outputs[0].unit);
+    for Candidacy { effect, .. } in between {
+        Domain::check(effect, problem.plant, unit.map_or("", |unit| unit))?;
     }
     // What is wrong with the limits is said before anything is computed, as far as it can be.
     let looped = problem.controller.is_some() && options.simulate_loop;
@@ -271,6 +278,9 @@ fn rival(fitted: &Fitted, i: usize) -> Rival {
         at_the_edge: node.at_the_edge(placed),
         rmse: node.fit.rmse,
         bic_gain: node.gain_over(&fitted.base),
-        confirm: placed.effect.confirm.to_string(),
+        confirm: match node.setup.structure.domain {
+            Domain::Hydraulic => placed.effect.confirm.to_string(),
+            Domain::General => String::new(),
+        },
     }
 }

@@ -1,9 +1,10 @@
 //! The result of a design: plain structs, written as JSON as they stand; everything that is printed is derived from them.
 
+use plants::Domain;
 use serde::Serialize;
 
 use super::{limits::Bounds, sequences::Kind};
-use crate::{Effort, Parameter};
+use crate::{Effort, Parameter, diagnosis::domain_of};
 
 /// One of the two effects that are to be told apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -20,7 +21,7 @@ pub struct Rival {
     pub rmse: f64,
     /// By how much it lowers the criterion of the believed model.
     pub bic_gain: f64,
-    /// How a person confirms it at the plant.
+    /// How a person confirms it at the plant; empty outside hydraulics.
     pub confirm: String,
 }
 
@@ -173,6 +174,12 @@ pub struct Design {
 }
 
 impl Design {
+    /// The domain of the model, which says what things are called.
+    #[must_use]
+    pub fn domain(&self) -> Domain {
+        domain_of(&self.plant, &self.output_unit)
+    }
+
     /// No experiment tells the two apart: none is worth playing.
     #[must_use]
     pub fn twins(&self) -> bool {

@@ -1,5 +1,7 @@
 //! The design in words.
 
+use plants::Domain;
+
 use super::{
     plan::{Candidate, Design, Power, Prospect, Rival},
     sequences::Kind,
@@ -14,18 +16,21 @@ fn with_unit(number: &str, unit: &str) -> String {
 }
 
 /// An effect, with the tank where there are two, and its size.
-fn sized(rival: &Rival) -> String {
+fn sized(rival: &Rival, domain: Domain) -> String {
     let size = rival.size.as_ref().map_or(String::new(), |size| {
         let name = size.name.rsplit('.').next().unwrap_or_default();
         format!(" ({name} = {})", with_error(size))
     });
-    format!("{}{size}", named(rival))
+    format!("{}{size}", named(rival, domain))
 }
 
 /// An effect, with the tank where there are two.
-pub(super) fn named(rival: &Rival) -> String {
+pub(super) fn named(rival: &Rival, domain: Domain) -> String {
     match &rival.place {
-        Some(place) => format!("{} in the {place} tank", rival.effect),
+        Some(place) => {
+            let (which, kind) = domain.vessel_words(place);
+            format!("{} in the {which} {kind}", rival.effect)
+        }
         None => rival.effect.clone(),
     }
 }
@@ -95,6 +100,7 @@ pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
 
 /// What the records say already.
 fn so_far(design: &Design) -> Vec<String> {
+    let domain = design.domain();
     let [a, b] = &design.between;
     let mut said = Vec::new();
     let ahead = significant(design.bic_ahead.abs(), 2);
@@ -106,20 +112,20 @@ fn so_far(design: &Design) -> Vec<String> {
     said.push(if design.bic_ahead.abs() > GROUP_MARGIN {
         format!(
             "The records that there are decide for {}: the criterion of {} is higher by {ahead}.",
-            sized(first),
-            sized(second)
+            sized(first, domain),
+            sized(second, domain)
         )
     } else if design.bic_ahead.abs() < TWIN {
         format!(
             "The records that there are leave it open: {} and {} fit alike.",
-            sized(first),
-            sized(second)
+            sized(first, domain),
+            sized(second, domain)
         )
     } else {
         format!(
             "The records that there are leave it open: {} fits best, the criterion of {} is higher by {ahead} alone.",
-            sized(first),
-            sized(second)
+            sized(first, domain),
+            sized(second, domain)
         )
     });
     for rival in [a, b] {
@@ -136,7 +142,7 @@ fn so_far(design: &Design) -> Vec<String> {
             };
             said.push(format!(
                 "They do not call for {}: {called}{edge}. What is hardly there is hardly told from anything.",
-                named(rival)
+                named(rival, domain)
             ));
         }
     }
@@ -147,6 +153,7 @@ fn so_far(design: &Design) -> Vec<String> {
 pub(super) fn of(design: &Design) -> Vec<String> {
     let mut said = so_far(design);
     let unit = &design.experiment.unit;
+    let domain = design.domain();
     let [a, b] = &design.between;
     let Some(best) = design.candidates.first() else {
         return said;
@@ -166,8 +173,8 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             },
             design.candidates.len(),
             significant(best.power.power, 1),
-            if best.power.if_true[0] < best.power.if_true[1] { named(b) } else { named(a) },
-            if best.power.if_true[0] < best.power.if_true[1] { named(a) } else { named(b) },
+            if best.power.if_true[0] < best.power.if_true[1] { named(b, domain) } else { named(a, domain) },
+            if best.power.if_true[0] < best.power.if_true[1] { named(a, domain) } else { named(b, domain) },
         ));
     } else {
         let first = design.experiment.values.first().copied();
@@ -184,7 +191,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             .map(|reach| {
                 format!(
                     "{} moves between {} and {}",
-                    reach.level,
+                    domain.level_words(&reach.level),
                     significant(reach.low, 3),
                     with_unit(&significant(reach.high, 3), &design.output_unit)
                 )
@@ -243,13 +250,13 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     if let Some(second) = &design.second_sensor {
         said.push(format!(
             "With {} measured too, with the same noise: in records like those that there are {} (instead of {}), in the best experiment {}.",
-            second.level,
+            domain.level_words(&second.level),
             with_power(&second.existing_with),
             with_power(&second.existing_without),
             with_power(&second.best_with)
         ));
     }
-    if design.prospect != Prospect::Decides {
+    if design.prospect != Prospect::Decides && domain == Domain::Hydraulic {
         said.push("Without an experiment, at the plant:".to_string());
         said.extend([a, b].map(|rival| format!("{}: {}", rival.effect, rival.confirm)));
     }

@@ -7,6 +7,7 @@ mod expected;
 mod words;
 
 use ct_signals::{ArModel, Clock};
+use plants::Domain;
 
 use self::expected::{Expected, FACTOR_OF_A_BAND, beyond_chance, transform};
 use crate::{Bin, Failures};
@@ -33,6 +34,7 @@ pub(crate) struct Located<'a> {
     pub output_unit: &'a str,
     pub input_unit: &'a str,
     pub clock: &'a Clock,
+    pub domain: Domain,
 }
 
 fn bin(from: f64, to: f64, values: impl Iterator<Item = f64>, expected: &Expected) -> Bin {

@@ -29,6 +29,7 @@ fn located(noise: &ArModel, records: &[(&[f64], &[f64], &[f64])]) -> Failures {
         series: &series,
         noise,
         output_unit: "cm",
+        domain: plants::Domain::Hydraulic,
         input_unit: "V",
         clock: &ct_signals::Clock::of([]),
     })

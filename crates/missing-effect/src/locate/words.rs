@@ -8,6 +8,7 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
     let present = residual.iter().filter(|r| !r.is_nan());
     let total: f64 = present.map(|r| r * r).sum();
     let (y, u) = (located.output_unit, located.input_unit);
+    let level = located.domain.level_words("level");
     let share = |bin: &Bin| bin.rms * bin.rms * bin.count as f64 / total.max(f64::MIN_POSITIVE);
     let mut found: Vec<(f64, String)> = Vec::new();
     // A bin stands out where it holds more of the error than of the samples.
@@ -41,7 +42,7 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
         record + &located.clock.span(bin.from, bin.to)
     });
     worst(&failures.by_level, &|bin| {
-        format!("at levels of {:.3} to {:.3} {y}", bin.from, bin.to)
+        format!("at {level}s of {:.3} to {:.3} {y}", bin.from, bin.to)
     });
     worst(&failures.by_flow, &|bin| {
         format!("at commands of {:.3} to {:.3} {u}", bin.from, bin.to)
@@ -55,7 +56,7 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
         } else {
             "falls"
         };
-        format!("while the level {way}")
+        format!("while the {level} {way}")
     });
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut sentences: Vec<String> = found.into_iter().map(|(_, sentence)| sentence).collect();
@@ -72,10 +73,9 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
         ));
     }
     if sentences.is_empty() {
-        sentences.push(
-            "nowhere in particular: no window, level, flow or direction stands out of the noise"
-                .to_string(),
-        );
+        sentences.push(format!(
+            "nowhere in particular: no window, {level}, flow or direction stands out of the noise"
+        ));
     }
     sentences
 }

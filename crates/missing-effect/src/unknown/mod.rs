@@ -277,8 +277,8 @@ fn report(
         variable: shape.variable.name(),
         variable_unit: label(shape.variable.unit()),
         primitive: nearest(
-            spot.place,
-            shape.variable,
+            structure.domain,
+            (spot.place, shape.variable),
             &term.knots,
             &term.ordinates,
             &shape.information,

@@ -1,7 +1,7 @@
 //! The simple shape that comes nearest to a polyline, and the effects of the catalogue that leave such a shape.
 
 use nalgebra::{DMatrix, DVector};
-use plants::{EffectInfo, Place, Variable};
+use plants::{Domain, EffectInfo, Place, Variable};
 use serde::Serialize;
 
 /// A simple shape explains a polyline where it leaves less than this share of what the polyline tells.
@@ -76,8 +76,8 @@ const FAMILIES: [Family; 8] = [
 /// The nearest simple shape in the metric of the information, which does not see what the plant's own parameters imitate;
 /// `None` where none comes near.
 pub(super) fn nearest(
-    place: Place,
-    variable: Variable,
+    domain: Domain,
+    (place, variable): (Place, Variable),
     knots: &[f64],
     ordinates: &[f64],
     information: &DMatrix<f64>,
@@ -137,12 +137,12 @@ pub(super) fn nearest(
     (left < LEFT * told).then(|| Primitive {
         name: family.name,
         at: family.located.then_some(c),
-        effects: leaves(place, variable, family.name),
+        effects: leaves(domain, (place, variable), family.name),
     })
 }
 
-/// The effects of the catalogue that leave such a shape.
-fn leaves(place: Place, variable: Variable, shape: &str) -> Vec<&'static str> {
+/// The effects that leave such a shape, of those that the domain offers.
+fn leaves(domain: Domain, (place, variable): (Place, Variable), shape: &str) -> Vec<&'static str> {
     let known: &[&'static str] = match (place, variable, shape) {
         (Place::Vessel, Variable::Time, "step") => &["valve_step"],
         (Place::Vessel, Variable::Time, "line") => &["valve_drift"],
@@ -167,7 +167,7 @@ fn leaves(place: Place, variable: Variable, shape: &str) -> Vec<&'static str> {
     known
         .iter()
         .copied()
-        .filter(|id| EffectInfo::find(id).is_some())
+        .filter(|id| EffectInfo::find(id).is_some_and(|effect| domain.offers(effect)))
         .collect()
 }
 
@@ -183,7 +183,21 @@ mod tests {
             .collect();
         let ordinates: Vec<f64> = knots.iter().map(|v| f(*v)).collect();
         let information = DMatrix::identity(13, 13) * 400.0;
-        nearest(Place::Vessel, variable, &knots, &ordinates, &information)
+        nearest(
+            Domain::Hydraulic,
+            (Place::Vessel, variable),
+            &knots,
+            &ordinates,
+            &information,
+        )
+    }
+
+    #[test]
+    fn outside_hydraulics_a_shape_names_general_effects_alone() {
+        let at = |domain, shape| leaves(domain, (Place::Vessel, Variable::Level), shape);
+        assert_eq!(at(Domain::General, "constant"), ["const_leak"]);
+        assert!(at(Domain::General, "threshold").is_empty());
+        assert_eq!(at(Domain::Hydraulic, "threshold").len(), 2);
     }
 
     #[test]
@@ -219,8 +233,8 @@ mod tests {
         let ordinates: Vec<f64> = knots.iter().map(|v| 0.05 * v * v + 3.0 * v - 7.0).collect();
         let information = &project * 400.0;
         let found = nearest(
-            Place::Actuator,
-            Variable::Input,
+            Domain::Hydraulic,
+            (Place::Actuator, Variable::Input),
             &knots,
             &ordinates,
             &information,
@@ -229,8 +243,8 @@ mod tests {
         let line: Vec<f64> = knots.iter().map(|v| 3.0 * v - 7.0).collect();
         assert!(
             nearest(
-                Place::Actuator,
-                Variable::Input,
+                Domain::Hydraulic,
+                (Place::Actuator, Variable::Input),
                 &knots,
                 &line,
                 &information

@@ -1,6 +1,7 @@
 //! What runs is built from plain numbers and the rows that are kept.
 
 use ct_signals::Hold;
+use plants::Domain;
 
 use super::{Core, Running};
 use crate::{
@@ -55,7 +56,8 @@ impl Core {
     pub(super) fn running_from(&self, levels: &[f64], at_rest: f64) -> Option<Running> {
         let learned = self.now.learned.as_ref()?;
         let bank = self.now.bank.as_ref()?;
-        let structure = self.model.structure(learned.scales.clone()).ok()?;
+        let mut structure = self.model.structure(learned.scales.clone()).ok()?;
+        structure.domain = Domain::of(structure.plant, &self.units.output);
         let watch = Watch::new(&structure, learned, self.hold(), levels, at_rest)?;
         let memory = self.settings.memory * learned.time_constant;
         let tracker = self

@@ -2,5 +2,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod dead_time;
+mod domain;
 mod monitor;
 mod play;

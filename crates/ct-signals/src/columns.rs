@@ -213,6 +213,14 @@ struct Header<'a> {
 }
 
 impl Columns {
+    /// The unit that is given for the first output; empty where none is.
+    #[must_use]
+    pub fn output_unit(&self) -> &str {
+        self.outputs
+            .first()
+            .map_or("", |output| unit::split(output).1)
+    }
+
     /// The header of the time as a file that goes with these columns has it, with its unit, and the seconds in that; `t [s]`
     /// where none is named, or its unit is none of the time.
     #[must_use]

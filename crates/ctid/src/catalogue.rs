@@ -1,32 +1,52 @@
 //! `ctid effects`: the catalogue, and what it knows of one effect.
 
-use plants::{CATALOGUE, EffectInfo, ParameterInfo, Place, Placed, Plant};
+use plants::{CATALOGUE, Domain, EffectInfo, ParameterInfo, Place, Placed, Plant};
 
 use crate::look::{Look, Side, table};
-use crate::{Error, model_file, names, numbers, signature};
+use crate::model_file::{self, ModelFile};
+use crate::{Error, names, numbers, signature};
 
 /// The whole catalogue, by place.
 #[must_use]
 pub fn list(look: Look) -> String {
+    listed(Domain::Hydraulic, |_| true, look)
+}
+
+/// The effects that may be added to a model, by place, in the words of its domain.
+#[must_use]
+pub fn list_for(model: &ModelFile, look: Look) -> String {
+    let domain = model.domain();
+    let offered = |effect: &'static EffectInfo| {
+        domain.offers(effect)
+            && effect.sites(model.plant).next().is_some()
+            && model.effects.iter().all(|on| on.effect.id != effect.id)
+    };
+    listed(domain, offered, look)
+}
+
+fn listed(domain: Domain, offered: impl Fn(&'static EffectInfo) -> bool, look: Look) -> String {
     let widest = CATALOGUE.iter().map(|effect| effect.id.len()).max();
     let widest = widest.unwrap_or(0);
     let mut text = String::new();
-    for (place, heading) in [
-        (
-            Place::Actuator,
+    let headings = match domain {
+        Domain::Hydraulic => [
             "actuator: between the command and the inflow",
-        ),
-        (Place::Vessel, "vessel: in its balance"),
-        (Place::Sensor, "sensor: between the level and the reading"),
-    ] {
+            "vessel: in its balance",
+            "sensor: between the level and the reading",
+        ],
+        Domain::General => ["actuator", "process", "sensor"],
+    };
+    let places = [Place::Actuator, Place::Vessel, Place::Sensor];
+    for (place, heading) in places.into_iter().zip(headings) {
         text += &format!("{}\n", look.heading(heading));
-        for effect in CATALOGUE.iter().filter(|effect| effect.place == place) {
+        let here = CATALOGUE.iter().filter(|effect| effect.place == place);
+        for effect in here.filter(|effect| offered(effect)) {
             let first = format!(
                 "  {}{}  ",
                 look.strong(effect.id),
                 " ".repeat(widest - effect.id.len())
             );
-            text += &look.paragraph(&first, effect.physics);
+            text += &look.paragraph(&first, effect.in_words(domain));
         }
         text.push('\n');
     }
@@ -57,6 +77,8 @@ pub fn describe(id: &str, look: Look) -> Result<String, Error> {
             .collect::<Vec<_>>()
             .join(", "),
     );
+    let elsewhere = "not offered for linear plants whose output is no level";
+    text += &entry("no tank", effect.general.unwrap_or(elsewhere));
     text.push('\n');
     text += &parameters(effect, look);
     text.push('\n');

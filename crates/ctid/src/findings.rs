@@ -3,6 +3,7 @@
 use missing_effect::{
     Acceptance, Diagnosis, Effort, GROUP_MARGIN, HeldOutError, PlaceScore, Score,
 };
+use plants::Domain;
 
 use crate::effort::{EffortLevel, limit_text};
 use crate::numbers;
@@ -129,12 +130,12 @@ pub(crate) fn places(diagnosis: &Diagnosis) -> Vec<String> {
     let of_effects = diagnosis.effects.iter().zip(&diagnosis.places);
     of_effects
         .filter(|(_, places)| places.len() > 1)
-        .map(|(effect, places)| format!("{effect}: {}", place_scores(places)))
+        .map(|(effect, places)| format!("{effect}: {}", place_scores(diagnosis.domain(), places)))
         .collect()
 }
 
 /// `upper tank 1.00, lower tank 0.31: cannot be told`.
-pub(crate) fn place_scores(places: &[PlaceScore]) -> String {
+pub(crate) fn place_scores(domain: Domain, places: &[PlaceScore]) -> String {
     let scores: Vec<String> = places
         .iter()
         .map(|score| {
@@ -143,7 +144,7 @@ pub(crate) fn place_scores(places: &[PlaceScore]) -> String {
             } else {
                 format!("{:.2}", score.relative_likelihood)
             };
-            format!("{} {likelihood}", place_name(&score.place))
+            format!("{} {likelihood}", place_name(domain, &score.place))
         })
         .collect();
     // As far apart as effects that are told apart: a difference of BIC of the margin of a group.
@@ -153,15 +154,19 @@ pub(crate) fn place_scores(places: &[PlaceScore]) -> String {
         .filter(|score| score.relative_likelihood >= least)
         .count();
     let finding = match (places.first(), possible) {
-        (Some(best), 1) => format!("it is the {}", place_name(&best.place)),
+        (Some(best), 1) => format!("it is the {}", place_name(domain, &best.place)),
         _ => "cannot be told".to_string(),
     };
     format!("{}: {finding}", scores.join(", "))
 }
 
 /// A vessel or a pump in words.
-fn place_name(place: &str) -> String {
+fn place_name(domain: Domain, place: &str) -> String {
     match place {
+        _ if domain == Domain::General => {
+            let (which, kind) = domain.vessel_words(place);
+            format!("{which} {kind}")
+        }
         "upper" | "lower" => format!("{place} tank"),
         _ if place.starts_with("pump_") => place.replace('_', " "),
         _ => format!("tank {place}"),
@@ -312,7 +317,7 @@ mod tests {
                     relative_likelihood,
                 })
                 .collect();
-            place_scores(&scores)
+            place_scores(Domain::Hydraulic, &scores)
         };
         assert_eq!(
             scores(&[("upper", 1.0), ("lower", 0.31)]),

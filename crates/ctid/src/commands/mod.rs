@@ -13,6 +13,7 @@ use self::compare::{Compare, Diagnose};
 use self::identify::Identify;
 use self::tables::Tables;
 use crate::look::Look;
+use crate::model_file;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
 use crate::{Error, catalogue, design, edit, monitor, serve, tour};
@@ -91,6 +92,9 @@ struct Remove {
 struct Effects {
     /// One effect to say all about
     effect: Option<String>,
+    /// List only what may be added to the model of this file
+    #[arg(long, value_name = "M.toml", conflicts_with = "effect")]
+    model: Option<PathBuf>,
 }
 
 /// Does what the command line asks for; what a person reads goes to `out`.
@@ -117,10 +121,14 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Remove(Remove { effect, model })) => {
             say(out, &(edit::remove(&model, &effect)? + "\n"))
         }
-        Some(Command::Effects(Effects { effect: None })) => say(out, &catalogue::list(look)),
         Some(Command::Effects(Effects {
             effect: Some(effect),
+            ..
         })) => say(out, &catalogue::describe(&effect, look)?),
+        Some(Command::Effects(Effects {
+            model: Some(model), ..
+        })) => say(out, &catalogue::list_for(&model_file::read(&model)?, look)),
+        Some(Command::Effects(_)) => say(out, &catalogue::list(look)),
         Some(Command::Design(arguments)) => {
             let (proposal, outputs) = arguments.run()?;
             let text = design::text::design(&proposal.design, look);

@@ -75,7 +75,7 @@ fn experiments(design: &Design, look: Look) -> String {
         "experiment",
         "range",
         "held for",
-        "level",
+        design.domain().level_words("level"),
         "power",
         "decides",
     ];
@@ -99,7 +99,7 @@ fn experiments(design: &Design, look: Look) -> String {
     if more > 0 {
         text += &format!("  {}\n", look.faint(format!("and {more} more")));
     }
-    let note = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to the levels of the records)";
+    let note = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to what the records visited)";
     text += &look.faint(look.paragraph("  ", note).trim_end());
     text + "\n\n"
 }

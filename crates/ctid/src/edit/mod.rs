@@ -6,7 +6,7 @@ mod layout;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use plants::{Fitted, Place, Placed, Term};
+use plants::{Domain, Fitted, Place, Placed, Term};
 use toml_edit::{Array, DocumentMut, Item, Table, value};
 
 pub(crate) use self::layout::document;
@@ -145,6 +145,8 @@ pub fn with_effect(
             effect.id
         )));
     }
+    Domain::check(effect, model.plant, model.columns.output_unit())
+        .map_err(|error| refuse(error.to_string()))?;
     let vessel = place
         .map(|word| model_file::vessel(model.plant, effect, word).map_err(&refuse))
         .transpose()?;

@@ -33,7 +33,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ct_signals::{Columns, Hold, read_file};
-use plants::{Known, Placed, Plant, Scales, Structure, Term};
+use plants::{Domain, Known, Placed, Plant, Scales, Structure, Term};
 
 use crate::Error;
 
@@ -82,6 +82,12 @@ pub struct OwnTerm {
 }
 
 impl ModelFile {
+    /// The domain of the model, as far as its own text says the output's unit.
+    #[must_use]
+    pub fn domain(&self) -> Domain {
+        Domain::of(self.plant, self.columns.output_unit())
+    }
+
     /// The plant with its effects, over the ranges that the data visit.
     ///
     /// # Errors

@@ -66,7 +66,7 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
             };
             let places = match diagnosis.places.get(k).map(Vec::as_slice) {
                 Some(places @ [_, _, ..]) => {
-                    let scores = escape(&findings::place_scores(places));
+                    let scores = escape(&findings::place_scores(diagnosis.domain(), places));
                     format!("; where it acts, with relative likelihood: {scores}")
                 }
                 _ => String::new(),

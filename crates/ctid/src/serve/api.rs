@@ -11,6 +11,7 @@ use axum::response::Response;
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use missing_effect::design::Limits;
+use plants::{Domain, EffectInfo};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
@@ -279,6 +280,11 @@ async fn effect(
             (Way::Keep, Some(unknown)) => Some(TermFile::from(unknown)),
             _ => None,
         };
+        if let (Way::Add, Ok(model), Some(info)) = (way, session.model(), EffectInfo::find(&effect))
+        {
+            Domain::check(info, model.plant, session.output_unit(&model))
+                .map_err(|error| Refusal::input(error.to_string()))?;
+        }
         session.change(|file, text| match (way, &shape) {
             (Way::Keep, Some(shape)) => edit::with_term(file, text, &effect, "the shape", shape),
             (Way::Remove, _) => edit::without_effect(file, text, &effect),

@@ -10,6 +10,7 @@ use axum::body::Bytes;
 use ct_signals::{Columns, ReadOptions};
 use missing_effect::design::Design;
 use missing_effect::{Diagnosis, Progress};
+use plants::Domain;
 
 use super::guard::{LARGEST_BODY, Refusal};
 use super::held::of_diagnosis;
@@ -225,6 +226,17 @@ impl Session {
     /// The model as it stands.
     pub(super) fn model(&self) -> Result<ModelFile, Error> {
         model_file::parse(&self.model_name(), &self.text)
+    }
+
+    /// The unit of a model's output: that of the first record that can be read, else that of the model's columns.
+    pub(super) fn output_unit<'a>(&'a self, model: &'a ModelFile) -> &'a str {
+        let mut read = self.records.iter().filter_map(Upload::as_read);
+        let output = read.next().and_then(|record| record.outputs.first());
+        output.map_or(model.columns.output_unit(), |output| &output.unit)
+    }
+
+    pub(super) fn domain(&self, model: &ModelFile) -> Domain {
+        Domain::of(model.plant, self.output_unit(model))
     }
 
     /// Columns and hold as the model names them; what can be guessed where there is no model yet.

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use ct_signals::{Columns, Record};
 use missing_effect::numbers;
-use plants::{CATALOGUE, Outlet, Placed, Plant};
+use plants::{CATALOGUE, Domain, Outlet, Placed, Plant};
 use serde_json::{Value, json};
 
 use super::session::{Fitted, Found, Kind, Session, lock, same};
@@ -94,6 +94,7 @@ pub(super) fn state(session: &mut Session) -> Value {
         "model_error": error,
         "settings": Settings::of(&session.text),
         "effects": words::effects(session),
+        "offered": model.as_ref().map_or(Vec::new(), |model| sites(model.plant, session.domain(model))),
         "waiting": model.as_ref().map_or(Vec::new(), words::waiting),
         "records": records,
         "warnings": warnings,
@@ -209,7 +210,6 @@ pub(super) fn plants() -> Value {
             "pumps": plant.pumps(),
             "measured": if plant.joined() { vessel_names(plant) } else { Vec::new() },
             "model": equation(plant),
-            "effects": sites(plant),
         })
     });
     plants.collect()
@@ -235,9 +235,10 @@ fn vessel_names(plant: Plant) -> Vec<&'static str> {
     names
 }
 
-/// Every effect of the catalogue at every place where it can act on a plant.
-fn sites(plant: Plant) -> Vec<Value> {
-    let sites = CATALOGUE.iter().flat_map(|effect| {
+/// Every effect that the domain offers, at every place where it can act on a plant.
+fn sites(plant: Plant, domain: Domain) -> Vec<Value> {
+    let offered = CATALOGUE.iter().filter(|effect| domain.offers(effect));
+    let sites = offered.flat_map(|effect| {
         effect
             .sites(plant)
             .map(move |vessel| json!({ "effect": effect.id, "place": Placed { effect, vessel }.place_name(plant) }))

@@ -2,7 +2,7 @@
 
 use missing_effect::design::{Candidate, Design, Kind};
 use missing_effect::{Diagnosis, Parameter, Score, Step, Verdict, numbers};
-use plants::EffectInfo;
+use plants::{Domain, EffectInfo};
 use serde_json::{Value, json, value::RawValue};
 
 use super::session::{Found, Session};
@@ -92,7 +92,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
             "rmse": error_after(diagnosis, k, unit),
             "sentence": diagnosis.sentences.get(k),
             "in_doubt": diagnosis.in_doubt.get(k),
-            "places": diagnosis.places.get(k).filter(|places| places.len() > 1).map(|places| findings::place_scores(places)),
+            "places": diagnosis.places.get(k).filter(|places| places.len() > 1).map(|places| findings::place_scores(diagnosis.domain(), places)),
             "others": group.iter().filter(|other| *other != effect).collect::<Vec<_>>(),
         })
     });
@@ -184,6 +184,9 @@ fn error_after(diagnosis: &Diagnosis, index: usize, unit: &str) -> Option<String
 
 fn ranked(diagnosis: &Diagnosis, score: &Score) -> Value {
     let info = EffectInfo::find(&score.effect);
+    let domain = diagnosis.domain();
+    // How to confirm an effect is written for tanks.
+    let confirm = info.filter(|_| domain == Domain::Hydraulic);
     let unit = score.size.as_ref().map_or("", |size| size.unit.as_str());
     let visible = score.smallest_visible.filter(|size| size.is_finite());
     json!({
@@ -194,9 +197,9 @@ fn ranked(diagnosis: &Diagnosis, score: &Score) -> Value {
         "rmse": with_unit(&numbers::significant(score.rmse, 3), &diagnosis.output_unit),
         "size": score.size.as_ref().map(size),
         "visible": visible.map(|size| with_unit(&numbers::significant(size, 2), unit)),
-        "physics": info.map(|effect| effect.physics),
+        "physics": info.map(|effect| effect.in_words(domain)),
         "equation": info.map(|effect| effect.equation),
-        "confirm": info.map(|effect| effect.confirm),
+        "confirm": confirm.map(|effect| effect.confirm),
         "found": findings::is_added(diagnosis, score),
         "equal": findings::fits_as_well(diagnosis, score),
     })
@@ -258,9 +261,10 @@ pub(super) fn effects(session: &Session) -> Vec<Value> {
     let Ok(model) = session.model() else {
         return Vec::new();
     };
+    let domain = session.domain(&model);
     let placed = model.effects.iter().map(|placed| {
         let vessel = placed.place_name(model.plant);
-        json!({ "effect": placed.effect.id, "place": vessel, "physics": placed.effect.physics })
+        json!({ "effect": placed.effect.id, "place": vessel, "physics": placed.effect.in_words(domain) })
     });
     let terms = model.terms.iter().map(
         |own| json!({ "effect": own.term.name, "place": null, "physics": "a term of your own" }),

@@ -4,6 +4,7 @@
 mod bad_input;
 mod common;
 mod design;
+mod domain;
 mod effort;
 mod identify;
 mod identify_loop;

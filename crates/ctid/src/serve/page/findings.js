@@ -63,7 +63,7 @@ function row(state, one, k, widest, fail) {
   return make("li", {},
     make("div", { className: "head" },
       make("details", {}, make("summary", {}, make("code", {}, named(one))),
-        make("p", {}, one.physics), make("p", {}, make("code", {}, one.equation)), make("p", { className: "caption" }, `To confirm it: ${one.confirm}`)),
+        make("p", {}, one.physics), make("p", {}, make("code", {}, one.equation)), one.confirm ? make("p", { className: "caption" }, `To confirm it: ${one.confirm}`) : null),
       toggle(state, one.effect, one.place, fail, `add-ranked-${k}`)),
     make("p", { className: "figures" }, make("span", {}, "error then ", make("b", {}, units(one.rmse))), make("span", { title: "fall of the Bayesian information criterion; below 6 is no evidence" }, `evidence ${one.evidence}`),
       one.size ? make("span", {}, units(one.size)) : null, one.visible ? make("span", {}, "visible from ", units(one.visible)) : null),

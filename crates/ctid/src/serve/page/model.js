@@ -243,9 +243,9 @@ function effect(one, fail) {
   return make("li", { title: one.physics }, make("code", {}, name), button("Remove", { className: "quiet", ariaLabel: `Remove ${name}` }, remove));
 }
 
-/** Any effect of the catalogue that acts on this plant and is not in it. */
-function more(state, known, fail) {
-  const free = known.effects.filter((one) => !state.effects.some((on) => on.effect === one.effect));
+/** Any effect of the catalogue that is offered for this model and is not in it. */
+function more(state, fail) {
+  const free = state.offered.filter((one) => !state.effects.some((on) => on.effect === one.effect));
   const select = make("select", { id: "any-effect" }, make("option", { value: "" }, "any other effect…"),
     [...free, ...state.waiting].map((one) => make("option", { value: JSON.stringify(one) }, named(one))));
   select.setAttribute("aria-label", "An effect to add");
@@ -259,10 +259,10 @@ export function show(state, fail) {
   $("model").hidden = !state.records.length && !state.file;
   const known = plant(state.settings.plant);
   $("h-effects").hidden = !known;
-  const wanted = JSON.stringify([state.effects, state.waiting, known]);
+  const wanted = JSON.stringify([state.effects, state.waiting, state.offered, known]);
   if (known && wanted !== written) {
     written = wanted;
-    fill($("effects"), state.effects.map((one) => effect(one, fail)), state.effects.length ? null : make("li", { className: "caption" }, "none"), more(state, known, fail));
+    fill($("effects"), state.effects.map((one) => effect(one, fail)), state.effects.length ? null : make("li", { className: "caption" }, "none"), more(state, fail));
   }
   $("text").textContent = state.text || "(written once a plant is chosen)";
   $("loop").value = state.loop.measured ? "measured" : "simulated";

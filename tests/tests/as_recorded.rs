@@ -1,6 +1,8 @@
 //! Records as people have them: with missing readings and rows, in several files, with dates, in other units. What is found has to be what
 //! is found in the same record as a simulator writes it.
 
+#![allow(clippy::unwrap_used)]
+
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -225,7 +225,7 @@ pub enum Error {
         /// The column's header.
         column: String,
         /// The time, as the file gives it.
-        time: String,
+        time: Box<str>,
     },
     /// The time runs backward.
     #[error(
@@ -239,9 +239,9 @@ pub enum Error {
         /// The column's header.
         column: String,
         /// The time in this row, as the file gives it.
-        time: String,
+        time: Box<str>,
         /// The time in the row before.
-        previous: String,
+        previous: Box<str>,
         /// What to do.
         mend: &'static str,
     },
@@ -313,9 +313,9 @@ pub enum Error {
         /// How many samples are missing.
         missing: u64,
         /// The time before the gap, as the file gives it.
-        previous: String,
+        previous: Box<str>,
         /// The time after the gap.
-        time: String,
+        time: Box<str>,
         /// The median step of the time \[s\].
         interval: f64,
     },

@@ -237,10 +237,8 @@ impl Record {
     /// # Errors
     /// [`Error::ValueNotFinite`], which names the input and the first sample that is missing.
     pub fn require_whole_inputs(&self) -> Result<(), Error> {
-        let inputs = self.inputs.iter();
-        inputs
-            .map(|input| check_finite(&self.name, &input.name, &input.values))
-            .collect()
+        let check = |input: &Channel| check_finite(&self.name, &input.name, &input.values);
+        self.inputs.iter().try_for_each(check)
     }
 
     /// Checks a record that was put together in code: equal lengths, values that are finite or missing (NaN), increasing time.

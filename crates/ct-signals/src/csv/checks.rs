@@ -120,8 +120,8 @@ impl Table {
             row: line_number(text, self.ends[k + 1]),
             column: quoted(&column.header),
             missing: missing as u64,
-            previous: shown(self.time[k]),
-            time: shown(self.time[k + 1]),
+            previous: shown(self.time[k]).into(),
+            time: shown(self.time[k + 1]).into(),
             interval: rounded(median_step(&self.time)),
         })
     }

@@ -97,7 +97,7 @@ impl Times {
                 file,
                 row,
                 column,
-                time: self.shown(time),
+                time: self.shown(time).into(),
             });
         }
         let mend = match self {
@@ -111,8 +111,8 @@ impl Times {
             file,
             row,
             column,
-            time: self.shown(time),
-            previous: self.shown(previous),
+            time: self.shown(time).into(),
+            previous: self.shown(previous).into(),
             mend,
         })
     }

@@ -46,7 +46,7 @@ enum Command {
     /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
     Monitor(monitor::Arguments),
     /// Identify a linear model in continuous time from a record
-    Identify(Identify),
+    Identify(Box<Identify>),
     /// Serve the page: the same with the mouse, on this machine alone
     Serve(serve::Arguments),
     /// Compute the tables of a paper again, with many noises, and say which printed figures agree

@@ -13,6 +13,9 @@ const MOST_COLUMNS: usize = 500;
 /// Bytes in which the header has to be found.
 const LARGEST_HEAD: usize = 1 << 20;
 
+/// A record that could be read, and what was missing in it.
+type AsRead = (Arc<Record>, ReadSummary);
+
 /// A record as it was dropped.
 #[derive(Debug, Clone)]
 pub(super) struct Upload {
@@ -21,11 +24,7 @@ pub(super) struct Upload {
     pub headings: Vec<Heading>,
     pub content: Bytes,
     /// As it was read last, and with which columns.
-    read: Option<(
-        Columns,
-        ReadOptions,
-        Result<(Arc<Record>, ReadSummary), String>,
-    )>,
+    read: Option<(Columns, ReadOptions, Result<AsRead, String>)>,
 }
 
 impl Upload {

@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn times_are_said_in_one_unit_or_as_dates() {
         let record = |last: f64| Record {
-            time: vec![0.0, last],
+            time: vec![0.0, 60.0, 120.0, last],
             ..Record::default()
         };
         let short = Clock::of([&record(1800.0)]);

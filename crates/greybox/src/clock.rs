@@ -104,7 +104,7 @@ mod tests {
     fn record(from: f64, to: f64) -> Record {
         let signal = || Channel::new("", "", vec![0.0; 2]);
         Record {
-            name: String::new(),
+            name: format!("{from} {to}"),
             time: vec![from, to],
             inputs: vec![signal()],
             outputs: vec![signal()],
@@ -156,5 +156,17 @@ mod tests {
             assert_eq!(span(&records), longest);
         }
         assert_eq!(common_clock(&[]), None);
+    }
+
+    #[test]
+    fn parts_of_one_record_share_its_clock_beside_others() {
+        let part = |from: f64, to: f64| Record {
+            name: "a".into(),
+            ..record(from, to)
+        };
+        let records = [part(10.0, 100.0), part(150.0, 300.0), record(0.0, 90.0)];
+        assert_eq!(common_clock(&records), None);
+        assert_eq!(Clock::of(&records).begins, [0.0, 140.0, 0.0]);
+        assert_eq!(span(&records), 290.0);
     }
 }

@@ -106,8 +106,8 @@ impl From<Named> for Columns {
 
 impl From<Columns> for Named {
     fn from(mut columns: Columns) -> Self {
-        let guessed = columns.inputs.first().is_some_and(String::is_empty);
-        let input_2 = (guessed && columns.inputs.len() > 1).then(|| columns.inputs.remove(1));
+        // Two have names of their own.
+        let input_2 = (columns.inputs.len() == 2).then(|| columns.inputs.remove(1));
         columns.inputs.retain(|name| !name.is_empty());
         Self {
             time: columns.time,

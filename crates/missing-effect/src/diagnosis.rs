@@ -324,7 +324,6 @@ pub struct Diagnosis {
     #[serde(skip)]
     pub clock: Clock,
     /// What was done about rows and samples of inputs that are missing; `None` where none are.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<MendedGaps>,
     /// The effects that were added, in order.
     pub effects: Vec<String>,

@@ -2,7 +2,7 @@
 
 use std::{sync::atomic::Ordering, time::Instant};
 
-use ct_signals::{ArModel, Clock, Record};
+use ct_signals::{ArModel, Clock};
 use plants::Placed;
 
 use crate::{
@@ -360,16 +360,6 @@ pub(crate) fn assemble(
     steps: Vec<Step>,
     noise: NoiseFloor,
 ) -> Diagnosis {
-    let shown = |held_out: bool| {
-        move |record: &Record| Shown {
-            name: record.name.clone(),
-            held_out,
-            time: record.time.clone(),
-            input: record.inputs[0].values.clone(),
-            input_2: record.inputs.get(1).map(|second| second.values.clone()),
-            output: record.outputs[0].values.clone(),
-        }
-    };
     Diagnosis {
         schema: 1,
         verdict,
@@ -403,8 +393,8 @@ pub(crate) fn assemble(
         records: problem
             .records
             .iter()
-            .map(shown(false))
-            .chain(problem.test.iter().map(shown(true)))
+            .map(|record| Shown::of(record, false))
+            .chain(problem.test.iter().map(|record| Shown::of(record, true)))
             .collect(),
         seconds: 0.0,
     }

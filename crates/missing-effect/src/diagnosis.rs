@@ -1,7 +1,7 @@
 //! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
 //! printed or plotted is derived from them.
 
-use ct_signals::{ArModel, Clock};
+use ct_signals::{ArModel, Clock, Record};
 use plants::{Domain, Plant};
 use serde::Serialize;
 
@@ -306,6 +306,19 @@ pub struct Shown {
 }
 
 impl Shown {
+    /// A record; `held_out`: it takes no part in any fit or choice.
+    #[must_use]
+    pub fn of(record: &Record, held_out: bool) -> Self {
+        Self {
+            name: record.name.clone(),
+            held_out,
+            time: record.time.clone(),
+            input: record.inputs[0].values.clone(),
+            input_2: record.inputs.get(1).map(|second| second.values.clone()),
+            output: record.outputs[0].values.clone(),
+        }
+    }
+
     /// Readings that are there.
     #[must_use]
     pub fn samples(&self) -> usize {

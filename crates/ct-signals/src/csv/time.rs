@@ -10,7 +10,7 @@ use super::{
     text::{read, reader},
 };
 use crate::columns::{Columns, Found};
-use crate::{Calendar, Error, Timestamp, TimestampError, TimestampReader, quoted};
+use crate::{Calendar, Error, Timestamp, TimestampError, TimestampReader, Zone, quoted};
 
 /// How a column writes the time.
 pub(super) enum Times {
@@ -36,7 +36,8 @@ impl Times {
         if format.is_none() && !TimestampReader::understands(cell) && cell_is_number(cell) {
             return Ok(Self::Numbers(seconds));
         }
-        let zone = columns.time_zone.as_deref();
+        // Dates with an offset are shown, and limits of a part understood, with that offset.
+        let zone = columns.time_zone.as_deref().or_else(|| offset_of(cell));
         let reader = match TimestampReader::new(format, zone, [cell]) {
             // The rest of the column tells day and month apart.
             Err(TimestampError::DayOrMonth { .. }) => {
@@ -116,6 +117,16 @@ impl Times {
             mend,
         })
     }
+}
+
+/// The offset from UTC at the end of a date: `+01:00`.
+fn offset_of(cell: &str) -> Option<&str> {
+    let cell = cell.trim();
+    let time = cell.find(['T', ' '])?;
+    let sign = cell[time..].find(['+', '-'])?;
+    let offset = &cell[time + sign..];
+    let digits = |c: char| c.is_ascii_digit() || c == ':';
+    (offset[1..].chars().all(digits) && Zone::named(offset).is_ok()).then_some(offset)
 }
 
 fn cell_is_number(cell: &str) -> bool {

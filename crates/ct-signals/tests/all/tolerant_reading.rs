@@ -192,6 +192,22 @@ fn a_part_is_read_by_dates_and_by_numbers() {
 }
 
 #[test]
+fn dates_with_an_offset_are_shown_and_limited_with_it() {
+    let text = historian(|k| Some(format!("{}+01:00;{};{}", stamp(k), k % 5, k % 7)));
+    let options = ReadOptions {
+        from: Some("2026-03-28 23:30".into()),
+        ..ReadOptions::default()
+    };
+    let reading = read_with(&text, &columns("Zeit", "Ventil", "Inhalt"), &options).unwrap();
+    assert_eq!(reading.record.len(), 30);
+    let said = reading.summary.to_string();
+    assert!(
+        said.contains("from 2026-03-28 23:30 to 2026-03-28 23:59 (+01:00)"),
+        "{said}"
+    );
+}
+
+#[test]
 fn units_of_one_dimension_are_converted() {
     let rows = (0..40).map(|k| format!("{},{},{}\n", 2 * k, 10 + k % 5, 100 + k % 7));
     let text = "t [s],q [l/min],y [mm]\n".to_string() + &rows.collect::<String>();

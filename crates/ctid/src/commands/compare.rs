@@ -9,7 +9,7 @@ use missing_effect::Options;
 use super::{Results, finish};
 use crate::effort::EffortLevel;
 use crate::input::excitation::{self, ExcitationWarning};
-use crate::input::{Files, Input, ReadArguments};
+use crate::input::{self, Files, Input, ReadArguments};
 use crate::interrupt;
 use crate::look::Look;
 use crate::progress::Bar;
@@ -75,10 +75,6 @@ impl Compare {
     /// What stands in the model file and has no effect, and what the records cannot tell, where there is such.
     fn notes(waiting: &[String], input: &Input, look: Look) -> String {
         let Input { problem, summaries } = input;
-        let read = summaries
-            .iter()
-            .filter(|summary| !summary.is_plain() || summary.calendar.is_some())
-            .map(|summary| look.paragraph("", &format!("note: {summary}")));
         let note = |table: &String| {
             let name = table.split_once('.').map_or("", |(_, name)| name);
             look.paragraph(
@@ -98,7 +94,8 @@ impl Compare {
             let what = "the time stamps continue from file to file, so drifts, steps and periods run through them";
             look.paragraph("", &format!("note: {}: {what}", names.join(", ")))
         });
-        let notes = read.chain(waiting.iter().map(note)).chain(clock);
+        let notes = std::iter::once(input::notes(summaries, look));
+        let notes = notes.chain(waiting.iter().map(note)).chain(clock);
         notes.chain(warnings.iter().map(warning)).collect()
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use ct_signals::{Columns, Hold, ReadOptions, Record, quoted, read_csv};
+use ct_signals::{Columns, Hold, ReadOptions, Reading, Record, quoted, read_csv};
 use missing_effect::Progress;
 
 use super::{Results, finish};
@@ -13,7 +13,7 @@ use crate::Error;
 use crate::column_errors::of_option;
 use crate::identify::side_by_side::{self, Orders};
 use crate::identify::{self, DelayChoice, LevelChoice, Method, Request, side_by_side_text};
-use crate::input::ReadArguments;
+use crate::input::{self, ReadArguments};
 use crate::look::Look;
 use crate::model_file::{self, ControllerSettings};
 use crate::progress::Bar;
@@ -243,13 +243,14 @@ impl Identify {
     }
 
     /// A record as `--columns` and `--model` say. The methods take whole records: what is missing is refused.
-    fn read(&self, path: &Path, columns: &Columns, hold: Hold) -> Result<Record, Error> {
+    fn read(&self, path: &Path, columns: &Columns, hold: Hold) -> Result<Reading, Error> {
         let options = ReadOptions {
             hold,
             ..self.reading.options()
         };
         let reading = read_csv(path, columns, &options).map_err(self.named_by())?;
-        let record = self.without_unnamed(reading.record);
+        let Reading { record, summary } = reading;
+        let record = self.without_unnamed(record);
         let missing = record.channels().find(|channel| channel.missing() > 0);
         let rows = record.missing_rows();
         let what = match missing {
@@ -265,12 +266,12 @@ impl Identify {
                     rows => format!("{rows} rows are missing"),
                 }
             }
-            None => return Ok(record),
+            None => return Ok(Reading { record, summary }),
         };
         Err(Error::file(
             path,
             format!(
-                "{what}, and the methods of identify need whole records; choose a part with --from and --to, put the record on an even grid with --resample, or use compare, which leaves missing readings out"
+                "{what}, and the methods of identify need whole records; choose a part with --from and --to, put the record on a coarser grid with --resample, or use compare, which leaves missing readings out"
             ),
         ))
     }
@@ -281,8 +282,8 @@ impl Identify {
         path: &Path,
         (columns, hold): (&Columns, Hold),
         fitted: &Record,
-    ) -> Result<Record, Error> {
-        let record = self.read(path, columns, hold)?;
+    ) -> Result<Reading, Error> {
+        let Reading { record, summary } = self.read(path, columns, hold)?;
         let inputs = record.inputs.iter().zip(&fitted.inputs);
         let pairs = inputs.chain(record.outputs.iter().zip(&fitted.outputs));
         for (test, fitted) in pairs {
@@ -298,7 +299,7 @@ impl Identify {
                 ));
             }
         }
-        Ok(record)
+        Ok(Reading { record, summary })
     }
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
@@ -333,16 +334,27 @@ impl Identify {
             .into_iter()
             .map(|method| self.request(method, controller.as_ref()))
             .collect::<Result<Vec<_>, _>>()?;
-        let record = self.read(data, &columns, hold)?;
+        let Reading { record, summary } = self.read(data, &columns, hold)?;
+        let mut summaries = vec![summary];
+        let mut noted = |reading: Reading| {
+            summaries.push(reading.summary);
+            reading.record
+        };
         record.require_moving_input().map_err(self.named_by())?;
         let test = self
             .test
             .iter()
-            .map(|path| self.read_test(path, (&columns, hold), &record))
+            .map(|path| {
+                self.read_test(path, (&columns, hold), &record)
+                    .map(&mut noted)
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let more = more
             .iter()
-            .map(|path| self.read_test(path, (&columns, hold), &record))
+            .map(|path| {
+                self.read_test(path, (&columns, hold), &record)
+                    .map(&mut noted)
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let inputs: Vec<&Path> = self
             .data
@@ -352,6 +364,7 @@ impl Identify {
             .map(PathBuf::as_path)
             .collect();
         let outputs = self.results.plan(&inputs, None)?;
+        let notes = input::notes(&summaries, look);
         let bar = Bar::new();
         if let ([request], [_], []) = (&requests[..], &self.order.0[..], &test[..]) {
             bar.phase("identifying");
@@ -363,7 +376,7 @@ impl Identify {
             };
             bar.clear();
             let found = found?;
-            let text = identify::text::text(&found, look);
+            let text = notes + &identify::text::text(&found, look);
             return finish(&found, &text, &outputs, out, look);
         }
         let total = requests.len() * self.order.0.len();
@@ -383,7 +396,7 @@ impl Identify {
         let found = side_by_side::compare(records, &requests, &self.order.0, &tell);
         bar.clear();
         let found = found?;
-        let text = side_by_side_text::text(&found, look);
+        let text = notes + &side_by_side_text::text(&found, look);
         finish(&found, &text, &outputs, out, look)
     }
 }

@@ -130,8 +130,8 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         })) => say(out, &catalogue::list_for(&model_file::read(&model)?, look)),
         Some(Command::Effects(_)) => say(out, &catalogue::list(look)),
         Some(Command::Design(arguments)) => {
-            let (proposal, outputs) = arguments.run()?;
-            let text = design::text::design(&proposal.design, look);
+            let (proposal, outputs, notes) = arguments.run(look)?;
+            let text = notes + &design::text::design(&proposal.design, look);
             finish(&proposal, &text, &outputs, out, look)
         }
         Some(Command::Monitor(arguments)) => arguments.run(out),

@@ -12,7 +12,8 @@ use plants::{EffectInfo, Placed, Plant};
 use serde::Serialize;
 
 use crate::effort::EffortLevel;
-use crate::input::{Files, Input, ReadArguments};
+use crate::input::{self, Files, Input, ReadArguments};
+use crate::look::Look;
 use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
@@ -188,8 +189,8 @@ impl Arguments {
         output::plan(&wanted, inputs)
     }
 
-    /// The design, and where it goes.
-    pub(crate) fn run(&self) -> Result<(Proposal, Vec<Output>), Error> {
+    /// The design, where it goes, and what was read.
+    pub(crate) fn run(&self, look: Look) -> Result<(Proposal, Vec<Output>, String), Error> {
         let files = Files {
             data: self.data.clone(),
             test: Vec::new(),
@@ -205,7 +206,7 @@ impl Arguments {
             return Err(Error::Usage("--between takes two effects".to_owned()));
         };
         let columns = model.columns.clone();
-        let Input { problem, .. } = files.read_with(model)?;
+        let Input { problem, summaries } = files.read_with(model)?;
         let mut outputs = self.outputs(&files.all())?;
         let options = Options {
             time_limit: Some(self.effort.limit()),
@@ -225,6 +226,7 @@ impl Arguments {
         if design.twins() && self.out.is_none() {
             outputs.retain(|output| output.kind() != Kind::Record);
         }
-        Ok((Proposal::new(design, &columns), outputs))
+        let notes = input::notes(&summaries, look);
+        Ok((Proposal::new(design, &columns), outputs, notes))
     }
 }

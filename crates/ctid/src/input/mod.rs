@@ -14,6 +14,7 @@ use self::checks::{
     controller,
 };
 use crate::Error;
+use crate::look::Look;
 use crate::model_file::{self, ModelFile};
 use crate::output::same_file;
 
@@ -67,6 +68,15 @@ fn interval(text: &str) -> Result<f64, String> {
         Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
         _ => Err("it has to be a number of seconds above zero".to_string()),
     }
+}
+
+/// What was missing, converted or left out in records, and their dates, a line each; empty where they were read as they stand.
+pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
+    let worth = |summary: &&ReadSummary| !summary.is_plain() || summary.calendar.is_some();
+    let noted = summaries.iter().filter(worth);
+    noted
+        .map(|summary| look.paragraph("", &format!("note: {summary}")))
+        .collect()
 }
 
 impl ReadArguments {

@@ -48,14 +48,8 @@ async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Res
             let [input, output] = [&record.inputs[0], &record.outputs[0]];
             (input.unit.clone(), output.unit.clone())
         });
-        let shown = read.iter().zip(held_out).map(|(record, held_out)| Shown {
-            name: record.name.clone(),
-            held_out,
-            time: record.time.clone(),
-            input: record.inputs[0].values.clone(),
-            input_2: record.inputs.get(1).map(|second| second.values.clone()),
-            output: record.outputs[0].values.clone(),
-        });
+        let shown = read.iter().zip(held_out);
+        let shown = shown.map(|(record, held_out)| Shown::of(record, held_out));
         let mut shown: Vec<Shown> = shown.collect();
         let (input, output) = units.unwrap_or_default();
         // As in the report, those that are fitted come first.

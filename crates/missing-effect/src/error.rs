@@ -4,12 +4,12 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Nothing is left of a record between its gaps.
+    /// No part of a record between its gaps has enough readings.
     #[error(
         "{record}: no stretch of 8 readings lies between gaps through which the input can be held (at most {} s); leave the record out, or fill its gaps",
         crate::numbers::significant(*limit, 2)
     )]
-    Shreds {
+    NoStretch {
         /// The record.
         record: String,
         /// The longest hold \[s\].

@@ -53,6 +53,22 @@ fn cut(records: &[Record], longest: f64) -> (Vec<Record>, Vec<usize>, Gaps) {
     (all, counts, gaps)
 }
 
+/// Something is left of every record where inputs are held for at most `limit` \[s\].
+fn check_parts<'a>(
+    mut records: impl Iterator<Item = &'a Record>,
+    parts: &[usize],
+    limit: f64,
+) -> Result<(), Error> {
+    let mut parts = parts.iter();
+    match records.find(|_| parts.next() == Some(&0)) {
+        Some(record) => Err(Error::NoStretch {
+            record: record.name.clone(),
+            limit,
+        }),
+        None => Ok(()),
+    }
+}
+
 impl Mended {
     /// `None` where no record has a gap.
     pub fn of(problem: &Problem, options: &Options) -> Result<Option<Self>, Error> {
@@ -65,17 +81,7 @@ impl Mended {
         let interval = problem.records.iter().map(Record::sample_interval);
         let first = FIRST_HOLD * interval.fold(0.0, f64::max);
         let (records, parts, _) = cut(&problem.records, first);
-        if let Some((record, _)) = problem
-            .records
-            .iter()
-            .zip(&parts)
-            .find(|(_, parts)| **parts == 0)
-        {
-            return Err(Error::Shreds {
-                record: record.name.clone(),
-                limit: first,
-            });
-        }
+        check_parts(problem.records.iter(), &parts, first)?;
         let trial = Problem {
             records,
             test: Vec::new(),
@@ -87,13 +93,7 @@ impl Mended {
         let (fitted, mut parts, gaps) = cut(&problem.records, limit);
         let (test, of_test, of_tests) = cut(&problem.test, limit);
         parts.extend(of_test);
-        let all = problem.records.iter().chain(&problem.test);
-        if let Some((record, _)) = all.zip(&parts).find(|(_, parts)| **parts == 0) {
-            return Err(Error::Shreds {
-                record: record.name.clone(),
-                limit,
-            });
-        }
+        check_parts(problem.records.iter().chain(&problem.test), &parts, limit)?;
         Ok(Some(Self {
             problem: Problem {
                 records: fitted,

@@ -185,15 +185,6 @@ fn read_table(
                 delimiter: delimiter_name(delimiter),
             });
         }
-        fn at<'a>((name, text, end): (&'a str, &'a str, usize), column: &'a Found) -> Place<'a> {
-            Place {
-                name,
-                text,
-                end,
-                header: &column.header,
-            }
-        }
-        let row = (file, text, end);
         if table.time.is_empty() && table.outside == 0 && is_row_of_units(&record) {
             let (name, unit) = unit::split(&layout.time.header);
             let below = &record[layout.time.index];
@@ -205,7 +196,12 @@ fn read_table(
             });
         }
         let cell = &record[layout.time.index];
-        let place = at(row, &layout.time);
+        let place = Place {
+            name: file,
+            text,
+            end,
+            header: &layout.time.header,
+        };
         if !options.strict && says_missing(cell) {
             table.without_time += 1;
             continue;
@@ -230,7 +226,11 @@ fn read_table(
         table.ends.push(end);
         for (k, column) in layout.channels().enumerate() {
             let cell = &record[column.index];
-            let value = match numbers.sample(at(row, column), cell)? {
+            let place = Place {
+                header: &column.header,
+                ..place
+            };
+            let value = match numbers.sample(place, cell)? {
                 Cell::Number(value) => match &column.converted {
                     Some((_, conversion)) => conversion.apply(value),
                     None => value,

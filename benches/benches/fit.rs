@@ -8,7 +8,7 @@ use std::{collections::BTreeMap, hint::black_box, time::Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ct_signals::{ArModel, Channel, Record};
-use greybox::{FitOptions, Setup, Triangle, fit_from};
+use greybox::{FitOptions, Noise, Setup, Triangle, fit_from};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 use plants::{Command, Known, Plant, Scales, Simulator, Structure};
@@ -35,7 +35,7 @@ fn record() -> Option<Record> {
     let y = (0..SAMPLES)
         .map(|k| {
             let wobble = ((k * k * 31 % 1009) as f64 / 1009.0 - 0.5) * 0.17;
-            let reading = simulator.read() + wobble;
+            let reading = simulator.read(0) + wobble;
             simulator.advance(Command::held(u[k]), H);
             reading
         })
@@ -112,7 +112,7 @@ fn benches(c: &mut Criterion) {
     ) else {
         return;
     };
-    let white = ArModel::white(1.0);
+    let white = Noise::white(1);
     let stopping = FitOptions::default().stopping;
     let start: Vec<f64> = TRUTH.iter().map(|x| 1.3 * x).collect();
     let starts = [start.clone()];
@@ -147,7 +147,8 @@ fn benches(c: &mut Criterion) {
     group.finish();
 
     let mut group = c.benchmark_group("evaluation");
-    let coloured = ArModel::from_coefficients(&[1.1, -0.4, 0.1], 1.0);
+    let coloured =
+        ArModel::from_coefficients(&[1.1, -0.4, 0.1], 1.0).map(|model| Noise::of(vec![model]));
     group.bench_function("simulate", |b| b.iter(|| setup.simulate(&TRUTH)));
     group.bench_function("rows", |b| b.iter(|| setup.rows(&TRUTH)));
     group.bench_function("linearise, white", |b| {

@@ -36,13 +36,9 @@ fn rows() -> Vec<Row> {
     let mut tank = Simulator::<f64>::new(&structure(), &THETA, &[16.0], 5.0).unwrap();
     (0..count)
         .map(|k| {
-            let output = tank.read() + noise[k];
+            let output = tank.read(0) + noise[k];
             tank.advance(Command::held(command[k]), 2.0);
-            Row {
-                time: 2.0 * k as f64,
-                input: command[k],
-                output,
-            }
+            Row::new(2.0 * k as f64, command[k], &[output])
         })
         .collect()
 }
@@ -72,7 +68,7 @@ fn benchmark(criterion: &mut Criterion) {
             let mut tank = Simulator::new(&structure, &theta, &level, 5.0).unwrap();
             let mut sum = 0.0;
             for row in &rows[LEARNED..] {
-                sum += tank.read().re;
+                sum += tank.read(0).re;
                 tank.advance(Command::held(row.input), 2.0);
             }
             black_box(sum)

@@ -41,7 +41,7 @@ fn run<T: Scalar>(structure: &Structure, theta: &[T], levels: &[T]) -> Option<T>
     let mut simulator = Simulator::new(structure, theta, levels, command(0)).ok()?;
     let mut sum = T::constant(0.0);
     for k in 0..SAMPLES {
-        sum = sum + simulator.read();
+        sum = sum + simulator.read(0);
         simulator.advance(Command::held(command(k)), H);
     }
     Some(sum)
@@ -97,7 +97,7 @@ fn accuracy() {
     if let Ok(mut simulator) = Simulator::new(&tanks, &THETA, &LEVELS, command(0)) {
         let readings: Vec<f64> = (0..SAMPLES)
             .map(|k| {
-                let y = simulator.read();
+                let y = simulator.read(0);
                 simulator.advance(Command::held(command(k)), H);
                 y
             })

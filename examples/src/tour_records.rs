@@ -68,7 +68,7 @@ fn record(samples: usize, initial_level: f64, rng: &mut ChaCha8Rng) -> Result<St
     let mut csv = String::from("t [s],u [V],y [cm]\n");
     for (k, (u, noise)) in input.iter().zip(noise).enumerate() {
         let time = k as f64 * INTERVAL;
-        writeln!(csv, "{time:.4},{u:.4},{:.4}", tank.read() + noise)?;
+        writeln!(csv, "{time:.4},{u:.4},{:.4}", tank.read(0) + noise)?;
         tank.advance(Command::held(*u), INTERVAL);
     }
     Ok(csv)

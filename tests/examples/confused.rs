@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 drive,
                 ..Rig::single_tank()
             };
-            let rig = if effect.sites(rig.plant).next().is_some() {
+            let rig = if effect.sites(rig.plant, &rig.known()).next().is_some() {
                 rig
             } else {
                 Rig {

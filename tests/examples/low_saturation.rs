@@ -107,9 +107,9 @@ fn largest_upper_level(rig: &Rig, problem: &Problem, found: &Diagnosis, k: usize
     let effects = found.steps[..=k].iter().filter_map(|step| {
         let effect = EffectInfo::find(step.added.as_deref()?)?;
         effect
-            .sites(rig.plant)
+            .sites(rig.plant, &rig.known())
             .map(|vessel| Placed { effect, vessel })
-            .find(|placed| placed.place_name(rig.plant) == step.place.as_deref())
+            .find(|placed| placed.place_name(rig.plant, &rig.known()) == step.place.as_deref())
     });
     let effects: Vec<Placed> = effects.collect();
     let records = &problem.records;

@@ -102,7 +102,15 @@ pub fn drawn(seed: u64) -> Option<Rig> {
     let drive = [Drive::Open, Drive::Closed][rng.random_range(0..2_usize)];
     let colour = [0.0, rng.random_range(0.3..0.9)][rng.random_range(0..2_usize)];
     let ratio = rng.random_range(0.0..8.0_f64.ln()).exp();
-    draw::with_effect(effect, ratio, drive, colour, 600, rng.random())
+    draw::with_effect(
+        effect,
+        draw::Levels::Last,
+        ratio,
+        drive,
+        colour,
+        600,
+        rng.random(),
+    )
 }
 
 /// A rig's record, where its diagnosis is one group of several that holds the truth.

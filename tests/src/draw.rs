@@ -2,9 +2,9 @@
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
-use ct_signals::{ArModel, Record};
-use greybox::{Fit, Setup, Stopping, fit_from, random_starts};
-use plants::{EffectInfo, ParameterInfo, Placed, Plant};
+use ct_signals::{Channel, Record};
+use greybox::{Fit, Setup, Stopping, fit_from, random_starts, weighted_rms};
+use plants::{EffectInfo, Known, ParameterInfo, Placed, Plant};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -17,6 +17,41 @@ pub const PLANTS: [Plant; 4] = [
     Plant::CascadedTanks,
     Plant::CascadedTanksLinear,
 ];
+
+/// Those of two tanks, whose levels may both be measured.
+pub const TWO_TANKS: [Plant; 2] = [Plant::CascadedTanks, Plant::CascadedTanksLinear];
+
+/// Which levels are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Levels {
+    /// The last one, of any plant.
+    Last,
+    /// Both, of two tanks.
+    Both,
+}
+
+impl Levels {
+    /// The plants that are drawn from.
+    #[must_use]
+    pub fn plants(self) -> &'static [Plant] {
+        match self {
+            Self::Last => &PLANTS,
+            Self::Both => &TWO_TANKS,
+        }
+    }
+
+    /// The rig with these levels measured.
+    #[must_use]
+    pub fn of(self, rig: Rig) -> Rig {
+        match self {
+            Self::Last => rig,
+            Self::Both => Rig {
+                measured: vec![0, 1],
+                ..rig
+            },
+        }
+    }
+}
 
 /// The command about which the rigs work \[V\].
 const MIDDLE: f64 = 5.0;
@@ -96,11 +131,12 @@ pub fn rig(plant: Plant, drive: Drive, colour: f64, samples: usize, rng: &mut Ch
 /// size goes from absent to the end of its plausible range until the ratio is met. One with which the level leaves 0.1 to 3 times the
 /// level at rest is too large. Where the ratio is not met, another rig is drawn; `None` where none of twelve would do.
 ///
-/// Coarse quantisation is a converter behind the noise, as real ones are: its structural error is that of rounding, the step over
-/// the square root of 12.
+/// Coarse quantisation is a converter behind the noise of the last output, as real ones are: its structural error is that of rounding, the
+/// step over the square root of 12. Where several levels are measured the error is the root mean square over all of them.
 #[must_use]
 pub fn with_effect(
     effect: &'static EffectInfo,
+    levels: Levels,
     ratio: f64,
     drive: Drive,
     colour: f64,
@@ -108,19 +144,23 @@ pub fn with_effect(
     seed: u64,
 ) -> Option<Rig> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let places: Vec<(Plant, usize)> = PLANTS
-        .into_iter()
-        .flat_map(|plant| effect.sites(plant).map(move |vessel| (plant, vessel)))
-        .collect();
-    let plants: Vec<Plant> = PLANTS
-        .into_iter()
-        .filter(|plant| places.iter().any(|(other, _)| other == plant))
-        .collect();
+    let sites = |plant: Plant| -> Vec<usize> {
+        let known = Known {
+            measured: levels.of(Rig::cascaded_tanks()).measured,
+            ..Known::default()
+        };
+        effect.sites(plant, &known).collect()
+    };
+    let plants = levels.plants().iter().copied();
+    let plants: Vec<Plant> = plants.filter(|plant| !sites(*plant).is_empty()).collect();
+    if plants.is_empty() {
+        return None;
+    }
     (0..DRAWS).find_map(|_| {
         let plant = plants[rng.random_range(0..plants.len())];
-        let vessels: Vec<usize> = effect.sites(plant).collect();
+        let vessels = sites(plant);
         let vessel = vessels[rng.random_range(0..vessels.len())];
-        let rig = rig(plant, drive, colour, samples, &mut rng);
+        let rig = levels.of(rig(plant, drive, colour, samples, &mut rng));
         let placed = Placed { effect, vessel };
         built(rig, placed, ratio, seed, &mut rng)
     })
@@ -158,7 +198,7 @@ pub fn with_pair(ratio: f64, drive: Drive, colour: f64, samples: usize, seed: u6
         let rig = rig(plant, drive, colour, samples, &mut rng);
         let (one, other) = pair(plant, &mut rng);
         let mut alone = |effect: &'static EffectInfo| {
-            let vessels: Vec<usize> = effect.sites(plant).collect();
+            let vessels: Vec<usize> = effect.sites(plant, &Known::default()).collect();
             let vessel = vessels[rng.random_range(0..vessels.len())];
             let placed = Placed { effect, vessel };
             built(rig.clone(), placed, ratio, seed, &mut rng)
@@ -177,7 +217,7 @@ fn pair(plant: Plant, rng: &mut ChaCha8Rng) -> (&'static EffectInfo, &'static Ef
     let effects: Vec<&'static EffectInfo> = plants::CATALOGUE
         .iter()
         .copied()
-        .filter(|effect| effect.sites(plant).next().is_some())
+        .filter(|effect| effect.sites(plant, &Known::default()).next().is_some())
         .collect();
     let mut one = || effects[rng.random_range(0..effects.len())];
     loop {
@@ -192,7 +232,7 @@ fn pair(plant: Plant, rng: &mut ChaCha8Rng) -> (&'static EffectInfo, &'static Ef
 fn rounded(rig: Rig, ratio: f64, seed: u64) -> Option<Rig> {
     let converter = 12.0_f64.sqrt() * ratio * rig.noise;
     // Half of what the level moves is the largest step that the catalogue knows.
-    let (low, high) = without_noise(&rig, seed).output_range();
+    let (low, high) = without_noise(&rig, seed).outputs[rig.outputs() - 1].range();
     (converter <= 0.5 * (high - low)).then_some(Rig { converter, ..rig })
 }
 
@@ -208,9 +248,7 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
         let mut at = |size: f64| {
             let with = path.at(&rig, size);
             let fit = misfit(&with, seed, near.as_deref(), 0);
-            let reached = fit
-                .as_ref()
-                .map_or(f64::INFINITY, |fit| fit.rmse / rig.noise);
+            let reached = fit.as_ref().map_or(f64::INFINITY, |fit| error(&rig, fit));
             near = fit.map(|fit| fit.x).or_else(|| near.take());
             (with, reached)
         };
@@ -249,7 +287,7 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
         }
         let (with, _) = found;
         let best = misfit(&with, seed, near.as_deref(), MORE)?;
-        let reached = best.rmse / rig.noise;
+        let reached = error(&rig, &best);
         if (reached / ratio - 1.0).abs() < 2.0 * MET {
             return Some(with);
         }
@@ -272,18 +310,31 @@ pub fn without_noise(rig: &Rig, seed: u64) -> Record {
 /// The believed model, refitted to the record without noise; `None` where the rig leaves its levels.
 fn misfit(rig: &Rig, seed: u64, near: Option<&[f64]>, more: usize) -> Option<Fit> {
     let records = [without_noise(rig, seed)];
-    let level = *rig.levels.last()?;
-    let sound = |y: &f64| y.is_finite() && (0.1 * level..3.0 * level).contains(y);
-    if !records[0].outputs[0].values.iter().all(sound) {
+    let read = rig.known().outputs(rig.plant);
+    let sound = |(output, vessel): (&Channel, &usize)| {
+        let level = rig.levels[*vessel];
+        let within = |y: &f64| y.is_finite() && (0.1 * level..3.0 * level).contains(y);
+        output.values.iter().all(within)
+    };
+    if !records[0].outputs.iter().zip(&read).all(sound) {
         return None;
     }
-    let setup = Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
+    let mut setup =
+        Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
+    // Outputs count as beside noise, though there is none.
+    setup.known_scales = Some(vec![rig.noise; rig.outputs()]);
     let mut starts = random_starts(&setup, more, seed);
     starts.push(near.map_or_else(
         || [rig.theta.as_slice(), &rig.levels].concat(),
         <[f64]>::to_vec,
     ));
-    fit_from(&setup, &starts, &ArModel::white(1.0), STOPPING).ok()
+    fit_from(&setup, &starts, &setup.white_noise(), STOPPING).ok()
+}
+
+/// Structural error of a fit to a record without noise, over the noise of a rig.
+fn error(rig: &Rig, fit: &Fit) -> f64 {
+    let scales = vec![rig.noise; fit.rmse.len()];
+    weighted_rms(&fit.rmse, &scales, &fit.samples_per_output)
 }
 
 /// The sizes of an effect in a rig, from absent at 0 to the end of the plausible range at 1.
@@ -393,7 +444,7 @@ mod tests {
     #[test]
     fn a_converter_rounds_the_reading_with_its_noise() {
         let effect = EffectInfo::find("coarse_quantisation").unwrap();
-        let rig = with_effect(effect, 1.0, Drive::Open, 0.0, 300, 1).unwrap();
+        let rig = with_effect(effect, Levels::Last, 1.0, Drive::Open, 0.0, 300, 1).unwrap();
         assert!((rig.converter / rig.noise - 12.0_f64.sqrt()).abs() < 1e-12);
         let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1));
         for y in &record.outputs[0].values {

@@ -44,6 +44,8 @@ pub struct Rig {
     pub theta: Vec<f64>,
     /// Level at rest of each vessel under the middle command \[cm\].
     pub levels: Vec<f64>,
+    /// The vessels whose levels are measured, each with noise of its own; none: the last one alone.
+    pub measured: Vec<usize>,
     /// Range of the command \[V\].
     pub command: (f64, f64),
     /// Standard deviation of the noise \[cm\].
@@ -81,6 +83,7 @@ impl Rig {
             terms: Vec::new(),
             theta: vec![10.0, 12.5],
             levels: vec![16.0],
+            measured: Vec::new(),
             command: (3.5, 6.5),
             noise: 0.05,
             colour: 0.0,
@@ -128,13 +131,20 @@ impl Rig {
         };
         Known {
             area,
+            measured: self.measured.clone(),
             tank_height: Some(60.0),
             input_range: Some(10.0),
             ..Known::default()
         }
     }
 
-    /// The controller of [`Drive::Closed`].
+    /// How many levels are measured.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.measured.len().max(1)
+    }
+
+    /// The controller of [`Drive::Closed`]; of several levels it reads the last.
     ///
     /// # Panics
     /// Where its settings cannot work: they are constants of a test, or drawn from what can.
@@ -142,7 +152,9 @@ impl Rig {
     #[allow(clippy::expect_used)]
     pub fn controller(&self) -> Controller {
         let (gain, integral_time) = self.pi;
-        Controller::pi(gain, integral_time, (0.0, 10.0)).expect("a controller")
+        let controller = Controller::pi(gain, integral_time, (0.0, 10.0));
+        let controller = controller.expect("a controller");
+        controller.at_output(self.outputs() - 1)
     }
 
     /// The plant without what is hidden, beside one record; the controller is not told.
@@ -180,6 +192,7 @@ impl Rig {
         let wanted = wanted.expect("an excitation");
         let controller = self.controller().start(&[middle]);
         let time = self.stamps(self.samples, rng);
+        let e = self.with_others(e, rng);
         self.from(&self.levels, middle, controller, wanted, (&time, &e))
     }
 
@@ -208,13 +221,15 @@ impl Rig {
         let mut command = first;
         for _ in 0..SETTLING {
             if self.drive == Drive::Closed {
-                command = controller.command(first, simulator.read(), self.interval);
+                let reading = simulator.read(self.outputs() - 1);
+                command = controller.command(first, reading, self.interval);
             }
             simulator.advance(Command::held(command), self.interval);
         }
         let levels = simulator.levels()[..self.plant.vessels()].to_vec();
         let e = self.noises(wanted.len(), rng);
         let time = self.stamps(wanted.len(), rng);
+        let e = self.with_others(e, rng);
         self.from(&levels, command, controller, wanted, (&time, &e))
     }
 
@@ -223,7 +238,12 @@ impl Rig {
     pub fn missing(&self) -> Vec<(&'static str, usize, Vec<f64>)> {
         let mut all = self.hidden.clone();
         if self.converter > 0.0 {
-            all.push(("coarse_quantisation", 0, vec![self.converter, self.noise]));
+            let last = self.outputs() - 1;
+            all.push((
+                "coarse_quantisation",
+                last,
+                vec![self.converter, self.noise],
+            ));
         }
         all
     }
@@ -243,6 +263,14 @@ impl Rig {
             }
         }
         e
+    }
+
+    /// The noise of the last output, and noise of the other ones: the last is the same whether others are measured too or not.
+    fn with_others(&self, last: Vec<f64>, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+        let n = last.len();
+        let mut all: Vec<Vec<f64>> = (1..self.outputs()).map(|_| self.noises(n, rng)).collect();
+        all.push(last);
+        all
     }
 
     /// When samples are taken \[s\].
@@ -272,6 +300,18 @@ impl Rig {
             *operating = *level;
         }
         scales.input_range = 10.0;
+        // Beside another level the scale of a reading is no matter of choice: what bends it bends over the range that is visited.
+        if self.outputs() > 1 {
+            let middle = 0.5 * (self.command.0 + self.command.1);
+            let power = match self.plant.outlet() {
+                plants::Outlet::Torricelli => 2,
+                plants::Outlet::Linear => 1,
+            };
+            for (range, level) in scales.level.iter_mut().zip(&self.levels) {
+                let at = |command: f64| level * (command / middle).powi(power);
+                *range = (at(self.command.0), at(self.command.1));
+            }
+        }
         let mut structure = Structure::new(self.plant, self.known(), scales);
         let mut theta = self.theta.clone();
         for (id, vessel, _) in &self.hidden {
@@ -308,18 +348,20 @@ impl Rig {
         before: f64,
         mut controller: Regulator<f64>,
         wanted: Vec<f64>,
-        (time, e): (&[f64], &[f64]),
+        (time, e): (&[f64], &[Vec<f64>]),
     ) -> Record {
         let (structure, theta) = self.built();
         let mut simulator =
             Simulator::new(&structure, &theta, levels, before).expect("a simulation");
-        let (mut u, mut y) = (
-            Vec::with_capacity(wanted.len()),
-            Vec::with_capacity(wanted.len()),
-        );
+        let mut u = Vec::with_capacity(wanted.len());
+        let last = self.outputs() - 1;
+        let mut outputs = vec![Vec::with_capacity(wanted.len()); last + 1];
         for k in 0..wanted.len() {
             let (unseen, misread) = (self.outside)(time[k]);
-            let mut reading = simulator.read() + misread + e[k];
+            for (o, output) in outputs.iter_mut().enumerate().take(last) {
+                output.push(simulator.read(o) + e[o][k]);
+            }
+            let mut reading = simulator.read(last) + misread + e[last][k];
             if self.converter > 0.0 {
                 reading = self.converter * (reading / self.converter).round();
             }
@@ -333,14 +375,20 @@ impl Rig {
                 Drive::Closed => controller.command(wanted[k], reading, self.interval),
             };
             simulator.advance(Command::held(command + unseen), interval);
-            y.push(reading);
+            outputs[last].push(reading);
             u.push(command);
         }
+        let named = |o: usize| match o {
+            o if o == last => "y".to_string(),
+            o => format!("y{o}"),
+        };
+        let outputs = outputs.into_iter().enumerate();
+        let outputs = outputs.map(|(o, values)| Channel::new(named(o), "cm", values));
         Record {
             name: "rig".to_string(),
             time: time.to_vec(),
             inputs: vec![Channel::new("u", "V", u)],
-            outputs: vec![Channel::new("y", "cm", y)],
+            outputs: outputs.collect(),
             references: (self.drive == Drive::Closed)
                 .then(|| Channel::new("r", "cm", wanted))
                 .into_iter()

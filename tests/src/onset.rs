@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Channel, Record, excitation, noise};
+use ct_signals::{Channel, Record, excitation, noise};
 use greybox::{Setup, Stopping, fit_from};
 use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
-use plants::{Command, EffectInfo, Placed, Plant, Scales, Simulator, Structure};
+use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StudentT;
@@ -73,7 +73,7 @@ impl Onset {
             let rng = &mut ChaCha8Rng::seed_from_u64(8_000_000 + 100 * number + attempt);
             let plants: Vec<Plant> = draw::PLANTS.to_vec();
             let plant = plants[rng.random_range(0..plants.len())];
-            let vessels: Vec<usize> = effect.sites(plant).collect();
+            let vessels: Vec<usize> = effect.sites(plant, &Known::default()).collect();
             let vessel = vessels[rng.random_range(0..vessels.len())];
             let rig = draw::rig(plant, Drive::Closed, colour, samples, rng);
             let sign = if rng.random() { 1.0 } else { -1.0 };
@@ -137,9 +137,9 @@ impl Onset {
             cost: 1e-9,
         };
         Some(
-            fit_from(&setup, &[truth], &ArModel::white(1.0), stopping)
+            fit_from(&setup, &[truth], &setup.white_noise(), stopping)
                 .ok()?
-                .rmse,
+                .rmse[0],
         )
     }
 
@@ -202,7 +202,7 @@ impl Onset {
                 let with = structure.with(*placed).ok()?;
                 simulator = Simulator::new(&with, &theta, &levels, before).ok()?;
             }
-            let reading = simulator.read() + e[k];
+            let reading = simulator.read(0) + e[k];
             let command = match &commands {
                 Some(commands) => commands[k],
                 None => controller.command(wanted[k], reading, rig.interval),
@@ -241,15 +241,12 @@ impl Onset {
         let mut monitor = Monitor::new(model, settings, units).ok()?;
         let mut alarms = Vec::new();
         for (k, lost) in self.lost_rows(&record, seed).into_iter().enumerate() {
-            let row = Row {
-                time: record.time[k],
-                input: record.inputs[0].values[k],
-                output: if lost {
-                    f64::NAN
-                } else {
-                    record.outputs[0].values[k]
-                },
+            let reading = if lost {
+                f64::NAN
+            } else {
+                record.outputs[0].values[k]
             };
+            let row = Row::new(record.time[k], record.inputs[0].values[k], &[reading]);
             alarms.extend(monitor.update(&row).ok()?.alarm);
         }
         Some(alarms)
@@ -285,7 +282,7 @@ impl Onset {
         let middle = 0.5 * (rig.command.0 + rig.command.1);
         let mut plain = Simulator::new(&self.structure(), &rig.theta, &rig.levels, middle).ok()?;
         for k in 0..rig.samples {
-            if (record.outputs[0].values[k] - plain.read()).abs() >= rig.noise {
+            if (record.outputs[0].values[k] - plain.read(0)).abs() >= rig.noise {
                 return Some(k);
             }
             plain.advance(Command::held(record.inputs[0].values[k]), rig.interval);

@@ -13,7 +13,7 @@ const COMMAND: (f64, f64) = (0.5, 5.5);
 pub fn known() -> Known {
     Known {
         area: [Some(154.0); 3],
-        measured: Some(1),
+        measured: vec![1],
         orifice: Some(0.5 * (2.0 * 981.0_f64).sqrt()),
         ..Known::default()
     }
@@ -51,7 +51,7 @@ pub fn record(hidden: Option<(&str, usize, &[f64])>, samples: usize, seed: u64) 
     simulator.set_substeps(2);
     let y = (0..samples)
         .map(|k| {
-            let reading = simulator.read() + e[k];
+            let reading = simulator.read(0) + e[k];
             simulator.advance_both([u[k], v[k]].map(Command::held), INTERVAL);
             reading
         })

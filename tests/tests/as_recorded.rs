@@ -169,7 +169,7 @@ fn clogging(change: f64, seed: u64) -> Vec<(f64, f64)> {
             }
             left -= 1;
             let noise: f64 = rng.sample(StandardNormal);
-            let content = simulator.read() + 0.8 * noise;
+            let content = simulator.read(0) + 0.8 * noise;
             simulator.advance(Command::held(valve), 60.0);
             (valve, content)
         })

@@ -43,7 +43,7 @@ fn model_files_on_the_page_are_read() {
         .skip(1)
         .filter_map(|rest| rest.split("```").next())
         .collect();
-    assert_eq!(blocks.len(), 3);
+    assert_eq!(blocks.len(), 5);
     for block in blocks {
         ctid::model_file::parse("docs/model-file.md", block).unwrap();
     }

@@ -166,7 +166,7 @@ fn an_effect_that_explains_a_small_part_is_a_remark() {
         assert!(found.effects.is_empty() && found.steps.len() == 1);
         if problem.records.len() > 1 {
             assert!(said.contains("(in disturbed.csv)"), "{said}");
-            let windows = &found.steps[0].failures.by_time;
+            let windows = &found.steps[0].outputs[0].failures.by_time;
             assert!(windows.iter().any(|bin| bin.fails));
             assert!(
                 windows
@@ -238,7 +238,7 @@ fn a_comparison_knows_the_noise_of_a_white_record() {
             let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
             for found in [&compared, &found] {
                 let failing: Vec<usize> = (0..12)
-                    .filter(|k| found.steps[0].failures.by_time[*k].fails)
+                    .filter(|k| found.steps[0].outputs[0].failures.by_time[*k].fails)
                     .collect();
                 assert_eq!(failing, [6], "{:?}", found.sentences);
             }
@@ -260,7 +260,7 @@ fn coloured_noise_is_no_failure() {
             let found = compare(&problem(&rig, seed), &Options::default()).unwrap();
             assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.sentences);
             records += 1;
-            let sentences = &found.steps[0].failures.sentences;
+            let sentences = &found.steps[0].outputs[0].failures.sentences;
             if !sentences[0].starts_with("nowhere") {
                 said.push((colour, seed, sentences.clone()));
             }

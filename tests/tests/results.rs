@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 
 use ctid_tests::{Drive, Rig};
 use missing_effect::{
-    Acceptance, Diagnosis, Effort, HeldOutError, Options, PlaceScore, Primitive, Problem, Verdict,
-    diagnose,
+    Acceptance, Diagnosis, Effort, HeldOutError, Options, PerOutput, PlaceScore, Primitive,
+    Problem, Verdict, diagnose,
 };
 use plants::{Fitted, Place, Term, Variable};
 use rand::SeedableRng;
@@ -65,7 +65,7 @@ fn a_result_is_the_same_with_any_number_of_threads() {
     for problem in [named(), unexplained()] {
         let [mut alone, mut beside] = [1, 4].map(|threads| json(&found(&problem, threads)));
         for result in [&mut alone, &mut beside] {
-            assert_ne!(result["noise"]["coefficients"], serde_json::json!([]));
+            assert_ne!(result["noise"][0]["coefficients"], serde_json::json!([]));
             result.as_object_mut().unwrap().remove("seconds").unwrap();
         }
         assert!(alone == beside, "{alone:#}\n{beside:#}");
@@ -104,26 +104,47 @@ fn keys(value: &Value) -> BTreeSet<&str> {
     }
 }
 
-/// What is in objects is explained in a part of their own or, where there is none, in their row; no row explains what is not there.
-fn explained(page: &str, name: &str, value: &Value) {
+/// All that a result has is explained.
+fn explained(page: &str, result: &Value) {
+    explained_of(page, "", result, &outputs(result));
+}
+
+/// The names of the outputs, which stand for keys where there is a number of each.
+fn outputs(result: &Value) -> Vec<&str> {
+    let names = result["outputs"].as_array().unwrap().iter();
+    names.filter_map(Value::as_str).collect()
+}
+
+/// What is in objects is explained in a part of their own or, where there is none, in their row; no row explains what is not there, unless it
+/// says with what alone it is.
+fn explained_of(page: &str, name: &str, value: &Value, outputs: &[&str]) {
     let part = part_of(page, name).unwrap();
     let entries = value.as_object().unwrap();
     for (key, value) in entries {
+        let objects = |values: &[Value]| values.iter().all(Value::is_object);
         let row = part.iter().find(|(keys, _)| keys.contains(key.as_str()));
         let (_, row) = row.unwrap_or_else(|| panic!("no row for {key} of {name:?}"));
         match value {
-            Value::Array(values) if part_of(page, key).is_some() => {
-                values.iter().for_each(|value| explained(page, key, value));
+            Value::Array(values) if objects(values) && part_of(page, key).is_some() => {
+                let of = |value| explained_of(page, key, value, outputs);
+                values.iter().for_each(of);
             }
-            Value::Object(_) if part_of(page, key).is_some() => explained(page, key, value),
+            Value::Object(_) if part_of(page, key).is_some() => {
+                explained_of(page, key, value, outputs)
+            }
             _ => {
-                let lacking: Vec<_> = keys(value).difference(&quoted(row)).copied().collect();
+                let known = quoted(row);
+                let unknown = keys(value).into_iter().filter(|key| !known.contains(key));
+                let lacking: Vec<_> = unknown.filter(|key| !outputs.contains(key)).collect();
                 assert!(lacking.is_empty(), "{lacking:?} of {key} of {name:?}");
             }
         }
     }
-    for key in part.iter().flat_map(|(keys, _)| keys) {
-        assert!(entries.contains_key(*key), "there is no {key} in {name:?}");
+    for (keys, row) in part {
+        for key in keys {
+            let there = entries.contains_key(key) || row.contains("nly with ");
+            assert!(there, "there is no {key} in {name:?}");
+        }
     }
 }
 
@@ -132,7 +153,7 @@ fn every_key_of_a_result_is_explained() {
     let page = include_str!("../../docs/results.md");
     let named = json(&found(&named(), 2));
     assert!(named["control_loop"]["mismatch"].is_number());
-    explained(page, "", &named);
+    explained(page, &named);
     let mut found = found(&unexplained(), 2);
     assert_eq!(found.verdict, Verdict::Unexplained);
     // A dip comes near to no simple shape; a step would.
@@ -141,8 +162,10 @@ fn every_key_of_a_result_is_explained() {
         at: Some(14.0),
         effects: vec!["overflow"],
     });
-    explained(page, "", &json(&found));
-    explained(page, "", &json(&partial(found)));
+    explained(page, &json(&found));
+    let partial = partial(found);
+    explained(page, &json(&partial));
+    explained(page, &json(&several(partial)));
 }
 
 /// The same with everything that a partial answer has, so that every key is there.
@@ -158,7 +181,7 @@ fn partial(mut found: Diagnosis) -> Diagnosis {
         share_test: Some(0.5),
         required: 0.9,
         required_partial: 0.5,
-        floor: 0.1,
+        floor: PerOutput(vec![(found.outputs[0].clone(), 0.1)]),
         bic_fall: Some(100.0),
         required_bic_fall: 6.0,
         reasons: vec!["the residual is not noise".to_string()],
@@ -169,13 +192,60 @@ fn partial(mut found: Diagnosis) -> Diagnosis {
         interrupted: false,
     };
     for step in &mut found.steps {
-        step.held_out_error = Some(HeldOutError {
+        step.rmse_test = Some(0.4);
+        step.rmse_test_per_output = Some(step.rmse_per_output.clone());
+        step.weighted_rmse_test = Some(4.0);
+        step.outputs[0].rmse_test = Some(0.4);
+        step.outputs[0].held_out_error = Some(HeldOutError {
             offset: 0.1,
             gain: 0.2,
             shape: 0.3,
         });
     }
     found
+}
+
+/// The same as if its output had been measured twice.
+fn several(mut found: Diagnosis) -> Diagnosis {
+    let twice = |values: &PerOutput| {
+        let (_, value) = values.0[0];
+        PerOutput(vec![
+            ("upper".to_string(), value),
+            ("lower".to_string(), value),
+        ])
+    };
+    found.outputs = vec!["upper".to_string(), "lower".to_string()];
+    found.noise = vec![found.noise[0].clone(); 2];
+    found.noise_floor = f64::NAN;
+    for step in &mut found.steps {
+        (step.rmse, step.rmse_test) = (f64::NAN, None);
+        step.rmse_per_output = twice(&step.rmse_per_output);
+        step.rmse_test_per_output = step.rmse_test_per_output.as_ref().map(twice);
+        step.outputs = vec![step.outputs[0].clone(); 2];
+    }
+    for score in &mut found.scores {
+        score.rmse = f64::NAN;
+    }
+    if let Some(test) = &mut found.acceptance {
+        test.floor = twice(&test.floor);
+    }
+    found
+}
+
+#[test]
+fn what_several_outputs_have_not_in_common_is_not_written() {
+    let found = json(&several(partial(found(&unexplained(), 2))));
+    for (part, key) in [
+        (&found, "noise_floor"),
+        (&found["steps"][0], "rmse"),
+        (&found["scores"][0], "rmse"),
+    ] {
+        assert!(part.get(key).is_none(), "{key}");
+    }
+    assert!(found["steps"][0]["rmse_test"].is_null());
+    let by_name = &found["steps"][0]["rmse_per_output"];
+    assert_eq!(by_name["upper"], found["steps"][0]["outputs"][0]["rmse"]);
+    assert_eq!(found["acceptance"]["floor"]["lower"], 0.1);
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! The traps that make a tool of this kind lie.
 #![allow(clippy::unwrap_used)]
 
-use ct_signals::{ArModel, Hold};
+use ct_signals::Hold;
 use ctid_tests::Rig;
-use greybox::{Fit, Setup, Stopping, fit_from, random_starts};
+use greybox::{Fit, Noise, Setup, Stopping, fit_from, random_starts};
 use missing_effect::{Diagnosis, Options, Verdict, diagnose};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -33,7 +33,7 @@ fn a_local_minimum_of_a_right_model_is_not_blamed_on_an_effect() {
         let records = [record.clone()];
         let setup =
             Setup::from_records(rig.plant, rig.known(), &[], &records, Default::default()).unwrap();
-        let white = ArModel::white(1.0);
+        let white = Noise::white(1);
         let costs: Vec<f64> = random_starts(&setup, 40, seed)
             .iter()
             .filter_map(|start| {
@@ -107,7 +107,7 @@ fn a_lag_at_zero_scores_what_it_should() {
 /// By how much the criterion falls with the best single effect, the noise taken for white: what a tool says that does not
 /// know its colour. The believed model is fitted from the given starts.
 fn gain_as_white(setup: &Setup, starts: &[Vec<f64>]) -> f64 {
-    let white = ArModel::white(1.0);
+    let white = Noise::white(1);
     let base = fit_from(setup, starts, &white, STOPPING).unwrap();
     let gains = setup.structure.candidates().into_iter().map(|placed| {
         let with = setup
@@ -146,7 +146,7 @@ fn coloured_records_are_not_blamed(colours: &[f64], noise: f64, runs: u64) {
         blamed_as_white += usize::from(gain > 6.0);
         let found = diagnose(&rig.problem(record), &Options::default(), &|_| {}).unwrap();
         assert!(found.effects.is_empty(), "seed {seed}: {:?}", found.effects);
-        assert!(!found.noise.coefficients.is_empty());
+        assert!(!found.noise[0].coefficients.is_empty());
         let said = found.sentences.join(" ");
         assert!(
             said.contains("The noise is coloured, and hides") && said.contains("times larger"),
@@ -207,7 +207,7 @@ fn effects_are_scored_from_the_better_of_two_basins() {
         let records = [record.clone()];
         let setup =
             Setup::from_records(rig.plant, rig.known(), &[], &records, Default::default()).unwrap();
-        let white = ArModel::white(1.0);
+        let white = Noise::white(1);
         let ends: Vec<Fit> = random_starts(&setup, 16, seed)
             .into_iter()
             .filter_map(|start| fit_from(&setup, &[start], &white, STOPPING).ok())
@@ -262,9 +262,9 @@ fn a_held_input_is_not_taken_for_a_continuous_one() {
         let setup =
             Setup::from_records(rig.plant, rig.known(), &[], &records, Default::default()).unwrap();
         let starts = random_starts(&setup, 12, 1);
-        fit_from(&setup, &starts, &ArModel::white(1.0), STOPPING)
+        fit_from(&setup, &starts, &Noise::white(1), STOPPING)
             .unwrap()
-            .rmse
+            .rmse[0]
     };
     let sound = Rig::single_tank();
     let (real, spurious) = (left(&leaking, Hold::Zero), left(&sound, Hold::First));

@@ -211,6 +211,15 @@ impl ArModel {
             .unwrap_or_else(|_| ArModel::white(self.sigma))
     }
 
+    /// The same colour with innovations of another standard deviation, `>= 0`.
+    #[must_use]
+    pub fn with_sigma(&self, sigma: f64) -> Self {
+        ArModel {
+            sigma,
+            ..self.clone()
+        }
+    }
+
     /// Of partial correlations that are within -1..1.
     pub(crate) fn of_stationary(reflections: &[f64], sigma: f64) -> Self {
         ArModel {

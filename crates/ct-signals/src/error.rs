@@ -91,9 +91,10 @@ pub enum Error {
         /// The first row.
         first: String,
     },
-    /// Numbers without names, and neither three nor four of them.
+    /// Numbers without names, and neither time, input and outputs nor these with a reference.
     #[error(
-        "{file}, row {row}: {found} numbers and no header; give t,u,y or t,r,u,y, or put a header such as \"t [s],u [V],y [cm]\" above"
+        "{file}, row {row}: {found} numbers and no header; give t,u,{y} or t,r,u,{y}, or put a header such as \"t [s],u [V],y [cm]\" above",
+        y = crate::stream::letters(*.outputs, ",")
     )]
     NoOrder {
         /// What is read.
@@ -102,6 +103,8 @@ pub enum Error {
         row: u64,
         /// Numbers in the row.
         found: usize,
+        /// Outputs that are read.
+        outputs: usize,
     },
     /// The columns of the file are not those that were named or are needed.
     #[error("{file}, row {row}{}", .fault.in_model())]

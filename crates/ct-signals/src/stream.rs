@@ -1,7 +1,7 @@
 //! Rows of numbers as they come on a stream, a line at a time: what a CSV file may hold, but without looking ahead.
 //!
 //! The first line that is neither blank nor a comment decides: where it holds names, [`Columns`] says which column is what, as
-//! in a file; where it holds numbers, they are time, reference, command and reading, or time, command and reading.
+//! in a file; where it holds numbers, they are time, reference, command and readings, or time, command and readings.
 //! Understood as in a file: commas, semicolons or tabs, a decimal comma where commas do not separate, a byte-order mark, CRLF,
 //! blank lines and comments, quotes. A line that cannot be used is refused by itself, and the next one is read on.
 
@@ -11,8 +11,10 @@ use crate::columns::{Found, Layout};
 use crate::csv::{check_width, delimiter, is_number};
 use crate::{Columns, Conversion, Error, quoted, unit};
 
-/// The names of the columns in use, and which they are in a row without a header.
+/// The names of the columns in use, where they have no header; all behind the last are outputs.
 const ROLES: [&str; 3] = ["time", "input", "output"];
+/// Roles before the outputs.
+const OUTPUTS: usize = 2;
 
 /// How rows are read.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,14 +24,16 @@ pub struct Rows {
     header: Option<String>,
     /// Fields of a row.
     fields: usize,
-    /// Positions of time, input and output.
-    at: [usize; 3],
+    /// Positions of time, input and outputs.
+    at: Vec<usize>,
     /// Their headers.
-    names: [String; 3],
-    /// Units of input and output.
-    units: [String; 2],
-    /// How input and output are converted to these, where the header has other ones.
-    conversions: [Option<Conversion>; 2],
+    names: Vec<String>,
+    /// Units of input and outputs.
+    units: Vec<String>,
+    /// How input and outputs are converted to these, where the header has other ones.
+    conversions: Vec<Option<Conversion>>,
+    /// The cells of the latest row: time, input, outputs.
+    values: Vec<Result<f64, BadLine>>,
     /// Seconds in one unit of the time.
     seconds: f64,
     /// The decimal mark seen so far.
@@ -40,10 +44,8 @@ pub struct Rows {
 /// What a line holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Line {
-    /// Time \[s\], input and output, finite or not.
-    Row([f64; 3]),
-    /// Time \[s\] and input, finite or not, and why there is no output: its cell is empty or holds no number.
-    NoOutput([f64; 2], BadLine),
+    /// Time \[s\] and input, finite or not; the outputs are in [`Rows::outputs`].
+    Row([f64; 2]),
     /// Nothing: it is blank, a comment, or the header again.
     Nothing,
 }
@@ -100,7 +102,8 @@ impl Rows {
     /// The second value is whether the line is a row, to be read by [`Rows::read`] too.
     ///
     /// # Errors
-    /// As of [`read_csv`](crate::read_csv) for a header; [`Error::NoOrder`] for numbers that are neither three nor four.
+    /// As of [`read_csv`](crate::read_csv) for a header; [`Error::NoOrder`] for numbers that are neither time, input and outputs nor these with
+    /// a reference. There is one output where `columns` name none.
     pub fn begin(
         file: &str,
         row: u64,
@@ -114,41 +117,50 @@ impl Rows {
             delimiter,
             header: None,
             fields: cells.len(),
-            at: [0; 3],
-            names: Default::default(),
-            units: Default::default(),
-            conversions: [None; 2],
+            at: Vec::new(),
+            names: Vec::new(),
+            units: Vec::new(),
+            conversions: Vec::new(),
+            values: Vec::new(),
             seconds: 1.0,
             mark: None,
             scratch: String::new(),
         };
         if cells.iter().all(|cell| is_number(cell)) {
-            rows.at = match cells.len() {
-                3 => [0, 1, 2],
-                4 => [0, 2, 3],
-                found => {
+            let outputs = columns.outputs.len().max(1);
+            let input = match cells.len().checked_sub(outputs) {
+                Some(2) => 1,
+                Some(3) => 2,
+                _ => {
                     return Err(Error::NoOrder {
                         file: file.into(),
                         row,
-                        found,
+                        found: cells.len(),
+                        outputs,
                     });
                 }
             };
-            let named = |names: &'_ [String]| -> Option<String> {
-                names.first().filter(|name| !name.is_empty()).cloned()
+            rows.at = std::iter::once(0).chain(input..=input + outputs).collect();
+            let named = |names: &[String], at: usize| {
+                let name = names.get(at).filter(|name| !name.is_empty());
+                name.cloned().unwrap_or_default()
             };
-            let (input, output) = (named(&columns.inputs), named(&columns.outputs));
-            let unit = |given: &Option<String>| {
-                given
-                    .as_deref()
-                    .map_or(String::new(), |name| unit::split(name).1.to_string())
-            };
-            rows.units = [unit(&input), unit(&output)];
-            let named = [columns.time.clone(), input, output];
-            for ((name, role), given) in rows.names.iter_mut().zip(ROLES).zip(named) {
-                *name = given.unwrap_or_else(|| role.to_string());
+            rows.names = vec![
+                columns.time.clone().unwrap_or_default(),
+                named(&columns.inputs, 0),
+            ];
+            rows.names
+                .extend((0..outputs).map(|output| named(&columns.outputs, output)));
+            let units = rows.names[1..].iter();
+            rows.units = units.map(|name| unit::split(name).1.to_string()).collect();
+            for (i, name) in rows.names.iter_mut().enumerate() {
+                if name.is_empty() {
+                    *name = ROLES[i.min(OUTPUTS)].to_string();
+                }
             }
+            rows.conversions = vec![None; outputs + 1];
             rows.seconds = columns.time_header().1;
+            rows.values = vec![Ok(f64::NAN); rows.at.len()];
             return Ok((rows, true));
         }
         check_width(file, row, cells.len())?;
@@ -156,17 +168,28 @@ impl Rows {
             time,
             seconds,
             mut inputs,
-            mut outputs,
+            outputs,
             ..
         } = columns.resolve(file, row, &cells)?;
-        // One of each at least.
-        let (input, output) = (inputs.swap_remove(0), outputs.swap_remove(0));
-        rows.at = [time.index, input.index, output.index];
-        let conversion = |found: &Found| found.converted.as_ref().map(|(_, by)| *by);
-        rows.conversions = [conversion(&input), conversion(&output)];
-        rows.units = [input.unit, output.unit];
-        rows.names = [time.header, input.header, output.header];
+        // One input at least.
+        let input = inputs.swap_remove(0);
+        rows.at = vec![time.index];
+        rows.names = vec![time.header];
+        for Found {
+            index,
+            header,
+            unit,
+            converted,
+            ..
+        } in std::iter::once(input).chain(outputs)
+        {
+            rows.at.push(index);
+            rows.names.push(header);
+            rows.units.push(unit);
+            rows.conversions.push(converted.map(|(_, by)| by));
+        }
         rows.seconds = seconds;
+        rows.values = vec![Ok(f64::NAN); rows.at.len()];
         rows.header = Some(line.to_string());
         Ok((rows, false))
     }
@@ -177,17 +200,27 @@ impl Rows {
         self.header.is_some()
     }
 
-    /// The header of time, input or output.
+    /// The header of time, input or the first output.
     #[must_use]
     pub fn name(&self, role: &str) -> &str {
         let at = ROLES.iter().position(|known| *known == role);
         at.map_or("", |at| &self.names[at])
     }
 
-    /// Units of input and output; empty where nothing says.
+    /// The header of an output, counted from zero.
     #[must_use]
-    pub fn units(&self) -> [&str; 2] {
-        [&self.units[0], &self.units[1]]
+    pub fn output_name(&self, output: usize) -> &str {
+        self.names.get(OUTPUTS + output).map_or("", String::as_str)
+    }
+
+    /// Units of input and outputs, in order; empty where nothing says.
+    pub fn units(&self) -> impl Iterator<Item = &str> {
+        self.units.iter().map(String::as_str)
+    }
+
+    /// The outputs of the row that was read last, finite or not, or why there is none: its cell is empty or holds no number.
+    pub fn outputs(&self) -> &[Result<f64, BadLine>] {
+        &self.values[OUTPUTS..]
     }
 
     /// Seconds in one unit of the time.
@@ -199,21 +232,33 @@ impl Rows {
     /// In which order a row's fields are read, in words.
     #[must_use]
     pub fn order(&self) -> String {
-        match (&self.header, self.fields) {
-            (Some(_), _) => format!(
-                "a header: \"{}\" is the time, \"{}\" the command, \"{}\" the reading",
+        let outputs = &self.names[OUTPUTS..];
+        let readings = if outputs.len() == 1 {
+            "reading"
+        } else {
+            "readings"
+        };
+        if self.header.is_some() {
+            let names: Vec<String> = outputs
+                .iter()
+                .map(|name| format!("\"{}\"", quoted(name)))
+                .collect();
+            return format!(
+                "a header: \"{}\" is the time, \"{}\" the command, {} the {readings}",
                 quoted(&self.names[0]),
                 quoted(&self.names[1]),
-                quoted(&self.names[2])
-            ),
-            (None, 4) => {
-                "no header: the columns are taken as time, reference, command, reading (t, r, u, y)"
-                    .to_string()
-            }
-            (None, _) => {
-                "no header: the columns are taken as time, command, reading (t, u, y)".to_string()
-            }
+                names.join(", ")
+            );
         }
+        let (reference, r) = if self.fields > self.names.len() {
+            (" reference,", " r,")
+        } else {
+            ("", "")
+        };
+        format!(
+            "no header: the columns are taken as time,{reference} command, {readings} (t,{r} u, {})",
+            letters(outputs.len(), ", ")
+        )
     }
 
     /// Reads a line, which was cut off at its end: a carriage return or a line feed within it is part of a cell.
@@ -229,12 +274,12 @@ impl Rows {
         if self.header.as_deref() == Some(line) {
             return Ok(Line::Nothing);
         }
-        let mut values = [const { Ok(f64::NAN) }; 3];
         if line.contains('"') {
             let cells = cells(line, self.delimiter);
             self.check_count(cells.len())?;
-            for (role, &at) in self.at.clone().iter().enumerate() {
-                values[role] = self.number(role, cells.get(at).map_or("", String::as_str));
+            for role in 0..self.at.len() {
+                let cell = cells.get(self.at[role]).map_or("", String::as_str);
+                self.values[role] = self.number(role, cell);
             }
         } else {
             let mut found = 0;
@@ -243,22 +288,18 @@ impl Rows {
                 let Some(role) = self.at.iter().position(|at| *at == i) else {
                     continue;
                 };
-                values[role] = self.number(role, cell.trim());
+                self.values[role] = self.number(role, cell.trim());
             }
             // A row that is not whole has wrong cells too.
             self.check_count(found)?;
         }
-        for (value, conversion) in values[1..].iter_mut().zip(&self.conversions) {
+        for (value, conversion) in self.values[1..].iter_mut().zip(&self.conversions) {
             if let (Ok(value), Some(conversion)) = (value, conversion) {
                 *value = conversion.apply(*value);
             }
         }
-        let [time, input, output] = values;
-        let (time, input) = (time? * self.seconds, input?);
-        Ok(match output {
-            Ok(output) => Line::Row([time, input, output]),
-            Err(bad) => Line::NoOutput([time, input], bad),
-        })
+        let value = |role: usize| self.values[role].clone();
+        Ok(Line::Row([value(0)? * self.seconds, value(1)?]))
     }
 
     fn check_count(&self, found: usize) -> Result<(), BadLine> {
@@ -323,6 +364,16 @@ impl Rows {
     }
 }
 
+/// What so many readings of a row without a header are called.
+pub(crate) fn letters(outputs: usize, between: &str) -> String {
+    let of_output = |output: usize| match outputs {
+        1 => "y".to_string(),
+        _ => format!("y{output}"),
+    };
+    let letters: Vec<String> = (1..=outputs).map(of_output).collect();
+    letters.join(between)
+}
+
 /// A line without its byte-order mark and the blanks around it.
 fn text(line: &str) -> &str {
     let line = line.strip_prefix('\u{feff}').unwrap_or(line);
@@ -361,19 +412,20 @@ mod tests {
     fn a_header_says_the_order_and_the_units() {
         let (mut rows, row) = rows("\u{feff}y [cm];u [V];t [min];note\r\n");
         assert!(!row);
-        assert_eq!(rows.units(), ["V", "cm"]);
+        assert!(rows.units().eq(["V", "cm"]));
         assert_eq!(
             read(&mut rows, "12,5; 4 ;0,5;\"a; b\"\r\n"),
-            Ok(Line::Row([30.0, 4.0, 12.5]))
+            Ok(Line::Row([30.0, 4.0]))
         );
+        assert_eq!(rows.outputs(), [Ok(12.5)]);
         assert_eq!(
             read(&mut rows, "y [cm];u [V];t [min];note"),
             Ok(Line::Nothing)
         );
         assert_eq!(read(&mut rows, "# a comment"), Ok(Line::Nothing));
-        let Ok(Line::NoOutput([60.0, 4.0], bad)) = read(&mut rows, "12.5;4;1;") else {
-            panic!("the command of a row counts whatever the reading is");
-        };
+        // The command of a row counts whatever the reading is.
+        assert_eq!(read(&mut rows, "12.5;4;1;"), Ok(Line::Row([60.0, 4.0])));
+        let bad = rows.outputs()[0].clone().unwrap_err();
         assert!(
             bad.to_string()
                 .contains("\"12.5\" has another decimal mark"),
@@ -392,16 +444,14 @@ mod tests {
         assert!(row);
         assert_eq!(
             read(&mut four, "0, 15, 4.5, 14.8"),
-            Ok(Line::Row([0.0, 4.5, 14.8]))
+            Ok(Line::Row([0.0, 4.5]))
         );
+        assert_eq!(four.outputs(), [Ok(14.8)]);
         let (mut three, _) = rows("0\t4\t14");
-        assert_eq!(
-            read(&mut three, "1\t5\t15"),
-            Ok(Line::Row([1.0, 5.0, 15.0]))
-        );
-        let Ok(Line::NoOutput([1.0, 5.0], bad)) = read(&mut three, "1\t5\t") else {
-            panic!("the command of a row counts whatever the reading is");
-        };
+        assert_eq!(read(&mut three, "1\t5\t15"), Ok(Line::Row([1.0, 5.0])));
+        assert_eq!(three.outputs(), [Ok(15.0)]);
+        assert_eq!(read(&mut three, "1\t5\t"), Ok(Line::Row([1.0, 5.0])));
+        let bad = three.outputs()[0].clone().unwrap_err();
         assert_eq!(
             bad.to_string(),
             "column \"output\": the cell is empty; check what writes the rows"
@@ -420,6 +470,39 @@ mod tests {
                 .starts_with("input, row 3: 2 numbers and no header")
         );
         assert_eq!(three.read(&[0xff, 0xfe]), Err(BadLine::NotText));
+    }
+
+    #[test]
+    fn several_outputs_are_read_in_the_order_in_which_they_are_named() {
+        let columns = Columns {
+            outputs: vec!["upper [cm]".into(), "lower [cm]".into()],
+            ..Columns::default()
+        };
+        let begin = |line: &str| Rows::begin("input", 1, line, &columns);
+        let (mut rows, _) = begin("t,lower [mm],u [V],upper [cm]").unwrap();
+        assert!(rows.units().eq(["V", "cm", "cm"]));
+        assert_eq!(read(&mut rows, "1,100,4,12"), Ok(Line::Row([1.0, 4.0])));
+        assert_eq!(rows.outputs(), [Ok(12.0), Ok(10.0)]);
+        assert_eq!(rows.output_name(1), "lower [mm]");
+        // Either may be lost for itself, in one row.
+        assert_eq!(read(&mut rows, "2,,4,12"), Ok(Line::Row([2.0, 4.0])));
+        assert_eq!(rows.outputs()[0], Ok(12.0));
+        let bad = rows.outputs()[1].clone().unwrap_err();
+        assert_eq!(
+            bad.to_string(),
+            "column \"lower [mm]\": the cell is empty; check what writes the rows"
+        );
+
+        let (mut rows, _) = begin("0,15,4.5,14.8,9.1").unwrap();
+        assert_eq!(
+            rows.order(),
+            "no header: the columns are taken as time, reference, command, readings (t, r, u, y1, y2)"
+        );
+        read(&mut rows, "0,15,4.5,14.8,9.1").unwrap();
+        assert_eq!(rows.outputs(), [Ok(14.8), Ok(9.1)]);
+        let message = begin("0,4.5,14.8").unwrap_err().to_string();
+        assert!(message.contains("3 numbers and no header"), "{message}");
+        assert!(message.contains("t,u,y1,y2"), "{message}");
     }
 
     /// What the first line is taken for is what it is read as: else it would be begun with again and again.

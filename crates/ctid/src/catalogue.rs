@@ -1,6 +1,6 @@
 //! `ctid effects`: the catalogue, and what it knows of one effect.
 
-use plants::{CATALOGUE, Domain, EffectInfo, ParameterInfo, Place, Placed, Plant};
+use plants::{CATALOGUE, Domain, EffectInfo, Known, ParameterInfo, Place, Placed, Plant};
 
 use crate::look::{Look, Side, table};
 use crate::model_file::{self, ModelFile};
@@ -18,7 +18,7 @@ pub fn list_for(model: &ModelFile, look: Look) -> String {
     let domain = model.domain();
     let offered = |effect: &'static EffectInfo| {
         domain.offers(effect)
-            && effect.sites(model.plant).next().is_some()
+            && effect.sites(model.plant, &model.known).next().is_some()
             && model.effects.iter().all(|on| on.effect.id != effect.id)
     };
     listed(domain, offered, look)
@@ -117,7 +117,7 @@ pub fn gallery() -> String {
 fn applies_to(effect: &'static EffectInfo) -> impl Iterator<Item = Plant> {
     Plant::ALL
         .into_iter()
-        .filter(|&plant| effect.sites(plant).next().is_some())
+        .filter(|&plant| effect.sites(plant, &Known::default()).next().is_some())
 }
 
 fn place(effect: &'static EffectInfo) -> String {
@@ -127,7 +127,7 @@ fn place(effect: &'static EffectInfo) -> String {
             let names = |vessels: usize| {
                 let several = applies_to(effect).find(|plant| plant.vessels() == vessels);
                 several.map_or(Vec::new(), |plant| {
-                    let sites = effect.sites(plant);
+                    let sites = effect.sites(plant, &Known::default());
                     let names = sites.filter_map(|vessel| plant.vessel_name(vessel));
                     names.collect::<Vec<_>>()
                 })
@@ -144,7 +144,10 @@ fn place(effect: &'static EffectInfo) -> String {
                 _ => format!("{of_two}; of three tanks any, `T1|T2|T3`"),
             }
         }
-        Place::Sensor => "at the sensor, between the level and the reading".to_string(),
+        Place::Sensor => {
+            "at the sensor, between the level and the reading; where several levels are measured at that of the last, or `ctid add --where upper|T1|...`"
+                .to_string()
+        }
     }
 }
 
@@ -152,8 +155,8 @@ fn place(effect: &'static EffectInfo) -> String {
 fn parameters(effect: &'static EffectInfo, look: Look) -> String {
     let mut all: Vec<ParameterInfo> = Vec::new();
     for plant in applies_to(effect) {
-        let structure = model_file::any_structure(plant, true);
-        for vessel in effect.sites(plant) {
+        let structure = model_file::any_structure(plant, &Known::default(), true);
+        for vessel in effect.sites(plant, &Known::default()) {
             for info in structure.effect_parameters(Placed { effect, vessel }) {
                 if all.iter().all(|known| known.name != info.name) {
                     all.push(info);

@@ -1,7 +1,7 @@
 //! What a diagnosis says of its parts, for the terminal, the report and the page alike.
 
 use missing_effect::{
-    Acceptance, Diagnosis, Effort, GROUP_MARGIN, HeldOutError, PlaceScore, Score,
+    Acceptance, Diagnosis, Effort, GROUP_MARGIN, HeldOutError, PerOutput, PlaceScore, Score, Step,
 };
 use plants::Domain;
 
@@ -34,6 +34,90 @@ pub(crate) fn tank(diagnosis: &Diagnosis, index: usize) -> Option<&str> {
     diagnosis.steps.get(index + 1)?.place.as_deref()
 }
 
+/// There are several outputs, so that what is said of one of them needs its name.
+pub(crate) fn several(diagnosis: &Diagnosis) -> bool {
+    diagnosis.outputs.len() > 1
+}
+
+/// What numbers that are weighted by the noise are multiples of.
+pub(crate) const TIMES_THE_NOISE: &str = "times the noise";
+
+/// A number of each output: `0.55 V`, of several outputs `0.55 V (upper), 0.20 V (lower)`.
+pub(crate) fn per_output(values: &PerOutput, digits: i32, unit: &str) -> String {
+    let several = values.0.len() > 1;
+    let of_output = |(name, value): &(String, f64)| {
+        let value = with_unit(&numbers::significant(*value, digits), unit);
+        if several {
+            format!("{value} ({name})")
+        } else {
+            value
+        }
+    };
+    let all: Vec<String> = values.0.iter().map(of_output).collect();
+    all.join(", ")
+}
+
+/// The noise floors as numbers of their outputs.
+pub(crate) fn noise_floors(diagnosis: &Diagnosis) -> PerOutput {
+    let floors = diagnosis.noise.iter();
+    PerOutput(
+        floors
+            .map(|floor| (floor.output.clone(), floor.level))
+            .collect(),
+    )
+}
+
+/// The error that a single effect leaves, and its unit: errors of several outputs are one number only where each is divided by its noise.
+pub(crate) fn score_error<'a>(diagnosis: &'a Diagnosis, score: &Score) -> (f64, &'a str) {
+    if several(diagnosis) {
+        (score.weighted_rmse, TIMES_THE_NOISE)
+    } else {
+        (score.rmse, &diagnosis.output_unit)
+    }
+}
+
+/// The same of a step, on the fitted records.
+pub(crate) fn step_error<'a>(diagnosis: &'a Diagnosis, step: &Step) -> (f64, &'a str) {
+    if several(diagnosis) {
+        (step.weighted_rmse, TIMES_THE_NOISE)
+    } else {
+        (step.rmse, &diagnosis.output_unit)
+    }
+}
+
+/// Where a step fails, output by output, behind the name of the output where there are several.
+pub(crate) fn sentences(diagnosis: &Diagnosis, step: &Step) -> Vec<String> {
+    let several = several(diagnosis);
+    let outputs = step.outputs.iter();
+    let sentences = outputs.flat_map(|output| {
+        let of_output = output.failures.sentences.iter();
+        of_output.map(move |sentence| {
+            if several {
+                format!("{}: {sentence}", output.name)
+            } else {
+                sentence.clone()
+            }
+        })
+    });
+    sentences.collect()
+}
+
+/// `held-out error 1.9 degC: offset 1.9, gain 0.1, shape 0.3 degC` of each output, with its name where there are several.
+pub(crate) fn held_out_errors(diagnosis: &Diagnosis, step: &Step) -> Vec<String> {
+    let several = several(diagnosis);
+    let outputs = step.outputs.iter();
+    let errors = outputs.filter_map(|output| {
+        let parts = held_out_error(output.held_out_error.as_ref()?, &diagnosis.output_unit);
+        let of = if several {
+            format!(" of {}", output.name)
+        } else {
+            String::new()
+        };
+        Some(format!("held-out error{of} {parts}"))
+    });
+    errors.collect()
+}
+
 /// A part of something in whole percent; `-` where there is none.
 pub(crate) fn percent(part: f64) -> String {
     if part.is_finite() {
@@ -63,13 +147,24 @@ pub(crate) fn partial_headline(diagnosis: &Diagnosis) -> String {
         });
     let remains = diagnosis.steps.last().map_or(String::new(), |last| {
         let unit = &diagnosis.output_unit;
-        let mut floor = String::new();
-        if diagnosis.noise_floor.is_finite() {
-            let level = numbers::significant(diagnosis.noise_floor, 2);
-            floor = format!(" (noise floor {})", with_unit(&level, unit));
-        }
-        let error = with_unit(&numbers::significant(last.rmse, 2), unit);
-        format!("; what remains: {error} rms{floor}")
+        let outputs = last.outputs.iter().zip(&diagnosis.noise);
+        let remains = outputs.map(|(output, floor)| {
+            let of = if several(diagnosis) {
+                format!("{} ", output.name)
+            } else {
+                String::new()
+            };
+            let error = with_unit(&numbers::significant(output.rmse, 2), unit);
+            let floor = if floor.level.is_finite() {
+                let level = with_unit(&numbers::significant(floor.level, 2), unit);
+                format!(" (noise floor {level})")
+            } else {
+                String::new()
+            };
+            format!("{of}{error} rms{floor}")
+        });
+        let remains: Vec<String> = remains.collect();
+        format!("; what remains: {}", remains.join(", "))
     });
     format!(
         "Mostly {}: {explained}{held_out}{remains}",
@@ -106,7 +201,7 @@ pub(crate) fn acceptance_rows(test: &Acceptance, unit: &str) -> Vec<AcceptanceRo
     ));
     rows.push((
         "Floor: noise that counts as no error",
-        with_unit(&numbers::significant(test.floor, 2), unit),
+        per_output(&test.floor, 2, unit),
         String::new(),
     ));
     rows
@@ -291,7 +386,7 @@ mod tests {
              0.26 V rms (noise floor 0.080 V)"
         );
         diagnosis.acceptance = None;
-        diagnosis.noise_floor = f64::NAN;
+        diagnosis.noise[0].level = f64::NAN;
         assert_eq!(
             partial_headline(&diagnosis),
             "Mostly overflow: the larger part of the squared error; what remains: 0.26 V rms"

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Channel, Record};
+use ct_signals::{Channel, Record};
 use greybox::{Setup, Stopping, fit_from};
 use plants::{Command, EffectInfo, Known, Placed, Plant, Simulator, Structure};
 
@@ -45,7 +45,7 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
     let plants = [Plant::SingleTank, Plant::SingleTankLinear];
     let plant = plants
         .into_iter()
-        .find(|&plant| effect.sites(plant).next().is_some())?;
+        .find(|&plant| effect.sites(plant, &Known::default()).next().is_some())?;
     // A tank of 154 cm^2 with a time constant of 100 s, its level near 16 cm; the linear one has the same slope there.
     let (own, area) = match plant {
         Plant::SingleTank => (vec![10.0, 12.5], Some(154.0)),
@@ -61,7 +61,7 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
     let simulate = |structure: &Structure, theta: &[f64]| -> Option<Record> {
         let mut simulator = Simulator::new(structure, theta, &initial, commands[0]).ok()?;
         let readings = commands.iter().map(|&u| {
-            let reading = simulator.read();
+            let reading = simulator.read(0);
             simulator.advance(Command::held(u), INTERVAL);
             reading
         });
@@ -95,7 +95,7 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
 
     let setup = Setup::from_records(plant, known.clone(), &[], &records, BTreeMap::new()).ok()?;
     let start = [own.as_slice(), &initial].concat();
-    let fit = fit_from(&setup, &[start], &ArModel::white(1.0), STOPPING).ok()?;
+    let fit = fit_from(&setup, &[start], &setup.white_noise(), STOPPING).ok()?;
     let residual = setup.residuals(&fit.x).ok()?.into_iter().next()?;
     let [mut record] = records;
     Some((record.outputs.swap_remove(0).values, residual))

@@ -6,14 +6,14 @@
 //! vessel,level,8.2,-0.3,0.2
 //! vessel,level,11.0,-4.1,0.3
 //! ```
-//! `place` is `actuator` (of two pumps the first), `sensor`, `vessel`, or of several vessels the name of one; `variable` is `level`, `rate` (the
+//! `place` is `actuator` (of two pumps the first), `sensor` (of several `sensor upper`), `vessel`, or of several vessels the name of one; `variable` is `level`, `rate` (the
 //! vessel's net inflow), `input` or `time` (since the record began). The standard errors are for the reader alone.
 
 use std::path::Path;
 
 use ct_signals::{quoted, read_file};
 use missing_effect::Unknown;
-use plants::{MOST_KNOTS, Place, Plant, Variable};
+use plants::{Known, MOST_KNOTS, Place, Plant, Variable};
 
 use crate::Error;
 use crate::model_file::LARGEST;
@@ -51,17 +51,25 @@ impl From<&Unknown> for TermFile {
     }
 }
 
-/// The place and the vessel of a name.
-pub(crate) fn place_of(plant: Plant, word: &str) -> Result<(Place, usize), String> {
+/// The place and the vessel, or the output, of a name.
+pub(crate) fn place_of(plant: Plant, known: &Known, word: &str) -> Result<(Place, usize), String> {
+    let outputs = known.outputs(plant);
     match word {
         "actuator" => return Ok((Place::Actuator, 0)),
-        "sensor" => return Ok((Place::Sensor, 0)),
+        "sensor" if outputs.len() == 1 => return Ok((Place::Sensor, 0)),
         "vessel" if plant.vessels() == 1 => return Ok((Place::Vessel, 0)),
         _ => {}
     }
+    let sensor = |vessel: &usize| Some(format!("sensor {}", plant.vessel_name(*vessel)?));
+    let at_sensor = || {
+        outputs
+            .iter()
+            .position(|vessel| sensor(vessel).as_deref() == Some(word))
+    };
     (0..plant.vessels())
         .find(|&vessel| plant.vessel_name(vessel) == Some(word))
         .map(|vessel| (Place::Vessel, vessel))
+        .or_else(|| Some((Place::Sensor, at_sensor()?)))
         .ok_or_else(|| {
             let names = (0..plant.vessels()).filter_map(|vessel| plant.vessel_name(vessel));
             let names: Vec<&str> = names.collect();
@@ -71,9 +79,16 @@ pub(crate) fn place_of(plant: Plant, word: &str) -> Result<(Place, usize), Strin
                 names.join(", ")
             };
             format!(
-                "\"{}\" is no place of plant {}; write actuator, {vessels} or sensor",
+                "\"{}\" is no place of plant {}; write actuator, {vessels} or {}",
                 quoted(word),
-                plant.id()
+                plant.id(),
+                match &outputs[..] {
+                    [_] => "sensor".to_string(),
+                    several => {
+                        let names: Vec<String> = several.iter().filter_map(sensor).collect();
+                        names.join(" or ")
+                    }
+                }
             )
         })
 }

@@ -4,8 +4,8 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Channel, Record, excitation, noise};
-use greybox::{FitOptions, Setup, coloured, fit_from, robust};
+use ct_signals::{Channel, Record, excitation, noise};
+use greybox::{FitOptions, Noise, Setup, coloured, fit_from, robust};
 use plants::controller::Controller;
 use plants::{Command, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
@@ -61,7 +61,7 @@ fn in_loop(
     let rms = (v.iter().map(|v| v * v).sum::<f64>() / SAMPLES as f64).sqrt();
     let (mut u, mut y) = (Vec::new(), Vec::new());
     for k in 0..SAMPLES {
-        let reading = simulator.read() + sigma * v[k] / rms;
+        let reading = simulator.read(0) + sigma * v[k] / rms;
         let command = regulator.command(r[k], reading, INTERVAL);
         simulator.advance(Command::held(command), INTERVAL);
         y.push(reading);
@@ -82,7 +82,7 @@ type Estimate = (Vec<f64>, Vec<Option<f64>>);
 fn ways(rig: &Rig, controller: &Controller, record: Record) -> Option<Vec<Estimate>> {
     let records = [record];
     let stopping = FitOptions::default().stopping;
-    let white = ArModel::white(1.0);
+    let white = Noise::white(1);
     let count = rig.theta.len();
     let setup = Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
     let mut truth = rig.theta.clone();

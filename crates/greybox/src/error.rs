@@ -21,14 +21,21 @@ pub enum Error {
         /// The names that there are.
         known: String,
     },
-    /// No start led anywhere.
+    /// A record has another number of outputs than the structure.
     #[error(
-        "none of {starts} starts gave a finite simulation: check the units of the data and the constants under [known]"
+        "{record}: it has {given} outputs, but the model has {needed}: name as many columns as there are measured levels"
     )]
-    NoFiniteStart {
-        /// How many were tried.
-        starts: usize,
+    Outputs {
+        /// The record.
+        record: String,
+        /// How many it has.
+        given: usize,
+        /// How many the structure has.
+        needed: usize,
     },
+    /// The least squares have no answer.
+    #[error(transparent)]
+    Estimation(#[from] estimation::Error),
     /// Somebody said so by [`Setup::stop`](crate::Setup::stop).
     #[error("stopped before it was done")]
     Stopped,

@@ -8,7 +8,7 @@
 //! y - ym = v / (1 + P C),   v = (1 + P C) (y - ym)
 //! ```
 //! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So what the loop did
-//! is undone: `y - ym + P0 (um - u)`, `P0` the plant linearised once at a first fit, is `v` itself, limits or not, of which a noise
+//! is undone: `y - ym + P0 (um - u)`, at every output, `P0` the plant linearised once at a first fit, is `v` itself, limits or not, of which a noise
 //! model is then made. Without limits this is the filter `1 + P0 C` of `y - ym`. The derivatives are filtered alike, and hold no
 //! noise: the estimate is the one of an instrumental variable, unbiased whatever the colour of `v` and whatever `P0`, which
 //! only the variance hangs on. The determinant of what makes `v` of `y` is one, so likelihoods compare.
@@ -28,7 +28,9 @@ use ct_signals::{Hold, Record};
 use plants::controller::{Controller, MAX_CONTROLLER_STATES};
 use plants::{Command, Dual, MAX_VESSELS, Scalar, Simulator, Structure};
 
-use crate::{Error, Triangle};
+use estimation::Triangle;
+
+use crate::Error;
 
 /// The controller on what was measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +65,14 @@ pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error>
     }
     record.validate()?;
     // The controller saw readings that the record lacks; a line between their neighbours stands for them.
-    let y = &record.outputs[0].interpolated();
+    let Some(read) = record.outputs.get(controller.output()) else {
+        return Err(Error::Outputs {
+            record: record.name.clone(),
+            given: record.outputs.len(),
+            needed: controller.output() + 1,
+        });
+    };
+    let y = &read.interpolated();
     let (r, u) = (&reference.values, &record.inputs[0].values);
     let n = controller.states();
     let run = |states: &[f64]| {
@@ -134,8 +143,8 @@ pub struct LinearPlant {
     pub a: Vec<Vec<f64>>,
     /// b.
     pub b: Vec<f64>,
-    /// Which level is measured.
-    pub measured: usize,
+    /// Of each output, which level it is.
+    pub outputs: Vec<usize>,
 }
 
 impl LinearPlant {
@@ -165,7 +174,7 @@ impl LinearPlant {
         Ok(Self {
             a: (0..n).map(|i| next[i].eps[..n].to_vec()).collect(),
             b: (0..n).map(|i| next[i].eps[n]).collect(),
-            measured: structure.scales.measured,
+            outputs: structure.scales.outputs.iter().map(|o| o.vessel).collect(),
         })
     }
 }
@@ -250,10 +259,10 @@ impl Response {
         self.levels.fill(0.0);
     }
 
-    /// Adds to a row what its commands so far did.
-    pub(crate) fn add_to(&self, row: &mut [f64]) {
-        let measured = self.plant.measured * row.len();
-        for (value, level) in row.iter_mut().zip(&self.levels[measured..]) {
+    /// Adds to a row of an output what its commands so far did.
+    pub(crate) fn add_to(&self, output: usize, row: &mut [f64]) {
+        let read = self.plant.outputs[output] * row.len();
+        for (value, level) in row.iter_mut().zip(&self.levels[read..]) {
             *value += level;
         }
     }

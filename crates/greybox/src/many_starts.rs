@@ -5,11 +5,11 @@
 //! the model without the effect: a start costs one simulation in plain numbers and a regression on this one column. Of plants that are not
 //! linear this holds to first order.
 
-use ct_signals::ArModel;
+use estimation::{Noise, costs_more, within};
 use plants::{Outlet, Place, Placed};
 use rayon::prelude::*;
 
-use crate::{Setup, levenberg_marquardt::within};
+use crate::Setup;
 
 /// What hides much of the command from the plant, and so how quick the plant is.
 const STICKS: &str = "stiction_backlash";
@@ -83,7 +83,7 @@ pub fn keep_best_simulated(
     setup: &Setup,
     placed: Placed,
     starts: &mut Vec<Vec<f64>>,
-    noise: &ArModel,
+    noise: &Noise,
 ) {
     if starts.len() <= MANY || placed.effect.place != Place::Actuator {
         return;
@@ -109,7 +109,7 @@ pub fn keep_best_simulated(
 }
 
 /// A start with the other parameters fitted to it in one step, by those of the free ones that are named, where that is a better one.
-fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &ArModel) -> Vec<f64> {
+fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &Noise) -> Vec<f64> {
     let triangle = (!setup.leaves_out(STARTS)).then(|| setup.linearise(&start, noise));
     let Some(triangle) = triangle.flatten() else {
         return start;
@@ -122,7 +122,7 @@ fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &ArModel) ->
     for (d, &i) in step.iter().zip(setup.free()) {
         moved[i] = within(moved[i] + d, setup.bounds()[i]);
     }
-    if setup.costs_more(&moved, noise, triangle.cost()) {
+    if costs_more(setup, &moved, noise, triangle.cost()) {
         start
     } else {
         moved
@@ -155,7 +155,7 @@ fn scores_of_simulations(
     setup: &Setup,
     placed: Placed,
     starts: &[Vec<f64>],
-    noise: &ArModel,
+    noise: &Noise,
 ) -> Option<Vec<Simulated>> {
     let parameters = setup.structure.effect_parameters(placed);
     let own: Vec<(usize, f64)> = parameters
@@ -181,10 +181,18 @@ fn scores_of_simulations(
             models.push(without);
         }
     }
+    // Outputs count against each other as in the first model, the same for all.
+    let weights = match setup.outputs() {
+        1 => vec![1.0],
+        _ => models
+            .iter()
+            .find_map(|x| estimation::squares(setup, x, noise))?
+            .weights(),
+    };
     // The effect's own columns take no part; those of time constants only where the model fits best without the effect, since elsewhere
     // they are not near what they will be.
     let simulated = |x: &Vec<f64>| {
-        let left = (!setup.leaves_out(STARTS)).then(|| whitened(setup, x, noise));
+        let left = (!setup.leaves_out(STARTS)).then(|| whitened(setup, x, noise, &weights));
         left.flatten()
     };
     let squares = |x: &Vec<f64>| simulated(x).map_or(f64::INFINITY, |left| dot(&left, &left));
@@ -206,7 +214,7 @@ fn scores_of_simulations(
             } else {
                 &apart
             };
-            WithoutEffect::at(x, apart, placed.vessel, setup, noise)
+            WithoutEffect::at(x, apart, placed.vessel, setup, (noise, &weights))
         })
         .collect();
     let scores = starts.par_iter().map(|start| {
@@ -222,12 +230,13 @@ fn scores_of_simulations(
     Some(scores.map(|score| score.unwrap_or(none)).collect())
 }
 
-/// What a model leaves of the records, whitened.
-fn whitened(setup: &Setup, x: &[f64], noise: &ArModel) -> Option<Vec<f64>> {
-    let residuals = setup.disturbance(x).ok()?;
-    let series = residuals.iter().flat_map(|residual| noise.whiten(residual));
+/// What a model leaves of the records, whitened and weighted.
+fn whitened(setup: &Setup, x: &[f64], noise: &Noise, weights: &[f64]) -> Option<Vec<f64>> {
+    let series = noise.whiten(&setup.disturbance(x).ok()?);
+    let weighted = series.iter().zip(weights.iter().cycle());
+    let all = weighted.flat_map(|(series, weight)| series.iter().map(move |v| v * weight));
     // Rows of missing samples take no part here as in the columns.
-    Some(series.filter(|value| !value.is_nan()).collect())
+    Some(all.filter(|value| !value.is_nan()).collect())
 }
 
 /// The model without an effect at the actuator, whitened.
@@ -251,26 +260,16 @@ impl WithoutEffect {
         apart: &[usize],
         gain: usize,
         setup: &Setup,
-        noise: &ArModel,
+        (noise, weights): (&Noise, &[f64]),
     ) -> Option<Self> {
         let rows = setup.rows(&x)?;
-        let mut whitener = noise.whitener(rows.columns);
         let mut columns = vec![Vec::with_capacity(setup.samples()); rows.columns];
-        let mut row = vec![0.0; rows.columns];
-        for record in rows.records() {
-            whitener.reset();
-            for values in record.chunks_exact(rows.columns) {
-                if values[rows.columns - 1].is_nan() {
-                    whitener.skip();
-                    continue;
-                }
-                row.copy_from_slice(values);
-                whitener.push(&mut row);
-                for (column, value) in columns.iter_mut().zip(&row) {
-                    column.push(*value);
-                }
+        let all: Vec<usize> = (0..rows.columns).collect();
+        rows.each_whitened(&all, noise, weights, |row| {
+            for (column, value) in columns.iter_mut().zip(row) {
+                column.push(*value);
             }
-        }
+        });
         let residual = columns.pop()?;
         let mut by_gain = None;
         let mut basis: Vec<Vec<f64>> = Vec::with_capacity(columns.len());

@@ -69,12 +69,12 @@ impl ReadingGrid {
     }
 }
 
-/// The grid that nearly all readings of all records lie on, the one of the largest step; `None` where there is none.
+/// The grid that nearly all readings of an output in all records lie on, the one of the largest step; `None` where there is none.
 #[must_use]
-pub fn reading_grid(records: &[Record]) -> Option<ReadingGrid> {
+pub fn reading_grid(records: &[Record], output: usize) -> Option<ReadingGrid> {
     let mut sorted: Vec<f64> = records
         .iter()
-        .flat_map(|record| record.outputs[0].present())
+        .flat_map(|record| record.outputs[output].present())
         .collect();
     if sorted.len() < FEWEST_READINGS || sorted.iter().any(|y| !y.is_finite()) {
         return None;
@@ -85,7 +85,7 @@ pub fn reading_grid(records: &[Record]) -> Option<ReadingGrid> {
     let levels = levels(&sorted, SAME * reach);
     let mut changes: Vec<f64> = records
         .iter()
-        .flat_map(|record| record.outputs[0].values.windows(2))
+        .flat_map(|record| record.outputs[output].values.windows(2))
         .map(|pair| (pair[1] - pair[0]).abs())
         .filter(|change| !change.is_nan())
         .collect();
@@ -248,7 +248,7 @@ mod tests {
                 for n in [300, 900, 4000] {
                     let step = ratio * SIGMA;
                     let rounded = |y: f64| step * ((y / step - offset).round() + offset);
-                    let grid = reading_grid(&[noisy(seed as u64, n, rounded)]).unwrap();
+                    let grid = reading_grid(&[noisy(seed as u64, n, rounded)], 0).unwrap();
                     assert!((grid.step / step - 1.0).abs() < 1e-6, "{grid:?} {step}");
                     assert!(
                         (grid.offset / step - offset).abs() < 1e-3,
@@ -270,7 +270,7 @@ mod tests {
             for (k, y) in wave.outputs[0].values.iter_mut().enumerate().step_by(25) {
                 *y += (0.2 + 0.5 * (k as f64).sin().abs()) * step;
             }
-            let grid = reading_grid(&[wave]).unwrap();
+            let grid = reading_grid(&[wave], 0).unwrap();
             assert!((grid.step / step - 1.0).abs() < 1e-4, "{grid:?} {step}");
             assert!(grid.share > 0.93 && grid.share < 0.98, "{grid:?}");
         }
@@ -281,7 +281,7 @@ mod tests {
         let step = 40.0 / 4096.0;
         for digits in [1e4, 1e5, 1e6] {
             let printed = |y: f64| ((y / step).round() * step * digits).round() / digits;
-            let grid = reading_grid(&[noisy(7, 900, printed)]).unwrap();
+            let grid = reading_grid(&[noisy(7, 900, printed)], 0).unwrap();
             assert!((grid.step / step - 1.0).abs() < 1e-4, "{grid:?} {step}");
             assert!(grid.share > 0.99 && !grid.is_coarse(), "{grid:?}");
         }
@@ -293,7 +293,7 @@ mod tests {
             .map(|k| smooth.outputs[0].values[k] - smooth.outputs[0].values[0] + k as f64 * 0.02)
             .map(|y| wide(14.0 + y / 60.0))
             .collect();
-        let grid = reading_grid(&[record(ramped)]).unwrap();
+        let grid = reading_grid(&[record(ramped)], 0).unwrap();
         assert!((grid.step / step - 1.0).abs() < 1e-4, "{grid:?} {step}");
         assert!(grid.is_coarse());
     }
@@ -301,7 +301,7 @@ mod tests {
     #[test]
     fn digits_of_a_file_are_a_grid_far_below_the_noise() {
         let printed = |y: f64| (20.0 * y * 100.0).round() / 100.0;
-        let grid = reading_grid(&[noisy(3, 900, printed)]).unwrap();
+        let grid = reading_grid(&[noisy(3, 900, printed)], 0).unwrap();
         assert!((grid.step - 0.01).abs() < 1e-8, "{grid:?}");
         assert!(grid.has_zero() && !grid.is_coarse(), "{grid:?}");
         assert!(grid.coarseness() < 0.02);
@@ -311,15 +311,15 @@ mod tests {
     fn noise_and_smooth_courses_have_no_grid() {
         for seed in 0..200 {
             let n = [25, 60, 300, 900][seed as usize % 4];
-            assert_eq!(reading_grid(&[noisy(seed, n, |y| y)]), None, "{seed}");
+            assert_eq!(reading_grid(&[noisy(seed, n, |y| y)], 0), None, "{seed}");
         }
         let course = |read: fn(f64) -> f64| record((0..900).map(|k| read(f64::from(k))).collect());
-        assert_eq!(reading_grid(&[course(|t| (t / 50.0).sin())]), None);
-        assert_eq!(reading_grid(&[course(|_| 3.0)]), None);
-        assert_eq!(reading_grid(&[course(|_| f64::NAN)]), None);
+        assert_eq!(reading_grid(&[course(|t| (t / 50.0).sin())], 0), None);
+        assert_eq!(reading_grid(&[course(|_| 3.0)], 0), None);
+        assert_eq!(reading_grid(&[course(|_| f64::NAN)], 0), None);
         // Two readings are no grid, however often they come.
         assert_eq!(
-            reading_grid(&[course(|t| if t < 300.0 { 1.0 } else { 2.7 })]),
+            reading_grid(&[course(|t| if t < 300.0 { 1.0 } else { 2.7 })], 0),
             None
         );
     }

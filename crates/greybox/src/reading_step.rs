@@ -15,25 +15,25 @@ const FEWEST_STEPS: f64 = 4.0;
 /// Readings that the first look takes.
 const FIRST_LOOK: usize = 400;
 
-/// The largest `D` that nearly all readings are multiples of \[output unit\], if there is one that is coarse enough to be
+/// The largest `D` that nearly all readings of an output are multiples of \[output unit\], if there is one that is coarse enough to be
 /// more than the last digit.
-pub(crate) fn reading_step(records: &[Record]) -> Option<f64> {
-    exact_reading_step(records).or_else(|| noisy_step(records))
+pub(crate) fn reading_step(records: &[Record], output: usize) -> Option<f64> {
+    exact_reading_step(records, output).or_else(|| noisy_step(records, output))
 }
 
 /// The same where the readings themselves are multiples, as a converter leaves them.
 #[must_use]
-pub fn exact_reading_step(records: &[Record]) -> Option<f64> {
-    let grid = reading_grid(records).filter(|grid| grid.is_coarse() && grid.has_zero());
+pub fn exact_reading_step(records: &[Record], output: usize) -> Option<f64> {
+    let grid = reading_grid(records, output).filter(|grid| grid.is_coarse() && grid.has_zero());
     grid.map(|grid| grid.step)
 }
 
 /// The same where noise comes behind the steps.
-fn noisy_step(records: &[Record]) -> Option<f64> {
+fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
     let all = || {
         records
             .iter()
-            .flat_map(|record| record.outputs[0].present())
+            .flat_map(|record| record.outputs[output].present())
     };
     let count = all().count();
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
@@ -118,7 +118,7 @@ mod tests {
             for noise in [0.0, 0.07] {
                 let jitter = |y: f64| noise * step * (977.0 * y).sin();
                 let wave = record(|y| step * (y / step).round() + jitter(y));
-                let found = reading_step(&[wave]).unwrap();
+                let found = reading_step(&[wave], 0).unwrap();
                 assert!((found - step).abs() < 1e-3 * step, "{found} of {step}");
             }
         }
@@ -126,9 +126,12 @@ mod tests {
 
     #[test]
     fn a_smooth_reading_and_a_fine_converter_have_none() {
-        assert_eq!(reading_step(&[record(|y| y)]), None);
-        assert_eq!(reading_step(&[record(|y| (y / 0.01).round() * 0.01)]), None);
-        assert_eq!(reading_step(&[record(|_| 3.0)]), None);
-        assert_eq!(reading_step(&[record(|_| f64::INFINITY)]), None);
+        assert_eq!(reading_step(&[record(|y| y)], 0), None);
+        assert_eq!(
+            reading_step(&[record(|y| (y / 0.01).round() * 0.01)], 0),
+            None
+        );
+        assert_eq!(reading_step(&[record(|_| 3.0)], 0), None);
+        assert_eq!(reading_step(&[record(|_| f64::INFINITY)], 0), None);
     }
 }

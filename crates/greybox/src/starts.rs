@@ -3,13 +3,15 @@
 //! What a tank's record fixes well is its throughput in the mean; what it may be anything of is its time constants.
 //! So time constants are drawn evenly on a logarithmic scale between the sampling interval and the record's length,
 //! in either order for two tanks (which fit almost as well with their time constants swapped), and the rest of the
-//! parameters follows from the mean of the record.
+//! parameters follows from the mean of the record. The gain of a measured disturbance, of either sign, starts at zero.
 
 use ct_signals::{Channel, Record};
 use plants::{Outlet, Plant};
 use rand::RngExt;
 
-use crate::{Setup, at_rest, levenberg_marquardt::within};
+use estimation::within;
+
+use crate::{Setup, at_rest};
 
 /// One start for the plant's own parameters and the initial levels; effects start at their first start value.
 #[must_use]
@@ -37,12 +39,15 @@ pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
 fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     let structure = &setup.structure;
     let scales = &structure.scales;
+    // The output that the others lead into.
+    let last = scales.outputs.len() - 1;
+    let read = scales.outputs[last].vessel;
     let (mut u, mut y, mut uu, mut uy, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for record in setup.records {
         for (a, b) in record.inputs[0]
             .values
             .iter()
-            .zip(&record.outputs[0].values)
+            .zip(&record.outputs[last].values)
             .filter(|(_, reading)| !reading.is_nan())
         {
             u += a;
@@ -70,7 +75,7 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     // The static gain's sign and rough size, from the correlation of command and level.
     let slope = {
         let (variance, covariance) = (uu / count - u * u, uy / count - u * y);
-        let (low, high) = scales.level[scales.measured];
+        let (low, high) = scales.level[read];
         let span = scales.input.1 - scales.input.0;
         let size = if span > 0.0 { (high - low) / span } else { 0.0 };
         if variance > 0.0 && covariance < 0.0 {
@@ -88,13 +93,13 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
         }
         Plant::CascadedTanks => {
             let q = flow(scales.area[1]);
-            let upper = q * tau[0] / (2.0 * scales.area[0]);
+            let upper = mean_level(setup, 0).unwrap_or(q * tau[0] / (2.0 * scales.area[0]));
             vec![q / drive, q / upper.sqrt(), q / mean.sqrt()]
         }
         Plant::SingleTankLinear => vec![slope, tau[1], y - slope * u],
         Plant::CascadedTanksLinear => vec![slope, tau[0], tau[1], y - slope * u],
         Plant::FirstOrder => vec![if driven { y / u } else { slope }, tau[1]],
-        Plant::ThreeTank => joined_tanks(setup, mean, flow(scales.area[scales.measured]), heads),
+        Plant::ThreeTank => joined_tanks(setup, mean, flow(scales.area[read]), heads),
     };
     let added = structure.parameters().split_off(x.len());
     x.extend(
@@ -125,12 +130,20 @@ fn joined_tanks(setup: &Setup, mean: f64, flow: f64, heads: [f64; 2]) -> Vec<f64
     let through = (gain * u).max(0.1 * flow);
     let [d13, d32] = heads.map(|share| share * mean);
     // Levels in the row, T1, T3, T2, from the measured one.
-    let outlet = match scales.measured {
+    let read = scales.outputs.last().map_or(2, |output| output.vessel);
+    let outlet = match read {
         0 => mean - d13 - d32,
         1 => mean - d32,
         _ => mean,
     };
     let outlet = outlet.max(0.05 * mean);
+    // Two levels that are read say the head between them.
+    let known = [0, 1, 2].map(|vessel| mean_level(setup, vessel));
+    let between = |a: usize, b: usize| Some((known[a]? - known[b]?).abs());
+    let least = 1e-3 * mean;
+    let d13 = between(0, 1).map_or(d13, |head| head.max(least));
+    let d32 = between(1, 2).map_or(d32, |head| head.max(least));
+    let outlet = known[2].map_or(outlet, |level| level.max(least));
     let orifice = scales.orifice.unwrap_or(1.0);
     let valve = |flow: f64, head: f64| flow / (orifice * head.sqrt());
     let mut x = vec![gain];
@@ -160,35 +173,63 @@ fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     let h2 = head(all.max(0.0), x[pumps + 2]);
     let h3 = h2 + head(first, x[pumps + 1]);
     let mut levels = [h3 + head(first, x[pumps]), h3, h2];
-    // They stand about the measured one as they would at rest.
-    let shift = first_reading(record) - levels[scales.measured];
-    for level in &mut levels {
-        *level = (*level + shift).max(0.0);
+    // They stand about the first that is read as they would at rest.
+    let read = scales.outputs[0].vessel;
+    let shift = first_reading(setup, record, read).unwrap_or(0.0) - levels[read];
+    for (vessel, level) in levels.iter_mut().enumerate() {
+        let at_rest = (*level + shift).max(0.0);
+        *level = first_reading(setup, record, vessel).unwrap_or(at_rest);
     }
-    levels[scales.measured] = first_reading(record);
     levels.to_vec()
 }
 
-/// The first reading that is there; zero of a record that has none.
-fn first_reading(record: &Record) -> f64 {
-    record.outputs[0].present().next().unwrap_or(0.0)
+/// The output that reads the level of a vessel, if one does.
+fn output_of(setup: &Setup, vessel: usize) -> Option<usize> {
+    let mut outputs = setup.structure.scales.outputs.iter();
+    outputs.position(|output| output.vessel == vessel)
 }
 
-/// Appends initial states: the measured level from the first reading, the upper one and lags at rest under the first
+/// The first reading of a vessel's level; `None` where nobody reads it, or it has no sample.
+fn first_reading(setup: &Setup, record: &Record, vessel: usize) -> Option<f64> {
+    let output = &record.outputs[output_of(setup, vessel)?];
+    output.present().next()
+}
+
+/// The mean reading of a vessel's level, if it is above zero; `None` where nobody reads it.
+fn mean_level(setup: &Setup, vessel: usize) -> Option<f64> {
+    let output = output_of(setup, vessel)?;
+    let outputs = setup.records.iter().map(|record| &record.outputs[output]);
+    let (sum, count) = outputs
+        .flat_map(Channel::present)
+        .fold((0.0, 0.0), |(sum, count), y| (sum + y, count + 1.0));
+    Some(sum / count).filter(|mean| *mean > 0.0)
+}
+
+/// Appends initial states: a level that is measured from its first reading, an upper one that is not and lags at rest under the first
 /// command, the controller's as they give the measured command.
 pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
     for (r, record) in setup.records.iter().enumerate() {
-        let (u0, y0) = (record.inputs[0].values[0], first_reading(record));
-        match setup.structure.plant {
-            Plant::CascadedTanks => x.push((x[0] * u0 / x[1]).powi(2)),
-            Plant::CascadedTanksLinear => x.push(x[0] * u0),
-            _ => {}
+        let structure = &setup.structure;
+        let [u0, d0] = at_rest(record);
+        let mut inflow = x[0] * u0;
+        if structure.known.disturbed_vessel(structure.plant) == Some(0)
+            && structure.scales.input_2.is_some()
+        {
+            let own = structure.plant.parameters(&structure.scales).len();
+            inflow = (inflow + x[own - 1] * d0).max(0.0);
         }
+        let at_rest = match structure.plant {
+            Plant::CascadedTanks => Some((inflow / x[1]).powi(2)),
+            Plant::CascadedTanksLinear => Some(inflow),
+            _ => None,
+        };
+        x.extend(at_rest.map(|level| first_reading(setup, record, 0).unwrap_or(level)));
         if setup.structure.plant.joined() {
             let levels = joined_levels(setup, x, record);
             x.extend(levels);
         } else {
-            x.push(y0);
+            let last = setup.structure.plant.vessels() - 1;
+            x.push(first_reading(setup, record, last).unwrap_or(0.0));
         }
         x.extend(setup.structure.lags().iter().map(|_| 0.0));
         x.extend(setup.controller_states(r));

@@ -4,7 +4,6 @@
 //! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that
 //! depends on the colour of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
 
-use ct_signals::ArModel;
 use greybox::{Replay, Setup, coloured, fit_from};
 use plants::Variable;
 
@@ -54,7 +53,10 @@ pub(crate) fn enclose<'a>(
     if !options.simulate_loop {
         return Ok((node, Some(not_simulated("as was asked for", None))));
     }
-    let lacking = problem.records.iter().find(|r| r.outputs[0].missing() > 0);
+    let lacking = problem.records.iter().find(|r| {
+        let read = r.outputs.get(controller.output());
+        read.is_some_and(|output| output.missing() > 0)
+    });
     if let Some(record) = lacking {
         let why = format!(
             "readings are missing in {}, so the controller cannot be checked against its commands",
@@ -126,9 +128,12 @@ fn disagreement(replays: &[Replay]) -> (f64, f64) {
 /// having taken it.
 fn feedback_p(node: &Node) -> Result<f64, Error> {
     let residuals = node.setup.residuals(&node.fit.x)?;
-    let pairs = node.setup.records.iter().zip(&residuals);
-    let least = pairs
-        .map(|(record, residual)| {
+    let outputs = node.setup.outputs();
+    let least = residuals
+        .iter()
+        .enumerate()
+        .map(|(i, residual)| {
+            let record = &node.setup.records[i / outputs];
             // The first parameter of every plant is its gain.
             let gain = record.references.is_empty().then_some(node.fit.x[0]);
             // What was not read moved no controller.
@@ -160,7 +165,7 @@ fn other_metric(setup: &Setup, node: &Node) -> Result<Vec<f64>, Error> {
     Ok(if node.fit.noise.order() == 0 {
         coloured(setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.x
     } else {
-        let white = ArModel::white(1.0);
+        let white = setup.white_noise();
         fit_from(setup, std::slice::from_ref(&node.fit.x), &white, STOPPING)?.x
     })
 }

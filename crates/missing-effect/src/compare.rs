@@ -7,7 +7,7 @@ use greybox::coloured;
 use crate::{
     ControlLoop, Diagnosis, Error, Options, Problem, Verdict,
     confirm::{BIC_MARGIN, beyond_chance},
-    diagnose::{allow, assemble, effort, floor},
+    diagnose::{allow, assemble, effort, floors},
     gaps::Mended,
     node::Node,
     noise_floor::{NOISE_ORDER, wanders},
@@ -67,7 +67,7 @@ fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Erro
     } else {
         Verdict::Adequate
     };
-    let floor = floor(&own.noise, "the residual of the believed model");
+    let floor = floors(problem, &own.noise, "the residual of the believed model");
     // In the metric of a noise that wanders a simulation may drift off.
     let shown = if lacking || wanders(&base, &own.noise) {
         base
@@ -83,7 +83,7 @@ fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Erro
         floor
     };
     let widen = ControlLoop::widens(control_loop.as_ref());
-    let step = step::report(&shown, own.bic(), &floor.model()?, &problem.test, widen)?;
+    let step = step::report(&shown, own.bic(), &floor.noise()?, &problem.test, widen)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
     diagnosis.residual_unexplained = lacking;
     diagnosis.sentences = sentences::of_comparison(&diagnosis, left);

@@ -1,6 +1,6 @@
 //! Confirmation: which effects of a set stay when the noise may explain what they explain.
 
-use ct_signals::ArModel;
+use greybox::Noise;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -47,7 +47,7 @@ pub(crate) fn chance_of(gained: &Node, lacking: &Node, chance: f64) -> bool {
 }
 
 /// Takes out, one by one, what the noise explains as well, first what is worth least.
-pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     loop {
         // Each has its own share of the risk: that the one which is worth least is beyond chance says nothing of the others.
         let lacking = each_lacking(&node, noise)?.into_iter();
@@ -66,7 +66,7 @@ pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a
 /// Of sets that take the same out of a residual the search follows one, and a stand-in that is nearly right calls for a
 /// further effect that mends it: on the emulated rig of a closed loop a raised outlet stood for the pump's dead zone, and a bent
 /// pump for the difference. With the dead zone in its place the bend is not needed.
-pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     // Every round ends with fewer effects, or with a lower criterion of as many.
     while node.added.len() > 1 {
         let mut others: Vec<Node<'a>> = (0..node.added.len())
@@ -107,15 +107,12 @@ pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &ArModel) -> Result<Node<'a
 }
 
 /// The node without the effect whose loss costs least; `None` where it has none.
-pub(crate) fn least_useful<'a>(
-    node: &Node<'a>,
-    noise: &ArModel,
-) -> Result<Option<Node<'a>>, Error> {
+pub(crate) fn least_useful<'a>(node: &Node<'a>, noise: &Noise) -> Result<Option<Node<'a>>, Error> {
     Ok(least_bic(each_lacking(node, noise)?.into_iter()))
 }
 
 /// The node without each of its effects.
-fn each_lacking<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Vec<Node<'a>>, Error> {
+fn each_lacking<'a>(node: &Node<'a>, noise: &Noise) -> Result<Vec<Node<'a>>, Error> {
     (0..node.added.len())
         .into_par_iter()
         .map(|position| without(node, position, noise, FINE))

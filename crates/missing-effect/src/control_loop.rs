@@ -16,6 +16,7 @@ const GROWTH: f64 = 1.0;
 pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), Error> {
     let setup = &node.setup;
     let plant = linearised(node)?;
+    let read = plant.outputs[controller.output()];
     let own = controller.linear(setup.structure.scales.sample_interval);
     let (n, m) = (plant.b.len(), own.b.len());
     // Levels x, then the controller's states z: e = -x_measured, u = c z + d e.
@@ -24,7 +25,7 @@ pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), E
         for j in 0..n {
             a[(i, j)] = plant.a[i][j];
         }
-        a[(i, plant.measured)] -= plant.b[i] * own.d;
+        a[(i, read)] -= plant.b[i] * own.d;
         for j in 0..m {
             a[(i, n + j)] = plant.b[i] * own.c[j];
         }
@@ -35,7 +36,7 @@ pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), E
         for j in 0..m {
             a[(n + i, n + j)] = if constant { 0.0 } else { own.a[i][j] };
         }
-        a[(n + i, plant.measured)] = -own.b[i];
+        a[(n + i, read)] = -own.b[i];
     }
     let radius = radius(&a);
     let samples = setup

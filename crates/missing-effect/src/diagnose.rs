@@ -3,12 +3,14 @@
 use std::{sync::atomic::Ordering, time::Instant};
 
 use ct_signals::{ArModel, Clock};
+use greybox::Noise;
 use plants::Placed;
 
 use crate::{
-    Acceptance, ControlLoop, Diagnosis, Effort, Error, GROUP_MARGIN, NoiseFloor, Options, Problem,
-    Progress, Rankings, Score, Shown, Step, Verdict,
+    Acceptance, ControlLoop, Diagnosis, Effort, Error, GROUP_MARGIN, NoiseFloor, Options,
+    PerOutput, Problem, Progress, Rankings, Score, Shown, Step, Verdict,
     confirm::BIC_MARGIN,
+    diagnosis::Floors,
     doubt::doubt,
     find::{Found, find, shortened},
     gaps::Mended,
@@ -68,7 +70,7 @@ fn diagnose_whole(
     allow(&base, CONFIRMED);
     // The weighting in which single effects are ranked: white where the residual wanders, since a noise model takes slow effects for
     // noise.
-    let white = ArModel::white(1.0);
+    let white = base.setup.white_noise();
     let (metric, believed, grown) = match &found.prewhitened {
         Some(grown) if !found.by_simulation && !found.wandering => {
             (&found.noise, &found.base, grown)
@@ -104,7 +106,7 @@ fn diagnose_whole(
         || judge.judge(confirmed),
         || {
             rayon::join(
-                || scores(believed, &single, metric),
+                || scores(believed, &single, metric, &innovations(&found.noise)),
                 || price_of_colour(&found.base, &single, &found.noise),
             )
         },
@@ -118,7 +120,7 @@ fn diagnose_whole(
         share_test: None,
         required: WHOLE,
         required_partial: PART,
-        floor: found.noise.sigma(),
+        floor: per_output(problem, &innovations(&found.noise)),
         bic_fall: None,
         required_bic_fall: BIC_MARGIN,
         reasons: Vec::new(),
@@ -130,7 +132,7 @@ fn diagnose_whole(
     let unexplained = course.left.is_some() || found.limited || sticking;
     if judged.grade != Grade::Whole || (course.last().added.is_empty() && unexplained) {
         let by_error = found.grown.promising_singles();
-        let tested = largest_part(&base, &found, &by_error, found.noise.sigma(), widen)?;
+        let tested = largest_part(&base, &found, &by_error, &innovations(&found.noise), widen)?;
         if let Some(tested) = &tested {
             acceptance.effects = ids(&tested.node.added);
             acceptance.share = Some(tested.share);
@@ -153,10 +155,7 @@ fn diagnose_whole(
                 partial = true;
             }
             None if judged.grade != Grade::Whole => {
-                remark = Some(sentences::of_a_part(
-                    course.last(),
-                    &problem.records[0].outputs[0].unit,
-                ));
+                remark = Some(sentences::of_a_part(course.last()));
                 course = Course {
                     left: remains(&base, &doubted.own_base)?,
                     own: doubted.own_base,
@@ -167,7 +166,8 @@ fn diagnose_whole(
             None => {}
         }
     }
-    let mut floor = floor(
+    let mut floor = floors(
+        problem,
         &found.noise,
         if course.last().added.len() == found.richest.added.len() && !stopped {
             "the residual of the final model"
@@ -181,9 +181,8 @@ fn diagnose_whole(
         && let Some(rounded) = rounded(course.last())?
     {
         rounding = Some(sentences::of_rounding(
-            rounded.step,
-            rounded.share,
-            &problem.records[0].outputs[0].unit,
+            &rounded,
+            &problem.records[0].outputs[rounded.output],
         ));
         let longer = judge.longer(course.nodes.clone(), rounded.node)?;
         // What nothing explains stays unexplained where rounding leaves something that is not noise.
@@ -199,7 +198,7 @@ fn diagnose_whole(
     if (course.left.is_some() || partial) && !stopped {
         floor = floor.of_what_is_new();
     }
-    let floor = floor.at_most(course.last().fit.rmse);
+    let floor = floor.at_most(&course.last().fit.rmse);
 
     tell("telling apart", 2, 3);
     allow(&base, REPORTED);
@@ -227,7 +226,7 @@ fn diagnose_whole(
         .map(|group| (group.members, group.places))
         .unzip();
     if verdict != Verdict::Adequate {
-        acceptance.share_test = share_on_held_out(&diagnosis.steps, acceptance.floor);
+        acceptance.share_test = share_on_held_out(&diagnosis.steps, &acceptance.floor);
         acceptance.bic_fall = acceptance.bic_fall.or_else(|| {
             let (first, last) = (diagnosis.steps.first()?, diagnosis.steps.last()?);
             (diagnosis.steps.len() > 1).then_some(first.bic - last.bic)
@@ -285,14 +284,20 @@ pub(crate) fn effort(node: &Node, options: &Options) -> Effort {
 }
 
 /// The share of the excess error on held-out records that the last model explains of the first one's.
-fn share_on_held_out(steps: &[Step], floor: f64) -> Option<f64> {
+fn share_on_held_out(steps: &[Step], floor: &PerOutput) -> Option<f64> {
     let [first, .., last] = steps else {
         return None;
     };
-    let (before, after) = (first.rmse_test?.powi(2), last.rmse_test?.powi(2));
-    let noise = floor * floor;
+    // Over the floor of each output, in their mean.
+    let mean_square = |step: &Step| -> Option<f64> {
+        let errors = step.rmse_test_per_output.as_ref()?.values();
+        let squares = errors.zip(floor.values());
+        let sum: f64 = squares.map(|(rmse, floor)| (rmse / floor).powi(2)).sum();
+        Some(sum / floor.0.len() as f64)
+    };
+    let (before, after) = (mean_square(first)?, mean_square(last)?);
     // An error that is noise has no share to explain.
-    (before > noise).then(|| (before - after) / (before - after.min(noise)))
+    (before > 1.0).then(|| (before - after) / (before - after.min(1.0)))
 }
 
 /// The single effects under both weightings, those that were promising enough for a refit.
@@ -344,13 +349,28 @@ fn ranked(scores: &[Score], verdict: Verdict) -> Vec<String> {
     ranked
 }
 
-pub(crate) fn floor(noise: &ArModel, source: &str) -> NoiseFloor {
-    NoiseFloor {
+/// The noise floors that a noise model stands for.
+pub(crate) fn floors(problem: &Problem, noise: &Noise, source: &str) -> Floors {
+    let outputs = problem.records[0].outputs.iter().zip(noise.iter());
+    let floors = outputs.map(|(output, noise)| NoiseFloor {
+        output: output.name.clone(),
         level: noise.stationary_std(),
         innovation: noise.sigma(),
         coefficients: noise.coefficients().to_vec(),
         source: source.to_string(),
-    }
+    });
+    Floors(floors.collect())
+}
+
+/// Standard deviation of the innovations at each output.
+fn innovations(noise: &Noise) -> Vec<f64> {
+    noise.iter().map(ArModel::sigma).collect()
+}
+
+/// Numbers by the names of the outputs.
+fn per_output(problem: &Problem, values: &[f64]) -> PerOutput {
+    let names = problem.records[0].outputs.iter().map(|y| y.name.clone());
+    PerOutput(names.zip(values.iter().copied()).collect())
 }
 
 /// Everything but the findings.
@@ -358,10 +378,12 @@ pub(crate) fn assemble(
     problem: &Problem,
     verdict: Verdict,
     steps: Vec<Step>,
-    noise: NoiseFloor,
+    noise: Floors,
 ) -> Diagnosis {
+    let noise = noise.0;
+    let outputs = &problem.records[0].outputs;
     Diagnosis {
-        schema: 1,
+        schema: 2,
         verdict,
         effects: Vec::new(),
         groups: Vec::new(),
@@ -373,7 +395,10 @@ pub(crate) fn assemble(
         residual_unexplained: false,
         ranked: Vec::new(),
         steps,
-        noise_floor: noise.level,
+        noise_floor: match &noise[..] {
+            [only] => only.level,
+            _ => f64::NAN,
+        },
         noise,
         scores: Vec::new(),
         unknown: None,
@@ -389,7 +414,8 @@ pub(crate) fn assemble(
             .chain(problem.terms.iter().map(|term| term.name.clone()))
             .collect(),
         input_unit: problem.records[0].inputs[0].unit.clone(),
-        output_unit: problem.records[0].outputs[0].unit.clone(),
+        outputs: outputs.iter().map(|output| output.name.clone()).collect(),
+        output_unit: outputs[0].unit.clone(),
         records: problem
             .records
             .iter()

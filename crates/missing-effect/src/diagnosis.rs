@@ -2,6 +2,7 @@
 //! printed or plotted is derived from them.
 
 use ct_signals::{ArModel, Clock, Record};
+use greybox::Noise;
 use plants::{Domain, Plant};
 use serde::Serialize;
 
@@ -98,12 +99,19 @@ pub struct Step {
     pub added: Option<String>,
     /// The vessel or pump it acts in, where the plant has more than one: `upper` or `lower` of two tanks.
     pub place: Option<String>,
-    /// Root mean square of the simulation error on the fitted records, in the output's unit.
+    /// Root mean square of the simulation error on the fitted records, in the output's unit; NaN, and not written, of several outputs.
+    #[serde(skip_serializing_if = "none")]
     pub rmse: f64,
     /// The same on the held-out record, whose first five samples set its initial states and are not scored.
     pub rmse_test: Option<f64>,
-    /// The parts of `rmse_test`; `None` without held-out records.
-    pub held_out_error: Option<HeldOutError>,
+    /// `rmse` of each output by its name.
+    pub rmse_per_output: PerOutput,
+    /// `rmse_test` of each output by its name.
+    pub rmse_test_per_output: Option<PerOutput>,
+    /// Root mean square of the simulation errors of all outputs, each divided by the noise floor of its output: one is the noise.
+    pub weighted_rmse: f64,
+    /// The same on the held-out record.
+    pub weighted_rmse_test: Option<f64>,
     /// Bayesian information criterion with this model's own noise colour; smaller is better.
     pub bic: f64,
     /// Parameters in chain order, initial states last.
@@ -112,13 +120,51 @@ pub struct Step {
     pub starts: usize,
     /// How many of them ended in the best minimum.
     pub starts_agree: usize,
+    /// What it shows at each output, in order.
+    pub outputs: Vec<OutputStep>,
+    /// The model's simulated outputs, one series per fitted record and, within it, output, then those of the held-out records.
+    #[serde(skip)]
+    pub simulated: Vec<Vec<f64>>,
+}
+
+/// What one model shows at one output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputStep {
+    /// Its name.
+    pub name: String,
+    /// Root mean square of the simulation error on the fitted records, in the output's unit.
+    pub rmse: f64,
+    /// The same on the held-out records.
+    pub rmse_test: Option<f64>,
+    /// The parts of `rmse_test`; `None` without held-out records.
+    pub held_out_error: Option<HeldOutError>,
     /// Residual tests.
     pub tests: ResidualTests,
     /// Where it fails.
     pub failures: Failures,
-    /// The model's simulated output, one series per fitted record, then one per held-out record.
-    #[serde(skip)]
-    pub simulated: Vec<Vec<f64>>,
+}
+
+/// There is no such number.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn none(value: &f64) -> bool {
+    value.is_nan()
+}
+
+/// A number for each output, by its name, in order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PerOutput(pub Vec<(String, f64)>);
+
+impl PerOutput {
+    /// The numbers in order.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        self.0.iter().map(|(_, value)| *value)
+    }
+}
+
+impl Serialize for PerOutput {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+    }
 }
 
 /// One candidate of the catalogue at the first step.
@@ -130,8 +176,11 @@ pub struct Score {
     pub place: Option<String>,
     /// Fall of the Bayesian information criterion when it is added and everything is refitted; larger is better.
     pub bic_gain: f64,
-    /// Simulation error after the refit, in the output's unit.
+    /// Simulation error after the refit, in the output's unit; NaN, and not written, of several outputs.
+    #[serde(skip_serializing_if = "none")]
     pub rmse: f64,
+    /// The same of all outputs, each divided by the noise floor of its output.
+    pub weighted_rmse: f64,
     /// `|p|/|j|`: the part of the effect's signature that the fitted parameters cannot imitate.
     pub visibility: f64,
     /// The size that was found: the effect's leading parameter.
@@ -151,7 +200,7 @@ pub struct Acceptance {
     /// The effects that were tested; empty where no candidate lowers the error.
     pub effects: Vec<String>,
     /// Part of the excess error that they explain on the fitted records: the fall of the mean squared simulation error over
-    /// its excess above `floor` squared, at most 1.
+    /// its excess above `floor` squared, at most 1; of several outputs errors are divided by `floor` first.
     pub share: Option<f64>,
     /// The same on the held-out records; it takes no part in the verdict.
     pub share_test: Option<f64>,
@@ -159,8 +208,8 @@ pub struct Acceptance {
     pub required: f64,
     /// Least `share` of a partial answer.
     pub required_partial: f64,
-    /// Standard deviation of the noise that is no excess \[output unit\].
-    pub floor: f64,
+    /// Standard deviation of the noise that is no excess, by output \[output unit\].
+    pub floor: PerOutput,
     /// Fall of the criterion (BIC), each model under the noise model of its own residual.
     pub bic_fall: Option<f64>,
     /// What it has to exceed.
@@ -212,9 +261,11 @@ pub struct Effort {
     pub interrupted: bool,
 }
 
-/// The noise floor and how it was obtained.
+/// The noise floor of an output and how it was obtained.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseFloor {
+    /// Name of the output.
+    pub output: String,
     /// Standard deviation of the noise, in the output's unit.
     pub level: f64,
     /// Standard deviation of what cannot be predicted from its own past, in the output's unit.
@@ -228,31 +279,43 @@ pub struct NoiseFloor {
 impl NoiseFloor {
     /// The noise that a residual is judged against: that of the floor's level and, where that is the noise's own, of its
     /// colour.
-    pub(crate) fn model(&self) -> Result<ArModel, ct_signals::Error> {
+    fn model(&self) -> Result<ArModel, ct_signals::Error> {
         if self.level > self.innovation {
             ArModel::from_coefficients(&self.coefficients, self.innovation)
         } else {
             Ok(ArModel::white(self.level))
         }
     }
+}
 
-    /// The floor, which no model that was fitted lies below: what it leaves holds the noise.
-    pub(crate) fn at_most(self, rmse: f64) -> Self {
-        Self {
-            level: self.level.min(rmse),
-            innovation: self.innovation.min(rmse),
-            ..self
-        }
+/// The noise floors of all outputs.
+#[derive(Debug, Clone)]
+pub(crate) struct Floors(pub Vec<NoiseFloor>);
+
+impl Floors {
+    /// The noise that residuals are judged against.
+    pub fn noise(&self) -> Result<Noise, ct_signals::Error> {
+        let models: Result<_, _> = self.0.iter().map(NoiseFloor::model).collect();
+        Ok(Noise::of(models?))
     }
 
-    /// The floor where the residual is not noise alone: what a model lacks is in the residual too, but hardly in what
-    /// cannot be predicted from the residual's own past.
-    pub(crate) fn of_what_is_new(self) -> Self {
-        Self {
-            level: self.innovation,
-            source: format!("what the past of {} does not predict", self.source),
-            ..self
+    /// The floors, which no model that was fitted lies below: what it leaves holds the noise.
+    pub fn at_most(mut self, rmse: &[f64]) -> Self {
+        for (floor, rmse) in self.0.iter_mut().zip(rmse) {
+            floor.level = floor.level.min(*rmse);
+            floor.innovation = floor.innovation.min(*rmse);
         }
+        self
+    }
+
+    /// The floors where the residual is not noise alone: what a model lacks is in the residual too, but hardly in what
+    /// cannot be predicted from the residual's own past.
+    pub fn of_what_is_new(mut self) -> Self {
+        for floor in &mut self.0 {
+            floor.level = floor.innovation;
+            floor.source = format!("what the past of {} does not predict", floor.source);
+        }
+        self
     }
 }
 
@@ -298,11 +361,14 @@ pub struct Shown {
     pub time: Vec<f64>,
     /// Command.
     pub input: Vec<f64>,
-    /// Command of the second pump, in the unit of the first, where the model runs on it too.
+    /// Command of the second pump, or the measured disturbance, where the model runs on it too.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input_2: Option<Vec<f64>>,
-    /// Reading.
-    pub output: Vec<f64>,
+    /// Its unit, where that is another than the first one's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input_2_unit: Option<String>,
+    /// Readings, a series for each output.
+    pub outputs: Vec<Vec<f64>>,
 }
 
 impl Shown {
@@ -315,14 +381,20 @@ impl Shown {
             time: record.time.clone(),
             input: record.inputs[0].values.clone(),
             input_2: record.inputs.get(1).map(|second| second.values.clone()),
-            output: record.outputs[0].values.clone(),
+            input_2_unit: record
+                .inputs
+                .get(1)
+                .map(|second| second.unit.clone())
+                .filter(|unit| *unit != record.inputs[0].unit),
+            outputs: record.outputs.iter().map(|y| y.values.clone()).collect(),
         }
     }
 
-    /// Readings that are there.
+    /// Readings that are there, of all outputs.
     #[must_use]
     pub fn samples(&self) -> usize {
-        self.output.iter().filter(|y| !y.is_nan()).count()
+        let readings = self.outputs.iter().flatten();
+        readings.filter(|y| !y.is_nan()).count()
     }
 }
 
@@ -355,10 +427,11 @@ pub struct Diagnosis {
     pub ranked: Vec<String>,
     /// The base model and every model after it.
     pub steps: Vec<Step>,
-    /// Standard deviation of the noise, in the output's unit.
+    /// Standard deviation of the noise, in the output's unit; NaN, and not written, of several outputs.
+    #[serde(skip_serializing_if = "none")]
     pub noise_floor: f64,
-    /// How the noise floor was found.
-    pub noise: NoiseFloor,
+    /// The noise floor of each output, and how it was found.
+    pub noise: Vec<NoiseFloor>,
     /// The single effects under both weightings.
     pub rankings: Rankings,
     /// The limit on the time, and what it left out.
@@ -377,7 +450,9 @@ pub struct Diagnosis {
     pub known_effects: Vec<String>,
     /// Unit of the input.
     pub input_unit: String,
-    /// Unit of the output.
+    /// Names of the outputs.
+    pub outputs: Vec<String>,
+    /// Unit of the outputs.
     pub output_unit: String,
     /// The records, fitted ones first.
     #[serde(skip)]

@@ -1,6 +1,6 @@
 //! Sets in which one effect stands in the place of another.
 
-use ct_signals::ArModel;
+use greybox::Noise;
 use plants::{Placed, Unit};
 use rayon::prelude::*;
 
@@ -26,7 +26,7 @@ const OUT_OF_REACH: f64 = 0.5;
 pub(crate) fn exchanges<'a>(
     node: &Node<'a>,
     position: usize,
-    noise: &ArModel,
+    noise: &Noise,
     singles: Option<&[Node<'a>]>,
 ) -> Result<Vec<Node<'a>>, Error> {
     if node.setup.leaves_out("the exchange of confirmed effects") {
@@ -94,7 +94,7 @@ fn begin_exchanges<'a>(
     lacking: &Node<'a>,
     node: &Node<'a>,
     own: Placed,
-    noise: &ArModel,
+    noise: &Noise,
 ) -> Vec<Node<'a>> {
     let from = Parent::new(lacking);
     let mut proposals: Vec<Proposal> = candidates(lacking)

@@ -1,6 +1,6 @@
 //! The search: a set of effects, and the noise in whose metric it is confirmed.
 
-use ct_signals::ArModel;
+use greybox::Noise;
 use rayon::prelude::*;
 
 use crate::{
@@ -29,7 +29,7 @@ pub(crate) struct Found<'a> {
     /// The richest model in play, by simulation error; its residual gives the noise.
     pub richest: Node<'a>,
     /// The noise model in whose weighting effects are confirmed; its memory is limited.
-    pub noise: ArModel,
+    pub noise: Noise,
     /// The memory of the residual's own noise model was longer, so that it may hold slow physics.
     pub limited: bool,
     /// The base, and what is confirmed, in the metric of the noise.
@@ -81,7 +81,7 @@ pub(crate) fn find<'a>(
         let fall = || Ok::<_, Error>(bic_in_colour(before)? - least()?);
         pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
     };
-    let white = ArModel::white(1.0);
+    let white = base.setup.white_noise();
     let mut grown = grow(
         base,
         &white,
@@ -189,7 +189,7 @@ fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
 
 /// Whether a set simulates clearly worse than another, by the criterion.
 fn drifts_off(before: &Node, after: &Node) -> Result<bool, Error> {
-    let white = ArModel::white(1.0);
+    let white = before.setup.white_noise();
     Ok(refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?) > BIC_MARGIN)
 }
 
@@ -198,7 +198,7 @@ pub(crate) fn shortened<'a>(
     mut node: Node<'a>,
     sizes: &[Vec<Node<'a>>],
     most: usize,
-    noise: &ArModel,
+    noise: &Noise,
 ) -> Result<Node<'a>, Error> {
     while node.added.len() > most {
         let Some(lacking) = least_useful(&node, noise)? else {

@@ -3,7 +3,7 @@
 //! **Reference**: P. Pudil, J. Novovicova, J. Kittler, Floating search methods in feature selection, Pattern Recognition Letters 15 (1994)
 //! 1119-1125.
 
-use ct_signals::ArModel;
+use greybox::Noise;
 use plants::Placed;
 use rayon::prelude::*;
 
@@ -29,7 +29,7 @@ const FOLLOWED: usize = 10;
 pub(crate) fn follow<'a>(
     base: &Node<'a>,
     grown: &mut Grown<'a>,
-    noise: &ArModel,
+    noise: &Noise,
     most: usize,
 ) -> Result<(), Error> {
     let seeds: Vec<Node<'a>> = (PAIR..grown.sizes.len())
@@ -67,7 +67,7 @@ pub(crate) fn follow<'a>(
 }
 
 /// A set, fitted to the end, without the effects whose sizes end at a bound.
-fn within_bounds<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+fn within_bounds<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     let mut node = refine(node, noise, &[])?;
     let at_the_edge = |node: &Node| node.added.iter().position(|on| node.at_the_edge(*on));
     while let Some(position) = at_the_edge(&node) {
@@ -80,7 +80,7 @@ fn within_bounds<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error
 #[derive(Clone, Copy)]
 struct Floating<'n, 'a> {
     base: &'n Node<'a>,
-    noise: &'n ArModel,
+    noise: &'n Noise,
     /// Largest number of effects.
     most: usize,
     accepted: fn(&Node<'a>) -> bool,

@@ -118,14 +118,24 @@ impl Mended {
             if let (Some(whole), Some(part)) = (&mut whole.input_2, part.input_2) {
                 whole.extend(part);
             }
-            whole.output.extend(part.output);
-        });
-        for step in &mut diagnosis.steps {
-            step.simulated = self.joined(&step.simulated, |whole: &mut Vec<f64>, part| {
+            for (whole, part) in whole.outputs.iter_mut().zip(part.outputs) {
                 whole.extend(part);
+            }
+        });
+        let outputs = diagnosis.outputs.len();
+        for step in &mut diagnosis.steps {
+            let parts: Vec<&[Vec<f64>]> = step.simulated.chunks(outputs).collect();
+            let parts: Vec<Vec<Vec<f64>>> = parts.into_iter().map(<[_]>::to_vec).collect();
+            let whole = self.joined(&parts, |whole: &mut Vec<Vec<f64>>, part| {
+                for (whole, part) in whole.iter_mut().zip(part) {
+                    whole.extend(part);
+                }
             });
-            for bin in &mut step.failures.by_time {
-                bin.record = bin.record.map(|part| self.record_of(part));
+            step.simulated = whole.concat();
+            for output in &mut step.outputs {
+                for bin in &mut output.failures.by_time {
+                    bin.record = bin.record.map(|part| self.record_of(part));
+                }
             }
             for parameter in &mut step.parameters {
                 parameter.name = self.named(&parameter.name);

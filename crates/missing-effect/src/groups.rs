@@ -1,6 +1,6 @@
 //! What cannot be told apart: the effects that fit as well in the place of another.
 
-use ct_signals::ArModel;
+use greybox::Noise;
 use plants::Placed;
 use rayon::prelude::*;
 
@@ -31,7 +31,7 @@ pub(crate) struct Group {
 /// that is not simulated.
 pub(crate) fn groups<'a>(
     last: &Node<'a>,
-    metric: &ArModel,
+    metric: &Noise,
     per_sample: f64,
     singles: Option<&[Node<'a>]>,
     searched: &[&Node<'a>],

@@ -9,7 +9,7 @@ use greybox::Setup;
 use plants::Picked;
 use rayon::prelude::*;
 
-use crate::{Error, node::Node, noise_floor::residual_colour};
+use crate::{Error, node::Node, noise_floor::NOISE_ORDER};
 
 /// The effect whose step it is.
 pub(crate) const EFFECT: &str = "coarse_quantisation";
@@ -30,12 +30,18 @@ pub(crate) fn step_of(setup: &Setup) -> Option<usize> {
     setup.names().iter().position(|name| name == STEP)
 }
 
-/// The step that takes most out of what a node does not explain, the model run on the measured command: there
+/// The step of an output's sensor that takes most out of what a node does not explain, the model run on the measured command: there
 /// the level is known best.
-pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
-    let models = node.setup.simulate(&node.fit.x)?.output;
-    let residuals = node.setup.residuals(&node.fit.x)?;
-    let noise = residual_colour(&residuals)?;
+pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, Error> {
+    let outputs = node.setup.outputs();
+    let of_output = |series: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+        series.into_iter().skip(output).step_by(outputs).collect()
+    };
+    let models = of_output(node.setup.simulate(&node.fit.x)?.output);
+    let residuals = of_output(node.setup.residuals(&node.fit.x)?);
+    let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    let noise = ArModel::fit(&segments, NOISE_ORDER)?;
+    let samples = node.setup.samples_per_output()[output];
     let (low, high) = models
         .iter()
         .flatten()
@@ -44,7 +50,7 @@ pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
         });
     let (span, reach) = (high - low, low.abs().max(high.abs()));
     let grid = TURN / reach;
-    let affordable = STEPS.0 + LOOKED_AT / node.setup.samples() as f64 * grid * span;
+    let affordable = STEPS.0 + LOOKED_AT / samples as f64 * grid * span;
     // A step below the noise is a noise too.
     let most = (span / noise.sigma()).min(STEPS.1).min(affordable);
     if !(span > 0.0 && reach.is_finite() && most > STEPS.0) {
@@ -71,7 +77,7 @@ pub(crate) fn hidden_step(node: &Node) -> Result<Option<Picked>, Error> {
     let best = best_of(near - grid, finer, 2 * FINER + 1);
     // No coarser than a fit may take it: the start that was picked is known by its value (`Structure::ways`).
     let structure = &node.setup.structure;
-    let visited = structure.scales.level[structure.plant.vessels() - 1];
+    let visited = structure.scales.level[structure.scales.outputs[output].vessel];
     let coarsest = 0.5 * (visited.1 - visited.0);
     Ok(best.map(|(_, turns)| Picked {
         value: (1.0 / turns).min(coarsest),
@@ -135,7 +141,7 @@ mod tests {
             let step = part * NOISE;
             let problem = problem(step, colour, seed as u64);
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
-            let found = hidden_step(&node).unwrap().unwrap();
+            let found = hidden_step(&node, 0).unwrap().unwrap();
             // Over the range of the readings, of 8 at most, it counts right to less than one. What is below that range is not
             // seen: at half the noise the whole count may be one off.
             let counted = |step: f64| 8.0 / step;
@@ -145,7 +151,7 @@ mod tests {
                 found.value
             );
             // It is what a fit needs to name it.
-            let noise = ArModel::white(1.0);
+            let noise = node.setup.white_noise();
             assert_eq!(singles(&node, &noise)[0].added[0].effect.id, EFFECT);
         }
     }
@@ -154,7 +160,7 @@ mod tests {
     fn the_steps_that_were_looked_at_are_paid_for() {
         let problem = simulated::tank(|u| u, |_, level| level, 0.0, 7);
         let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
-        let found = hidden_step(&node).unwrap().unwrap();
+        let found = hidden_step(&node, 0).unwrap().unwrap();
         // From two to as many as the noise leaves room for, over the range of the readings.
         assert!(found.of > 100.0);
         let placed = Placed {

@@ -1,15 +1,16 @@
 //! Whether a confirmed set of effects is the answer, beside what it leaves.
 
 use ct_signals::ArModel;
-use greybox::{Fit, coloured};
+use greybox::{Fit, Noise, coloured};
 use plants::{EffectInfo, Placed};
 use rayon::prelude::*;
 
 use crate::{
-    Error, NoiseFloor, Problem, Step,
+    Error, Problem, Step,
     confirm::confirm,
+    diagnosis::Floors,
     groups::{Group, groups},
-    node::{FINE, Node, observed, refine, without},
+    node::{FINE, Node, refine, without},
     noise_floor::{NOISE_ORDER, longest_memory, residual_colour, slowness},
     problem::STOPPING,
     remains::{Left, Remains, remains},
@@ -28,6 +29,9 @@ pub(crate) const WHOLE: f64 = 0.9;
 /// They are a partial answer if they explain this share.
 pub(crate) const PART: f64 = 0.38;
 
+/// A noise floor below this part of the error is none.
+const NOTHING: f64 = 1e-9;
+
 /// How much of an answer a set of effects is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Grade {
@@ -42,7 +46,7 @@ pub(crate) enum Grade {
 /// What a set is judged by.
 pub(crate) struct Judge<'s, 'a> {
     pub base: &'s Node<'a>,
-    pub noise: &'s ArModel,
+    pub noise: &'s Noise,
     pub wandering: bool,
     /// The records come from a loop that is not simulated.
     pub in_loop: bool,
@@ -114,7 +118,7 @@ impl<'a> Judge<'_, 'a> {
         course.left = course.left.or(beside);
         let (share, grade) = match course.left {
             Some(left) if !self.stopped && !course.last().added.is_empty() => {
-                let share = explained(self.base, course.last(), left.above(self.noise))?;
+                let share = explained(self.base, course.last(), &left.above(self.noise))?;
                 let grade = match share {
                     share if share >= WHOLE => Grade::Whole,
                     share if share >= PART => Grade::Part,
@@ -123,7 +127,7 @@ impl<'a> Judge<'_, 'a> {
                 (share, grade)
             }
             _ => (
-                explained(self.base, course.last(), self.noise.stationary_std())?,
+                explained(self.base, course.last(), &stationary(self.noise))?,
                 Grade::Whole,
             ),
         };
@@ -143,12 +147,12 @@ impl<'a> Judge<'_, 'a> {
 
     /// The groups of a set's effects.
     pub fn groups(&self, last: &Node<'a>) -> Result<Vec<Group>, Error> {
-        let white = ArModel::white(1.0);
+        let white = last.setup.white_noise();
         let (metric, per_sample) = if self.by_simulation || self.stopped {
             let residuals = last.setup.disturbance(&last.fit.x)?;
-            let noise = residual_colour(&residuals)?;
+            let noise = residual_colour(&last.setup, &residuals)?;
             let limited = noise.with_memory_at_most(longest_memory(&last.setup));
-            (&white, slowness(&limited))
+            (&white, slowness(&limited, last.setup.samples_per_output()))
         } else {
             (self.noise, 1.0)
         };
@@ -166,7 +170,7 @@ impl<'a> Judge<'_, 'a> {
 
     /// The models on the way to a set.
     pub fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
-        let mut nodes = trail(self.base, set, &ArModel::white(1.0))?;
+        let mut nodes = trail(self.base, set, &set.setup.white_noise())?;
         let last = nodes.pop().unwrap_or_else(|| self.base.clone());
         let in_noise = if self.by_simulation || self.stopped {
             last.clone()
@@ -240,11 +244,11 @@ impl<'a> Course<'a> {
     /// What is reported of each model.
     pub fn steps(
         &self,
-        floor: &NoiseFloor,
+        floor: &Floors,
         problem: &Problem,
         widen: bool,
     ) -> Result<Vec<Step>, Error> {
-        let judge = floor.model()?;
+        let judge = floor.noise()?;
         self.nodes
             .par_iter()
             .enumerate()
@@ -260,16 +264,25 @@ impl<'a> Course<'a> {
     }
 }
 
-/// The share of the excess error, in mean square above the noise floor, that a model explains of its base.
-pub(crate) fn explained(base: &Node, last: &Node, floor: f64) -> Result<f64, Error> {
-    let mean_square = |node: &Node| -> Result<f64, Error> {
-        let series = observed(node.setup.records, node.setup.disturbance(&node.fit.x)?).concat();
-        Ok(series.iter().map(|e| e * e).sum::<f64>() / series.len().max(1) as f64)
-    };
-    let (before, after) = (mean_square(base)?, mean_square(last)?);
+/// The share of the excess error, in mean square above the noise floor, that a model explains of its base; of several outputs each error is
+/// taken over the floor of its output.
+pub(crate) fn explained(base: &Node, last: &Node, floor: &[f64]) -> Result<f64, Error> {
+    let series = |node: &Node| node.setup.disturbance(&node.fit.x);
+    let (before, after) = (series(base)?, series(last)?);
+    // A floor of nothing leaves all of the error to be explained.
+    let rms = base.setup.rms_per_output(&before);
+    let least = |(floor, rms): (&f64, &f64)| floor.max(NOTHING * rms).max(f64::MIN_POSITIVE);
+    let scales: Vec<f64> = floor.iter().zip(&rms).map(least).collect();
+    let mean_square = |series: &[Vec<f64>]| base.setup.weighted_rms(series, &scales).powi(2);
+    let (before, after) = (mean_square(&before), mean_square(&after));
     // A slow noise may be larger in the long run than it was in the record.
-    let floor = after.min(floor * floor);
+    let floor = after.min(1.0);
     Ok((before - after) / (before - floor).max(f64::MIN_POSITIVE))
+}
+
+/// Standard deviation of each output's noise.
+fn stationary(noise: &Noise) -> Vec<f64> {
+    noise.iter().map(ArModel::stationary_std).collect()
 }
 
 #[cfg(test)]
@@ -289,7 +302,7 @@ mod tests {
         let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
         let problem = simulated::tank(|u| u.min(4.2), read, 0.0, 1);
         let (base, _) = base(&problem, &Options::default(), 1.0).unwrap();
-        let white = ArModel::white(1.0);
+        let white = Noise::white(1);
         let mut set = base.clone();
         for id in ["pump_saturation", "sensor_drift"] {
             let placed = Placed {

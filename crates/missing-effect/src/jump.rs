@@ -4,8 +4,8 @@
 //! in part, and beside it a wide play of the sensor or a leak the rest: down to the noise, with three sizes or four for
 //! what is one. So whatever is claimed has to be better than a jump.
 
-use ct_signals::{ArModel, Record};
-use greybox::fit_from;
+use ct_signals::Record;
+use greybox::{Noise, fit_from};
 use plants::{Fitted, Place, Term, Variable};
 use rayon::prelude::*;
 
@@ -30,6 +30,8 @@ pub(crate) struct Jump {
     pub bic: f64,
     /// The last sample before it.
     before: usize,
+    /// The output that jumps.
+    output: usize,
 }
 
 impl Jump {
@@ -38,34 +40,37 @@ impl Jump {
         Left {
             what: Remains::Instant(record.time[self.before + 1], 0.0),
             record: Some(0),
+            output: self.output,
         }
     }
 }
 
 /// A node with a jump of the reading where that helps most, in the metric of a noise; `None` where the record is too short, no
 /// fit succeeds, or there are several records.
-pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> {
+pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
     let [record] = node.setup.records else {
         return Ok(None);
     };
     let residuals = node.setup.disturbance(&node.fit.x)?;
-    let [residual] = &residuals[..] else {
-        return Ok(None);
-    };
     // Beside all else that the model lacks, an instant stands out where the residual's own colour does not foretell it.
-    let whitened = residual_colour(&residuals)?.whiten(residual);
-    let mut instants: Vec<(f64, usize)> = (AROUND..residual.len().saturating_sub(AROUND))
-        .filter(|k| !whitened[*k].is_nan())
-        .map(|k| (whitened[k].abs(), k))
-        .collect();
+    let noise_of_residual = residual_colour(&node.setup, &residuals)?;
+    let whitened = noise_of_residual.whiten(&residuals);
+    let mut instants: Vec<(f64, usize, usize)> = Vec::new();
+    for (output, whitened) in whitened.iter().enumerate() {
+        let sigma = noise_of_residual.output(output).sigma();
+        let within = AROUND..whitened.len().saturating_sub(AROUND);
+        let present = within.filter(|k| !whitened[*k].is_nan());
+        instants.extend(present.map(|k| (whitened[k].abs() / sigma, k, output)));
+    }
     instants.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let fitted = |k: usize| -> Result<f64, Error> {
+    let fitted = |k: usize, output: usize| -> Result<f64, Error> {
+        let residual = &residuals[output];
         let size = mean(&residual[k..k + AROUND]) - mean(&residual[k - AROUND..k]);
         let time = &record.time;
         let structure = node.setup.structure.with_term(Term {
             name: "jump_of_the_reading".to_string(),
             place: Place::Sensor,
-            vessel: 0,
+            vessel: output,
             variable: Variable::Time,
             knots: vec![time[k - 1] - time[0], time[k] - time[0]],
             ordinates: vec![0.0, size],
@@ -80,10 +85,11 @@ pub(crate) fn jump(node: &Node, noise: &ArModel) -> Result<Option<Jump>, Error> 
     Ok(instants
         .into_par_iter()
         .take(INSTANTS)
-        .filter_map(|(_, k)| {
+        .filter_map(|(_, k, output)| {
             Some(Jump {
-                bic: fitted(k).ok()?,
+                bic: fitted(k, output).ok()?,
                 before: k - 1,
+                output,
             })
         })
         .min_by(|a, b| a.bic.total_cmp(&b.bic)))
@@ -134,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_jump_is_found_where_it_is_and_pays_only_there() {
-        let noise = ArModel::white(1.0);
+        let noise = Noise::white(1);
         for by in [0.3, -0.3, 3.0] {
             let problem = problem(by, 1, 1);
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
@@ -158,7 +164,7 @@ mod tests {
 
     #[test]
     fn of_several_records_none_is_sought() {
-        let noise = ArModel::white(1.0);
+        let noise = Noise::white(1);
         let several = problem(0.3, 2, 1);
         let (node, _) = base(&several, &Options::default(), 1.0).unwrap();
         assert!(jump(&node, &noise).unwrap().is_none());

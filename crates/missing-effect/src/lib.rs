@@ -50,8 +50,9 @@ mod unknown;
 pub use compare::compare;
 pub use diagnose::diagnose;
 pub use diagnosis::{
-    Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor, Parameter,
-    PlaceScore, Rankings, ResidualTests, Score, Shown, Step, Verdict,
+    Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor,
+    OutputStep, Parameter, PerOutput, PlaceScore, Rankings, ResidualTests, Score, Shown, Step,
+    Verdict,
 };
 pub use error::Error;
 pub use gaps::{LONGEST_HOLD, MendedGaps};

@@ -1,7 +1,6 @@
 //! Whether a minimum is the lowest: it is held against those that other starts reach.
 
-use ct_signals::ArModel;
-use greybox::{Fit, Start, fit_onward, keep_best_simulated, starts_around};
+use greybox::{Fit, Noise, Start, fit_onward, keep_best_simulated, starts_around};
 use plants::Placed;
 use rayon::prelude::*;
 
@@ -16,12 +15,7 @@ use crate::{
 const HOPELESS: [f64; 3] = [1.5, 1.15, 1.05];
 
 /// The node's minimum against those that so many starts around it reach.
-pub(crate) fn around(
-    node: &mut Node,
-    count: usize,
-    noise: &ArModel,
-    seed: u64,
-) -> Result<(), Error> {
+pub(crate) fn around(node: &mut Node, count: usize, noise: &Noise, seed: u64) -> Result<(), Error> {
     let mut starts = starts_around(&node.setup, &node.fit.x, count, seed);
     // Every line of a spectrum is a minimum of its own, and so is every step of a reading; the strongest was picked: the starts
     // stay on it.
@@ -41,11 +35,7 @@ pub(crate) fn around(
 ///
 /// While a set grows, an effect takes the place that is free. On the measured Cascaded Tanks data that is a leak a little
 /// below the rim; once the sensor's play and limit are there, one near the bottom lowers the error by an eighth.
-pub(crate) fn begun_again(
-    node: &mut Node,
-    effects: &[Placed],
-    noise: &ArModel,
-) -> Result<(), Error> {
+pub(crate) fn begun_again(node: &mut Node, effects: &[Placed], noise: &Noise) -> Result<(), Error> {
     let starts = effects.iter();
     let starts = starts.flat_map(|placed| {
         let mut starts = grid(node, &node.setup, *placed);
@@ -57,7 +47,7 @@ pub(crate) fn begun_again(
 }
 
 /// Follows the starts down as long as they promise to come as low as the node's minimum.
-fn descend(node: &mut Node, starts: Vec<Vec<f64>>, noise: &ArModel) -> Result<(), Error> {
+fn descend(node: &mut Node, starts: Vec<Vec<f64>>, noise: &Noise) -> Result<(), Error> {
     if node.setup.leaves_out("further starts of the final models") {
         return Ok(());
     }

@@ -1,7 +1,6 @@
 //! A set of effects with its fit, and the fits of what it is changed to.
 
-use ct_signals::{ArModel, Record};
-use greybox::{Fit, Setup, Start, Stopping, fit_from, fit_onward, random_starts};
+use greybox::{Fit, Noise, Setup, Start, Stopping, fit_from, fit_onward, random_starts};
 use plants::{ParameterInfo, Placed};
 
 use crate::Error;
@@ -91,7 +90,7 @@ pub(crate) fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
 /// Fits a node's structure anew to the end, from where it is and from the given further starts.
 pub(crate) fn refine<'a>(
     node: &Node<'a>,
-    noise: &ArModel,
+    noise: &Noise,
     more: &[Vec<f64>],
 ) -> Result<Node<'a>, Error> {
     fitted(node, noise, FINE, more)
@@ -99,7 +98,7 @@ pub(crate) fn refine<'a>(
 
 pub(crate) fn fitted<'a>(
     node: &Node<'a>,
-    noise: &ArModel,
+    noise: &Noise,
     stopping: Stopping,
     more: &[Vec<f64>],
 ) -> Result<Node<'a>, Error> {
@@ -117,7 +116,7 @@ pub(crate) fn fitted<'a>(
 pub(crate) fn without<'a>(
     node: &Node<'a>,
     position: usize,
-    noise: &ArModel,
+    noise: &Noise,
     stopping: Stopping,
 ) -> Result<Node<'a>, Error> {
     let setup = node
@@ -126,7 +125,7 @@ pub(crate) fn without<'a>(
     let start = transfer(node, &setup);
     let fit = match fit_from(&setup, &[start], noise, stopping) {
         // Some parameters hold beside the effect alone.
-        Err(greybox::Error::NoFiniteStart { .. }) => {
+        Err(greybox::Error::Estimation(greybox::NoFit::NoFiniteStart { .. })) => {
             let others = random_starts(&setup, OTHER_STARTS, 1);
             fit_from(&setup, &others, noise, stopping)?
         }
@@ -138,7 +137,7 @@ pub(crate) fn without<'a>(
 }
 
 /// The node without its effects that follow the clock alone, refitted from where it was.
-pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &ArModel) -> Result<Node<'a>, Error> {
+pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     let mut node = node.clone();
     while let Some(position) = node.added.iter().position(|placed| placed.effect.by_clock) {
         node = without(&node, position, noise, FINE)?;
@@ -152,14 +151,16 @@ pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes
 }
 
-/// Series of records without the samples that the output lacks.
-pub(crate) fn observed(records: &[Record], series: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let of_one = |(record, series): (&Record, Vec<f64>)| {
-        let measured = record.outputs[0].values.iter();
-        let pairs = measured
-            .zip(series)
-            .filter(|(measured, _)| !measured.is_nan());
-        pairs.map(|(_, value)| value).collect()
-    };
-    records.iter().zip(series).map(of_one).collect()
+/// Values of series that follow each other as the outputs of records do, without those whose sample is missing: record by record, in the
+/// order of time, each times the weight of its output.
+pub(crate) fn in_time(setup: &Setup, series: &[Vec<f64>], weights: &[f64]) -> Vec<f64> {
+    let (outputs, mut all) = (setup.outputs(), Vec::with_capacity(setup.samples()));
+    for (record, series) in setup.records.iter().zip(series.chunks_exact(outputs)) {
+        for k in 0..record.len() {
+            let at_once = record.outputs.iter().zip(series).zip(weights);
+            let present = at_once.filter(|((output, _), _)| !output.values[k].is_nan());
+            all.extend(present.map(|((_, series), weight)| weight * series[k]));
+        }
+    }
+    all
 }

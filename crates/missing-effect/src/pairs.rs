@@ -11,8 +11,7 @@
 //!
 //! **Cost**: `O(N m^2)` for `m` columns of all candidates together, `O(p^3)` for a pair.
 
-use ct_signals::ArModel;
-use greybox::Setup;
+use greybox::{Noise, Setup};
 use nalgebra::{DMatrix, DVector};
 use plants::Placed;
 use rayon::prelude::*;
@@ -46,11 +45,13 @@ pub(crate) fn joint_pairs<'a>(
     base: &Node<'a>,
     singles: &[Node<'a>],
     others: &[Proposal<'a>],
-    noise: &ArModel,
+    noise: &Noise,
     count: usize,
     taken: impl Fn(&[Placed]) -> bool,
 ) -> Vec<Proposal<'a>> {
-    let Some((own, residual)) = whitened(&base.setup, &base.fit.x, noise, |_| true) else {
+    // Outputs count against each other as beside the base.
+    let metric = (noise, &base.fit.weights[..]);
+    let Some((own, residual)) = whitened(&base.setup, &base.fit.x, metric, |_| true) else {
         return Vec::new();
     };
     let points = singles
@@ -65,7 +66,7 @@ pub(crate) fn joint_pairs<'a>(
         .chain(starts)
         .collect::<Vec<_>>()
         .into_par_iter()
-        .filter_map(|(placed, setup, x)| linearise(placed, setup, x, &residual, noise))
+        .filter_map(|(placed, setup, x)| linearise(placed, setup, x, &residual, metric))
         .collect();
     let width: usize = linearised.iter().map(|one| one.columns.len()).sum();
     if (own.len() + width + 1) * residual.len() > LARGEST {
@@ -126,7 +127,7 @@ pub(crate) fn joint_pairs<'a>(
 fn whitened(
     setup: &Setup,
     x: &[f64],
-    noise: &ArModel,
+    (noise, weights): (&Noise, &[f64]),
     wanted: impl Fn(usize) -> bool,
 ) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
     let rows = setup.rows(x)?;
@@ -135,24 +136,11 @@ fn whitened(
         .chain(std::iter::once(rows.columns - 1))
         .collect();
     let mut columns = vec![Vec::with_capacity(setup.samples()); chosen.len()];
-    let mut whitener = noise.whitener(chosen.len());
-    let mut values = vec![0.0; chosen.len()];
-    for record in rows.records() {
-        whitener.reset();
-        for row in record.chunks_exact(rows.columns) {
-            if row[rows.columns - 1].is_nan() {
-                whitener.skip();
-                continue;
-            }
-            for (value, &column) in values.iter_mut().zip(&chosen) {
-                *value = row[column];
-            }
-            whitener.push(&mut values);
-            for (column, value) in columns.iter_mut().zip(&values) {
-                column.push(*value);
-            }
+    rows.each_whitened(&chosen, noise, weights, |row| {
+        for (column, value) in columns.iter_mut().zip(row) {
+            column.push(*value);
         }
-    }
+    });
     let residual = columns.pop()?;
     Some((columns, residual))
 }
@@ -162,7 +150,7 @@ fn linearise<'a>(
     setup: &Setup<'a>,
     x: Vec<f64>,
     residual: &[f64],
-    noise: &ArModel,
+    metric: (&Noise, &[f64]),
 ) -> Option<Linearised<'a>> {
     let parameters = setup.structure.effect_parameters(placed);
     let own: Vec<usize> = parameters
@@ -170,7 +158,7 @@ fn linearise<'a>(
         .filter_map(|info| position_of(setup, placed, info.name))
         .filter(|at| setup.free().contains(at))
         .collect();
-    let (mut columns, with) = whitened(setup, &x, noise, |at| own.contains(&at))?;
+    let (mut columns, with) = whitened(setup, &x, metric, |at| own.contains(&at))?;
     columns.push(with.iter().zip(residual).map(|(a, b)| a - b).collect());
     let finite = columns.iter().flatten().all(|value| value.is_finite());
     let room = own
@@ -254,7 +242,9 @@ fn joined<'a>(
     if structure.scales.period == 0.0 {
         structure.scales.period = picked.period;
     }
-    structure.scales.hidden_step = structure.scales.hidden_step.or(picked.hidden_step);
+    for (own, other) in structure.scales.outputs.iter_mut().zip(&picked.outputs) {
+        own.hidden_step = own.hidden_step.or(other.hidden_step);
+    }
     let setup = base.setup.with_structure(structure).ok()?;
     let start = |own: &Linearised<'a>, other: &Linearised<'a>| {
         let from = |one: &Linearised<'a>| {

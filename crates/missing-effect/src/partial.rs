@@ -13,7 +13,6 @@
 //!
 //! A larger set is taken where it explains half of what each smaller one of its effects leaves.
 
-use ct_signals::ArModel;
 use greybox::{fit_from, fit_initial_levels};
 use plants::Placed;
 use rayon::prelude::*;
@@ -70,15 +69,15 @@ pub(crate) struct Tested<'a> {
 
 /// The set that explains the largest part of the excess error, accepted or, where none is, the best that was refused.
 ///
-/// `floor`: standard deviation of the noise \[output unit\]; `in_loop`: the records come from a loop that is not simulated.
+/// `floor`: standard deviation of each output's noise \[output unit\]; `in_loop`: the records come from a loop that is not simulated.
 pub(crate) fn largest_part<'a>(
     base: &Node<'a>,
     found: &Found<'a>,
     singles: &[Node<'a>],
-    floor: f64,
+    floor: &[f64],
     in_loop: bool,
 ) -> Result<Option<Tested<'a>>, Error> {
-    let white = ArModel::white(1.0);
+    let white = base.setup.white_noise();
     let own_base = in_own_noise(base)?;
     let jump = jump(base, &white)?.map_or(f64::INFINITY, |jump| jump.bic);
     let sticks = in_loop && sticks(base.setup.records);
@@ -94,7 +93,7 @@ pub(crate) fn largest_part<'a>(
                 .filter(|node| node.added.len() == size && node.plausible())
                 .cloned()
                 .collect();
-            nodes.sort_by(|a, b| a.fit.rmse.total_cmp(&b.fit.rmse));
+            nodes.sort_by(|a, b| a.fit.mean_rmse().total_cmp(&b.fit.mean_rmse()));
             nodes.truncate(REFITTED);
             nodes
         };
@@ -135,7 +134,9 @@ pub(crate) fn largest_part<'a>(
             .filter(|tested| {
                 !matches!(
                     tested,
-                    Err(Error::Fit(greybox::Error::NoFiniteStart { .. }))
+                    Err(Error::Fit(greybox::Error::Estimation(
+                        greybox::NoFit::NoFiniteStart { .. }
+                    )))
                 )
             })
             .collect::<Result<Vec<_>, _>>()?;
@@ -171,14 +172,14 @@ pub(crate) fn largest_part<'a>(
 /// A noise model that is nearly integrated looks at changes from sample to sample alone, and takes any slow effect for noise. Physics
 /// that is real helps on data that were not fitted; what imitates a slow disturbance does not.
 fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
-    let white = ArModel::white(1.0);
+    let white = base.setup.white_noise();
     let records = base.setup.records.iter();
     let Some(record) = records.max_by_key(|record| record.len()) else {
         return Ok(0.0);
     };
     let half = record.len() / 2;
     let halves = [record.rows(0..half), record.rows(half..record.len())];
-    let error = |node: &Node, fitted: usize| -> Result<f64, Error> {
+    let error = |node: &Node, fitted: usize| -> Result<Vec<f64>, Error> {
         let own = node
             .setup
             .with_records(std::slice::from_ref(&halves[fitted]))?;
@@ -190,10 +191,25 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
             added: node.added.clone(),
         };
         let other = std::slice::from_ref(&halves[1 - fitted]);
-        Ok(held_out_rmse(&half, other)?.map_or(f64::INFINITY, |rmse| rmse.powi(2)))
+        held_out_rmse(&half, other)
     };
-    let of_both = |node: &Node| Ok::<f64, Error>(error(node, 0)? + error(node, 1)?);
-    Ok(1.0 - of_both(node)? / of_both(base)?)
+    // Outputs count by what the base leaves of them.
+    let both = |node: &Node| Ok::<_, Error>((error(node, 0)?, error(node, 1)?));
+    let (of_base, of_node) = (both(base)?, both(node)?);
+    let scales: Vec<f64> = of_base
+        .0
+        .iter()
+        .zip(&of_base.1)
+        .map(|(a, b)| a.hypot(*b))
+        .collect();
+    let mean = |half: &[f64]| -> f64 {
+        let outputs = half.iter().zip(&scales);
+        // An output that one half lacks says nothing.
+        let outputs = outputs.filter(|(_, scale)| **scale > 0.0);
+        outputs.map(|(rms, scale)| (rms / scale).powi(2)).sum()
+    };
+    let of_both = |(first, second): &(Vec<f64>, Vec<f64>)| mean(first) + mean(second);
+    Ok(1.0 - of_both(&of_node) / of_both(&of_base))
 }
 
 /// Whether a set leaves at most [`LEFT`] of what each smaller one of its effects leaves, accepted or refused.
@@ -215,7 +231,7 @@ fn test<'a>(
     base: &Node<'a>,
     own_base: &Node<'a>,
     node: Node<'a>,
-    floor: f64,
+    floor: &[f64],
     jump: f64,
 ) -> Result<Tested<'a>, Error> {
     let share = explained(base, &node, floor)?;
@@ -246,16 +262,19 @@ fn test<'a>(
                     .to_string(),
             );
         }
-        if own.fit.noise.sigma() > ROUGHER * own_base.fit.noise.sigma() {
+        let outputs = own.fit.noise.iter().zip(own_base.fit.noise.iter());
+        let mut rougher = outputs.map(|(own, base)| own.sigma() > ROUGHER * base.sigma());
+        if rougher.any(|rougher| rougher) {
             reasons.push("from sample to sample the record does not go as this has it".to_string());
         }
-        if carried_over(base, &node)? < CARRIED_OVER {
+        // A share that is no number is none.
+        if carried_over(base, &node)?.max(0.0) < CARRIED_OVER {
             reasons.push(
                 "what is fitted to one half of the record does not predict the other".to_string(),
             );
         }
     }
-    let timeless = without_clock(&node, &ArModel::white(1.0))?;
+    let timeless = without_clock(&node, &node.setup.white_noise())?;
     if required > PART && node.added.len() > 1 {
         reasons.push(
             "with an effect that follows time alone a set bends to any disturbance".to_string(),

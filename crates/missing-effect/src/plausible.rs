@@ -1,6 +1,7 @@
 //! Whether a fitted set of effects is credible: sizes inside their bounds, levels that are physical, and what an effect says of the
 //! readings to be seen in them.
 
+use ct_signals::Channel;
 use plants::{Outlet, Placed};
 
 use crate::node::{Node, transfer};
@@ -61,8 +62,11 @@ impl Node<'_> {
                 .setup
                 .with_structure(structure.without(placed.effect))
                 .ok()?;
-            let level = setup.simulate(&transfer(self, &setup)).ok()?.output;
-            let residual = self.setup.residuals(&self.fit.x).ok()?;
+            let level = self.of_output(
+                *placed,
+                setup.simulate(&transfer(self, &setup)).ok()?.output,
+            );
+            let residual = self.of_output(*placed, self.setup.residuals(&self.fit.x).ok()?);
             let limit = self.fit.x[self.size_of(*placed)?.1];
             let beyond: Vec<(f64, f64)> = level
                 .concat()
@@ -81,11 +85,7 @@ impl Node<'_> {
         if structure.plant.outlet() != Outlet::Torricelli {
             return true;
         }
-        let readings = self
-            .setup
-            .records
-            .iter()
-            .map(|record| record.output_range());
+        let readings = self.setup.measured().map(Channel::range);
         let highest = readings.fold(0.0, |most: f64, (low, high)| {
             most.max(low.abs()).max(high.abs())
         });
@@ -108,12 +108,15 @@ impl Node<'_> {
             let step = self.fit.x[self.size_of(*placed)?.1];
             let structure = self.setup.structure.without(placed.effect);
             let setup = self.setup.with_structure(structure).ok()?;
-            let with = self.setup.simulate(&self.fit.x).ok()?.output;
-            let without = setup.simulate(&transfer(self, &setup)).ok()?.output;
+            let with = self.of_output(*placed, self.setup.simulate(&self.fit.x).ok()?.output);
+            let without = self.of_output(
+                *placed,
+                setup.simulate(&transfer(self, &setup)).ok()?.output,
+            );
             let (mut predicted, mut seen, mut noise, mut events, mut count) = (0.0, 0.0, 0.0, 0, 0);
             for ((with, without), record) in with.iter().zip(&without).zip(self.setup.records) {
                 let added: Vec<f64> = with.iter().zip(without).map(|(a, b)| a - b).collect();
-                let rest: Vec<f64> = record.outputs[0]
+                let rest: Vec<f64> = record.outputs[placed.vessel]
                     .interpolated()
                     .iter()
                     .zip(without)
@@ -141,6 +144,12 @@ impl Node<'_> {
             (events > 0 && -predicted > CLEAR * noise).then_some(seen > SEEN * predicted)
         };
         unseen().unwrap_or(false)
+    }
+
+    /// Of series for each record and output those of the output that an effect is at.
+    fn of_output(&self, placed: Placed, series: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let own = series.into_iter().skip(placed.vessel);
+        own.step_by(self.setup.outputs()).collect()
     }
 
     /// The size of an added effect is absent or at the far end of its plausible range.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, atomic::AtomicBool};
 use std::time::Duration;
 
-use ct_signals::{ArModel, Record, require_samples};
+use ct_signals::{Record, require_samples};
 use greybox::{Setup, Stopping, TimeLimit, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 use rayon::prelude::*;
@@ -132,7 +132,7 @@ pub(crate) fn base<'a>(
     limit.allow(share);
     setup.time_limit = Some(limit);
     require_samples(&problem.records, setup.free().len())?;
-    let white = ArModel::white(1.0);
+    let white = setup.white_noise();
     let mut starts = options.starts.max(10);
     let one_by_one = one_by_one(&setup, options.seed)?;
     let fit = loop {
@@ -186,7 +186,7 @@ fn one_by_one(setup: &Setup, seed: u64) -> Result<Option<Vec<f64>>, Error> {
     if remaining.is_empty() {
         return Ok(None);
     }
-    let white = ArModel::white(1.0);
+    let white = setup.white_noise();
     let structure = setup.structure.clone();
     let structure = remaining.iter().fold(structure, |structure, placed| {
         structure.without(placed.effect)
@@ -209,7 +209,7 @@ fn one_by_one(setup: &Setup, seed: u64) -> Result<Option<Vec<f64>>, Error> {
             .par_iter()
             .filter_map(|placed| realise(propose(&parent, *placed, &white)?, &white, ROUGH))
             .collect();
-        let least = |a: &Node, b: &Node| a.fit.rmse.total_cmp(&b.fit.rmse);
+        let least = |a: &Node, b: &Node| a.fit.mean_rmse().total_cmp(&b.fit.mean_rmse());
         let Some(first) = placed.into_iter().min_by(least) else {
             break;
         };

@@ -2,9 +2,9 @@
 
 use std::{f64::consts::TAU, sync::OnceLock};
 
-use ct_signals::{ArModel, Record};
+use ct_signals::Record;
 use greybox::{
-    Setup, Start, Stopping, Triangle, fit_onward, keep_best_simulated, with_other_speeds,
+    Noise, Setup, Start, Stopping, Triangle, fit_onward, keep_best_simulated, with_other_speeds,
 };
 use plants::{Place, Placed, Plant, Unit};
 use rayon::prelude::*;
@@ -169,10 +169,14 @@ impl<'n, 'a> Parent<'n, 'a> {
         if placed.effect.by_clock {
             structure.scales.period = (*self.period.get_or_init(|| strongest_period(self.node)))?;
         }
-        if placed.effect.id == hidden_step::EFFECT && structure.scales.reading_step == 0.0 {
+        let output = placed.vessel;
+        if placed.effect.id == hidden_step::EFFECT
+            && structure.scales.outputs[output].reading_step == 0.0
+        {
             // One effect asks for it. It is looked for by all threads, and must not be kept in a cell: a thread that waits for the
             // others may take up the next proposal, which would ask the cell that it is filling.
-            structure.scales.hidden_step = hidden_step(self.node).ok().flatten();
+            let step = hidden_step(self.node, output).ok().flatten();
+            structure.scales.outputs[output].hidden_step = step;
         }
         self.node.setup.with_structure(structure).ok()
     }
@@ -181,7 +185,7 @@ impl<'n, 'a> Parent<'n, 'a> {
 pub(crate) fn propose<'a>(
     parent: &Parent<'_, 'a>,
     placed: Placed,
-    noise: &ArModel,
+    noise: &Noise,
 ) -> Option<Proposal<'a>> {
     if parent
         .node
@@ -207,7 +211,7 @@ pub(crate) fn promising(
     from: &Node,
     setup: &Setup,
     placed: Placed,
-    noise: &ArModel,
+    noise: &Noise,
 ) -> Option<(f64, Vec<Start>)> {
     let mut starts = grid(from, setup, placed);
     if from.added.len() > 1 {
@@ -240,7 +244,7 @@ fn every_so_many(starts: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
 
 /// Of starts with many periods keeps those whose periods show most in what is not explained without the effect: a plant answers a
 /// swing with a swing of that period, and a Fourier sum costs far less than a simulation.
-fn keep_shown_periods(setup: &Setup, placed: Placed, starts: &mut Vec<Vec<f64>>, noise: &ArModel) {
+fn keep_shown_periods(setup: &Setup, placed: Placed, starts: &mut Vec<Vec<f64>>, noise: &Noise) {
     let (Some(at), Some(mut without)) = (period_of(setup), starts.first().cloned()) else {
         return;
     };
@@ -259,12 +263,11 @@ fn keep_shown_periods(setup: &Setup, placed: Placed, starts: &mut Vec<Vec<f64>>,
     let Ok(residuals) = setup.disturbance(&without) else {
         return;
     };
-    let whitened: Vec<(&Record, Vec<f64>)> = setup
+    let of_series = setup
         .records
         .iter()
-        .zip(&residuals)
-        .map(|(record, residual)| (record, noise.whiten(residual)))
-        .collect();
+        .flat_map(|record| record.outputs.iter().map(move |_| record));
+    let whitened: Vec<(&Record, Vec<f64>)> = of_series.zip(noise.whiten(&residuals)).collect();
     let mut shown: Vec<(f64, f64)> = periods
         .into_par_iter()
         .map(|period| (power_at(TAU / period, &whitened), period))
@@ -302,7 +305,12 @@ pub(crate) fn period_of(setup: &Setup) -> Option<usize> {
 // A cell is filled by it: it must not wait for other threads, for the reason that is given at the hidden step.
 fn strongest_period(node: &Node) -> Option<f64> {
     let residuals = node.setup.disturbance(&node.fit.x).ok()?;
-    let lines = residuals.iter().zip(node.setup.records);
+    let of_series = node
+        .setup
+        .records
+        .iter()
+        .flat_map(|record| record.outputs.iter().map(move |_| record));
+    let lines = residuals.iter().zip(of_series);
     let strongest = lines
         .filter_map(|(residual, record)| Some((strongest_line(residual).ok()??, record.duration())))
         .min_by(|a, b| a.0.chance.total_cmp(&b.0.chance));
@@ -311,7 +319,7 @@ fn strongest_period(node: &Node) -> Option<f64> {
 
 pub(crate) fn realise<'a>(
     proposal: Proposal<'a>,
-    noise: &ArModel,
+    noise: &Noise,
     stopping: Stopping,
 ) -> Option<Node<'a>> {
     let fit = fit_onward(&proposal.setup, proposal.starts, noise, stopping).ok()?;
@@ -324,7 +332,7 @@ pub(crate) fn realise<'a>(
 }
 
 /// The node with the range of its newest size widened and fitted again, where that ended at the bound and a larger size fits better.
-fn widened<'a>(node: Node<'a>, noise: &ArModel, stopping: Stopping) -> Node<'a> {
+fn widened<'a>(node: Node<'a>, noise: &Noise, stopping: Stopping) -> Node<'a> {
     let again = || {
         let placed = *node.added.last()?;
         let (size, at) = node.size_of(placed)?;
@@ -346,13 +354,13 @@ fn widened<'a>(node: Node<'a>, noise: &ArModel, stopping: Stopping) -> Node<'a> 
 }
 
 /// All single extensions of a node, refitted, best first.
-pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Node<'a>> {
+pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &Noise) -> Vec<Node<'a>> {
     let proposals = proposals(parent, noise);
     best_first(realise_all(proposals, noise, ROUGH))
 }
 
 /// All extensions of a node by one effect, not fitted, the most promising first.
-pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Proposal<'a>> {
+pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &Noise) -> Vec<Proposal<'a>> {
     let from = Parent::new(parent);
     let mut proposals: Vec<Proposal> = candidates(parent)
         .into_par_iter()
@@ -364,7 +372,7 @@ pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &ArModel) -> Vec<Proposal<
 
 pub(crate) fn realise_all<'a>(
     proposals: Vec<Proposal<'a>>,
-    noise: &ArModel,
+    noise: &Noise,
     stopping: Stopping,
 ) -> Vec<Node<'a>> {
     proposals
@@ -386,7 +394,7 @@ pub(crate) fn candidates(parent: &Node) -> Vec<Placed> {
 /// Whether some effect more makes a promise that is `worth` it.
 pub(crate) fn any_promise(
     parent: &Node,
-    noise: &ArModel,
+    noise: &Noise,
     worth: impl Fn(&Setup, f64) -> bool + Sync,
 ) -> bool {
     let from = Parent::new(parent);
@@ -402,7 +410,7 @@ pub(crate) fn place<'a>(
     parent: &Node<'a>,
     placed: Placed,
     known: &Node<'a>,
-    noise: &ArModel,
+    noise: &Noise,
     stopping: Stopping,
 ) -> Option<Node<'a>> {
     let from = Parent::new(parent);

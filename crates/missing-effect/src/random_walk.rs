@@ -17,7 +17,7 @@
 //! **Reference**: A. C. Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, Cambridge 1989, ch. 4.
 
 use ct_signals::ArModel;
-use greybox::Triangle;
+use greybox::{Noise, Triangle};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
@@ -69,34 +69,42 @@ impl Walk {
     };
 }
 
-/// Residuals whitened by a noise model beside their derivatives by the free parameters, row by row, a series for each record; the
-/// residual is the last column. The first samples of a record are left out: they have no complete past, and are scaled otherwise, so that
+/// Residuals whitened by the noise model of their output, over its innovations, beside their derivatives by the free parameters, row by row,
+/// a series for each record and output; the residual is the last column. The first samples of a record are left out: they have no complete past, and are scaled otherwise, so that
 /// a level other than zero would look like a jump.
 struct Whitened {
     columns: usize,
-    records: Vec<Vec<f64>>,
+    series: Vec<Vec<f64>>,
     /// Size of a slow move of the output in the whitened rows, over that of their innovations, where the move is as large as the noise.
     slow: f64,
 }
 
 impl Whitened {
-    fn of(columns: usize, records: impl Iterator<Item = Vec<f64>>, noise: &ArModel) -> Self {
-        let whiten = |mut rows: Vec<f64>| {
-            let mut whitener = noise.whitener(columns);
+    fn of(columns: usize, series: impl Iterator<Item = Vec<f64>>, noise: &Noise) -> Self {
+        let first = noise.output(0).sigma();
+        let whiten = |(i, mut rows): (usize, Vec<f64>)| {
+            let model = noise.of_series(i);
+            let mut whitener = model.whitener(columns);
+            let weight = if noise.outputs() > 1 {
+                first / model.sigma()
+            } else {
+                1.0
+            };
             for row in rows.chunks_exact_mut(columns) {
                 // The row of a missing sample stays one without a residual.
                 if row[columns - 1].is_nan() {
                     whitener.skip();
                 } else {
                     whitener.push(row);
+                    row.iter_mut().for_each(|value| *value *= weight);
                 }
             }
-            rows.split_off((noise.order() * columns).min(rows.len()))
+            rows.split_off((model.order() * columns).min(rows.len()))
         };
         Self {
             columns,
-            records: records.map(whiten).collect(),
-            slow: noise.slow_gain(),
+            series: series.enumerate().map(whiten).collect(),
+            slow: noise.iter().map(ArModel::slow_gain).fold(0.0, f64::max),
         }
     }
 
@@ -104,7 +112,7 @@ impl Whitened {
     /// Gauss-Newton in the metric of this noise, within [`BENDING`]) and over `q`.
     fn deviance(&self, walk: Walk) -> f64 {
         let rows = |values: &Vec<f64>| values.len() / self.columns;
-        let longest = self.records.iter().map(rows).max().unwrap_or(1);
+        let longest = self.series.iter().map(rows).max().unwrap_or(1);
         let largest = (self.slow * walk.largest).powi(2) / longest as f64;
         (DECADES.start * EACH..DECADES.end * EACH)
             .map(|step| 10_f64.powf(f64::from(step) / f64::from(EACH)))
@@ -117,7 +125,7 @@ impl Whitened {
         let last = self.columns - 1;
         let (mut triangle, mut log_det) = (Triangle::new(self.columns), 0.0);
         let (mut level, mut innovation) = (vec![0.0; self.columns], vec![0.0; self.columns]);
-        for rows in &self.records {
+        for rows in &self.series {
             let mut rows = rows.chunks_exact(self.columns);
             let mut variance = 0.0;
             level.fill(0.0);
@@ -151,7 +159,7 @@ impl Whitened {
         // A walk bends the parameters by no more than what moves the output, slowly, as far as the walk goes.
         let bend = ((self.slow * BENDING).powi(2) * count / last.max(1) as f64).sqrt();
         for row in self
-            .records
+            .series
             .iter()
             .flat_map(|rows| rows.chunks_exact(self.columns))
             .filter(|row| !row[last].is_nan())
@@ -187,7 +195,7 @@ pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node, walk: Walk) -> R
     Ok(fall > penalty + BIC_MARGIN && chance_of(gained, lacking, STRICTER * chance))
 }
 
-fn of_node(node: &Node, noise: &ArModel, walk: Walk) -> Option<Whitened> {
+fn of_node(node: &Node, noise: &Noise, walk: Walk) -> Option<Whitened> {
     let rows = node.setup.rows(&node.fit.x)?;
     let last = rows.columns - 1;
     let (columns, from) = if walk.fitted_again {
@@ -195,11 +203,11 @@ fn of_node(node: &Node, noise: &ArModel, walk: Walk) -> Option<Whitened> {
     } else {
         (1, last)
     };
-    let records = rows.records().map(|record| {
-        let rows = record.chunks_exact(rows.columns);
+    let series = rows.series().map(|(_, series)| {
+        let rows = series.chunks_exact(rows.columns);
         rows.flat_map(|row| &row[from..]).copied().collect()
     });
-    Some(Whitened::of(columns, records, noise))
+    Some(Whitened::of(columns, series, noise))
 }
 
 #[cfg(test)]
@@ -208,6 +216,8 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
+
+    use ct_signals::ArModel;
 
     use super::*;
     use crate::noise_floor::NOISE_ORDER;
@@ -250,7 +260,7 @@ mod tests {
             let mean = series.iter().sum::<f64>() / N as f64;
             let centred: Vec<f64> = series.iter().map(|e| e - mean).collect();
             let gained = without_line(&series);
-            let noise = ArModel::fit(&[&gained], NOISE_ORDER).unwrap();
+            let noise = Noise::fit(std::slice::from_ref(&gained), 1, NOISE_ORDER).unwrap();
             let of = |residual: Vec<f64>| {
                 Whitened::of(1, std::iter::once(residual), &noise).deviance(Walk::ANY)
             };
@@ -278,7 +288,7 @@ mod tests {
             let series = series(0.0, 0.1, rise, 5);
             let t = |k: usize| k as f64 / N as f64;
             let of = |columns: usize, rows: Vec<f64>| {
-                Whitened::of(columns, std::iter::once(rows), &ArModel::white(1.0))
+                Whitened::of(columns, std::iter::once(rows), &Noise::white(1))
                     .deviance(Walk::SMALL_FROM_ZERO)
             };
             let fitted = of(2, (0..N).flat_map(|k| [t(k), series[k]]).collect());
@@ -306,12 +316,10 @@ mod tests {
         let offset: Vec<f64> = white.iter().map(|e| e + 1.0).collect();
         let fall = |anywhere: bool| {
             let of = |rows: &[f64]| {
-                Whitened::of(1, std::iter::once(rows.to_vec()), &ArModel::white(1.0)).deviance(
-                    Walk {
-                        anywhere,
-                        ..Walk::ANY
-                    },
-                )
+                Whitened::of(1, std::iter::once(rows.to_vec()), &Noise::white(1)).deviance(Walk {
+                    anywhere,
+                    ..Walk::ANY
+                })
             };
             of(&offset) - of(&white)
         };
@@ -323,7 +331,7 @@ mod tests {
     #[test]
     fn a_small_walk_is_small_beside_the_noise_itself() {
         // A line beside noise with a long memory is told from a walk as large as the noise better than from one of any size.
-        let noise = ArModel::from_coefficients(&[0.8], 0.6).unwrap();
+        let noise = Noise::of(vec![ArModel::from_coefficients(&[0.8], 0.6).unwrap()]);
         let falls = (0..40).map(|seed| {
             let series = series(0.8, 0.0, 5.0, seed);
             let of = |rows: Vec<f64>, walk: Walk| {
@@ -348,8 +356,7 @@ mod tests {
         // An unknown mean costs the logarithm of the samples.
         let plain = N as f64 * (squares / N as f64).ln() + (N as f64).ln();
         assert!(
-            (Whitened::of(1, std::iter::once(white), &ArModel::white(1.0)).deviance(Walk::ANY)
-                - plain)
+            (Whitened::of(1, std::iter::once(white), &Noise::white(1)).deviance(Walk::ANY) - plain)
                 .abs()
                 < 3.0
         );

@@ -20,7 +20,7 @@
 use std::f64::consts::SQRT_2;
 
 use ct_signals::{ArModel, Record, residual_tests::prewhitened_input_test};
-use greybox::Fit;
+use greybox::{Fit, Noise};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use statrs::{
@@ -29,7 +29,7 @@ use statrs::{
 };
 
 use crate::{
-    Error, control_loop::slowest_time_constant, node::Node, noise_floor::slowness,
+    Error, control_loop::slowest_time_constant, node::Node, noise_floor::slowness_of,
     spectral_line::strongest_line,
 };
 
@@ -58,92 +58,106 @@ pub(crate) enum Remains {
     Slow(f64, f64),
 }
 
-/// What a residual shows that noise does not, and in which of the fitted records, where it is one of them.
+/// What a residual shows that noise does not, in which of the fitted records, where it is one of them, and at which output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Left {
     pub what: Remains,
     pub record: Option<usize>,
+    pub output: usize,
 }
 
 impl Left {
     /// The size of the noise above which there is something to explain. A wander is a noise too, in whose metric effects
     /// are confirmed as in any other; what else remains is in the noise model by mistake, but hardly in what it cannot
-    /// predict.
-    pub(crate) fn above(&self, noise: &ArModel) -> f64 {
-        match self.what {
+    /// predict. By output.
+    pub(crate) fn above(&self, noise: &Noise) -> Vec<f64> {
+        let size = |noise: &ArModel| match self.what {
             Remains::Slow(..) => noise.stationary_std(),
             _ => noise.sigma(),
-        }
+        };
+        noise.iter().map(size).collect()
     }
 }
 
 /// What the residual of a model holds that is not noise; `own` is its fit with the colour of its own residual.
 pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
-    let (p, record) = least_p(node, of_command)?;
+    let outputs = node.setup.outputs();
+    let (p, series) = least_p(node, None, of_command)?;
     if p < NOT_NOISE {
         return Ok(Some(Left {
             what: Remains::Input,
-            record,
+            record: series.map(|i| i / outputs),
+            output: series.map_or(0, |i| i % outputs),
         }));
     }
     let residuals = node.setup.disturbance(&own.x)?;
     let records = node.setup.records;
-    let level = NOT_NOISE / records.len() as f64;
-    for (k, (record, residual)) in records.iter().zip(&residuals).enumerate() {
+    let level = NOT_NOISE / residuals.len() as f64;
+    let left = |what: Remains, i: usize| Left {
+        what,
+        record: Some(i / outputs),
+        output: i % outputs,
+    };
+    for (i, residual) in residuals.iter().enumerate() {
+        let record = &records[i / outputs];
         let found = match period(record, residual, level)? {
-            None => instant(record, &standardised(&own.noise, residual), level),
+            None => {
+                let white = standardised(own.noise.of_series(i), residual);
+                instant(record, &white, level)
+            }
             found => found,
         };
         if let Some(what) = found {
-            return Ok(Some(Left {
-                what,
-                record: Some(k),
-            }));
+            return Ok(Some(left(what, i)));
         }
     }
     let models = match node.setup.simulate_loop(&own.x)? {
         Some(run) => run.output,
         None => node.setup.simulate(&own.x)?.output,
     };
-    for (k, (model, residual)) in models.iter().zip(&residuals).enumerate() {
-        if level_p(model, &standardised(&own.noise, residual)) < level {
-            return Ok(Some(Left {
-                what: Remains::Level,
-                record: Some(k),
-            }));
+    for (i, (model, residual)) in models.iter().zip(&residuals).enumerate() {
+        if level_p(model, &standardised(own.noise.of_series(i), residual)) < level {
+            return Ok(Some(left(Remains::Level, i)));
         }
     }
     if own.noise.order() == 0 {
         return Ok(None);
     }
     let interval = node.setup.structure.scales.sample_interval;
-    let (wander, process) = (
-        0.5 * interval * slowness(&own.noise),
-        slowest_time_constant(node)?,
-    );
-    Ok((wander > process).then_some(Left {
-        what: Remains::Slow(wander, process),
-        record: None,
-    }))
+    let wanders = own.noise.iter().enumerate();
+    let wanders = wanders.map(|(o, noise)| (0.5 * interval * slowness_of(noise), o));
+    let slowest = wanders.max_by(|a, b| a.0.total_cmp(&b.0));
+    let process = slowest_time_constant(node)?;
+    Ok(slowest
+        .filter(|(wander, _)| *wander > process)
+        .map(|(wander, output)| Left {
+            what: Remains::Slow(wander, process),
+            record: None,
+            output,
+        }))
 }
 
-/// p-value of the test that the command itself does not show in a node's residual; of several records the smallest,
+/// p-value of the test that the command itself does not show in a node's residual at an output; of several records the smallest,
 /// corrected for having taken it.
-pub(crate) fn input_p(node: &Node) -> Result<f64, Error> {
-    Ok(least_p(node, |u| vec![u.to_vec()])?.0)
+pub(crate) fn input_p(node: &Node, output: usize) -> Result<f64, Error> {
+    Ok(least_p(node, Some(output), |u| vec![u.to_vec()])?.0)
 }
 
-/// The same for all signals that are made of a record's commands, and the record that shows it most.
+/// The same for all signals that are made of a record's commands, and the series that shows it most.
 fn least_p(
     node: &Node,
+    output: Option<usize>,
     signals: impl Fn(&[f64]) -> Vec<Vec<f64>>,
 ) -> Result<(f64, Option<usize>), Error> {
     let residuals = node.setup.disturbance(&node.fit.x)?;
     // In a loop the command holds the noise that came back; what moves it from outside is the reference.
     let in_loop = !node.setup.replays().is_empty();
     let (mut least, mut at, mut count) = (1.0, None, 0.0);
-    for (k, (record, residual)) in node.setup.records.iter().zip(&residuals).enumerate() {
-        let samples = record.len() - record.outputs[0].missing();
+    let outputs = node.setup.outputs();
+    let wanted = |k: usize| output.is_none_or(|output| output == k % outputs);
+    for (k, residual) in residuals.iter().enumerate().filter(|(k, _)| wanted(*k)) {
+        let record = &node.setup.records[k / outputs];
+        let samples = residual.iter().filter(|e| !e.is_nan()).count();
         let lags = (samples / 10).clamp(2, 25);
         let from_outside = record
             .references
@@ -267,6 +281,8 @@ fn period(record: &Record, residual: &[f64], level: f64) -> Result<Option<Remain
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
     use std::f64::consts::PI;
+
+    use ct_signals::ArModel;
 
     use super::*;
     use ct_signals::{Channel, noise};

@@ -8,7 +8,6 @@
 
 use std::ops::RangeInclusive;
 
-use ct_signals::ArModel;
 use greybox::{exact_reading_step, fit_from};
 use plants::{EffectInfo, Placed};
 
@@ -29,6 +28,8 @@ pub(crate) struct Rounded<'a> {
     pub node: Node<'a>,
     /// What is named with it.
     pub group: Group,
+    /// The output whose readings are rounded.
+    pub output: usize,
     /// The number that readings are multiples of \[output unit\].
     pub step: f64,
     /// Share of rounding alone in the mean squared error of the model without it.
@@ -41,18 +42,24 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
     let Some(effect) = EffectInfo::find(EFFECT) else {
         return Ok(None);
     };
-    let placed = Placed { effect, vessel: 0 };
-    let Some(step) = exact_reading_step(node.setup.records) else {
-        return Ok(None);
-    };
     let structure = &node.setup.structure;
-    let error = node.fit.rmse.powi(2);
-    let known = structure.effects().iter().any(|on| on.effect.id == EFFECT);
-    let rounding = step.powi(2) / 12.0;
-    let share = rounding / error;
-    if known || !SHARE.contains(&share) {
+    if structure.effects().iter().any(|on| on.effect.id == EFFECT) {
         return Ok(None);
     }
+    let rounds = |output: usize| {
+        let step = exact_reading_step(node.setup.records, output)?;
+        let share = step.powi(2) / 12.0 / node.fit.rmse[output].powi(2);
+        SHARE.contains(&share).then_some((output, step, share))
+    };
+    let Some((output, step, share)) = (0..node.setup.outputs()).find_map(rounds) else {
+        return Ok(None);
+    };
+    let placed = Placed {
+        effect,
+        vessel: output,
+    };
+    let error = node.fit.rmse[output].powi(2);
+    let rounding = step.powi(2) / 12.0;
     // The readings give the step to all their digits; a fit adds nothing.
     let mut setup = node.setup.clone();
     setup.fixed.insert(format!("{EFFECT}.step"), step);
@@ -66,7 +73,7 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
         }
         start
     });
-    let fit = fit_from(&setup, &starts, &ArModel::white(1.0), FINE)?.continuing(&node.fit);
+    let fit = fit_from(&setup, &starts, &setup.white_noise(), FINE)?.continuing(&node.fit);
     let mut added = node.added.clone();
     added.push(placed);
     let group = Group {
@@ -76,6 +83,7 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
     Ok(Some(Rounded {
         node: Node { setup, fit, added },
         group,
+        output,
         step,
         share,
     }))

@@ -3,14 +3,14 @@
 //! On the measured Cascaded Tanks data a pump dead zone alone lowers the error from 0.67 to 0.60 V and an overflow
 //! alone to 0.52 V, both together to 0.33 V: a search that stops at the first effect that does not pay misses such pairs.
 
-use ct_signals::ArModel;
+use greybox::Noise;
 use plants::Placed;
 use rayon::prelude::*;
 
 use crate::{
     Error,
     exhausted::Rest,
-    node::{Node, ROUGH, best_first, observed},
+    node::{Node, ROUGH, best_first, in_time},
     pairs::joint_pairs,
     proposal::{Parent, Proposal, candidates, proposals, propose, realise_all},
 };
@@ -54,7 +54,7 @@ fn distinct<'n, 'a>(
 ) -> Result<Vec<&'n Node<'a>>, Error> {
     let residual = |node: &Node| {
         let series = node.setup.disturbance(&node.fit.x)?;
-        Ok::<_, Error>(observed(node.setup.records, series).concat())
+        Ok::<_, Error>(in_time(&node.setup, &series, &base.fit.weights))
     };
     let before = residual(base)?;
     let mut chosen: Vec<(&Node, Vec<f64>)> = Vec::new();
@@ -119,7 +119,7 @@ impl<'a> Grown<'a> {
     }
 
     /// What [`singles`](crate::proposal::singles) gives for the base in the metric in which it was grown.
-    pub fn singles(&self, noise: &ArModel) -> Vec<Node<'a>> {
+    pub fn singles(&self, noise: &Noise) -> Vec<Node<'a>> {
         let mut nodes = self.refitted.clone();
         nodes.extend(realise_all(self.unpromising.clone(), noise, ROUGH));
         best_first(nodes)
@@ -137,7 +137,7 @@ impl<'a> Grown<'a> {
 /// an only effect leaves coloured noise, which may hold a second one, it goes on if some pair is worth it.
 pub(crate) fn grow<'a>(
     base: &Node<'a>,
-    noise: &ArModel,
+    noise: &Noise,
     breadth: Breadth,
     worth: impl Fn(&Node, &[Node]) -> bool,
     rest: impl Fn(&Node) -> Result<Rest, Error>,
@@ -238,7 +238,7 @@ pub(crate) fn extensions<'a>(
     base: &Node<'a>,
     parents: &[Node<'a>],
     width: usize,
-    noise: &ArModel,
+    noise: &Noise,
 ) -> Result<Vec<Proposal<'a>>, Error> {
     // What follows time alone bends to whatever is missing: it is added last.
     let timeless = |node: &&Node| node.added.len() < PAIR || !by_clock(node);

@@ -1,14 +1,15 @@
 //! The findings in words.
 
-use ct_signals::{Clock, Gaps, duration};
+use ct_signals::{Channel, Clock, Gaps, duration};
 use plants::{Domain, EffectInfo, Placed};
 
 use crate::{
-    Acceptance, Diagnosis, LONGEST_HOLD, MendedGaps, Parameter, Problem, Rankings, Step, Unknown,
-    Verdict,
+    Acceptance, Diagnosis, LONGEST_HOLD, MendedGaps, Parameter, PerOutput, Problem, Rankings, Step,
+    Unknown, Verdict,
     node::Node,
     numbers::{significant, value_and_error},
     remains::{Left, Remains},
+    rounding::Rounded,
 };
 
 /// A value with its standard error to two significant digits of the latter.
@@ -20,6 +21,20 @@ pub(crate) fn with_error(parameter: &Parameter) -> String {
 
 fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
+}
+
+/// Root mean squares in words: `0.300 cm rms`, of several outputs `0.300 cm rms (upper) and 0.100 cm rms (lower)`.
+fn rms(per_output: &PerOutput, unit: &str) -> String {
+    let words = |(name, rms): &(String, f64)| {
+        let of = if per_output.0.len() > 1 {
+            format!(" ({name})")
+        } else {
+            String::new()
+        };
+        format!("{rms:.3} {unit} rms{of}")
+    };
+    let all: Vec<String> = per_output.0.iter().map(words).collect();
+    list(&all, "and")
 }
 
 fn list(names: &[String], last_word: &str) -> String {
@@ -44,7 +59,15 @@ fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
     } else {
         "an effect outside the catalogue"
     };
-    let (rmse, unit) = (step.rmse, &diagnosis.output_unit);
+    // Of several outputs the one that shows it.
+    let shown = step.rmse_per_output.0.get(left.output);
+    let shown = PerOutput(shown.cloned().into_iter().collect());
+    let residual = rms(&shown, &diagnosis.output_unit);
+    let at = if step.rmse_per_output.0.len() > 1 {
+        format!(" of {}", shown.0.first().map_or("", |(name, _)| name))
+    } else {
+        String::new()
+    };
     let record = diagnosis
         .records
         .iter()
@@ -61,7 +84,7 @@ fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
         .filter(|_| several)
         .and_then(|k| diagnosis.records.get(k));
     let residual = format!(
-        "the residual of {rmse:.3} {unit} rms{}",
+        "the residual{at} of {residual}{}",
         name.map_or(String::new(), |record| format!(" (in {})", record.name))
     );
     match left.what {
@@ -102,12 +125,12 @@ pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<St
     let unit = &diagnosis.output_unit;
     vec![match (diagnosis.verdict, left) {
         (Verdict::Adequate, _) => format!(
-            "The model explains the data: its simulation error of {:.3} {unit} rms looks like noise.",
-            step.rmse
+            "The model explains the data: its simulation error of {} looks like noise.",
+            rms(&step.rmse_per_output, unit)
         ),
         (_, None) => format!(
-            "The model does not explain the data: its simulation error of {:.3} {unit} rms holds more than noise.",
-            step.rmse
+            "The model does not explain the data: its simulation error of {} holds more than noise.",
+            rms(&step.rmse_per_output, unit)
         ),
         (_, Some(left)) => format!(
             "The model does not explain the data: {}.",
@@ -125,23 +148,32 @@ pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
 }
 
 /// The best that the catalogue has where it is not the answer.
-pub(crate) fn of_a_part(last: &Node, unit: &str) -> String {
+pub(crate) fn of_a_part(last: &Node) -> String {
+    let outputs = &last.setup.records[0].outputs;
+    let errors = outputs.iter().zip(&last.fit.rmse);
+    let errors = errors.map(|(output, rmse)| (output.name.clone(), *rmse));
     let names: Vec<String> = last
         .added
         .iter()
         .map(|placed| placed.effect.id.to_string())
         .collect();
     format!(
-        "What comes nearest by more than chance, a course of time aside, is {}, which leaves {:.3} {unit} rms: too much would be left that is not noise, so it is not taken for the answer.",
+        "What comes nearest by more than chance, a course of time aside, is {}, which leaves {}: too much would be left that is not noise, so it is not taken for the answer.",
         list(&names, "and"),
-        last.fit.rmse
+        rms(&PerOutput(errors.collect()), &outputs[0].unit)
     )
 }
 
-/// What readings say of a converter: `share` is that of rounding in the mean squared error.
-pub(crate) fn of_rounding(step: f64, share: f64, unit: &str) -> String {
+/// What readings of an output say of a converter.
+pub(crate) fn of_rounding(rounded: &Rounded, output: &Channel) -> String {
+    let (step, share, unit) = (rounded.step, rounded.share, &output.unit);
+    let of = if rounded.node.setup.outputs() > 1 {
+        format!(" of {}", output.name)
+    } else {
+        String::new()
+    };
     format!(
-        "Nearly all readings are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error of the model without it.",
+        "Nearly all readings{of} are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error of the model without it.",
         significant(step, 3),
         significant(step / 12.0_f64.sqrt(), 2),
         100.0 * share.min(1.0)
@@ -194,7 +226,7 @@ const CARRIES_OVER: f64 = 2.0;
 /// Whether what was fitted holds on another record.
 pub(crate) fn of_held_out(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
-    let times = step.rmse_test? / step.rmse;
+    let times = step.weighted_rmse_test? / step.weighted_rmse;
     (times > CARRIES_OVER).then(|| {
         format!(
             "On held-out data the simulation error is {} times as large: what was fitted does not carry over to that record.",
@@ -251,15 +283,18 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
     let unknown = diagnosis.unknown.as_ref();
     let shaped = unknown.map(|unknown| of_unknown(unknown, &diagnosis.clock, diagnosis.domain()));
     let held_out = |step: &Step| {
-        step.rmse_test.map_or(String::new(), |e| {
-            format!(", {e:.3} {unit} on held-out data")
-        })
+        step.rmse_test_per_output
+            .as_ref()
+            .map_or(String::new(), |errors| {
+                let errors = rms(errors, unit).replace(" rms", "");
+                format!(", {errors} on held-out data")
+            })
     };
     match diagnosis.verdict {
         Verdict::Adequate => {
             said.push(format!(
-                "The model is adequate: its simulation error of {:.3} {unit} rms is noise{}.",
-                first.rmse,
+                "The model is adequate: its simulation error of {} is noise{}.",
+                rms(&first.rmse_per_output, unit),
                 held_out(first)
             ));
             let visible = visible(diagnosis);
@@ -283,8 +318,8 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
                 "Something is missing, and nothing in the catalogue explains it: {}.",
                 left.map_or_else(
                     || format!(
-                        "the residual of {:.3} {unit} rms holds more than noise",
-                        first.rmse
+                        "the residual of {} holds more than noise",
+                        rms(&first.rmse_per_output, unit)
                     ),
                     |left| left_over(left, first, diagnosis)
                 )
@@ -293,12 +328,15 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
         Verdict::Effect | Verdict::Undecided | Verdict::Partial => {
             said.extend(of_effects(diagnosis, last));
             said.push(format!(
-                "The simulation error falls from {:.3} to {:.3} {unit} rms{}.",
-                first.rmse,
-                last.rmse,
-                match (first.rmse_test, last.rmse_test) {
+                "The simulation error falls {}{}.",
+                falls(
+                    &first.rmse_per_output,
+                    &last.rmse_per_output,
+                    &format!("{unit} rms")
+                ),
+                match (&first.rmse_test_per_output, &last.rmse_test_per_output) {
                     (Some(before), Some(after)) =>
-                        format!(", on held-out data from {before:.3} to {after:.3} {unit}"),
+                        format!(", on held-out data {}", falls(before, after, unit)),
                     _ => String::new(),
                 }
             ));
@@ -317,6 +355,21 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
     said
 }
 
+/// From what errors fall to what: `from 0.900 to 0.300 cm`, of several outputs each with its name.
+fn falls(before: &PerOutput, after: &PerOutput, unit: &str) -> String {
+    let several = before.0.len() > 1;
+    let pairs = before.0.iter().zip(after.values());
+    let words = pairs.map(|((name, before), after)| {
+        let of = if several {
+            format!(" ({name})")
+        } else {
+            String::new()
+        };
+        format!("from {before:.3} to {after:.3} {unit}{of}")
+    });
+    list(&words.collect::<Vec<_>>(), "and")
+}
+
 /// A sentence for each effect of the answer: its group, its place and its size.
 fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
     let domain = diagnosis.domain();
@@ -333,9 +386,9 @@ fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
             let size = size_of(effect, last);
             let place = match diagnosis.places.get(k).map(Vec::as_slice) {
                 Some([best, other, ..]) if other.relative_likelihood > SAME_PLACE_LIKELIHOOD => {
-                    let (which, kind) = domain.vessel_words(&best.place);
                     format!(
-                        " (in the {which} {kind} or the {} one: the place cannot be told)",
+                        " ({} or the {} one: the place cannot be told)",
+                        domain.place_words(effect, &best.place),
                         domain.vessel_words(&other.place).0
                     )
                 }
@@ -343,8 +396,7 @@ fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
                     .place
                     .as_ref()
                     .map_or(String::new(), |place| {
-                        let (which, kind) = domain.vessel_words(place);
-                        format!(" in the {which} {kind}")
+                        format!(" {}", domain.place_words(effect, place))
                     }),
             };
             let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
@@ -431,8 +483,12 @@ fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> String {
         "vessel" if domain == Domain::General => "in the balance".to_string(),
         "vessel" => "in the vessel's balance".to_string(),
         which => {
+            let (at, which) = match which.strip_prefix("sensor ") {
+                Some(read) => ("at the sensor", read),
+                None => ("in the balance", which),
+            };
             let (which, kind) = domain.vessel_words(which);
-            format!("in the balance of the {which} {kind}")
+            format!("{at} of the {which} {kind}")
         }
     };
     let mut said = format!("What is missing acts {}", place(&unknown.place));
@@ -465,7 +521,7 @@ fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> String {
             ("input", _) => "the command",
             ("rate", _) if domain == Domain::General => "the rate of change",
             ("rate", _) => "the net inflow",
-            (_, "sensor") => "the reading",
+            (_, place) if place.starts_with("sensor") => "the reading",
             _ => &format!("the {}", domain.level_words("level")),
         };
         said += &format!(" and depends on {variable}");

@@ -68,7 +68,7 @@ fn through(
     let mut y = noise::ar1(samples, NOISE, colour, rng);
     let mut simulator = Simulator::<f64>::new(structure, theta, &[16.0], u[0]).unwrap();
     for (y, (u, t)) in y.iter_mut().zip(u.iter().zip(&time)) {
-        *y += sensor(*t, simulator.read());
+        *y += sensor(*t, simulator.read(0));
         simulator.advance(Command::held(pump(*u)), INTERVAL);
     }
     Record {

@@ -1,10 +1,10 @@
 //! From a fitted node to what is reported of it.
 
-use ct_signals::{ArModel, Clock, Record, residual_tests};
-use greybox::{Fit, Setup, Stopping, fit_initial_levels, robust};
+use ct_signals::{ArModel, Channel, Clock, Record, residual_tests};
+use greybox::{Fit, Noise, Setup, Stopping, fit_initial_levels, robust, weighted_rms};
 
 use crate::{
-    Error, HeldOutError, Parameter, ResidualTests, Step,
+    Error, HeldOutError, OutputStep, Parameter, PerOutput, ResidualTests, Step,
     closed_loop::widened,
     locate::{Located, Series, locate},
     node::Node,
@@ -15,20 +15,34 @@ use crate::{
 /// Samples of a held-out record on which its initial levels are fitted, and which are not scored.
 pub(crate) const HEAD: usize = 5;
 
-/// A held-out record as a model simulates it.
+/// Held-out records as a model simulates them.
 struct HeldOut {
-    outputs: Vec<Vec<f64>>,
-    rmse: f64,
-    error: HeldOutError,
+    /// A series for each record and output.
+    series: Vec<Vec<f64>>,
+    /// Of each output: samples that are scored, their root mean square error, and its parts.
+    outputs: Vec<(usize, f64, HeldOutError)>,
 }
 
-/// Rows until so many samples of the output are there: the initial levels follow from them.
-fn head(record: &Record) -> usize {
-    let present = record.outputs[0].values.iter().enumerate();
+/// Rows until so many samples of an output are there: the initial levels follow from them.
+fn head(output: &Channel) -> usize {
+    let present = output.values.iter().enumerate();
     present
         .filter(|(_, value)| !value.is_nan())
         .nth(HEAD - 1)
-        .map_or(record.len(), |(last, _)| last + 1)
+        .map_or(output.values.len(), |(last, _)| last + 1)
+}
+
+/// A record up to where the last of its outputs has so many samples, without what the others have beyond theirs.
+fn beginning(record: &Record) -> Record {
+    let rows = record.outputs.iter().map(head).max().unwrap_or(0);
+    let mut begun = Record {
+        references: Vec::new(),
+        ..record.rows(0..rows)
+    };
+    for (output, whole) in begun.outputs.iter_mut().zip(&record.outputs) {
+        output.values[head(whole)..].fill(f64::NAN);
+    }
+    begun
 }
 
 /// Initial levels from the first [`HEAD`] samples with everything else frozen; scored on the rest.
@@ -37,13 +51,7 @@ fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
         return Ok(None);
     }
     let parameters = &node.fit.x[..node.setup.parameter_count()];
-    let heads: Vec<Record> = test
-        .iter()
-        .map(|record| Record {
-            references: Vec::new(),
-            ..record.rows(0..head(record))
-        })
-        .collect();
+    let heads: Vec<Record> = test.iter().map(beginning).collect();
     let mut begun = node.setup.with_records(&heads)?;
     // A few samples take no time, and an error from wrong levels would be no error of the model.
     (begun.time_limit, begun.interrupt) = (None, None);
@@ -55,36 +63,48 @@ fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
             cost: 1e-10,
         },
     )?;
-    let simulated = node.setup.with_records(test)?.simulate(&x)?.output;
-    let mut parts = [0.0; 4];
-    let mut count = 0;
-    for (record, model) in test.iter().zip(&simulated) {
-        let measured = record.outputs[0].values.iter().copied();
-        let pairs: Vec<(f64, f64)> = measured
-            .zip(model.iter().copied())
-            .skip(head(record))
-            .filter(|(measured, _)| !measured.is_nan())
-            .collect();
-        for (sum, part) in parts.iter_mut().zip(error_parts(&pairs)) {
-            *sum += part;
+    let series = node.setup.with_records(test)?.simulate(&x)?.output;
+    let outputs = node.setup.outputs();
+    let of_output = |o: usize| {
+        let mut parts = [0.0; 4];
+        let mut count = 0;
+        for (record, models) in test.iter().zip(series.chunks_exact(outputs)) {
+            let measured = record.outputs[o].values.iter().copied();
+            let pairs: Vec<(f64, f64)> = measured
+                .zip(models[o].iter().copied())
+                .skip(head(&record.outputs[o]))
+                .filter(|(measured, _)| !measured.is_nan())
+                .collect();
+            for (sum, part) in parts.iter_mut().zip(error_parts(&pairs)) {
+                *sum += part;
+            }
+            count += pairs.len();
         }
-        count += pairs.len();
-    }
-    let [rmse, offset, gain, shape] = parts.map(|sum| (sum / count.max(1) as f64).sqrt());
-    Ok(Some(HeldOut {
-        outputs: simulated,
-        rmse,
-        error: HeldOutError {
+        // NaN of an output of which nothing is left to be scored.
+        let [rmse, offset, gain, shape] = parts.map(|sum| (sum / count as f64).sqrt());
+        let error = HeldOutError {
             offset,
             gain,
             shape,
-        },
-    }))
+        };
+        (count, rmse, error)
+    };
+    let outputs = (0..outputs).map(of_output).collect();
+    Ok(Some(HeldOut { series, outputs }))
 }
 
-/// The error on held-out records \[output unit\]; `None` where there are none.
-pub(crate) fn held_out_rmse(node: &Node, test: &[Record]) -> Result<Option<f64>, Error> {
-    Ok(hold_out(node, test)?.map(|held_out| held_out.rmse))
+/// The error on held-out records at each output \[output unit\].
+pub(crate) fn held_out_rmse(node: &Node, test: &[Record]) -> Result<Vec<f64>, Error> {
+    let held_out = hold_out(node, test)?.map_or_else(Vec::new, |held_out| held_out.outputs);
+    Ok(held_out.into_iter().map(|(_, rmse, _)| rmse).collect())
+}
+
+/// The number of an only output; NaN of several.
+pub(crate) fn of_one(outputs: &[f64]) -> f64 {
+    match outputs {
+        [only] => *only,
+        _ => f64::NAN,
+    }
 }
 
 /// Sums of squares of measured minus model: all of it, what its mean explains, what a factor on the model's deviations from
@@ -141,34 +161,23 @@ fn testable<T>(test: Result<T, ct_signals::Error>) -> Result<Option<T>, ct_signa
     }
 }
 
-/// The report of one node; `bic` is its criterion under the colour of its own residual, `judge` the noise
-/// against which its residual is judged; `widen`: the standard errors allow
-/// for the bias of feedback.
-pub(crate) fn report(
-    node: &Node,
-    bic: f64,
-    judge: &ArModel,
-    test: &[Record],
-    widen: bool,
-) -> Result<Step, Error> {
-    let Node { setup, fit, added } = node;
-    let last = added.last();
-    let simulated = setup.simulate(&fit.x)?.output;
-    let residuals = setup.residuals(&fit.x)?;
-    // Of a record that is cut the longest part.
-    let samples_of = |record: &Record| record.len() - record.outputs[0].missing();
-    let parts = setup.records.iter().zip(&residuals);
+/// The residual tests of an output, on the first record or, where that is cut, its longest part.
+fn tests(node: &Node, residuals: &[Vec<f64>], output: usize) -> Result<ResidualTests, Error> {
+    let setup = &node.setup;
+    let samples_of = |residual: &[f64]| residual.iter().filter(|e| !e.is_nan()).count();
+    let own = residuals.iter().skip(output).step_by(setup.outputs());
+    let parts = setup.records.iter().zip(own);
     let parts = parts.take_while(|(record, _)| record.name == setup.records[0].name);
     let (record, residual) = parts
         .reduce(|a, b| {
-            if samples_of(b.0) > samples_of(a.0) {
+            if samples_of(b.1) > samples_of(a.1) {
                 b
             } else {
                 a
             }
         })
-        .unwrap_or((&setup.records[0], &residuals[0]));
-    let samples = samples_of(record);
+        .unwrap_or((&setup.records[0], &residuals[output]));
+    let samples = samples_of(residual);
     let lags = (samples / 10).clamp(2, 60);
     let portmanteau = (samples / 10).clamp(2, 25);
     let (cross, _) = testable(residual_tests::prewhitened_input_test(
@@ -179,64 +188,110 @@ pub(crate) fn report(
     .unwrap_or((vec![f64::NAN; lags + 1], f64::NAN));
     // As many pairs of samples are there as the square of the share of samples.
     let bound = 1.96 * (record.len() as f64).sqrt() / samples.max(1) as f64;
-    let tests = ResidualTests {
+    Ok(ResidualTests {
         autocorrelation: residual_tests::autocorrelation(residual, lags),
         cross_correlation: cross,
         autocorrelation_bound: bound,
         cross_correlation_bound: bound,
         whiteness_p: testable(residual_tests::ljung_box(residual, portmanteau, 0))?
             .unwrap_or(f64::NAN),
-        input_p: input_p(node)?,
-    };
-    let series: Vec<Series> = setup
-        .records
-        .iter()
-        .zip(&simulated)
-        .zip(&residuals)
-        .map(|((record, model), residual)| Series {
-            name: &record.name,
-            time: &record.time,
-            input: &record.inputs[0].values,
-            model,
-            residual,
-        })
-        .collect();
-    let failures = locate(&Located {
-        series: &series,
-        noise: judge,
-        output_unit: &record.outputs[0].unit,
-        input_unit: &record.inputs[0].unit,
-        clock: &Clock::of(setup.records),
-        domain: setup.structure.domain,
-    });
+        input_p: input_p(node, output)?,
+    })
+}
+
+/// The report of one node; `bic` is its criterion under the colour of its own residual, `judge` the noise
+/// against which its residual is judged; `widen`: the standard errors allow
+/// for the bias of feedback.
+pub(crate) fn report(
+    node: &Node,
+    bic: f64,
+    judge: &Noise,
+    test: &[Record],
+    widen: bool,
+) -> Result<Step, Error> {
+    let Node { setup, fit, added } = node;
+    let last = added.last();
+    let simulated = setup.simulate(&fit.x)?.output;
+    let residuals = setup.residuals(&fit.x)?;
     let held_out = hold_out(node, test)?;
+    let count = setup.outputs();
+    let first = &setup.records[0];
+    let of_output = |output: usize| {
+        let own = simulated.iter().zip(&residuals).skip(output).step_by(count);
+        let series: Vec<Series> = setup
+            .records
+            .iter()
+            .zip(own)
+            .map(|(record, (model, residual))| Series {
+                name: &record.name,
+                time: &record.time,
+                input: &record.inputs[0].values,
+                model,
+                residual,
+            })
+            .collect();
+        let failures = locate(&Located {
+            series: &series,
+            noise: judge.output(output),
+            output_unit: &first.outputs[output].unit,
+            input_unit: &first.inputs[0].unit,
+            clock: &Clock::of(setup.records),
+            domain: setup.structure.domain,
+        });
+        let held_out = held_out.as_ref().map(|held_out| held_out.outputs[output]);
+        Ok(OutputStep {
+            name: first.outputs[output].name.clone(),
+            rmse: fit.rmse[output],
+            rmse_test: held_out.map(|(_, rmse, _)| rmse),
+            held_out_error: held_out.map(|(.., error)| error),
+            tests: tests(node, &residuals, output)?,
+            failures,
+        })
+    };
+    let outputs = (0..count)
+        .map(of_output)
+        .collect::<Result<Vec<_>, Error>>()?;
     let mut errors = std_errors(node)?;
     if widen {
         errors = widened(node, errors)?;
     }
-    let rmse_test = held_out.as_ref().map(|held_out| held_out.rmse);
-    let held_out_error = held_out.as_ref().map(|held_out| held_out.error);
+    let named = |values: &[f64]| {
+        let names = first.outputs.iter().map(|output| output.name.clone());
+        PerOutput(names.zip(values.iter().copied()).collect())
+    };
+    let floors: Vec<f64> = judge.iter().map(ArModel::stationary_std).collect();
+    let of_test = held_out.as_ref().map(|held_out| {
+        let of = |(count, rmse, _): &(usize, f64, HeldOutError)| (*count, *rmse);
+        let (counts, rmse): (Vec<usize>, Vec<f64>) = held_out.outputs.iter().map(of).unzip();
+        (weighted_rms(&rmse, &floors, &counts), rmse)
+    });
     let mut series = simulated;
-    series.extend(held_out.into_iter().flat_map(|held_out| held_out.outputs));
+    series.extend(held_out.into_iter().flat_map(|held_out| held_out.series));
     Ok(Step {
         added: last.map(|placed| placed.effect.id.to_string()),
         place: last.and_then(|placed| place_name(node, *placed)),
-        rmse: fit.rmse,
-        rmse_test,
-        held_out_error,
+        rmse: of_one(&fit.rmse),
+        rmse_test: of_test
+            .as_ref()
+            .map(|(_, rmse)| of_one(rmse))
+            .filter(|rmse| !rmse.is_nan()),
+        rmse_per_output: named(&fit.rmse),
+        rmse_test_per_output: of_test.as_ref().map(|(_, rmse)| named(rmse)),
+        weighted_rmse: weighted_rms(&fit.rmse, &floors, setup.samples_per_output()),
+        weighted_rmse_test: of_test.map(|(weighted, _)| weighted),
         bic,
         parameters: parameters(setup, fit, &errors),
         starts: fit.starts,
         starts_agree: fit.agree,
-        tests,
-        failures,
+        outputs,
         simulated: series,
     })
 }
 
-/// The name of its vessel or pump, where the effect acts in one of several.
+/// The name of its vessel, pump or sensor, where the effect acts in one of several.
 pub(crate) fn place_name(node: &Node, placed: plants::Placed) -> Option<String> {
-    let name = placed.place_name(node.setup.structure.plant);
+    let structure = &node.setup.structure;
+    let name = placed.place_name(structure.plant, &structure.known);
     name.map(str::to_string)
 }
 

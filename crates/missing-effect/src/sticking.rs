@@ -34,8 +34,11 @@ struct Shape {
 
 /// Whether some record has the shape of a valve that sticks.
 pub(crate) fn sticks(records: &[Record]) -> bool {
-    records.iter().any(|record| {
-        let shape = shape(&record.inputs[0].values, &record.outputs[0].interpolated());
+    let outputs = records
+        .iter()
+        .flat_map(|record| record.outputs.iter().map(move |y| (record, y)));
+    outputs.into_iter().any(|(record, output)| {
+        let shape = shape(&record.inputs[0].values, &output.interpolated());
         shape.plateaus >= PLATEAUS
             && shape.plateaus as f64 >= OF_JUMPS * shape.jumps as f64
             && shape.share >= OF_RECORD

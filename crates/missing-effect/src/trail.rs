@@ -1,6 +1,6 @@
 //! The trail: the believed model, then one effect after the other, so that the error can be watched falling.
 
-use ct_signals::ArModel;
+use greybox::Noise;
 use plants::Placed;
 use rayon::prelude::*;
 
@@ -21,7 +21,7 @@ const ROUNDS: (u64, u64) = (2, 4);
 pub(crate) fn trail<'a>(
     base: &Node<'a>,
     last: &Node<'a>,
-    noise: &ArModel,
+    noise: &Noise,
 ) -> Result<Vec<Node<'a>>, Error> {
     let mut trail = vec![refine(base, noise, &[])?];
     trail[0].fit = trail[0].fit.clone().continuing(&base.fit);
@@ -34,7 +34,7 @@ pub(crate) fn trail<'a>(
             .into_par_iter()
             .filter_map(|placed| place(parent, placed, last, noise, ROUGH))
             .collect();
-        let least = |a: &Node, b: &Node| a.fit.rmse.total_cmp(&b.fit.rmse);
+        let least = |a: &Node, b: &Node| a.fit.mean_rmse().total_cmp(&b.fit.mean_rmse());
         let Some(first) = nodes.into_iter().min_by(least) else {
             break;
         };

@@ -1,7 +1,7 @@
 //! An alarm, and its sentence.
 
 use missing_effect::numbers::significant;
-use plants::{Domain, Structure};
+use plants::{Domain, Known, Place, Plant, Structure};
 use serde::{Deserialize, Serialize};
 
 use crate::isolate::Suspect;
@@ -58,6 +58,10 @@ pub struct Alarm {
     pub score: f64,
     /// See `score`.
     pub threshold: f64,
+    /// Of several outputs the one at which the offset of the reading had the largest score when the alarm was raised: the vessel whose level
+    /// it reads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub output: Option<String>,
     /// All of it in words.
     pub sentence: String,
 }
@@ -80,23 +84,36 @@ pub struct Size {
     pub value: f64,
     /// Its unit; empty for a share.
     pub unit: String,
-    /// The vessel, of two.
+    /// The vessel, of several; of an effect at a sensor the one whose level that reads, of several outputs.
     pub vessel: Option<String>,
 }
 
 /// Units of the signals, for sentences.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Units {
-    /// Of the reading.
+    /// Of the readings.
     pub output: String,
     /// Of the command.
     pub input: String,
 }
 
-/// What a look at the rows found; `raised`: when the alarm was.
+/// The name of an output, where there are several: that of the vessel whose level it reads.
+pub(crate) fn output_name(plant: Plant, known: &Known, output: usize) -> Option<&'static str> {
+    let outputs = known.outputs(plant);
+    let vessel = outputs.get(output).filter(|_| outputs.len() > 1)?;
+    plant.vessel_name(*vessel)
+}
+
+/// Where a sensor is, in words; `name`: of the output.
+pub(crate) fn at_sensor(name: &str, domain: Domain) -> String {
+    let (which, kind) = domain.vessel_words(name);
+    format!("at the sensor of the {which} {kind}")
+}
+
+/// What a look at the rows found; `raised`: when the alarm was; `output`: at which it shows most.
 pub(crate) fn alarm(
     (event, time, raised): (Stage, f64, f64),
-    (score, threshold): (f64, f64),
+    (score, threshold, output): (f64, f64, usize),
     suspects: &[Suspect],
     structure: &Structure,
     units: &Units,
@@ -116,8 +133,10 @@ pub(crate) fn alarm(
         size: None,
         score,
         threshold,
+        output: output_name(structure.plant, &structure.known, output).map(str::to_string),
         sentence: String::new(),
     };
+    let mut place = Place::Vessel;
     if let Some(best) = best {
         let group: Vec<&Suspect> = suspects.iter().filter(|s| s.near(best)).collect();
         alarm.since = Some(best.since);
@@ -141,13 +160,14 @@ pub(crate) fn alarm(
             name: name.to_string(),
             value,
             unit: unit.label(&units.output, &units.input, known),
-            vessel: (best.placed.effect.place == plants::Place::Vessel)
-                .then(|| structure.plant.vessel_name(best.placed.vessel))
-                .flatten()
+            vessel: best
+                .placed
+                .place_name(structure.plant, &structure.known)
                 .map(str::to_string),
         });
+        place = best.placed.effect.place;
     }
-    alarm.sentence = sentence(&alarm, raised, structure.domain);
+    alarm.sentence = sentence(&alarm, raised, place, structure.domain);
     alarm
 }
 
@@ -159,11 +179,15 @@ pub fn instant(time: f64) -> String {
     if time.abs() < 1e12 { rounded } else { time }.to_string()
 }
 
-fn sentence(alarm: &Alarm, raised: f64, domain: Domain) -> String {
+/// `place`: of the best effect.
+fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain) -> String {
     let (Some(since), Some(evidence), Some(size)) = (alarm.since, alarm.evidence, &alarm.size)
     else {
+        let most = alarm.output.as_ref().map_or(String::new(), |output| {
+            format!("; it shows most {}", at_sensor(output, domain))
+        });
         return format!(
-            "The model does not fit since about t = {} s or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}).",
+            "The model does not fit since about t = {} s or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
             instant(raised),
             alarm.score,
             alarm.threshold
@@ -176,7 +200,11 @@ fn sentence(alarm: &Alarm, raised: f64, domain: Domain) -> String {
     };
     let vessel = size.vessel.as_ref().map_or(String::new(), |vessel| {
         let (which, kind) = domain.vessel_words(vessel);
-        format!(", {which} {kind}")
+        let sensor = match place {
+            Place::Sensor => "sensor of the ",
+            _ => "",
+        };
+        format!(", {sensor}{which} {kind}")
     });
     let against = alarm.next.as_ref().map_or(String::new(), |next| {
         format!(

@@ -1,5 +1,7 @@
 //! What a monitor refuses.
 
+use crate::MAX_OUTPUTS;
+
 /// Why there is no monitor.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -22,6 +24,17 @@ pub enum Error {
     TwoPumps {
         /// The plant.
         plant: &'static str,
+    },
+    /// A measured disturbance in the model.
+    #[error(
+        "the model has a measured disturbance, and a row of the monitor has one input: delete disturbance under [known] and its column"
+    )]
+    Disturbance,
+    /// More outputs than a row carries.
+    #[error("{outputs} outputs are more than the monitor watches: at most {MAX_OUTPUTS}")]
+    TooManyOutputs {
+        /// How many.
+        outputs: usize,
     },
     /// A setting is outside its range.
     #[error("{setting} is {value}, but has to be {range}")]
@@ -59,7 +72,7 @@ pub enum Error {
     },
 }
 
-/// Why a row is not used, or only its command ([`Step::lost`](crate::Step::lost)). A row that is not used leaves the monitor as it was,
+/// Why a row is not used, or one of its readings is not ([`Step::lost`](crate::Step::lost)). A row that is not used leaves the monitor as it was,
 /// but for the count of times that go back.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -30,13 +30,19 @@ pub(crate) fn fingerprint(model: &Model) -> Fingerprint {
     for (key, &area) in areas.iter().zip(&known.area) {
         add(key, number(area));
     }
-    let measured = known.measured.and_then(|vessel| plant.vessel_name(vessel));
-    add("measured", measured.map(str::to_string));
+    let measured = known.measured.iter();
+    let measured: Vec<&str> = measured
+        .filter_map(|&vessel| plant.vessel_name(vessel))
+        .collect();
+    add(
+        "measured",
+        (!measured.is_empty()).then(|| measured.join(", ")),
+    );
     add("pipe_area sqrt(2 gravity)", number(known.orifice));
     add("tank_height", number(known.tank_height));
     add("input_range", number(known.input_range));
     let effects = model.effects.iter().map(|placed| {
-        let place = placed.place_name(plant);
+        let place = placed.place_name(plant, known);
         placed.effect.id.to_string() + &place.map_or(String::new(), |place| format!(" ({place})"))
     });
     let terms = model.terms.iter().map(|term| term.name.clone());

@@ -8,12 +8,12 @@
 //! A process that is sampled much faster than it moves is watched in blocks: time, command and reading are their means over
 //! `every` rows, and the command runs in a straight line from one mean to the next.
 //!
-//! A row may lack its reading. In a block such a row is taken on the straight line between the readings beside it; a block whose last
-//! row lacks its reading, or more than half of its rows, has none.
+//! A row may lack the reading of an output. In a block such a row is taken on the straight line between the readings beside it; a block whose
+//! last row lacks the reading, or more than half of its rows, has none of that output.
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Notice, Refused, Row};
+use crate::{MAX_OUTPUTS, Notice, Refused, Row};
 
 /// Steps from which the usual one is taken.
 const STEPS: usize = 21;
@@ -32,14 +32,17 @@ const MOST_ROWS: u64 = 1 << 53;
 /// Rows in a block.
 pub(crate) const LONGEST_BLOCK: usize = 1 << 24;
 
+/// A reading of each output; `None` where it is lost, and behind the last output.
+pub(crate) type Readings = [Option<f64>; MAX_OUTPUTS];
+
 /// A row, or the mean of a block of rows, as it is watched.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sample {
     /// \[s\]
     pub time: f64,
     pub input: f64,
-    /// `None` where the reading is lost.
-    pub output: Option<f64>,
+    /// In the order of the outputs.
+    pub outputs: Readings,
     /// How it follows the one before.
     pub follows: Follows,
 }
@@ -93,20 +96,28 @@ pub(crate) struct Intake {
     usual: Option<(f64, f64)>,
     /// Steps of another length in a row.
     other: usize,
-    /// Sums of the block's times (since its first), commands and readings; rows in it; its first time.
-    sums: [f64; 3],
+    /// Sums of the block's times (since its first) and commands; rows in it; its first time.
+    sums: [f64; 2],
     filled: usize,
     begun: f64,
     follows: Follows,
-    /// The latest reading of the stretch, and rows without one since.
+    outputs: Vec<Output>,
+}
+
+/// The readings of an output.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+struct Output {
+    /// Sum of the block's.
+    sum: f64,
+    /// The latest one of the stretch, and rows without one since.
     reading: Option<f64>,
     without: usize,
-    /// Rows of the block with a reading.
+    /// Rows of the block with one.
     readings: usize,
 }
 
 impl Intake {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(outputs: usize) -> Self {
         Self {
             every: 1,
             rows: 0,
@@ -115,37 +126,40 @@ impl Intake {
             steps: Vec::with_capacity(STEPS),
             usual: None,
             other: 0,
-            sums: [0.0; 3],
+            sums: [0.0; 2],
             filled: 0,
             begun: 0.0,
             follows: Follows::Gap,
-            reading: None,
-            without: 0,
-            readings: 0,
+            outputs: vec![Output::default(); outputs],
         }
     }
 
     /// The numbers that a file may have spoilt.
-    pub(crate) fn sound(&self) -> bool {
+    pub(crate) fn sound(&self, outputs: usize) -> bool {
         (1..=LONGEST_BLOCK).contains(&self.every)
             && self.rows <= MOST_ROWS
             && self.steps.len() <= STEPS
             && self.back.is_none_or(|(_, count)| count < BACK)
             && self.other < OTHER
             && self.filled < self.every
-            && self.readings <= self.filled
-            && self.without as u64 <= self.rows
+            && self.outputs.len() == outputs
+            && self
+                .outputs
+                .iter()
+                .all(|output| output.readings <= self.filled && output.without as u64 <= self.rows)
     }
 
     /// Begins a new block, after `every` has changed.
     pub(crate) fn begin(&mut self) {
         self.filled = 0;
-        self.readings = 0;
-        self.sums = [0.0; 3];
+        self.sums = [0.0; 2];
+        for output in &mut self.outputs {
+            (output.sum, output.readings) = (0.0, 0);
+        }
     }
 
-    /// Takes in a row with its `reading`, where that can be used.
-    pub(crate) fn take(&mut self, row: &Row, reading: Option<f64>) -> Result<Taken, Refused> {
+    /// Takes in a row with those of its `readings` that can be used.
+    pub(crate) fn take(&mut self, row: &Row, readings: &Readings) -> Result<Taken, Refused> {
         let time = usable("time", row.time)?;
         let input = usable("input", row.input)?;
         let mut notice = None;
@@ -168,18 +182,23 @@ impl Intake {
         self.sums[0] += time - self.begun;
         self.sums[1] += input;
         self.filled += 1;
-        if let Some(reading) = reading {
-            self.read(reading);
-        } else {
-            self.without += 1;
+        for (output, reading) in self.outputs.iter_mut().zip(readings) {
+            match reading {
+                Some(reading) => output.read(*reading, self.filled),
+                None => output.without += 1,
+            }
         }
-        let has_reading = reading.is_some() && 2 * self.readings >= self.every;
         let sample = (self.filled == self.every).then(|| {
             let mean = |sum: f64| sum / self.every as f64;
+            let mut means = [None; MAX_OUTPUTS];
+            for ((output, reading), of_block) in self.outputs.iter().zip(readings).zip(&mut means) {
+                let enough = reading.is_some() && 2 * output.readings >= self.every;
+                *of_block = enough.then(|| mean(output.sum));
+            }
             Sample {
                 time: self.begun + mean(self.sums[0]),
                 input: mean(self.sums[1]),
-                output: has_reading.then(|| mean(self.sums[2])),
+                outputs: means,
                 follows: self.follows,
             }
         });
@@ -190,26 +209,14 @@ impl Intake {
         Ok(Taken { sample, notice })
     }
 
-    /// Adds a reading to the block, and what the rows of the block right before it lack.
-    fn read(&mut self, reading: f64) {
-        let in_block = self.without.min(self.filled - 1);
-        let before = self.reading.unwrap_or(reading);
-        let slope = (reading - before) / (self.without + 1) as f64;
-        let first = (self.without - in_block + 1) as f64;
-        let steps = in_block as f64 * (first + self.without as f64) / 2.0;
-        self.sums[2] += in_block as f64 * before + slope * steps + reading;
-        self.readings += 1;
-        self.reading = Some(reading);
-        self.without = 0;
-    }
-
     /// Begins a new stretch.
     fn part(&mut self) {
         if self.follows == Follows::On {
             self.follows = Follows::Gap;
         }
-        self.reading = None;
-        self.without = 0;
+        for output in &mut self.outputs {
+            (output.reading, output.without) = (None, 0);
+        }
         self.begin();
     }
 
@@ -281,5 +288,20 @@ impl Intake {
         let mut sorted = self.steps.clone();
         sorted.sort_by(f64::total_cmp);
         (sorted[STEPS / 2], sorted[STEPS - 2])
+    }
+}
+
+impl Output {
+    /// Adds a reading to the block of so many rows, this one among them, and what the rows of the block right before it lack.
+    fn read(&mut self, reading: f64, filled: usize) {
+        let in_block = self.without.min(filled - 1);
+        let before = self.reading.unwrap_or(reading);
+        let slope = (reading - before) / (self.without + 1) as f64;
+        let first = (self.without - in_block + 1) as f64;
+        let steps = in_block as f64 * (first + self.without as f64) / 2.0;
+        self.sum += in_block as f64 * before + slope * steps + reading;
+        self.readings += 1;
+        self.reading = Some(reading);
+        self.without = 0;
     }
 }

@@ -1,25 +1,27 @@
 //! Isolation: which effect of the catalogue began, and when, explains the latest rows.
 //!
-//! An effect that begins at row `k` is fitted to the rows from `k` on by `greybox`, in the metric of the learned noise: every
+//! An effect that begins at row `k` is fitted to the rows of all outputs from `k` on by `greybox`, in the metric of the learned noise: every
 //! parameter of the plant as it was learned, the levels at `k` as the learned model has them, only the effect's own
 //! parameters free. Onsets lie on a grid that is finer towards now, and then between its neighbours. With the innovations
 //! `e` of the learned model,
 //! ```text
-//! evidence = sum_{j >= k} e_j^2 - cost/sigma^2 - (parameters + 1) ln n
+//! evidence = sum_o (sum_{j >= k} e_jo^2 - cost_o/sigma_o^2) - (parameters + 1) ln n
 //! ```
-//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept. Effects
+//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs `o`.
+//! Effects
 //! within [`GROUP_MARGIN`] of the best cannot be told apart yet.
 
 use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Hold, Record};
-use greybox::{Setup, Stopping, fit_from};
+use greybox::{Noise, Setup, Stopping, fit_from};
 use missing_effect::GROUP_MARGIN;
 use plants::{MAX_VESSELS, Placed, Simulator, Structure, Unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    MAX_OUTPUTS,
     intake::Sample,
     learn::{BEGIN as BEGIN_IN_BAND, Learned, record},
     lost::interpolated,
@@ -73,16 +75,16 @@ pub(crate) struct Kept {
     pub levels: [f64; MAX_VESSELS],
     /// Where in it stood what the command moves: play has a memory without an end, and no run-up finds it.
     pub stands: f64,
-    /// Reading of the learned model.
-    pub modelled: f64,
-    /// Whitened residual in its standard deviations; zero where the reading is lost.
-    pub innovation: f64,
+    /// Readings of the learned model.
+    pub modelled: [f64; MAX_OUTPUTS],
+    /// Whitened residual of each output in its standard deviations; zero where the reading is lost.
+    pub innovations: [f64; MAX_OUTPUTS],
 }
 
 impl Kept {
     /// Measured minus the learned model.
-    fn residual(&self) -> Option<f64> {
-        Some(self.sample.output? - self.modelled)
+    fn residual(&self, output: usize) -> Option<f64> {
+        Some(self.sample.outputs[output]? - self.modelled[output])
     }
 }
 
@@ -98,17 +100,17 @@ pub(crate) struct Suspect {
     /// The size lies inside its plausible range.
     pub plausible: bool,
     /// Whitened squares from its onset on, in the noise's variance: what the learned model leaves, and what is left with it; and rows
-    /// there.
+    /// there times outputs.
     squares: (f64, f64),
-    rows: usize,
+    samples: usize,
 }
 
 impl Suspect {
     /// What it leaves is more than noise.
     pub(crate) fn leaves_more_than_noise(&self) -> bool {
         let (before, left) = self.squares;
-        let rows = self.rows as f64;
-        left > rows + BEYOND * (2.0 * rows).sqrt() && left - rows > LEFT * (before - rows)
+        let n = self.samples as f64;
+        left > n + BEYOND * (2.0 * n).sqrt() && left - n > LEFT * (before - n)
     }
 
     /// Belongs to the group of the best.
@@ -117,41 +119,63 @@ impl Suspect {
     }
 }
 
-/// Every effect that may have begun, best first: an implausible size comes after every plausible one. The noise is `growth` times as large as
-/// it was learned. Residuals of lost readings are taken on straight lines between those beside them, for each effect alike; they count as readings.
+/// Every effect that may have begun, best first: an implausible size comes after every plausible one. The noise of each output is `growth`
+/// times as large as it was learned. Residuals of lost readings are taken on straight lines between those beside them, for each effect alike;
+/// they count as readings. An output that has no reading in all the rows is left out.
 pub(crate) fn isolate(
     structure: &Structure,
     learned: &Learned,
     hold: Hold,
     rows: &[Kept],
-    growth: f64,
+    growth: [f64; MAX_OUTPUTS],
 ) -> Vec<Suspect> {
-    let residuals: Vec<Option<f64>> = rows.iter().map(Kept::residual).collect();
-    let (Some(noise), Some(residuals)) = (learned.noise(), interpolated(&residuals)) else {
+    let Some(noise) = learned.noise() else {
         return Vec::new();
     };
-    let readings = rows.iter().zip(&residuals);
-    let readings = readings
-        .map(|(row, residual)| row.sample.output.unwrap_or(row.modelled + residual))
-        .collect();
-    let innovations = innovations(rows, &residuals, &noise);
+    let mut squares = vec![0.0; rows.len()];
+    let mut series = Vec::with_capacity(noise.outputs());
+    for (output, (noise, growth)) in noise.iter().zip(growth).enumerate() {
+        let residuals: Vec<Option<f64>> = rows.iter().map(|row| row.residual(output)).collect();
+        let Some(residuals) = interpolated(&residuals) else {
+            series.push(Series::without_readings(rows.len()));
+            continue;
+        };
+        let innovations = innovations(rows, output, &residuals, noise);
+        for (square, innovation) in squares.iter_mut().zip(innovations) {
+            *square += (innovation / growth).powi(2);
+        }
+        let readings = rows.iter().zip(&residuals).map(|(row, residual)| {
+            row.sample.outputs[output].unwrap_or(row.modelled[output] + residual)
+        });
+        series.push(Series {
+            readings: readings.collect(),
+            residuals,
+        });
+    }
+    let read = series.iter().filter(|series| series.is_read()).count();
+    if read == 0 {
+        return Vec::new();
+    }
+    let sigmas = learned.outputs.iter().zip(growth);
     let search = Search {
         structure,
         learned,
         noise,
         hold,
         rows,
-        variance: (growth * learned.sigma).powi(2),
-        squares: innovations
+        series,
+        read,
+        sigmas: sigmas
+            .map(|(output, growth)| growth * output.sigma)
+            .collect(),
+        squares: squares
             .iter()
             .rev()
-            .scan(0.0, |sum, innovation| {
-                *sum += (innovation / growth).powi(2);
+            .scan(0.0, |sum, square| {
+                *sum += square;
                 Some(*sum)
             })
             .collect(),
-        readings,
-        residuals,
     };
     let mut suspects: Vec<Suspect> = structure
         .candidates()
@@ -164,7 +188,7 @@ pub(crate) fn isolate(
             .partial_cmp(&(a.plausible, a.evidence))
             .unwrap_or(std::cmp::Ordering::Equal)
     });
-    // Of two vessels the one that explains more.
+    // Of two vessels, or outputs, the one that explains more.
     let mut best: Vec<Suspect> = Vec::with_capacity(suspects.len());
     for suspect in suspects {
         if best
@@ -177,14 +201,15 @@ pub(crate) fn isolate(
     best
 }
 
-/// Innovations in their standard deviations, of lost readings too: as a fit to the filled record has them.
-fn innovations(rows: &[Kept], residuals: &[f64], noise: &ArModel) -> Vec<f64> {
+/// Innovations of an output in their standard deviations, of lost readings too: as a fit to the filled record has them.
+fn innovations(rows: &[Kept], output: usize, residuals: &[f64], noise: &ArModel) -> Vec<f64> {
     let p = noise.order();
     (0..rows.len())
         .map(|k| {
             let from = k.saturating_sub(p);
-            if rows[from..=k].iter().all(|row| row.sample.output.is_some()) {
-                return rows[k].innovation;
+            let is_read = |row: &Kept| row.sample.outputs[output].is_some();
+            if rows[from..=k].iter().all(is_read) {
+                return rows[k].innovations[output];
             }
             let past = residuals[from..k].iter().rev();
             let foretold: f64 = past.zip(noise.coefficients()).map(|(r, a)| a * r).sum();
@@ -193,18 +218,42 @@ fn innovations(rows: &[Kept], residuals: &[f64], noise: &ArModel) -> Vec<f64> {
         .collect()
 }
 
+/// An output in each row.
+struct Series {
+    /// Measured or filled in; all NaN where there is none.
+    readings: Vec<f64>,
+    /// The same less the learned model's.
+    residuals: Vec<f64>,
+}
+
+impl Series {
+    fn without_readings(rows: usize) -> Self {
+        Self {
+            readings: vec![f64::NAN; rows],
+            residuals: vec![f64::NAN; rows],
+        }
+    }
+
+    fn is_read(&self) -> bool {
+        self.readings
+            .first()
+            .is_some_and(|reading| !reading.is_nan())
+    }
+}
+
 struct Search<'a> {
     structure: &'a Structure,
     learned: &'a Learned,
-    noise: ArModel,
+    noise: Noise,
     hold: Hold,
     rows: &'a [Kept],
-    /// Of each row, measured or filled in; and the same less the learned model's.
-    readings: Vec<f64>,
-    residuals: Vec<f64>,
-    /// Of the noise's innovations.
-    variance: f64,
-    /// Sum of squared innovations over the last 1, 2, ... rows.
+    /// Of each output.
+    series: Vec<Series>,
+    /// Outputs that have readings.
+    read: usize,
+    /// Standard deviation of each output's innovations \[output unit\].
+    sigmas: Vec<f64>,
+    /// Sum of squared innovations of all outputs over the last 1, 2, ... rows.
     squares: Vec<f64>,
 }
 
@@ -292,14 +341,16 @@ impl Search<'_> {
         .ok()?;
         begun.set_substeps(self.learned.substeps);
         let mut before: Option<&Kept> = None;
-        let readings = record.outputs[0].values.iter_mut();
-        for ((row, residual), reading) in rows.iter().zip(&self.residuals[from..]).zip(readings) {
+        for (k, row) in rows.iter().enumerate() {
             if let Some(before) = before {
                 let step = row.sample.time - before.sample.time;
                 begun.advance(command(self.hold, &before.sample, &row.sample), step);
             }
             before = Some(row);
-            *reading = begun.read() + residual;
+            let outputs = record.outputs.iter_mut().zip(&self.series);
+            for (output, (channel, series)) in outputs.enumerate() {
+                channel.values[k] = begun.read(output) + series.residuals[from + k];
+            }
         }
         Some(())
     }
@@ -316,7 +367,10 @@ impl Search<'_> {
         let rows = &self.rows[from..];
         let mut records = [record(
             rows.iter().map(|row| &row.sample),
-            self.readings[from..].to_vec(),
+            self.series
+                .iter()
+                .map(|series| series.readings[from..].to_vec())
+                .collect(),
             self.hold,
         )];
         self.put_right(&mut records[0], from)?;
@@ -342,6 +396,7 @@ impl Search<'_> {
         }
         let mut setup = Setup::new(structure, &records, fixed).ok()?;
         setup.substeps = self.learned.substeps;
+        setup.known_scales = Some(self.sigmas.clone());
         setup.hold_initial_states();
         let mut x = vec![0.0; setup.names().len()];
         for (i, name) in setup.names().iter().enumerate() {
@@ -367,8 +422,10 @@ impl Search<'_> {
             })
             .collect();
         let fit = fit_from(&setup, &starts, &self.noise, stopping).ok()?;
-        let squares = fit.cost / self.variance;
-        let cost = (free.len() + 1) as f64 * (self.rows.len() as f64).ln();
+        // The cost is in units of the first output's.
+        let squares = fit.cost / self.sigmas.first()?.powi(2);
+        let samples = (self.rows.len() * self.read) as f64;
+        let cost = (free.len() + 1) as f64 * samples.ln();
         let values: Vec<f64> = free.iter().map(|&i| fit.x[i]).collect();
         let size = *values.first()?;
         let room = 1e-6 * (leading.upper - leading.lower);
@@ -380,7 +437,7 @@ impl Search<'_> {
                 size: (leading.name, size, leading.unit),
                 plausible: size > leading.lower + room && size < leading.upper - room,
                 squares: (self.squares[length - 1], squares),
-                rows: length,
+                samples: length * self.read,
             },
             values,
         ))

@@ -1,9 +1,9 @@
-//! The learning phase: the believed model fitted to the first rows, and the noise that it leaves.
+//! The learning phase: the believed model fitted to the first rows of all outputs, and the noise that it leaves at each.
 
 use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Channel, Hold, Record};
-use greybox::{Fit, FitOptions, LinearPlant, Setup, coloured, fit_from, random_starts};
+use greybox::{Fit, FitOptions, LinearPlant, Noise, Setup, coloured, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Scales, Structure, Term};
 use serde::{Deserialize, Serialize};
 
@@ -12,16 +12,19 @@ use crate::{
     intake::Sample,
     lost::{expect, interpolated},
     scatter::Limit,
+    threshold::relative_error,
 };
 
 /// A command that moves by less of itself stands still.
 const STILL: f64 = 1e-9;
 
-/// Fewest rows with a reading, as a part of all.
+/// Fewest rows with a reading of each output, as a part of all.
 const READ: f64 = 0.5;
 
 /// Fits in turn with what is expected of lost readings: each leaves of the error of the one before the share of the information that is lost.
 const ROUNDS: usize = 2;
+
+const NO_NOISE: &str = "the model leaves no noise to judge by: are the readings measured?";
 
 /// More of either was never learned: a state that says so would be computed for ever.
 const MOST_SUBSTEPS: usize = 1024;
@@ -86,24 +89,64 @@ pub(crate) struct Learned {
     pub theta: Vec<f64>,
     /// Their covariance, row by row; zero for what was not fitted, or held at a bound.
     pub covariance: Vec<f64>,
-    /// Coefficients and innovations' standard deviation of the noise.
-    pub coefficients: Vec<f64>,
-    pub sigma: f64,
-    /// Rows from which it was learned.
-    pub rows: usize,
+    /// The noise of each output.
+    pub outputs: Vec<OutputNoise>,
     /// The slowest time constant \[s\].
     pub time_constant: f64,
     /// The usual step of the time \[s\].
     pub interval: f64,
     pub scales: Scales,
     pub substeps: usize,
+}
+
+/// The noise of an output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OutputNoise {
+    /// Coefficients and innovations' standard deviation \[output unit\].
+    pub coefficients: Vec<f64>,
+    pub sigma: f64,
+    /// Readings from which it was learned.
+    pub readings: usize,
     /// How far neighbouring innovations lie apart.
     pub scatter: Limit,
 }
 
-impl Learned {
-    pub(crate) fn noise(&self) -> Option<ArModel> {
+impl OutputNoise {
+    pub(crate) fn model(&self) -> Option<ArModel> {
         ArModel::from_coefficients(&self.coefficients, self.sigma).ok()
+    }
+
+    fn sound(&self) -> bool {
+        self.sigma.is_finite()
+            && self.sigma > 0.0
+            && self.readings <= KEPT
+            && self.coefficients.len() <= MOST_COEFFICIENTS
+            && self.model().is_some()
+            && self.scatter.sound()
+    }
+}
+
+impl Learned {
+    pub(crate) fn noise(&self) -> Option<Noise> {
+        let models: Option<Vec<ArModel>> = self.outputs.iter().map(OutputNoise::model).collect();
+        models.map(Noise::of)
+    }
+
+    /// Rows from which it was learned.
+    pub(crate) fn rows(&self) -> usize {
+        let readings = self.outputs.iter().map(|output| output.readings);
+        readings.max().unwrap_or(0)
+    }
+
+    /// The relative standard error of the noise's slow part ([`relative_error`]) at the output where it is largest, which may be the only
+    /// one that sees a change.
+    pub(crate) fn relative_error(&self) -> Option<f64> {
+        let of_output = |output: &OutputNoise| {
+            let model = output.model()?;
+            Some(relative_error(&model, output.readings))
+        };
+        let errors: Option<Vec<f64>> = self.outputs.iter().map(of_output).collect();
+        Some(errors?.into_iter().fold(0.0, f64::max))
     }
 
     /// The slowest time constant in rows.
@@ -129,30 +172,31 @@ impl Learned {
             .collect()
     }
 
-    pub(crate) fn sound(&self, parameters: usize) -> bool {
-        let finite = [self.sigma, self.time_constant, self.interval];
+    pub(crate) fn sound(&self, parameters: usize, outputs: usize) -> bool {
+        let finite = [self.time_constant, self.interval];
         self.theta.len() == parameters
             && self.covariance.len() == parameters * parameters
             && finite.iter().all(|v| v.is_finite() && *v > 0.0)
-            && self.rows <= KEPT
             && self.substeps <= MOST_SUBSTEPS
-            && self.coefficients.len() <= MOST_COEFFICIENTS
-            && self.noise().is_some()
-            && self.scatter.sound()
+            && self.outputs.len() == outputs
+            && self.outputs.iter().all(OutputNoise::sound)
     }
 }
 
-/// Rows as a record, with a reading for each; the time counts from the first.
+/// Rows as a record, with the readings of each output; the time counts from the first.
 pub(crate) fn record<'a>(
     rows: impl Iterator<Item = &'a Sample>,
-    readings: Vec<f64>,
+    readings: Vec<Vec<f64>>,
     hold: Hold,
 ) -> Record {
+    let outputs = readings.into_iter();
     let mut record = Record {
         name: "the rows".to_string(),
         time: Vec::new(),
         inputs: vec![Channel::default().with_hold(hold)],
-        outputs: vec![Channel::new("", "", readings)],
+        outputs: outputs
+            .map(|readings| Channel::new("", "", readings))
+            .collect(),
         references: Vec::new(),
         calendar: None,
     };
@@ -177,19 +221,29 @@ pub(crate) fn learn(
     samples: &[Sample],
     hold: Hold,
 ) -> Result<(Learned, Vec<f64>), String> {
-    let readings: Vec<Option<f64>> = samples.iter().map(|sample| sample.output).collect();
-    let lost: Vec<usize> = (0..samples.len())
-        .filter(|&k| readings[k].is_none())
-        .collect();
-    let read = samples.len() - lost.len();
-    let filled = interpolated(&readings).filter(|_| read as f64 >= READ * samples.len() as f64);
-    let Some(filled) = filled else {
-        return Err(format!(
-            "{} of {} rows have no reading: check the sensor",
-            lost.len(),
-            samples.len()
-        ));
-    };
+    let vessels = model.known.outputs(model.plant);
+    let outputs = vessels.len();
+    let mut filled = Vec::with_capacity(outputs);
+    // Of each output the rows without a reading.
+    let mut lost: Vec<Vec<usize>> = Vec::with_capacity(outputs);
+    for output in 0..outputs {
+        let readings: Vec<Option<f64>> = samples.iter().map(|s| s.outputs[output]).collect();
+        let missing = (0..samples.len()).filter(|&k| readings[k].is_none());
+        lost.push(missing.collect());
+        let missing = lost[output].len();
+        let enough = (samples.len() - missing) as f64 >= READ * samples.len() as f64;
+        let Some(values) = interpolated(&readings).filter(|_| enough) else {
+            let of = match vessels[..] {
+                [_] => String::new(),
+                _ => format!(" of {}", model.plant.level_name(vessels[output])),
+            };
+            return Err(format!(
+                "{missing} of {} rows have no reading{of}: check the sensor",
+                samples.len()
+            ));
+        };
+        filled.push(values);
+    }
     let records = &[record(samples.iter(), filled, hold)];
     let options = FitOptions::default();
     let said = |error: &dyn std::fmt::Display| error.to_string();
@@ -224,7 +278,7 @@ pub(crate) fn learn(
         }
         starts.push(guessed);
     }
-    let white = ArModel::white(1.0);
+    let white = setup.white_noise();
     let fit = fit_from(&setup, &starts, &white, options.stopping).map_err(|error| said(&error))?;
     setup
         .choose_substeps(&fit.x)
@@ -237,7 +291,7 @@ pub(crate) fn learn(
     let mut fit = coloured(&setup, fit, options.noise_order, options.stopping)
         .map_err(|error| said(&error))?;
     let mut refilled = records.clone();
-    if !lost.is_empty() {
+    if lost.iter().any(|lost| !lost.is_empty()) {
         for _ in 0..ROUNDS {
             fit = again(&setup, &mut refilled, &fit, &lost, &options)
                 .map_err(|error| said(&error))?;
@@ -245,9 +299,11 @@ pub(crate) fn learn(
     }
 
     let n = setup.parameter_count();
-    // What stands in for a lost reading has no noise, and says nothing of its own.
-    let all_over_read = samples.len() as f64 / read as f64;
-    let widened = all_over_read * all_over_read;
+    // What stands in for a lost reading has no noise, and says nothing of its own. The output that lost most counts for all.
+    let read = |output: usize| samples.len() - lost[output].len();
+    let all_over_read = |output: usize| samples.len() as f64 / read(output) as f64;
+    let most = (0..outputs).map(all_over_read).fold(1.0, f64::max);
+    let widened = most * most;
     let errors = fit.std_errors();
     let mut covariance = vec![0.0; n * n];
     if let Some((positions, correlations)) = fit.correlations() {
@@ -265,23 +321,37 @@ pub(crate) fn learn(
             "the rows do not determine the parameters: the command has not moved enough".into(),
         );
     }
-    let sigma = fit.noise.sigma() * all_over_read.sqrt();
-    if !(sigma.is_finite() && sigma > 0.0 && covariance.iter().all(|c| c.is_finite())) {
-        return Err("the model leaves no noise to judge by: are the readings measured?".into());
+    if !covariance.iter().all(|c| c.is_finite()) {
+        return Err(NO_NOISE.into());
     }
     let residuals = setup.residuals(&fit.x).map_err(|error| said(&error))?;
-    let mut whitener = fit.noise.whitener(1);
-    let mut innovations = Vec::with_capacity(read);
-    for (mut residual, reading) in residuals.into_iter().flatten().zip(&readings) {
-        if reading.is_some() {
-            whitener.push(std::slice::from_mut(&mut residual));
-            innovations.push(residual / sigma);
-        } else {
-            whitener.skip();
+    let mut noises = Vec::with_capacity(outputs);
+    for (output, residuals) in residuals.into_iter().enumerate() {
+        let noise = fit.noise.output(output);
+        let sigma = noise.sigma() * all_over_read(output).sqrt();
+        if !(sigma.is_finite() && sigma > 0.0) {
+            return Err(NO_NOISE.into());
         }
+        let mut whitener = noise.whitener(1);
+        let mut innovations = Vec::with_capacity(read(output));
+        for (mut residual, sample) in residuals.into_iter().zip(samples) {
+            if sample.outputs[output].is_some() {
+                whitener.push(std::slice::from_mut(&mut residual));
+                innovations.push(residual / sigma);
+            } else {
+                whitener.skip();
+            }
+        }
+        // Of several outputs each has fewer parameters to itself: the limit is a little wide.
+        let scatter = Limit::learned(&innovations, setup.free().len())
+            .ok_or("the model leaves no noise to judge by: do the readings move?")?;
+        noises.push(OutputNoise {
+            coefficients: noise.coefficients().to_vec(),
+            sigma,
+            readings: read(output),
+            scatter,
+        });
     }
-    let scatter = Limit::learned(&innovations, setup.free().len())
-        .ok_or("the model leaves no noise to judge by: do the readings move?")?;
     let commands = &record.inputs[0].values;
     let mean = commands.iter().sum::<f64>() / commands.len() as f64;
     let interval = record.sample_interval();
@@ -299,14 +369,11 @@ pub(crate) fn learn(
     let learned = Learned {
         theta: fit.x[..n].to_vec(),
         covariance,
-        coefficients: fit.noise.coefficients().to_vec(),
-        sigma,
-        rows: read,
+        outputs: noises,
         time_constant: slowest,
         interval,
         scales: setup.structure.scales.clone(),
         substeps: setup.substeps,
-        scatter,
     };
     let levels = fit.x[n..].to_vec();
     Ok((learned, levels))
@@ -317,16 +384,17 @@ fn again(
     setup: &Setup,
     records: &mut [Record; 1],
     fit: &Fit,
-    lost: &[usize],
+    lost: &[Vec<usize>],
     options: &FitOptions,
 ) -> Result<Fit, greybox::Error> {
     let before = setup.with_records(&*records)?;
     let residuals = before.residuals(&fit.x)?;
-    if let Some(residual) = residuals.first() {
+    let outputs = records[0].outputs.iter_mut().zip(lost);
+    for (o, ((output, lost), residual)) in outputs.zip(&residuals).enumerate() {
         let mut expected = residual.clone();
-        expect(&fit.noise, &mut expected, lost);
+        expect(fit.noise.output(o), &mut expected, lost);
         for &k in lost {
-            records[0].outputs[0].values[k] += expected[k] - residual[k];
+            output.values[k] += expected[k] - residual[k];
         }
     }
     let setup = setup.with_records(&*records)?;

@@ -4,14 +4,18 @@
 //! | question | answer |
 //! |---|---|
 //! | Where do I start? | [`Monitor::new`] with the believed [`Model`], then [`Monitor::update`] once a row |
-//! | What does a row say? | [`Step`]: the innovation, and now and then an [`Alarm`], a [`ScatterAlarm`] or a [`Notice`] |
+//! | What does a row say? | [`Step`]: the innovation of each output, and now and then an [`Alarm`], a [`ScatterAlarm`] or a [`Notice`] |
 //! | What are the parameters now? | [`Monitor::estimates`] |
 //! | What if it is stopped? | [`Monitor::state`] is saved, [`Monitor::restore`] goes on as if nothing had happened |
 //!
 //! It learns first: the believed model is fitted to the first rows (a thousand and twenty time constants at least), with the
-//! colour of its noise. From then on the learned model runs beside the plant on the measured command, and never
+//! colour of the noise at each output. From then on the learned model runs beside the plant on the measured command, and never
 //! learns: so a feedback that hides a change in the reading shows it in the command, and a slow change does not pass for
 //! normal. After an alarm it stays the learned one, until it fits again. Memory is constant, and a row allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
+//!
+//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`]. Each output has a noise of its own, independent of the
+//! others, and may lack readings for itself. One model runs beside all of them: scores, tracker and isolation take each innovation in units
+//! of its own standard deviation, and an alarm that speaks of a sensor says of which.
 //!
 //! # Example
 //! A tank loses water from the 3000th row on.
@@ -30,7 +34,7 @@
 //! let command = ct_signals::excitation::steps(4000, 20..=80, 4.0, 6.0, &mut rng)?;
 //! let (mut level, mut alarm) = (16.0_f64, None);
 //! for k in 0..4000 {
-//!     let row = Row { time: k as f64, input: command[k], output: level + noise[k] };
+//!     let row = Row::new(k as f64, command[k], &[level + noise[k]]);
 //!     alarm = alarm.or(monitor.update(&row)?.alarm);
 //!     let leak = if k < 3000 { 0.0 } else { 3.0 };
 //!     // S dH/dt = pump_gain u - alpha sqrt(H) - leak, in short steps
@@ -65,6 +69,8 @@ mod watch;
 pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict, instant};
 pub use error::{Error, Refused};
 pub use learn::Model;
-pub use monitor::{Estimate, Gathered, Innovation, Monitor, Notice, Progress, Row, State, Step};
+pub use monitor::{
+    Estimate, Gathered, Innovation, MAX_OUTPUTS, Monitor, Notice, Progress, Row, State, Step,
+};
 pub use scatter::{ScatterAlarm, ScatterEvent};
 pub use settings::Settings;

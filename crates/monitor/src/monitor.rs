@@ -9,8 +9,10 @@ use crate::{
     intake::{Intake, Sample, usable},
 };
 
+/// The most outputs that are watched.
+pub const MAX_OUTPUTS: usize = plants::MAX_VESSELS;
 /// The version of [`State`].
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// A command above so many times its full range is in another unit, or none, as in a record.
 const BEYOND: f64 = 1.01;
 /// A reading above so many times the tank's height is in another unit, or none; below it a sensor may be off, which is to be seen.
@@ -23,26 +25,44 @@ pub struct Row {
     pub time: f64,
     /// Command \[input unit\].
     pub input: f64,
-    /// Reading \[output unit\], made before the command acts. NaN where it is lost: the command of the row is used all the same.
-    pub output: f64,
+    /// Readings in the order of the outputs \[output unit\], made before the command acts. NaN where one is lost: the command and the other
+    /// readings of the row are used all the same. Entries behind the last output are not looked at.
+    pub outputs: [f64; MAX_OUTPUTS],
+}
+
+impl Row {
+    /// A row of time \[s\], command \[input unit\] and readings \[output unit\]; outputs without one have lost it, and readings behind
+    /// [`MAX_OUTPUTS`] are left out.
+    #[must_use]
+    pub fn new(time: f64, input: f64, readings: &[f64]) -> Self {
+        let mut outputs = [f64::NAN; MAX_OUTPUTS];
+        for (output, reading) in outputs.iter_mut().zip(readings) {
+            *output = *reading;
+        }
+        Self {
+            time,
+            input,
+            outputs,
+        }
+    }
 }
 
 /// What a row says.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Step {
-    /// The learned model beside the row; `None` while learning, within a block of rows, and without a reading.
-    pub innovation: Option<Innovation>,
-    /// Why the reading is not used, where it is not; the command is.
-    pub lost: Option<Refused>,
+    /// The learned model beside the reading of each output; `None` while learning, within a block of rows, and without a reading.
+    pub innovations: [Option<Innovation>; MAX_OUTPUTS],
+    /// Why the reading of an output is not used, where it is not; the command is.
+    pub lost: [Option<Refused>; MAX_OUTPUTS],
     /// Something about the rows or the phase, where there is something.
     pub notices: [Option<Notice>; 2],
     /// The model does not fit any more, or more is known of that.
     pub alarm: Option<Alarm>,
-    /// The noise has grown, or is back where it was.
-    pub scatter: Option<ScatterAlarm>,
+    /// The noise of an output has grown, or is back where it was.
+    pub scatter: [Option<ScatterAlarm>; MAX_OUTPUTS],
 }
 
-/// The learned model beside a row.
+/// The learned model beside a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
     /// Measured minus model, which runs on the command alone \[output unit\].
@@ -88,8 +108,8 @@ pub enum Notice {
         rows: usize,
         /// The slowest time constant \[s\].
         time_constant: f64,
-        /// Standard deviation of the noise \[output unit\].
-        noise: f64,
+        /// Standard deviation of the noise at each output \[output unit\].
+        noise: Vec<f64>,
         /// Rows are watched in blocks of so many.
         every: usize,
         /// What a score has to pass; far above 6 where the noise is so slow that these rows hardly say how large it is.
@@ -190,19 +210,27 @@ pub struct Monitor {
     core: Core,
     fingerprint: Fingerprint,
     units: Units,
+    outputs: usize,
 }
 
 impl Monitor {
     /// A monitor that has seen nothing yet.
     ///
     /// # Errors
-    /// [`Error::Setting`], [`Error::TwoPumps`], [`Error::ByClock`] for an effect in the model that follows the time since a record began, [`Error::Structure`].
+    /// [`Error::Setting`], [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::TooManyOutputs`], [`Error::ByClock`] for an effect in the model that follows the time since a record began, [`Error::Structure`].
     pub fn new(model: Model, settings: Settings, units: Units) -> Result<Self, Error> {
         settings.check()?;
         if model.plant.pumps() > 1 {
             return Err(Error::TwoPumps {
                 plant: model.plant.id(),
             });
+        }
+        if model.known.disturbance.is_some() {
+            return Err(Error::Disturbance);
+        }
+        let outputs = model.known.outputs(model.plant).len();
+        if outputs > MAX_OUTPUTS {
+            return Err(Error::TooManyOutputs { outputs });
         }
         if let Some(placed) = model.effects.iter().find(|placed| placed.effect.by_clock) {
             return Err(Error::ByClock {
@@ -225,10 +253,11 @@ impl Monitor {
             1.0,
         ))?;
         Ok(Self {
-            intake: Intake::new(),
+            intake: Intake::new(outputs),
             fingerprint: fingerprint(&model),
             core: Core::new(model, settings, units.clone()),
             units,
+            outputs,
         })
     }
 
@@ -249,7 +278,7 @@ impl Monitor {
                 differences: differences(&state.model, &monitor.fingerprint),
             });
         }
-        if !state.intake.sound() {
+        if !state.intake.sound(monitor.outputs) {
             return Err(Error::Damaged {
                 what: "its counts of rows do not go together".into(),
             });
@@ -276,20 +305,25 @@ impl Monitor {
 
     /// Takes in a row.
     ///
-    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command,
-    /// and nothing is judged by the row.
+    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command, and
+    /// nothing is judged by what is lost.
     ///
     /// # Errors
     /// [`Refused`]: time or command cannot be used, and the row is not.
     pub fn update(&mut self, row: &Row) -> Result<Step, Refused> {
         let known = self.core.known();
-        let reading = match known.tank_height {
-            Some(height) if row.output > ABOVE * height => Err(Refused::AboveTank {
-                value: row.output,
-                height,
-            }),
-            _ => usable("output", row.output),
-        };
+        let mut readings = [None; MAX_OUTPUTS];
+        let mut step = Step::default();
+        for (output, &value) in row.outputs[..self.outputs].iter().enumerate() {
+            let reading = match known.tank_height {
+                Some(height) if value > ABOVE * height => Err(Refused::AboveTank { value, height }),
+                _ => usable("output", value),
+            };
+            match reading {
+                Ok(reading) => readings[output] = Some(reading),
+                Err(lost) => step.lost[output] = Some(lost),
+            }
+        }
         if let Some(range) = known.input_range
             && row.input.abs() > BEYOND * range
         {
@@ -298,15 +332,13 @@ impl Monitor {
                 range,
             });
         }
-        let taken = self.intake.take(row, reading.as_ref().ok().copied())?;
-        let mut step = Step {
-            lost: reading.err(),
-            ..Step::default()
-        };
+        let taken = self.intake.take(row, &readings)?;
         step.notices[0] = taken.notice;
         if let Some(sample) = taken.sample {
             let fed = self.core.feed(sample);
-            step.innovation = fed.said.and_then(|said| said.innovation);
+            if let Some(said) = fed.said {
+                step.innovations = said.innovations;
+            }
             step.notices[1] = fed.notice;
             step.alarm = fed.alarm;
             step.scatter = fed.scatter;
@@ -328,6 +360,12 @@ impl Monitor {
     #[must_use]
     pub fn last_time(&self) -> Option<f64> {
         self.intake.last
+    }
+
+    /// How many outputs there are.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.outputs
     }
 
     /// The parameters as they are tracked, with their band; empty while learning. Allocates.

@@ -1,4 +1,4 @@
-//! The size of the innovations: has their scatter grown, whatever their structure?
+//! The size of an output's innovations: has their scatter grown, whatever their structure?
 //!
 //! The scores ask whether the residual has a structure, so innovations that only grow, as those of a loose cable do, fit. Here the rows
 //! are taken in pairs: `d = |e_2j - e_2j-1|` is the scatter from a row to the next, which a residual that moves slowly leaves as it is, so
@@ -11,10 +11,11 @@
 //! too. A block that has more of them than it has with a probability of its share is an alarm. What was fitted lies a little closer to the
 //! model than what comes later: the limit is wider by `sqrt((N + p)/(N - p))`, Akaike's final prediction error.
 
+use plants::Domain;
 use serde::{Deserialize, Serialize};
 use statrs::function::{beta::ln_beta, factorial::ln_binomial};
 
-use crate::Units;
+use crate::{Units, alarm::at_sensor};
 
 /// The share of the false alarms that is promised for the scatter; the scores have the rest.
 pub(crate) const SHARE: f64 = 0.1;
@@ -140,8 +141,9 @@ pub(crate) enum Moved {
 pub(crate) struct Most([usize; BLOCKS.len()]);
 
 impl Most {
-    /// `samples` is the mean number between false alarms of all kinds.
-    pub(crate) fn new(limit: &Limit, samples: f64) -> Self {
+    /// For one of so many outputs, which share the false alarms; `samples` is the mean number between those of all kinds.
+    pub(crate) fn new(limit: &Limit, samples: f64, outputs: usize) -> Self {
+        let samples = samples * outputs as f64;
         Self(BLOCKS.map(|length| {
             let rows = 2.0 * length as f64;
             limit.most(length, SHARE * rows / (samples * BLOCKS.len() as f64))
@@ -222,6 +224,9 @@ pub struct ScatterAlarm {
     pub event: ScatterEvent,
     /// Time of the row after which it was raised \[s\].
     pub time: f64,
+    /// The vessel whose level is read, of several outputs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub output: Option<String>,
     /// Standard deviation of the noise as it was learned \[output unit\].
     pub learned: f64,
     /// Standard deviation of the noise now \[output unit\].
@@ -243,8 +248,18 @@ pub enum ScatterEvent {
 }
 
 impl ScatterAlarm {
-    pub(crate) fn new(moved: Moved, time: f64, noise: f64, units: &Units) -> Self {
+    /// `output`: its name, of several; `noise`: as it was learned.
+    pub(crate) fn new(
+        moved: Moved,
+        time: f64,
+        (output, noise): (Option<&str>, f64),
+        domain: Domain,
+        units: &Units,
+    ) -> Self {
         let unit = &units.output;
+        let of = output.map_or(String::new(), |name| {
+            format!(" {}", at_sensor(name, domain))
+        });
         let written = |value: f64| {
             let number = missing_effect::numbers::significant(value, 3);
             format!("{number} {unit}").trim_end().to_string()
@@ -253,7 +268,7 @@ impl ScatterAlarm {
             Moved::Grown(ratio) => {
                 let now = ratio * noise;
                 let sentence = format!(
-                    "The scatter of the readings has grown from {} to {}, without a structure that an effect of the plant has: look at the sensor and its cable.",
+                    "The scatter of the readings{of} has grown from {} to {}, without a structure that an effect of the plant has: look at the sensor and its cable.",
                     written(noise),
                     written(now)
                 );
@@ -262,13 +277,17 @@ impl ScatterAlarm {
             Moved::Back => (
                 ScatterEvent::ScatterBack,
                 noise,
-                format!("The scatter of the readings is back at {}.", written(noise)),
+                format!(
+                    "The scatter of the readings{of} is back at {}.",
+                    written(noise)
+                ),
             ),
         };
         Self {
             schema: crate::SCHEMA,
             event,
             time,
+            output: output.map(str::to_string),
             learned: noise,
             now,
             unit: unit.clone(),
@@ -296,7 +315,7 @@ mod tests {
         let run = |seed| {
             let e = student(learned + rows, degrees, seed);
             let limit = Limit::learned(&e[..learned], 2).unwrap();
-            let most = Most::new(&limit, samples);
+            let most = Most::new(&limit, samples, 1);
             let mut scatter = Scatter::default();
             let moved = e[learned..]
                 .iter()
@@ -319,7 +338,7 @@ mod tests {
     fn what_alternates_and_what_grows_is_seen_and_comes_back() {
         let e = student(1000, 1e6, 1);
         let limit = Limit::learned(&e, 2).unwrap();
-        let most = Most::new(&limit, 1e6);
+        let most = Most::new(&limit, 1e6, 1);
         let seen = |values: &[f64]| {
             let mut scatter = Scatter::default();
             let (mut at, mut back) = (None, None);

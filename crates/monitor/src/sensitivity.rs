@@ -1,4 +1,4 @@
-//! The learned model on the rows as they come, with exact derivatives of its reading.
+//! The learned model on the rows as they come, with exact derivatives of its readings.
 
 use ct_signals::Hold;
 use plants::{Command, Dual, MAX_VESSELS, Scalar, Simulator, Structure};
@@ -10,8 +10,8 @@ pub(crate) const MOST_LANES: usize = 16;
 
 /// A simulation with derivatives by the parameters of its structure.
 pub(crate) trait Model: Send {
-    /// The reading now; its derivatives go to `row`, as many as there are lanes.
-    fn read(&mut self, row: &mut [f64]) -> f64;
+    /// The reading of an output now, once a sample; its derivatives go to `row`, as many as there are lanes.
+    fn read(&mut self, output: usize, row: &mut [f64]) -> f64;
     /// Moves on under a command for `h` seconds.
     fn advance(&mut self, command: Command, h: f64);
     /// The level of each vessel.
@@ -23,8 +23,8 @@ pub(crate) trait Model: Send {
 struct Lanes<const N: usize>(Simulator<Dual<N>>);
 
 impl<const N: usize> Model for Lanes<N> {
-    fn read(&mut self, row: &mut [f64]) -> f64 {
-        let y = self.0.read();
+    fn read(&mut self, output: usize, row: &mut [f64]) -> f64 {
+        let y = self.0.read(output);
         for (to, derivative) in row.iter_mut().zip(y.eps) {
             *to = derivative;
         }

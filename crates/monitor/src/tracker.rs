@@ -1,4 +1,4 @@
-//! Tracks the parameters: recursive least squares with forgetting on the whitened residual and its exact derivatives.
+//! Tracks the parameters: recursive least squares with forgetting on the whitened residuals of all outputs and their exact derivatives.
 //!
 //! Around the learned model the residual is `r = s' (theta - theta_0)` plus noise, so the deviation of the parameters is
 //! estimated by [`DynamicRls`] with the learned covariance as `P(0)`: the recursive prediction error method, linearised
@@ -25,6 +25,8 @@ pub(crate) struct TrackerState {
 pub(crate) struct Tracker {
     rls: DynamicRls,
     weights: Weights,
+    /// The same without forgetting.
+    together: Weights,
     /// Lane and learned standard error of each tracked parameter.
     tracked: Vec<(usize, f64)>,
     phi: Vec<f64>,
@@ -73,13 +75,23 @@ impl Tracker {
         Some(Self {
             rls: rls.with_guards(guards).ok()?,
             weights,
+            together: Weights::least_squares(0.0).ok()?,
             tracked: tracked.to_vec(),
             phi: vec![0.0; n],
         })
     }
 
-    /// Takes in a whitened row in units of the innovations: derivatives, then (last) the residual, after `h` seconds.
-    pub(crate) fn update(&mut self, row: &[f64], h: f64) {
+    /// Takes in a whitened row for each output that has a reading, in units of the innovations: derivatives, then (last) the residual; `h`
+    /// seconds after the sample before.
+    pub(crate) fn update<'a>(&mut self, rows: impl Iterator<Item = &'a [f64]>, h: f64) {
+        for (i, row) in rows.enumerate() {
+            // Rows of one instant: what was known before is forgotten once.
+            let weights = if i == 0 { self.weights } else { self.together };
+            self.take(row, h, &weights);
+        }
+    }
+
+    fn take(&mut self, row: &[f64], h: f64, weights: &Weights) {
         // A row says as much whatever its length: the estimator's information is an integral over time.
         let density = 1.0 / h.sqrt();
         for (phi, (lane, error)) in self.phi.iter_mut().zip(&self.tracked) {
@@ -89,7 +101,7 @@ impl Tracker {
         // What the estimator refuses leaves it as it was.
         let _ = self
             .rls
-            .update_with(&self.phi, residual * density, h, &self.weights);
+            .update_with(&self.phi, residual * density, h, weights);
     }
 
     pub(crate) fn state(&self) -> TrackerState {
@@ -137,10 +149,8 @@ mod tests {
             }
             let [a, b] = truth(k);
             let s = [noise[3 * k], noise[3 * k + 1]];
-            tracker.update(
-                &[s[0], s[1], 1.0, s[0] * a + s[1] * b + noise[3 * k + 2]],
-                2.0,
-            );
+            let row = [s[0], s[1], 1.0, s[0] * a + s[1] * b + noise[3 * k + 2]];
+            tracker.update(std::iter::once(&row[..]), 2.0);
             let inside = tracker
                 .estimates()
                 .zip([a, b])

@@ -4,7 +4,7 @@ use ct_signals::{Hold, Whitener};
 use plants::{MAX_VESSELS, Structure};
 
 use crate::{
-    Innovation,
+    Innovation, MAX_OUTPUTS,
     bank::Bank,
     intake::Sample,
     isolate::Kept,
@@ -16,14 +16,18 @@ use crate::{
 /// The running model; what it holds is rebuilt from rows, and never saved.
 pub(crate) struct Watch {
     model: Box<dyn Model>,
-    whitener: Whitener,
+    /// The noise of each output: what whitens it, and one over its standard deviation.
+    noises: Vec<(Whitener, f64)>,
     hold: Hold,
-    inverse_sigma: f64,
     last: Option<Sample>,
-    /// Seconds since the last reading.
+    /// Seconds since the last sample with a reading.
     since: f64,
-    /// A derivative for each lane, one for an offset of the reading, the residual.
-    row: Vec<f64>,
+    lanes: usize,
+    /// A row for each output: a derivative for each lane, one for an offset of each output, the residual. Those of the outputs that have a
+    /// reading come first, in order.
+    rows: Vec<f64>,
+    /// Outputs that have a reading.
+    read: Vec<usize>,
 }
 
 /// What the learned model says of a row.
@@ -33,11 +37,11 @@ pub(crate) struct Said {
     pub levels: [f64; MAX_VESSELS],
     /// Where what the command moves stands \[input unit\].
     pub stands: f64,
-    /// Its reading \[output unit\].
-    pub modelled: f64,
-    /// What the reading says; `None` where that is lost.
-    pub innovation: Option<Innovation>,
-    /// Seconds since the reading before; zero for the first.
+    /// Its readings \[output unit\].
+    pub modelled: [f64; MAX_OUTPUTS],
+    /// What each reading says; `None` where that is lost.
+    pub innovations: [Option<Innovation>; MAX_OUTPUTS],
+    /// Seconds since the sample with a reading before; zero for the first.
     pub step: f64,
 }
 
@@ -49,8 +53,15 @@ impl Said {
             levels: self.levels,
             stands: self.stands,
             modelled: self.modelled,
-            innovation: self.innovation.map_or(0.0, |said| said.standardised),
+            innovations: self
+                .innovations
+                .map(|said| said.map_or(0.0, |said| said.standardised)),
         }
+    }
+
+    /// Whether any output has a reading.
+    pub(crate) fn any(&self) -> bool {
+        self.innovations.iter().any(Option::is_some)
     }
 }
 
@@ -64,7 +75,7 @@ impl Watch {
         at_rest: f64,
     ) -> Option<Self> {
         let lanes = lanes(learned.theta.len());
-        let vessels = structure.plant.vessels();
+        let (vessels, outputs) = (structure.plant.vessels(), learned.outputs.len());
         let model = model(
             structure,
             learned.substeps,
@@ -75,12 +86,17 @@ impl Watch {
         .ok()?;
         Some(Self {
             model,
-            whitener: learned.noise()?.whitener(lanes + 2),
+            noises: learned
+                .noise()?
+                .iter()
+                .map(|noise| (noise.whitener(lanes + outputs + 1), 1.0 / noise.sigma()))
+                .collect(),
             hold,
-            inverse_sigma: 1.0 / learned.sigma,
             last: None,
             since: 0.0,
-            row: vec![0.0; lanes + 2],
+            lanes,
+            rows: vec![0.0; outputs * (lanes + outputs + 1)],
+            read: Vec::with_capacity(outputs),
         })
     }
 
@@ -92,58 +108,70 @@ impl Watch {
             self.since += step;
         }
         self.last = Some(*sample);
-        let lanes = self.row.len() - 2;
-        let (levels, stands) = (self.model.levels(), self.model.stands());
-        let modelled = self.model.read(&mut self.row[..lanes]);
         let mut said = Said {
-            levels,
-            stands,
-            modelled,
-            innovation: None,
+            levels: self.model.levels(),
+            stands: self.model.stands(),
+            modelled: [0.0; MAX_OUTPUTS],
+            innovations: [None; MAX_OUTPUTS],
             step: 0.0,
         };
-        let Some(output) = sample.output else {
-            self.whitener.skip();
-            return said;
-        };
-        let residual = output - modelled;
-        self.row[lanes] = 1.0;
-        self.row[lanes + 1] = residual;
-        self.whitener.push(&mut self.row);
-        for value in &mut self.row {
-            *value *= self.inverse_sigma;
+        let (lanes, last) = (self.lanes, self.lanes + self.noises.len());
+        self.read.clear();
+        for (output, (whitener, inverse_sigma)) in self.noises.iter_mut().enumerate() {
+            let row = &mut self.rows[self.read.len() * (last + 1)..][..=last];
+            let modelled = self.model.read(output, &mut row[..lanes]);
+            said.modelled[output] = modelled;
+            let Some(reading) = sample.outputs[output] else {
+                whitener.skip();
+                continue;
+            };
+            let residual = reading - modelled;
+            row[lanes..last].fill(0.0);
+            row[lanes + output] = 1.0;
+            row[last] = residual;
+            whitener.push(row);
+            for value in row.iter_mut() {
+                *value *= *inverse_sigma;
+            }
+            said.innovations[output] = Some(Innovation {
+                residual,
+                standardised: row[last],
+            });
+            self.read.push(output);
         }
-        said.innovation = Some(Innovation {
-            residual,
-            standardised: self.row[lanes + 1],
-        });
-        said.step = std::mem::take(&mut self.since);
+        if said.any() {
+            said.step = std::mem::take(&mut self.since);
+        }
         said
     }
 
-    /// Lets the scores and the tracker see the reading that was followed last, `growth` times as noisy as was learned.
+    /// Lets the scores and the tracker see the readings that were followed last, each `growth` times as noisy as was learned.
     pub(crate) fn judge(
         &mut self,
         bank: &mut Bank,
         tracker: Option<&mut Tracker>,
         covariance: &[f64],
         threshold: f64,
-        (step, growth): (f64, f64),
+        (step, growth): (f64, [f64; MAX_OUTPUTS]),
     ) -> bool {
-        if !self.row.iter().all(|value| value.is_finite()) {
+        let width = self.lanes + self.noises.len() + 1;
+        let rows = &mut self.rows[..self.read.len() * width];
+        if !rows.iter().all(|value| value.is_finite()) {
             return false;
         }
-        if growth > 1.0 {
-            for value in &mut self.row {
-                *value /= growth;
+        for (row, output) in rows.chunks_exact_mut(width).zip(&self.read) {
+            if growth[*output] > 1.0 {
+                for value in row {
+                    *value /= growth[*output];
+                }
             }
         }
         if let Some(tracker) = tracker
             && step > 0.0
         {
-            tracker.update(&self.row, step);
+            tracker.update(rows.chunks_exact(width), step);
         }
-        bank.update(&self.row, covariance, threshold)
+        bank.update(rows, covariance, threshold)
     }
 }
 

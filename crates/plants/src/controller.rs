@@ -37,6 +37,7 @@ enum Kind {
 pub struct Controller {
     kind: Kind,
     limits: (f64, f64),
+    output: usize,
 }
 
 /// A controller without limits as `x+ = A x + b e`, `u = c x + d e`.
@@ -64,10 +65,27 @@ fn checked(kind: Kind, limits: (f64, f64)) -> Result<Controller, Error> {
             short(limits.1)
         ));
     }
-    Ok(Controller { kind, limits })
+    Ok(Controller {
+        kind,
+        limits,
+        output: 0,
+    })
 }
 
 impl Controller {
+    /// The same controller at another output than the first.
+    #[must_use]
+    pub fn at_output(mut self, output: usize) -> Self {
+        self.output = output;
+        self
+    }
+
+    /// The output that it reads, counted from zero.
+    #[must_use]
+    pub fn output(&self) -> usize {
+        self.output
+    }
+
     /// A PI controller: `gain` \[input/output\], `integral_time` \[s\], `limits` \[input\].
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use ct_signals::Unit;
 
-use crate::{EffectInfo, Error, Outlet, Plant};
+use crate::{EffectInfo, Error, Outlet, Place, Plant};
 
 /// The domain that a model belongs to.
 ///
@@ -66,6 +66,18 @@ impl Domain {
             (Self::Hydraulic, _) => (name, "tank"),
             (Self::General, "upper") => ("first", "lag"),
             (Self::General, _) => ("second", "lag"),
+        }
+    }
+
+    /// Where an effect acts whose place has this name ([`crate::Placed::place_name`]): `in the upper tank`, `at the sensor of the lower tank`,
+    /// `at pump 1`.
+    #[must_use]
+    pub fn place_words(self, effect: &str, name: &str) -> String {
+        let (which, kind) = self.vessel_words(name);
+        match EffectInfo::find(effect).map(|effect| effect.place) {
+            Some(Place::Sensor) => format!("at the sensor of the {which} {kind}"),
+            Some(Place::Actuator) => format!("at {}", name.replace('_', " ")),
+            _ => format!("in the {which} {kind}"),
         }
     }
 

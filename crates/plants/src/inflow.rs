@@ -27,6 +27,15 @@ impl<T: Scalar> Inflow<T> {
         }
     }
 
+    /// Both inflows together.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            start: self.start + other.start,
+            middle: self.middle + other.middle,
+            end: self.end + other.end,
+        }
+    }
+
     /// Coefficients of `a + b s + c s^2`, `s` from 0 to 1 over the step.
     #[inline]
     pub(crate) fn coefficients(&self) -> [T; 3] {
@@ -43,6 +52,63 @@ impl<T: Scalar> Inflow<T> {
             start: at(from),
             middle: at((from + to) * 0.5),
             end: at(to),
+        }
+    }
+}
+
+/// An inflow beside that of the first pump, as a function of time: `a + b s + c s^2`, `s` the share of its `length` \[s\] since `start` \[s\].
+/// A second pump or a measured disturbance brings it.
+pub(crate) struct Feed<T> {
+    start: T,
+    length: T,
+    coefficients: [T; 3],
+    held: bool,
+}
+
+impl<T: Scalar> Feed<T> {
+    pub(crate) fn new(start: T, length: T, coefficients: [T; 3]) -> Self {
+        let [_, b, c] = coefficients;
+        let nothing = |x: T| x.value() == 0.0 && x.same_derivatives(T::constant(0.0));
+        Self {
+            start,
+            length,
+            coefficients,
+            held: nothing(b) && nothing(c),
+        }
+    }
+
+    /// The same without derivatives.
+    pub(crate) fn values(&self) -> Feed<f64> {
+        let coefficients = self.coefficients.map(T::value);
+        Feed::new(self.start.value(), self.length.value(), coefficients)
+    }
+
+    /// It does not change.
+    #[inline]
+    pub(crate) fn is_held(&self) -> bool {
+        self.held || self.length.value() == 0.0
+    }
+
+    /// At a time; `time` is asked only where it changes.
+    #[inline(always)]
+    pub(crate) fn at(&self, time: impl FnOnce() -> T) -> T {
+        let [a, b, c] = self.coefficients;
+        if self.is_held() {
+            return a;
+        }
+        let share = (time() - self.start) / self.length;
+        a + (b + c * share) * share
+    }
+
+    /// From a time on for `h` seconds.
+    pub(crate) fn over(&self, begin: T, h: T) -> Inflow<T> {
+        if self.is_held() {
+            return Inflow::held(self.coefficients[0]);
+        }
+        Inflow {
+            start: self.at(|| begin),
+            middle: self.at(|| begin + h * 0.5),
+            end: self.at(|| begin + h),
         }
     }
 }

@@ -12,12 +12,18 @@
 //! let tank = Structure::new(Plant::SingleTank, Known { area: [Some(154.0), None, None], ..Known::default() }, scales);
 //! // pump_gain [cm^3/(V s)], alpha [cm^2.5/s]; level(0) = 9 cm; the pump stands at 4 V.
 //! let mut simulator = Simulator::<f64>::new(&tank, &[9.0, 11.0], &[9.0], 4.0)?;
-//! let before = simulator.read();
+//! let before = simulator.read(0);
 //! simulator.advance(Command::held(5.0), 1.0);
-//! assert!(simulator.read() > before);
+//! assert!(simulator.read(0) > before);
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! # Measured disturbances
+//! The second input of a record is the command to the second pump of joined tanks. Of every other plant it may be a measured flow into
+//! a vessel ([`Known::disturbance`]), held or a ramp between samples, with a gain of its own:
+//! `S dH/dt = ... + disturbance_gain d` and, where the outflow is linear, `tau dy/dt + y = ... + disturbance_gain d`. Effects at the actuator
+//! do not act on it.
 //!
 //! # Steps that are longer than a time constant
 //! A step of up to one time constant of the fastest vessel is a Runge-Kutta step of order four. A longer one is cut into
@@ -56,7 +62,8 @@ pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scalar::{Dual, Scalar};
 pub use simulator::{Command, Simulator};
 pub use structure::{
-    Deciles, Known, MAX_VESSELS, Picked, Placed, Scales, Site, Structure, WIDENED, deciles,
+    Deciles, Known, MAX_VESSELS, OutputScales, Picked, Placed, Scales, Site, Structure, WIDENED,
+    deciles,
 };
 pub use term::{Fitted, MOST_KNOTS, Term, Variable};
 pub use unit::Unit;

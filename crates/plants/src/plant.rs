@@ -25,7 +25,7 @@ pub enum Plant {
     /// S2 dH2/dt = pump_gain_2 u2 + q32 - az20 sqrt(H2),   s(d) = sign(d) sqrt(|d|)
     /// ```
     /// `az` times `S_n sqrt(2 g)` where that is known ([`crate::Known::orifice`]). The vessels are numbered in the row: 0 is T1, 1 is T3, 2
-    /// is T2. [`crate::Known::measured`] says which level is read.
+    /// is T2. [`crate::Known::measured`] says which levels are read.
     ThreeTank,
 }
 
@@ -167,7 +167,8 @@ impl Plant {
         (self == Self::CascadedTanksLinear).then_some(["tau1", "tau2"])
     }
 
-    /// Its own fitted parameters, in the order in which the simulator takes them.
+    /// Its own fitted parameters, in the order in which the simulator takes them. Of a record with a measured disturbance
+    /// ([`crate::Known::disturbance`]) the last one is `disturbance_gain`: its inflow for one unit or, of a linear plant, its static gain.
     #[must_use]
     pub fn parameters(self, scales: &Scales) -> Vec<ParameterInfo> {
         let info = |name, unit, meaning, lower: f64, upper: f64| ParameterInfo {
@@ -198,9 +199,11 @@ impl Plant {
         let gain = |area: f64| pump("pump_gain", area, input);
         // Torricelli: tau = 2 S sqrt(H)/alpha = 2 S Q/alpha^2. The measured vessel, of a series the last one, is the shortest at
         // its largest level; that bounds the throughput Q, and Q the upper vessel, whose level is not known.
-        let measured = scales.measured;
-        let (low, high) = scales.level[measured];
-        let content = scales.area[measured] * positive(low.abs().max(high.abs()));
+        let contents = scales.outputs.iter().map(|output| {
+            let (low, high) = scales.level[output.vessel];
+            scales.area[output.vessel] * positive(low.abs().max(high.abs()))
+        });
+        let content = contents.fold(f64::MIN_POSITIVE, f64::max);
         let alpha = |name, meaning, area: f64| {
             info(
                 name,
@@ -240,7 +243,7 @@ impl Plant {
                 reach,
             )
         };
-        match self {
+        let mut own = match self {
             Self::SingleTank => vec![
                 gain(scales.area[0]),
                 alpha("alpha", "outflow coefficient", scales.area[0]),
@@ -278,7 +281,29 @@ impl Plant {
                 ]);
                 all
             }
+        };
+        if let Some(input) = scales.input_2.filter(|_| !self.joined()) {
+            let area = scales.area[..self.vessels()].iter().copied();
+            let (unit, meaning, reach) = match self.outlet() {
+                Outlet::Torricelli => (
+                    GAIN,
+                    "inflow for one unit of the disturbance",
+                    flow(area.fold(0.0, f64::max)).1,
+                ),
+                Outlet::Linear => (
+                    STATIC_GAIN,
+                    "rise of the level for one unit of the disturbance",
+                    reach,
+                ),
+            };
+            let reach = reach / largest(input);
+            own.push(ParameterInfo {
+                // What is measured may flow out as well as in.
+                starts: vec![0.0],
+                ..info("disturbance_gain", unit, meaning, -reach, reach)
+            });
         }
+        own
     }
 }
 

@@ -4,7 +4,7 @@ use crate::{
     Error, Outlet, Place, Scalar, Structure,
     actuator::{Actuator, Signal},
     effects,
-    inflow::Inflow,
+    inflow::{Feed, Inflow},
     sensor::Sensor,
     structure::{MAX_VESSELS, SERIES},
     term,
@@ -43,9 +43,12 @@ impl Command {
 pub struct Simulator<T: Scalar> {
     actuator: Actuator<T>,
     layout: Layout<T>,
-    sensor: Sensor<T>,
+    /// Of each output, with the vessel whose level it reads.
+    sensors: Vec<(usize, Sensor<T>)>,
+    /// The output whose sensor lags.
+    lagging: Option<usize>,
     pump_gain: T,
-    measured: usize,
+    disturbance: Option<Disturbance<T>>,
     time: f64,
     substeps: usize,
 }
@@ -63,6 +66,23 @@ enum Layout<T: Scalar> {
 struct Joined<T: Scalar> {
     vessels: Vessels<T, MAX_VESSELS>,
     second: Option<SecondPump<T>>,
+}
+
+/// A measured disturbance that flows into a vessel.
+struct Disturbance<T> {
+    /// Inflow for one unit.
+    gain: T,
+    /// It is the lower one of two: what flows into the upper one, or an only one, flows in with what the pump brings.
+    into_lower: bool,
+}
+
+impl<T: Scalar> Disturbance<T> {
+    /// What it brings over an interval of length `h`.
+    fn over(&self, Command { from, to }: Command, time: f64, h: f64) -> Feed<T> {
+        let rise = to.map_or(0.0, |to| to - from);
+        let coefficients = [self.gain * from, self.gain * rise, T::constant(0.0)];
+        Feed::new(T::constant(time), T::constant(h), coefficients)
+    }
 }
 
 struct SecondPump<T: Scalar> {
@@ -88,7 +108,8 @@ impl<T: Scalar> Simulator<T> {
         Self::with_inputs(structure, theta, initial, [at_rest, 0.0])
     }
 
-    /// The same for a plant with two pumps: what either was told before the record began.
+    /// The same for a plant with two pumps: what either was told before the record began. A measured disturbance
+    /// ([`crate::Known::disturbance`]) has no memory, and its value before is not used.
     ///
     /// # Errors
     /// As [`Simulator::new`].
@@ -173,8 +194,20 @@ impl<T: Scalar> Simulator<T> {
             }
         };
         let second_gain = structure.scales.input_2.map(|_| theta[1]);
+        let second_gain = second_gain.filter(|_| plant.joined());
+        let known = &structure.known;
+        let disturbed = known
+            .disturbed_vessel(plant)
+            .filter(|_| structure.scales.input_2.is_some());
+        let disturbance = disturbed.map(|vessel| Disturbance {
+            gain: theta[own - 1],
+            into_lower: vessel > 0,
+        });
         let mut actuators = [Vec::new(), Vec::new()];
-        let (mut vessels, mut sensor) = (Vec::new(), Vec::new());
+        let outputs = &structure.scales.outputs;
+        let mut vessels = Vec::new();
+        let mut sensors: Vec<Vec<_>> = outputs.iter().map(|_| Vec::new()).collect();
+        let last_output = sensors.len() - 1;
         // The laws of joined vessels once more without derivatives.
         let plain: Vec<f64> = theta.iter().map(|value| value.value()).collect();
         let mut values = Vec::new();
@@ -191,7 +224,7 @@ impl<T: Scalar> Simulator<T> {
                 match placed.effect.place {
                     Place::Actuator => actuators[placed.vessel.min(1)].push(law),
                     Place::Vessel => vessels.push((placed.vessel, law)),
-                    Place::Sensor => sensor.push(law),
+                    Place::Sensor => sensors[placed.vessel.min(last_output)].push(law),
                 }
             }
             at += count;
@@ -204,7 +237,7 @@ impl<T: Scalar> Simulator<T> {
             match term.place {
                 Place::Actuator => actuators[term.vessel.min(1)].push(law),
                 Place::Vessel => vessels.push((term.vessel, law)),
-                Place::Sensor => sensor.push(law),
+                Place::Sensor => sensors[term.vessel.min(last_output)].push(law),
             }
             at += count;
         }
@@ -215,7 +248,11 @@ impl<T: Scalar> Simulator<T> {
             gain,
             pieces: Vec::new(),
         });
-        let mut sensor = Sensor::new(sensor);
+        let read = outputs.iter().map(|output| output.vessel.min(n - 1));
+        let mut sensors: Vec<(usize, Sensor<T>)> =
+            read.zip(sensors.into_iter().map(Sensor::new)).collect();
+        // An effect is on once, so no more than one lags.
+        let lagging = sensors.iter().position(|(_, sensor)| sensor.has_lag());
         let sample = structure.scales.sample_interval;
         for (lag, &before) in lags.iter().zip(before) {
             match lag.effect.place {
@@ -223,31 +260,41 @@ impl<T: Scalar> Simulator<T> {
                     Some(second) if lag.vessel > 0 => second.actuator.unsettle(before, sample),
                     _ => actuator.unsettle(before, sample),
                 },
-                _ => sensor.unsettle(before, sample),
+                _ => sensors[lag.vessel.min(last_output)]
+                    .1
+                    .unsettle(before, sample),
             }
         }
-        let measured = structure.scales.measured.min(n - 1);
+        let watched = sensors[lagging.unwrap_or(0)].0;
         let layout = if plant.joined() {
-            let (low, high) = structure.scales.level[measured];
-            let valves = Valves::new(low.abs().max(high.abs()));
+            let levels_read = sensors.iter().map(|(vessel, _)| {
+                let (low, high) = structure.scales.level[*vessel];
+                low.abs().max(high.abs())
+            });
+            let valves = Valves::new(levels_read.fold(0.0, f64::max));
             let plain_parts = parts
                 .iter()
                 .map(|&(area, outlet, coefficient)| (area.value(), outlet, coefficient.value()));
             let plain_levels: Vec<f64> = levels.iter().map(|level| level.value()).collect();
-            let seen = (measured, Some(valves));
+            let seen = (watched, Some(valves));
             let values = Vessels::new(plain_parts.collect(), values, &plain_levels, seen);
             let mut vessels = Vessels::new(parts, vessels, levels, seen);
             vessels.cut_by(values);
             Layout::Joined(Box::new(Joined { vessels, second }))
         } else {
-            Layout::Series(Vessels::new(parts, vessels, levels, (measured, None)))
+            let mut vessels = Vessels::new(parts, vessels, levels, (watched, None));
+            if disturbance.as_ref().is_some_and(|d| d.into_lower) {
+                vessels.feed_last();
+            }
+            Layout::Series(vessels)
         };
         Ok(Self {
             actuator,
             layout,
-            sensor,
+            sensors,
+            lagging,
             pump_gain,
-            measured,
+            disturbance,
             time: start,
             substeps: 1,
         })
@@ -258,13 +305,19 @@ impl<T: Scalar> Simulator<T> {
         self.substeps = n.max(1);
     }
 
-    /// The sensor's reading now. Sensors may have memory, so it is called once for each sample, in order.
-    pub fn read(&mut self) -> T {
+    /// How many outputs there are.
+    pub fn outputs(&self) -> usize {
+        self.sensors.len()
+    }
+
+    /// The reading of an output now. Sensors may have memory, so it is called once for each output and sample, in order of time.
+    pub fn read(&mut self, output: usize) -> T {
+        let (vessel, sensor) = &mut self.sensors[output];
         let level = match &self.layout {
-            Layout::Series(vessels) => vessels.levels[self.measured],
-            Layout::Joined(joined) => joined.vessels.levels[self.measured],
+            Layout::Series(vessels) => vessels.levels[*vessel],
+            Layout::Joined(joined) => joined.vessels.levels[*vessel],
         };
-        self.sensor.read(level, self.time)
+        sensor.read(level, self.time)
     }
 
     /// The level of each vessel now; only the first [`crate::Plant::vessels`] entries are used.
@@ -290,12 +343,13 @@ impl<T: Scalar> Simulator<T> {
         self.time
     }
 
-    /// Moves on by one sampling interval of length `h` \[s\]; a second pump stands at zero.
+    /// Moves on by one sampling interval of length `h` \[s\]; a second pump, or a measured disturbance, stands at zero.
     pub fn advance(&mut self, command: Command, h: f64) {
         self.advance_both([command, Command::held(0.0)], h);
     }
 
-    /// The same under a command to either pump; the second one is not looked at where the plant has no second pump, or that is off.
+    /// The same under a command to either pump, or under one and a measured disturbance, each held or a ramp; the second one is not looked
+    /// at where there is neither.
     pub fn advance_both(&mut self, [command, second]: [Command; 2], h: f64) {
         self.step(T::constant(command.from), command.to, second, h);
     }
@@ -309,22 +363,36 @@ impl<T: Scalar> Simulator<T> {
         let Self {
             actuator,
             layout,
-            sensor,
+            sensors,
+            lagging,
             pump_gain,
+            disturbance,
             time,
             substeps,
-            ..
         } = self;
         let gain = *pump_gain;
+        let mut lagging = lagging.map(|output| &mut sensors[output].1);
         let mut now = T::constant(*time);
         match layout {
             Layout::Series(vessels) => {
+                let mut with_pump = None;
+                if let Some(disturbance) = disturbance {
+                    let feed = disturbance.over(second, *time, h);
+                    if disturbance.into_lower {
+                        vessels.disturb(feed);
+                    } else {
+                        with_pump = Some(feed);
+                    }
+                }
                 actuator.pieces(from, to, *time, h, |actuator, length, signal| {
                     let (parts, part) = cut(length, h, *substeps);
                     for i in 0..parts {
                         let signal = signal.from(part * i as f64);
-                        let inflow = actuator.inflow(part, signal, gain, now);
-                        if sensor.has_lag() {
+                        let mut inflow = actuator.inflow(part, signal, gain, now);
+                        if let Some(feed) = &with_pump {
+                            inflow = inflow.and(feed.over(now, part));
+                        }
+                        if let Some(sensor) = &mut lagging {
                             let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
                             vessels.step(part, &inflow, now, &mut Some(&mut follow));
                         } else {
@@ -373,7 +441,7 @@ impl<T: Scalar> Simulator<T> {
                                 _ => Inflow::held(T::constant(0.0)),
                             };
                             let both = [&inflow, &inflow_2];
-                            if sensor.has_lag() {
+                            if let Some(sensor) = &mut lagging {
                                 let mut follow = |stretch: &Stretch<T>| sensor.follow(stretch);
                                 vessels.step_fed(part, both, now, &mut Some(&mut follow));
                             } else {

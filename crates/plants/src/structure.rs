@@ -30,7 +30,8 @@ pub struct Picked {
 pub struct Scales {
     /// Smallest and largest command \[input unit\].
     pub input: (f64, f64),
-    /// Smallest and largest command to the second pump; `None`: no second pump runs \[input unit\].
+    /// Smallest and largest value of the second input: the command to the second pump or, where [`Known::disturbance`] says so, the measured
+    /// disturbance; `None`: there is none \[input unit\].
     pub input_2: Option<(f64, f64)>,
     /// Deciles of the commands, where they are known \[input unit\].
     #[serde(default)]
@@ -51,15 +52,10 @@ pub struct Scales {
     pub operating_level: [f64; MAX_VESSELS],
     /// Area of each vessel, one where it is not known.
     pub area: [f64; MAX_VESSELS],
-    /// The vessel whose level is measured, as [`Structure::new`] knows it.
-    pub measured: usize,
+    /// The outputs in order, at least one, as [`Structure::new`] knows them.
+    pub outputs: Vec<OutputScales>,
     /// Flow through a valve of flow coefficient one at one unit of head, where it is known \[level^2.5/s\].
     pub orifice: Option<f64>,
-    /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
-    pub reading_step: f64,
-    /// Step of a sensor that takes most out of what is not explained so far, where the readings show none; `None` where none is looked for
-    /// \[level unit\].
-    pub hidden_step: Option<Picked>,
     /// Period of the strongest line in the spectrum of what is not explained so far; zero where none is looked for \[s\].
     pub period: f64,
     /// Mean throughput \[area x level/s\].
@@ -68,6 +64,18 @@ pub struct Scales {
     pub sample_interval: f64,
     /// Length of the longest record \[s\].
     pub duration: f64,
+}
+
+/// An output: a sensor and what its readings show.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct OutputScales {
+    /// The vessel whose level it reads.
+    pub vessel: usize,
+    /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
+    pub reading_step: f64,
+    /// Step of a sensor that takes most out of what is not explained so far, where the readings show none; `None` where none is looked for
+    /// \[level unit\].
+    pub hidden_step: Option<Picked>,
 }
 
 /// The 10 %, 20 %, ... 90 % quantiles of what was visited.
@@ -115,8 +123,8 @@ impl Scales {
 pub struct Known {
     /// Area of each vessel; `None`: one, the level is only known in units of the sensor.
     pub area: [Option<f64>; MAX_VESSELS],
-    /// The vessel whose level is measured; `None`: the last one.
-    pub measured: Option<usize>,
+    /// The vessels whose levels are measured, in the order of the outputs; none: the last one alone.
+    pub measured: Vec<usize>,
     /// `S_n sqrt(2 g)` of the pipes that join tanks, `S_n` their cross-section: then flow coefficients are pure numbers
     /// \[level^2.5/s\].
     pub orifice: Option<f64>,
@@ -124,6 +132,29 @@ pub struct Known {
     pub tank_height: Option<f64>,
     /// Largest command \[input unit\].
     pub input_range: Option<f64>,
+    /// The vessel into which the record's second input flows as a measured disturbance, with the gain `disturbance_gain`; a vessel that
+    /// there is not stands for the last one. `None`: a second input is not used, but for the second pump of joined tanks, whose second
+    /// input always is that pump's.
+    pub disturbance: Option<usize>,
+}
+
+impl Known {
+    /// The vessels whose levels are measured, in the order of the outputs.
+    #[must_use]
+    pub fn outputs(&self, plant: Plant) -> Vec<usize> {
+        if self.measured.is_empty() {
+            vec![plant.vessels() - 1]
+        } else {
+            self.measured.clone()
+        }
+    }
+
+    /// The vessel into which a measured disturbance flows, if one does.
+    #[must_use]
+    pub fn disturbed_vessel(&self, plant: Plant) -> Option<usize> {
+        let vessel = self.disturbance.filter(|_| !plant.joined())?;
+        Some(vessel.min(plant.vessels() - 1))
+    }
 }
 
 /// An effect at its place.
@@ -131,18 +162,22 @@ pub struct Known {
 pub struct Placed {
     /// The effect.
     pub effect: &'static EffectInfo,
-    /// The vessel it acts in or, at the actuator, the pump; zero for the sensor.
+    /// The vessel it acts in, or which of the pumps or of the outputs it is at.
     pub vessel: usize,
 }
 
 impl Placed {
-    /// The name of its place, where the plant has several of the kind: of a vessel or of a pump.
+    /// The name of its place, where there are several of the kind: of a vessel, of a pump, or of the vessel that a sensor reads.
     #[must_use]
-    pub fn place_name(&self, plant: Plant) -> Option<&'static str> {
+    pub fn place_name(&self, plant: Plant, known: &Known) -> Option<&'static str> {
         match self.effect.place {
             Place::Vessel => plant.vessel_name(self.vessel),
             Place::Actuator => plant.pump_name(self.vessel),
-            Place::Sensor => None,
+            Place::Sensor => {
+                let outputs = known.outputs(plant);
+                let vessel = outputs.get(self.vessel).filter(|_| outputs.len() > 1)?;
+                plant.vessel_name(*vessel)
+            }
         }
     }
 }
@@ -158,7 +193,7 @@ impl PartialEq for Placed {
 pub struct Site<'a> {
     /// The plant.
     pub plant: Plant,
-    /// The vessel it acts in or, at the actuator, the pump.
+    /// The vessel it acts in, or which of the pumps or of the outputs it is at.
     pub vessel: usize,
     /// What the data visit.
     pub scales: &'a Scales,
@@ -168,7 +203,14 @@ impl Site<'_> {
     /// The vessel's level is measured.
     #[must_use]
     pub fn is_measured(&self) -> bool {
-        self.vessel == self.scales.measured
+        let mut outputs = self.scales.outputs.iter();
+        outputs.any(|output| output.vessel == self.vessel)
+    }
+    /// At the sensor: its output.
+    #[must_use]
+    pub fn output(&self) -> &OutputScales {
+        let last = self.scales.outputs.len() - 1;
+        &self.scales.outputs[self.vessel.min(last)]
     }
     /// The vessel stands above another one, into which its outlet leads.
     #[must_use]
@@ -216,10 +258,10 @@ impl Site<'_> {
         let deciles = &self.scales.level_deciles[self.vessel];
         quantile(share, self.level(), deciles.as_ref())
     }
-    /// The same of the measured vessel.
+    /// At the sensor: the same of the level that it reads.
     #[must_use]
     pub fn measured_quantile(&self, share: f64) -> f64 {
-        let deciles = &self.scales.level_deciles[self.scales.measured];
+        let deciles = &self.scales.level_deciles[self.output().vessel];
         quantile(share, self.measured_level(), deciles.as_ref())
     }
     /// The highest place for a rim or a hole: the height of the tank, where it is known and the level is counted from its bottom; else so far
@@ -237,10 +279,10 @@ impl Site<'_> {
             None => beyond,
         }
     }
-    /// Smallest and largest level of the measured vessel.
+    /// At the sensor: smallest and largest level of the vessel that it reads.
     #[must_use]
     pub fn measured_level(&self) -> (f64, f64) {
-        self.scales.level[self.scales.measured]
+        self.scales.level[self.output().vessel]
     }
 }
 
@@ -277,11 +319,18 @@ impl Structure {
             domain: Domain::of(plant, ""),
         };
         let scales = &mut structure.scales;
-        scales.measured = structure.known.measured.unwrap_or(plant.vessels() - 1);
+        let seen = std::mem::take(&mut scales.outputs);
+        let outputs = structure.known.outputs(plant).into_iter().enumerate();
+        scales.outputs = outputs
+            .map(|(i, vessel)| OutputScales {
+                vessel,
+                ..seen.get(i).cloned().unwrap_or_default()
+            })
+            .collect();
         scales.orifice = structure.known.orifice;
         scales.tank_height = structure.known.tank_height;
         scales.vessels = plant.vessels();
-        if !plant.joined() {
+        if !plant.joined() && structure.known.disturbance.is_none() {
             scales.input_2 = None;
         }
         if plant.outlet() == Outlet::Torricelli {
@@ -309,7 +358,7 @@ impl Structure {
         if self.effects.iter().any(|on| on.effect.id == effect.id) {
             return Err(Error::EffectTwice { effect: effect.id });
         }
-        if effect.sites(self.plant).next().is_none() {
+        if effect.sites(self.plant, &self.known).next().is_none() {
             return Err(Error::EffectDoesNotApply {
                 effect: effect.id,
                 plant: self.plant.id(),
@@ -320,7 +369,10 @@ impl Structure {
                 },
             });
         }
-        if effect.sites(self.plant).all(|site| site != vessel) {
+        if effect
+            .sites(self.plant, &self.known)
+            .all(|site| site != vessel)
+        {
             return Err(Error::NoSuchVessel {
                 effect: effect.id,
                 plant: self.plant.id(),
@@ -365,7 +417,7 @@ impl Structure {
             .filter(|effect| self.effects.iter().all(|on| on.effect.id != effect.id))
             .flat_map(|&effect| {
                 effect
-                    .sites(self.plant)
+                    .sites(self.plant, &self.known)
                     .map(move |vessel| Placed { effect, vessel })
             })
             .filter(|&placed| self.runs(placed))
@@ -409,7 +461,13 @@ impl Structure {
         };
         combinations
             + picked(crate::Unit::TIME, Some(lines))
-            + picked(crate::Unit::LEVEL, self.scales.hidden_step)
+            + picked(crate::Unit::LEVEL, self.hidden_step(placed))
+    }
+
+    /// Of an effect at a sensor, the step that takes most out of what its readings leave unexplained.
+    fn hidden_step(&self, placed: Placed) -> Option<Picked> {
+        let at_sensor = placed.effect.place == Place::Sensor;
+        at_sensor.then(|| self.site(placed).output().hidden_step)?
     }
 
     /// The parameters of one effect here; their starts lie within their bounds, however short or narrow the record.
@@ -538,10 +596,8 @@ impl Scales {
             operating_level: [middle; MAX_VESSELS],
             area: [1.0; MAX_VESSELS],
             vessels: 1,
-            measured: 0,
+            outputs: vec![OutputScales::default()],
             orifice: None,
-            reading_step: 0.0,
-            hidden_step: None,
             period: 0.0,
             flow: middle.abs() / (0.1 * duration),
             sample_interval,

@@ -85,7 +85,7 @@ pub struct Term {
     pub name: String,
     /// Where it acts.
     pub place: Place,
-    /// The vessel it acts in; zero for actuator and sensor.
+    /// The vessel it acts in, or at the sensor the output; zero for the actuator.
     pub vessel: usize,
     /// What it depends on.
     pub variable: Variable,
@@ -182,7 +182,7 @@ impl Term {
                 may.join(", ")
             ));
         }
-        if self.vessel >= plant.vessels() || (self.place != Place::Vessel && self.vessel != 0) {
+        if self.vessel >= plant.vessels() || (self.place == Place::Actuator && self.vessel != 0) {
             return refuse(format!(
                 "it cannot act there: plant `{}` has {} of vessels",
                 plant.id(),
@@ -295,6 +295,16 @@ impl Structure {
     /// Where [`Term::check`] refuses it, or one of that name is on.
     pub fn with_term(&self, term: Term) -> Result<Self, Error> {
         term.check(self.plant)?;
+        let outputs = self.scales.outputs.len();
+        if term.place == Place::Sensor && term.vessel >= outputs {
+            return Err(Error::Term {
+                what: format!(
+                    "it cannot act at output {}: there are {outputs}",
+                    term.vessel + 1
+                ),
+                term: term.name,
+            });
+        }
         if self.terms.iter().any(|on| on.name == term.name) {
             return Err(Error::Term {
                 term: term.name,

@@ -76,7 +76,7 @@ fn simulated() -> Result<Record, Box<dyn Error>> {
     tank.set_substeps(4);
     let mut levels = Vec::with_capacity(samples);
     for (u, noise) in inputs.iter().zip(noise::white(samples, 0.02, &mut rng)) {
-        levels.push(tank.read() + noise);
+        levels.push(tank.read(0) + noise);
         tank.advance(Command::held(*u), interval);
     }
     let record = Record {

@@ -22,7 +22,7 @@ use std::{
 };
 
 use clap::Parser;
-use ctid_tests::Drive;
+use ctid_tests::{Drive, draw::Levels};
 use indicatif::{ProgressBar, ProgressStyle};
 use plants::{CATALOGUE, EffectInfo};
 use record::{Job, Outcome, kinds_of_unknown};
@@ -42,6 +42,9 @@ struct Arguments {
     /// Effects, all where none is given.
     #[arg(long, value_delimiter = ',')]
     effects: Vec<String>,
+    /// Of two tanks both levels are measured, each with noise of its own; no other plants are drawn. Effects alone.
+    #[arg(long)]
+    both_levels: bool,
     /// Structural errors over the noise.
     #[arg(long, value_delimiter = ',', default_values_t = RATIOS)]
     ratios: Vec<f64>,
@@ -82,6 +85,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     let begun = Instant::now();
     let effects = chosen(&arguments.effects)?;
+    let levels = if arguments.both_levels {
+        Levels::Both
+    } else {
+        Levels::Last
+    };
     let mut jobs = Vec::new();
     for &effect in &effects {
         for &ratio in &arguments.ratios {
@@ -89,6 +97,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 for coloured in [false, true] {
                     jobs.extend((0..arguments.records).map(|number| Job::Effect {
                         effect,
+                        levels,
                         ratio,
                         drive,
                         coloured,
@@ -98,7 +107,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    for ratio in PAIR_RATIOS {
+    let others = !arguments.both_levels;
+    for ratio in PAIR_RATIOS.into_iter().filter(|_| others) {
         for drive in [Drive::Open, Drive::Closed] {
             for coloured in [false, true] {
                 jobs.extend((0..arguments.pairs).map(|number| Job::Pair {
@@ -110,9 +120,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    jobs.extend((0..arguments.null).map(Job::Nothing));
-    jobs.extend((0..arguments.integrated).map(Job::Integrated));
-    for kind in 0..kinds_of_unknown() {
+    jobs.extend((0..arguments.null).map(|number| Job::Nothing { levels, number }));
+    jobs.extend(
+        (0..arguments.integrated)
+            .filter(|_| others)
+            .map(Job::Integrated),
+    );
+    for kind in (0..kinds_of_unknown()).filter(|_| others) {
         jobs.extend((0..arguments.unknown).map(|number| Job::Unknown { kind, number }));
     }
     jobs.retain(|job| job.name().contains(&arguments.only));

@@ -3,7 +3,7 @@
 
 use ct_signals::ArModel;
 use ctid_tests::Rig;
-use greybox::{Fit, Setup, Stopping, fit_from, random_starts};
+use greybox::{Fit, Noise, Setup, Stopping, fit_from, random_starts};
 use missing_effect::{Diagnosis, Problem};
 use plants::{EffectInfo, ParameterInfo, Placed};
 use serde_json::{Value, json};
@@ -31,17 +31,18 @@ impl Mark {
 }
 
 /// The noise's colour, of size one.
-fn colour(rig: &Rig) -> Option<ArModel> {
-    if rig.colour > 0.0 {
-        ArModel::from_coefficients(&[rig.colour], 1.0).ok()
+fn colour(rig: &Rig) -> Option<Noise> {
+    let of_one = if rig.colour > 0.0 {
+        ArModel::from_coefficients(&[rig.colour], 1.0).ok()?
     } else {
-        Some(ArModel::white(1.0))
-    }
+        ArModel::white(1.0)
+    };
+    Some(Noise::of(vec![of_one; rig.outputs()]))
 }
 
 /// The believed model, in its loop where that is known, and its fit.
-fn believed<'a>(rig: &Rig, problem: &'a Problem, noise: &ArModel) -> Option<(Setup<'a>, Fit)> {
-    let white = ArModel::white(1.0);
+fn believed<'a>(rig: &Rig, problem: &'a Problem, noise: &Noise) -> Option<(Setup<'a>, Fit)> {
+    let white = Noise::white(rig.outputs());
     let records = &problem.records;
     let mut open = Setup::from_records(
         rig.plant,
@@ -104,9 +105,9 @@ pub fn pair(rig: &Rig, problem: &Problem, found: &Diagnosis) -> Option<f64> {
     let added = found.steps.iter().filter_map(|step| {
         let effect = EffectInfo::find(step.added.as_deref()?)?;
         effect
-            .sites(rig.plant)
+            .sites(rig.plant, &rig.known())
             .map(|vessel| Placed { effect, vessel })
-            .find(|placed| placed.place_name(rig.plant) == step.place.as_deref())
+            .find(|placed| placed.place_name(rig.plant, &rig.known()) == step.place.as_deref())
     });
     let answer = with_all(&added.collect::<Vec<_>>())?;
     let start = answer.names().iter().map(|name| {
@@ -170,7 +171,7 @@ fn with(
     base: &Setup,
     fit: &Fit,
     placed: Placed,
-    noise: &ArModel,
+    noise: &Noise,
     truth: Option<(&Rig, &[f64])>,
 ) -> Option<Fit> {
     let setup = base

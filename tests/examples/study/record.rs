@@ -3,7 +3,7 @@
 use ct_signals::Record;
 use ctid_tests::{
     Drive, Rig,
-    draw::{self, PLANTS},
+    draw::{self, Levels, PLANTS},
     measured::claims_feedback,
     outside::OUTSIDE,
 };
@@ -30,6 +30,8 @@ pub enum Job {
     Effect {
         /// The effect.
         effect: &'static EffectInfo,
+        /// Which levels are measured.
+        levels: Levels,
         /// Structural error over noise.
         ratio: f64,
         /// Open or closed loop.
@@ -51,7 +53,12 @@ pub enum Job {
         number: u64,
     },
     /// Nothing is missing.
-    Nothing(u64),
+    Nothing {
+        /// Which levels are measured.
+        levels: Levels,
+        /// Number of its kind.
+        number: u64,
+    },
     /// Nothing is missing, but the noise is white beside a random walk, and the time stamps jitter.
     Integrated(u64),
     /// Something that no effect describes.
@@ -168,6 +175,7 @@ impl Job {
                 drive,
                 coloured,
                 number,
+                ..
             } => format!(
                 "{} {ratio} {} {number}",
                 effect.id,
@@ -179,7 +187,7 @@ impl Job {
                 coloured,
                 number,
             } => format!("pair {ratio} {} {number}", condition(*drive, *coloured)),
-            Self::Nothing(number) => format!("nothing {number}"),
+            Self::Nothing { number, .. } => format!("nothing {number}"),
             Self::Integrated(number) => format!("integrated {number}"),
             Self::Unknown { kind, number } => format!("{} {number}", unknown_name(*kind)),
         }
@@ -194,6 +202,7 @@ impl Job {
                 drive,
                 coloured,
                 number,
+                ..
             } => {
                 let position = plants::CATALOGUE
                     .iter()
@@ -212,7 +221,7 @@ impl Job {
                 let cell = 2 * u64::from(*drive == Drive::Closed) + u64::from(*coloured);
                 3_000_000_000 + 1_000_000 * cell + 1000 * (100.0 * ratio).round() as u64 + number
             }
-            Self::Nothing(number) => 1_000_000_000 + number,
+            Self::Nothing { number, .. } => 1_000_000_000 + number,
             Self::Integrated(number) => 4_000_000_000 + number,
             Self::Unknown { kind, number } => 2_000_000_000 + 1000 * *kind as u64 + number,
         }
@@ -254,13 +263,14 @@ impl Job {
         match *self {
             Self::Effect {
                 effect,
+                levels,
                 ratio,
                 drive,
                 coloured,
                 number,
             } => {
                 let colour = colour(coloured, number);
-                draw::with_effect(effect, ratio, drive, colour, samples, seed)
+                draw::with_effect(effect, levels, ratio, drive, colour, samples, seed)
             }
             Self::Pair {
                 ratio,
@@ -268,12 +278,13 @@ impl Job {
                 coloured,
                 number,
             } => draw::with_pair(ratio, drive, colour(coloured, number), samples, seed),
-            Self::Nothing(number) => {
-                let plant = PLANTS[number as usize % PLANTS.len()];
-                let number = number / PLANTS.len() as u64;
+            Self::Nothing { levels, number } => {
+                let plants = levels.plants();
+                let plant = plants[number as usize % plants.len()];
+                let number = number / plants.len() as u64;
                 let drive = [Drive::Open, Drive::Closed][number as usize % 2];
                 let colour = colour((number / 2).is_multiple_of(2), number / 4);
-                Some(draw::rig(plant, drive, colour, samples, rng))
+                Some(levels.of(draw::rig(plant, drive, colour, samples, rng)))
             }
             Self::Integrated(number) => {
                 let plant = PLANTS[number as usize % PLANTS.len()];

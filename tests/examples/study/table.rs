@@ -542,7 +542,7 @@ fn summary(jobs: &[Job], outcomes: &[Outcome], cells: &BTreeMap<Cell, Count>) ->
         out.push('\n');
     }
     out += &pairs(jobs, outcomes);
-    out += &Nulls::of(jobs, outcomes, |job| matches!(job, Job::Nothing(_))).said("");
+    out += &Nulls::of(jobs, outcomes, |job| matches!(job, Job::Nothing { .. })).said("");
     out += &Nulls::of(jobs, outcomes, |job| matches!(job, Job::Integrated(_)))
         .said(" whose noise is white beside a random walk and whose time stamps jitter");
     let unknowns = unknowns(jobs, outcomes);

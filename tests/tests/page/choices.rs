@@ -45,7 +45,7 @@ fn a_loop_is_treated_in_both_ways() {
         assert_eq!(tab.post("/api/run", br#"{"what": "compare"}"#).status, 200);
         let state = tab.until("fitted", |state| !state["current"].is_null());
         assert_eq!(
-            state["trail"][0]["rmse"], compared["steps"][0]["rmse"],
+            state["trail"][0]["errors"][0]["rmse"], compared["steps"][0]["rmse"],
             "{way}"
         );
         fits.push(state["current"].clone());

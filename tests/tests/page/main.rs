@@ -12,3 +12,4 @@ mod other_users;
 mod overtaken;
 mod server;
 mod three_tanks;
+mod two_levels;

@@ -111,13 +111,22 @@ impl Identify {
         if let Some(model) = &self.model {
             let path = model;
             let model = model_file::read(path)?;
+            if model.columns.outputs.len() > 1 {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "the model names {} outputs, and `ctid identify` fits one: name one of them in a model file of its own, or by --columns, or use `ctid compare`",
+                        model.columns.outputs.len()
+                    ),
+                ));
+            }
             if let Some(second) = model.columns.inputs.get(1)
                 && !self.methods().iter().all(|method| method.is_refined())
             {
                 return Err(Error::file(
                     path,
                     format!(
-                        "the model names a second input, \"{second}\", which of the methods srivc and rivc alone fit: choose one of them, use `ctid compare`, or delete it where that pump stood still"
+                        "the model names a second input, \"{second}\", which of the methods srivc and rivc alone fit: choose one of them, use `ctid compare`, or delete it where that pump stood still or nothing was disturbed"
                     ),
                 ));
             }

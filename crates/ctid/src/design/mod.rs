@@ -8,7 +8,7 @@ use clap::Args;
 use ct_signals::Columns;
 use missing_effect::Options;
 use missing_effect::design::{Candidacy, Design, Limits};
-use plants::{EffectInfo, Placed, Plant};
+use plants::{EffectInfo, Known, Placed, Plant};
 use serde::Serialize;
 
 use crate::effort::EffortLevel;
@@ -133,20 +133,21 @@ pub(crate) fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Ca
         ));
     }
     let vessel = place
-        .map(|place| vessel(model.plant, effect, name, place))
+        .map(|place| vessel(model.plant, &model.known, effect, name, place))
         .transpose()?;
     Ok(Candidacy { effect, vessel })
 }
 
 fn vessel(
     plant: Plant,
+    known: &Known,
     effect: &'static EffectInfo,
     name: &str,
     place: &str,
 ) -> Result<usize, Error> {
     let named: Vec<(usize, &str)> = effect
-        .sites(plant)
-        .filter_map(|vessel| Some((vessel, Placed { effect, vessel }.place_name(plant)?)))
+        .sites(plant, known)
+        .filter_map(|vessel| Some((vessel, Placed { effect, vessel }.place_name(plant, known)?)))
         .collect();
     if let Some((vessel, _)) = named.iter().find(|(_, known)| *known == place) {
         return Ok(*vessel);

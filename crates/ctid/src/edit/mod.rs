@@ -148,13 +148,13 @@ pub fn with_effect(
     Domain::check(effect, model.plant, model.columns.output_unit())
         .map_err(|error| refuse(error.to_string()))?;
     let vessel = place
-        .map(|word| model_file::vessel(model.plant, effect, word).map_err(&refuse))
+        .map(|word| model_file::vessel(model.plant, &model.known, effect, word).map_err(&refuse))
         .transpose()?;
     let placed = Placed {
         effect,
-        vessel: vessel.unwrap_or(effect.usual_site(model.plant)),
+        vessel: vessel.unwrap_or(effect.usual_site(model.plant, &model.known)),
     };
-    model_file::any_structure(model.plant, model.columns.inputs.len() > 1)
+    model_file::any_structure(model.plant, &model.known, model.columns.inputs.len() > 1)
         .with(placed)
         .map_err(|error| refuse(error.to_string()))?;
 
@@ -241,7 +241,8 @@ pub fn with_term(
         file: from.to_string(),
         what,
     };
-    let (place, vessel) = term_file::place_of(model.plant, &shape.place).map_err(&refuse)?;
+    let (place, vessel) =
+        term_file::place_of(model.plant, &model.known, &shape.place).map_err(&refuse)?;
     let (at, values) = (knots(&shape.at), shortened(&shape.value));
     let term = Term {
         name: name.to_string(),
@@ -336,13 +337,14 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
     Ok(Edited { text, done })
 }
 
-/// ` at the upper vessel`, where the plant has several; `assumed` when nobody said which.
+/// ` at the upper vessel`, ` at the sensor of the lower tank`, where the plant has several; `assumed` when nobody said which.
 fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
-    match placed.place_name(model.plant) {
+    match placed.place_name(model.plant, &model.known) {
         Some(name) => {
-            let kind = match (placed.effect.place, model.plant.joined()) {
-                (Place::Vessel, false) => " vessel",
-                _ => "",
+            let (kind, sensor) = match (placed.effect.place, model.plant.joined()) {
+                (Place::Vessel, false) => (" vessel", ""),
+                (Place::Sensor, _) => (" tank", "the sensor of "),
+                _ => ("", ""),
             };
             let other = if assumed {
                 "; `--where` says another"
@@ -350,7 +352,7 @@ fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
                 ""
             };
             let the = if kind.is_empty() { "" } else { "the " };
-            format!(" at {the}{name}{kind}{other}")
+            format!(" at {sensor}{the}{name}{kind}{other}")
         }
         None => String::new(),
     }

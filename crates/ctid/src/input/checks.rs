@@ -59,21 +59,25 @@ pub(super) fn controller(
             });
         }
     }
-    settings.controller(interval).map_err(|error| Error::File {
+    let controller = settings.controller(interval).map_err(|error| Error::File {
         file: model_name.to_string(),
         what: error.to_string(),
-    })
+    })?;
+    // Of several levels it is the last one that is held.
+    let outputs = records.first().map_or(1, |record| record.outputs.len());
+    Ok(controller.at_output(outputs.saturating_sub(1)))
 }
 
-/// Records that are fitted by one model are in one unit, and so are the commands of two pumps.
-pub(super) fn check_units(records: &[Record], test: &[Record]) -> Result<(), Error> {
+/// Records that are fitted by one model are in one unit, and so are the commands of two pumps and the levels of several tanks.
+pub(super) fn check_units(pumps: usize, records: &[Record], test: &[Record]) -> Result<(), Error> {
     let Some((first, others)) = records.split_first() else {
         return Err(Error::Usage(
             "no record is given; name a CSV file".to_string(),
         ));
     };
     for record in std::iter::once(first).chain(others).chain(test) {
-        if let Some(second) = record.inputs.get(1)
+        if pumps > 1
+            && let Some(second) = record.inputs.get(1)
             && second.unit != record.inputs[0].unit
         {
             return Err(Error::File {
@@ -81,6 +85,30 @@ pub(super) fn check_units(records: &[Record], test: &[Record]) -> Result<(), Err
                 what: format!(
                     "column \"{}\" is in \"{}\" and column \"{}\" in \"{}\": convert one of the two commands, or correct its header",
                     record.inputs[0].name, record.inputs[0].unit, second.name, second.unit
+                ),
+            });
+        }
+    }
+    for record in std::iter::once(first).chain(others).chain(test) {
+        let mut names: Vec<&str> = record.outputs.iter().map(|y| y.name.as_str()).collect();
+        names.sort_unstable();
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "two outputs are called \"{}\"; rename one of the columns",
+                    pair[0]
+                ),
+            });
+        }
+        let mut outputs = record.outputs.iter();
+        let Some(own) = outputs.next() else { continue };
+        if let Some(other) = outputs.find(|other| other.unit != own.unit) {
+            return Err(Error::File {
+                file: record.name.clone(),
+                what: format!(
+                    "column \"{}\" is in \"{}\" and column \"{}\" in \"{}\": levels are compared; write the unit of both in the header and the one to which both are converted under [columns]",
+                    own.name, own.unit, other.name, other.unit
                 ),
             });
         }
@@ -128,29 +156,30 @@ pub(super) fn check_height<'a>(
     let Some(height) = model.known.tank_height else {
         return Ok(());
     };
-    let of_sensor = model
-        .effects
-        .iter()
-        .any(|placed| placed.effect.place == Place::Sensor);
-    let (most, mend) = if of_sensor {
-        (BEYOND_THE_TANK, "")
-    } else {
+    let limits = |output: usize| {
+        let mut effects = model.effects.iter();
+        if effects.any(|on| on.effect.place == Place::Sensor && on.vessel == output) {
+            return (BEYOND_THE_TANK, "");
+        }
         (
             BEYOND_THE_RANGE,
             ", or, where the sensor reads too high, run `ctid add sensor_offset`",
         )
     };
     for record in records {
-        let (_, highest) = record.output_range();
-        if highest > most * height {
+        for (o, output) in record.outputs.iter().enumerate() {
+            let ((most, mend), (_, highest)) = (limits(o), output.range());
+            if highest <= most * height {
+                continue;
+            }
             return Err(Error::File {
                 file: model_name.to_string(),
                 what: format!(
                     "tank_height = {height}, but column \"{}\" of {} reaches {}{}; give the height in the output's unit{mend}",
-                    record.outputs[0].name,
+                    output.name,
                     record.name,
                     numbers::significant(highest, 3),
-                    after_space(&record.outputs[0].unit)
+                    after_space(&output.unit)
                 ),
             });
         }
@@ -168,7 +197,7 @@ pub(super) fn check_input<'a>(
         return Ok(());
     };
     for record in records {
-        for input in record.inputs.iter() {
+        for input in record.inputs.iter().take(model.plant.pumps()) {
             let (low, high) = input.range();
             let furthest = if -low > high { low } else { high };
             if furthest.abs() > BEYOND_THE_RANGE * range {
@@ -202,28 +231,32 @@ pub(super) fn check_levels<'a>(
     model: &ModelFile,
     mut records: impl Iterator<Item = &'a Record>,
 ) -> Result<(), Error> {
-    let offset = model
-        .effects
-        .iter()
-        .any(|placed| placed.effect.id == "sensor_offset");
-    if model.plant.outlet() != Outlet::Torricelli || offset {
+    let offset = |output: usize| {
+        let mut effects = model.effects.iter();
+        effects.any(|on| on.effect.id == "sensor_offset" && on.vessel == output)
+    };
+    if model.plant.outlet() != Outlet::Torricelli {
         return Ok(());
     }
     let below = records.find_map(|record| {
-        let (low, high) = record.output_range();
-        (low < -BELOW_THE_OUTLET * (high - low)).then_some((record, low))
+        let outputs = record.outputs.iter().enumerate();
+        let mut without = outputs.filter(|(o, _)| !offset(*o));
+        without.find_map(|(_, output)| {
+            let (low, high) = output.range();
+            (low < -BELOW_THE_OUTLET * (high - low)).then_some((record, output, low))
+        })
     });
-    let Some((record, low)) = below else {
+    let Some((record, output, low)) = below else {
         return Ok(());
     };
-    let unit = after_space(&record.outputs[0].unit);
+    let unit = after_space(&output.unit);
     Err(Error::File {
         file: record.name.clone(),
         what: format!(
             "column \"{}\" falls to {}{unit}, but {} lets out by the square root of the level, which is not below zero: \
              add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, where the \
              offset is to be fitted, run `ctid add sensor_offset`",
-            record.outputs[0].name,
+            output.name,
             numbers::significant(low, 3),
             model.plant.id()
         ),

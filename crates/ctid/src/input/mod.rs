@@ -236,21 +236,6 @@ pub(crate) fn on_one_clock(records: &mut [Record]) {
     }
 }
 
-/// The plants have one sensor each.
-fn check_outputs(model_name: &str, model: &ModelFile, records: &[Record]) -> Result<(), Error> {
-    let outputs = records.first().map_or(0, |record| record.outputs.len());
-    if outputs <= 1 {
-        return Ok(());
-    }
-    Err(Error::File {
-        file: model_name.to_string(),
-        what: format!(
-            "[columns] names {outputs} outputs, and {} is fitted to one; name the one to be fitted",
-            model.plant.id()
-        ),
-    })
-}
-
 /// Fitted records with dates are given in the order of their dates, and do not overlap: a clock that runs backwards between files tells
 /// nothing of drifts.
 fn check_clocks(records: &[Record]) -> Result<(), Error> {
@@ -287,9 +272,8 @@ pub fn problem(
     records: Vec<Record>,
     test: Vec<Record>,
 ) -> Result<Problem, Error> {
-    check_outputs(model_name, &model, &records)?;
     check_clocks(&records)?;
-    check_units(&records, &test)?;
+    check_units(model.plant.pumps(), &records, &test)?;
     check_movement(&records)?;
     check_height(model_name, &model, records.iter().chain(&test))?;
     check_input(model_name, &model, records.iter().chain(&test))?;

@@ -29,7 +29,7 @@ impl Source<'_> {
     /// the day on which it is added.
     pub(super) fn effect_tables(
         &self,
-        plant: Plant,
+        (plant, known): (Plant, &Known),
         tables: &BTreeMap<Spanned<String>, Spanned<EffectTable>>,
     ) -> Result<BTreeMap<&'static str, Setting>, Error> {
         let mut settings = BTreeMap::new();
@@ -40,8 +40,9 @@ impl Source<'_> {
                 let at = entry.span().start;
                 match (key.as_ref().as_str(), entry.as_ref()) {
                     ("where", Entry::Word(word)) => {
-                        setting.vessel =
-                            Some(vessel(plant, effect, word).map_err(|what| self.at(at, what))?);
+                        setting.vessel = Some(
+                            vessel(plant, known, effect, word).map_err(|what| self.at(at, what))?,
+                        );
                     }
                     ("where", _) => {
                         return Err(self.at(at, "where is a word, such as \"upper\" or \"T1\""));
@@ -64,7 +65,7 @@ impl Source<'_> {
                     }
                 }
             }
-            self.check_parameters(plant, effect, &setting)?;
+            self.check_parameters((plant, known), effect, &setting)?;
             settings.insert(effect.id, setting);
         }
         Ok(settings)
@@ -73,13 +74,13 @@ impl Source<'_> {
     /// The `[term.X]` tables, and whether each is kept as it stands; one that is not on is checked too.
     pub(super) fn terms(
         &self,
-        plant: Plant,
+        (plant, known): (Plant, &Known),
         tables: &BTreeMap<Spanned<String>, Spanned<RawTerm>>,
     ) -> Result<BTreeMap<String, (OwnTerm, bool)>, Error> {
         let mut terms = BTreeMap::new();
         for (name, table) in tables {
             let raw = table.as_ref();
-            let (place, vessel) = term_file::place_of(plant, raw.place.as_ref())
+            let (place, vessel) = term_file::place_of(plant, known, raw.place.as_ref())
                 .map_err(|what| self.at(raw.place.span().start, what))?;
             let variable = term_file::variable_of(raw.variable.as_ref())
                 .map_err(|what| self.at(raw.variable.span().start, what))?;
@@ -108,15 +109,15 @@ impl Source<'_> {
     /// The table's names are parameters of the effect at its place, and what is fixed has a value.
     pub(super) fn check_parameters(
         &self,
-        plant: Plant,
+        (plant, known): (Plant, &Known),
         effect: &'static EffectInfo,
         setting: &Setting,
     ) -> Result<(), Error> {
         let placed = Placed {
             effect,
-            vessel: setting.vessel.unwrap_or(effect.usual_site(plant)),
+            vessel: setting.vessel.unwrap_or(effect.usual_site(plant, known)),
         };
-        let infos = any_structure(plant, true).effect_parameters(placed);
+        let infos = any_structure(plant, known, true).effect_parameters(placed);
         let names: Vec<&str> = infos.iter().map(|info| info.name).collect();
         let unknown = |name: &str| {
             format!(
@@ -157,7 +158,7 @@ impl Source<'_> {
     /// An effect of the list, checked against the plant and the effects before it.
     pub(super) fn placed(
         &self,
-        (plant, second_pump): (Plant, bool),
+        (plant, known, second_pump): (Plant, &Known, bool),
         before: &[Placed],
         name: &Spanned<String>,
         settings: &BTreeMap<&'static str, Setting>,
@@ -166,13 +167,14 @@ impl Source<'_> {
         let vessel = settings.get(effect.id).and_then(|setting| setting.vessel);
         let placed = Placed {
             effect,
-            vessel: vessel.unwrap_or(effect.usual_site(plant)),
+            vessel: vessel.unwrap_or(effect.usual_site(plant, known)),
         };
         before
             .iter()
-            .try_fold(any_structure(plant, second_pump), |structure, &on| {
-                structure.with(on)
-            })
+            .try_fold(
+                any_structure(plant, known, second_pump),
+                |structure, &on| structure.with(on),
+            )
             .and_then(|structure| structure.with(placed))
             .map_err(|error| self.at(name.span().start, error.to_string()))?;
         Ok(placed)
@@ -213,18 +215,19 @@ impl Source<'_> {
     }
 }
 
-/// The vessel, or the pump, that `where = "..."` names.
+/// The vessel, the pump or the output that `where = "..."` names.
 pub(crate) fn vessel(
     plant: Plant,
+    known: &Known,
     effect: &'static EffectInfo,
     word: &str,
 ) -> Result<usize, String> {
-    let places = match effect.place {
-        Place::Vessel => plant.vessels(),
-        Place::Actuator => plant.pumps(),
-        Place::Sensor => 1,
+    let (places, kind) = match effect.place {
+        Place::Vessel => (plant.vessels(), "vessel"),
+        Place::Actuator => (plant.pumps(), "pump"),
+        Place::Sensor => (known.outputs(plant).len(), "tank whose level is measured"),
     };
-    let name = |vessel: usize| Placed { effect, vessel }.place_name(plant);
+    let name = |vessel: usize| Placed { effect, vessel }.place_name(plant, known);
     if places == 1 {
         return Err(if effect.place == Place::Vessel {
             format!(
@@ -246,11 +249,6 @@ pub(crate) fn vessel(
         .ok_or_else(|| {
             let names = (0..places).filter_map(name);
             let names: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
-            let kind = if effect.place == Place::Vessel {
-                "vessel"
-            } else {
-                "pump"
-            };
             format!(
                 "where = \"{}\" is no {kind}; write {}",
                 quoted(word),
@@ -267,6 +265,6 @@ fn any_scales(second_pump: bool) -> Scales {
 }
 
 /// A structure to ask for names and places, a second pump running or not.
-pub(crate) fn any_structure(plant: Plant, second_pump: bool) -> Structure {
-    Structure::new(plant, Known::default(), any_scales(second_pump))
+pub(crate) fn any_structure(plant: Plant, known: &Known, second_pump: bool) -> Structure {
+    Structure::new(plant, known.clone(), any_scales(second_pump))
 }

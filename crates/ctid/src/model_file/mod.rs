@@ -160,8 +160,12 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
     let source = Source { file, text };
     let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
     let plant = source.plant(raw.plant.as_ref())?;
-    let known = source.known(plant, &raw.known)?;
-    source.check_input_2(plant, &raw.columns)?;
+    let known = source.known(plant, &raw.known, raw.columns.outputs.len())?;
+    source.check_input_2(
+        plant,
+        &raw.columns,
+        (&known, raw.known.disturbance.as_ref()),
+    )?;
     let controller = raw
         .controller
         .as_ref()
@@ -179,8 +183,8 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
         hold: raw.hold,
         waiting: Vec::new(),
     };
-    let settings = source.effect_tables(plant, &raw.effect)?;
-    let terms = source.terms(plant, &raw.term)?;
+    let settings = source.effect_tables((plant, &model.known), &raw.effect)?;
+    let terms = source.terms((plant, &model.known), &raw.term)?;
     for name in &raw.effects {
         if let Some((term, fixed)) = terms.get(name.as_ref().as_str()) {
             if model.terms.iter().any(|on| on.term.name == term.term.name) {
@@ -195,7 +199,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
             model.terms.push(term.clone());
             continue;
         }
-        let site = (plant, model.columns.inputs.len() > 1);
+        let site = (plant, &model.known, model.columns.inputs.len() > 1);
         let placed = source.placed(site, &model.effects, name, &settings)?;
         model.effects.push(placed);
     }

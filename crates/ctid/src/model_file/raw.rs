@@ -54,7 +54,8 @@ pub(super) struct RawKnown {
     pub(super) area_3: Option<Spanned<Number>>,
     pub(super) pipe_area: Option<Spanned<Number>>,
     pub(super) gravity: Option<Spanned<Number>>,
-    pub(super) measured: Option<Spanned<String>>,
+    pub(super) measured: Option<Spanned<Words>>,
+    pub(super) disturbance: Option<Spanned<String>>,
     pub(super) tank_height: Option<Spanned<Number>>,
     pub(super) input_range: Option<Spanned<Number>>,
 }
@@ -71,6 +72,26 @@ pub(super) struct RawController {
     pub(super) s: Option<Spanned<Vec<Number>>>,
     pub(super) u_min: Option<Spanned<Number>>,
     pub(super) u_max: Option<Spanned<Number>>,
+}
+
+/// A word, or a list of them.
+#[derive(Deserialize, Clone)]
+#[serde(
+    untagged,
+    expecting = "a word in quotes, such as \"T1\", or a list of them"
+)]
+pub(super) enum Words {
+    One(String),
+    Several(Vec<String>),
+}
+
+impl Words {
+    pub(super) fn all(&self) -> &[String] {
+        match self {
+            Self::One(word) => std::slice::from_ref(word),
+            Self::Several(words) => words,
+        }
+    }
 }
 
 /// A number, written with or without a decimal point.

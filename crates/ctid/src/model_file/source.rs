@@ -4,7 +4,7 @@ use ct_signals::{Columns, quoted, shown};
 use plants::{Known, MAX_VESSELS, Plant};
 use toml::Spanned;
 
-use super::raw::{Number, RawKnown};
+use super::raw::{Number, RawKnown, Words};
 use crate::{Error, names};
 
 /// The file being read: it knows its lines.
@@ -131,27 +131,50 @@ impl Source<'_> {
         ))
     }
 
-    /// A second input is for a plant with a second pump.
-    pub(super) fn check_input_2(&self, plant: Plant, columns: &Columns) -> Result<(), Error> {
-        if columns.inputs.len() <= plant.pumps() {
+    /// A second input is for a plant with a second pump, or a measured disturbance.
+    pub(super) fn check_input_2(
+        &self,
+        plant: Plant,
+        columns: &Columns,
+        (known, disturbance): (&Known, Option<&Spanned<String>>),
+    ) -> Result<(), Error> {
+        let most = plant.pumps() + usize::from(known.disturbance.is_some());
+        if known.disturbance.is_some() && columns.inputs.len() < most {
+            return Err(self.at(
+                disturbance.map_or(0, |word| word.span().start),
+                "[known] says where a measured disturbance flows in, but [columns] names no column for it; write input_2 = \"...\", or delete disturbance",
+            ));
+        }
+        if columns.inputs.len() <= most {
             return Ok(());
+        }
+        if plant.pumps() == 1 && columns.inputs.len() == 2 {
+            return Err(self.at(
+                self.text.find("input_2").or(self.text.find("input")).unwrap_or(0),
+                format!(
+                    "plant {} has one pump; where the second input is a measured disturbance, write under [known] where it flows in: disturbance = {}; else delete input_2, or take plant = \"three-tank\"",
+                    plant.id(),
+                    disturbed(plant).join(" or ")
+                ),
+            ));
         }
         let at = self.text.find("input_2").or(self.text.find("input"));
         let pumps = match plant.pumps() {
             1 => "one pump",
             _ => "two pumps",
         };
-        let or = match plant.pumps() {
-            1 => ", or take plant = \"three-tank\"",
-            _ => "",
-        };
         Err(self.at(
             at.unwrap_or(0),
-            format!("plant {} has {pumps}; delete input_2{or}", plant.id()),
+            format!("plant {} has {pumps}; delete the others", plant.id()),
         ))
     }
 
-    pub(super) fn known(&self, plant: Plant, raw: &RawKnown) -> Result<Known, Error> {
+    pub(super) fn known(
+        &self,
+        plant: Plant,
+        raw: &RawKnown,
+        outputs: usize,
+    ) -> Result<Known, Error> {
         let id = plant.id();
         let of_one = [("area", &raw.area)];
         let of_two = [
@@ -208,7 +231,8 @@ impl Source<'_> {
         };
         Ok(Known {
             area,
-            measured: self.measured(plant, raw.measured.as_ref())?,
+            measured: self.measured(plant, raw.measured.as_ref(), outputs)?,
+            disturbance: self.disturbance(plant, raw.disturbance.as_ref())?,
             orifice: self.orifice(raw, area[0].is_some())?,
             tank_height: take("tank_height", &raw.tank_height)?,
             input_range: take("input_range", &raw.input_range)?,
@@ -248,38 +272,121 @@ impl Source<'_> {
         Ok(areas)
     }
 
-    /// The vessel that is measured: of three tanks any may be, so it has to be said.
+    /// The vessels whose levels are the outputs, in their order. Without a word it is the last one; of tanks that are joined, and of several
+    /// outputs, it has to be said.
     fn measured(
         &self,
         plant: Plant,
-        name: Option<&Spanned<String>>,
-    ) -> Result<Option<usize>, Error> {
-        const TANKS: &str = "\"T1\", \"T2\" or \"T3\"";
-        let Some(name) = name else {
-            if plant.joined() {
-                return Err(Error::File {
-                    file: self.file.to_string(),
-                    what: format!(
-                        "nothing says in which tank the level is measured; write measured = {TANKS} under [known]"
-                    ),
-                });
-            }
-            return Ok(None);
+        words: Option<&Spanned<Words>>,
+        outputs: usize,
+    ) -> Result<Vec<usize>, Error> {
+        let names: Vec<&str> = (0..plant.vessels())
+            .filter_map(|vessel| plant.vessel_name(vessel))
+            .collect();
+        let written = |names: &[&str]| {
+            let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+            quoted.join(", ")
         };
-        let at = name.span().start;
-        if !plant.joined() {
+        if outputs > plant.vessels() {
             let what = format!(
-                "plant {} is measured in its last vessel; delete measured",
+                "[columns] names {outputs} outputs, but plant {} has {}; name a column for each level that is measured",
+                plant.id(),
+                match plant.vessels() {
+                    1 => "one level".to_string(),
+                    levels => format!("{levels} levels"),
+                }
+            );
+            return Err(self.at(self.text.find("output").unwrap_or(0), what));
+        }
+        let Some(words) = words else {
+            let what = if outputs > 1 {
+                format!(
+                    "[columns] names {outputs} outputs, but nothing says which levels they are; write measured = [{}] under [known], in the order of the outputs",
+                    written(&names[..outputs])
+                )
+            } else if plant.joined() {
+                format!(
+                    "nothing says in which tank the level is measured; write measured = {} under [known]",
+                    "\"T1\", \"T2\" or \"T3\""
+                )
+            } else {
+                return Ok(Vec::new());
+            };
+            return Err(Error::File {
+                file: self.file.to_string(),
+                what,
+            });
+        };
+        let at = words.span().start;
+        let words = words.as_ref().all();
+        if names.is_empty() {
+            let what = format!("plant {} has one level; delete measured", plant.id());
+            return Err(self.at(at, what));
+        }
+        let mut vessels: Vec<usize> = Vec::new();
+        for word in words {
+            let Some(vessel) = names.iter().position(|name| name == word) else {
+                let what = format!(
+                    "measured = \"{}\" is no tank; write one of {}",
+                    quoted(word),
+                    written(&names)
+                );
+                return Err(self.at(at, what));
+            };
+            if vessels.contains(&vessel) {
+                let what = format!("measured names {word} twice; name each tank once");
+                return Err(self.at(at, what));
+            }
+            vessels.push(vessel);
+        }
+        if vessels.len() != outputs.max(1) {
+            let what = format!(
+                "measured names {} of the tanks, but [columns] names {} of the outputs; as many of both, in the same order",
+                vessels.len(),
+                outputs.max(1)
+            );
+            return Err(self.at(at, what));
+        }
+        // Nothing of what is below would show in the level of what is above.
+        let last = plant.vessels() - 1;
+        if !plant.joined() && !vessels.contains(&last) {
+            let what = format!(
+                "the level of the {} tank is not among the outputs, so nothing shows how it behaves; take plant = \"single-tank\" for the tank that is measured",
+                names[last]
+            );
+            return Err(self.at(at, what));
+        }
+        Ok(vessels)
+    }
+
+    /// The vessel into which a measured disturbance flows.
+    fn disturbance(
+        &self,
+        plant: Plant,
+        word: Option<&Spanned<String>>,
+    ) -> Result<Option<usize>, Error> {
+        let Some(word) = word else { return Ok(None) };
+        let at = word.span().start;
+        if plant.joined() {
+            let what = format!(
+                "plant {} takes no measured disturbance: its second input is the second pump; delete disturbance",
                 plant.id()
             );
             return Err(self.at(at, what));
         }
-        let word = name.as_ref();
-        let found = (0..plant.vessels()).find(|&i| plant.vessel_name(i) == Some(word));
+        let name = word.as_ref();
+        let found = (0..plant.vessels()).find(|&vessel| match plant.vessel_name(vessel) {
+            Some(known) => known == name,
+            None => name == ONLY,
+        });
         found.map(Some).ok_or_else(|| {
             self.at(
                 at,
-                format!("measured = \"{}\" is no tank; write {TANKS}", quoted(word)),
+                format!(
+                    "disturbance = \"{}\" says nothing of where it flows in; write {}",
+                    quoted(name),
+                    disturbed(plant).join(" or ")
+                ),
             )
         })
     }
@@ -305,6 +412,15 @@ impl Source<'_> {
             )),
         }
     }
+}
+
+/// The only vessel of a plant, as `disturbance` names it.
+const ONLY: &str = "tank";
+
+/// What `disturbance` may say, in quotes.
+fn disturbed(plant: Plant) -> Vec<String> {
+    let names = (0..plant.vessels()).map(|vessel| plant.vessel_name(vessel).unwrap_or(ONLY));
+    names.map(|name| format!("\"{name}\"")).collect()
 }
 
 /// A line as it was meant, where its value begins as a number and has a unit behind it or a decimal comma.

@@ -47,22 +47,10 @@ impl Session<'_> {
         }
         match read {
             Ok(Line::Nothing) => Ok(()),
-            Ok(Line::Row([time, input, output])) => self.row(
-                &Row {
-                    time,
-                    input,
-                    output,
-                },
-                None,
-            ),
-            Ok(Line::NoOutput([time, input], bad)) => self.row(
-                &Row {
-                    time,
-                    input,
-                    output: f64::NAN,
-                },
-                Some(bad),
-            ),
+            Ok(Line::Row([time, input])) => {
+                let (row, bad) = self.readings(time, input);
+                self.row(&row, bad)
+            }
             Err(bad @ (BadLine::Text { .. } | BadLine::Fields { .. })) => {
                 if !self.header_again(line)? {
                     self.bad(|| bad.to_string());
@@ -74,6 +62,20 @@ impl Session<'_> {
                 Ok(())
             }
         }
+    }
+
+    /// The row that was read last, and why it lacks the first reading that it lacks, where the line says so.
+    fn readings(&self, time: f64, input: f64) -> (Row, Option<BadLine>) {
+        let mut row = Row::new(time, input, &[]);
+        let mut bad = None;
+        let outputs = self.rows.as_ref().map_or(&[][..], Rows::outputs);
+        for (reading, output) in row.outputs.iter_mut().zip(outputs) {
+            match output {
+                Ok(value) => *reading = *value,
+                Err(why) => bad = bad.or_else(|| Some(why.clone())),
+            }
+        }
+        (row, bad)
     }
 
     /// A line in the order of the first one.
@@ -96,7 +98,7 @@ impl Session<'_> {
             _ => return Ok(false),
         };
         // Who does not say a unit does not change it.
-        let pairs = known.units().into_iter().zip(rows.units());
+        let pairs = known.units().zip(rows.units());
         for (before, now) in pairs {
             if !now.is_empty() && !before.is_empty() && now != before {
                 return Err(Error::Usage(format!(
@@ -133,7 +135,14 @@ impl Session<'_> {
         let (rows, is_row) = match Rows::begin(INPUT, self.line, text, &self.columns) {
             Err(ct_signals::Error::NoOrder { found, .. }) if self.parts < PARTS => {
                 self.parts += 1;
-                self.bad(|| format!("{found} numbers and no header; if this is no part of a row, give t,u,y or t,r,u,y"));
+                let y = match self.columns.outputs.len() {
+                    0 | 1 => "y".to_string(),
+                    n => (1..=n)
+                        .map(|i| format!("y{i}"))
+                        .collect::<Vec<_>>()
+                        .join(","),
+                };
+                self.bad(|| format!("{found} numbers and no header; if this is no part of a row, give t,u,{y} or t,r,u,{y}"));
                 return Ok(false);
             }
             Err(ct_signals::Error::NoOrder { .. }) | Ok((_, true)) if named => {
@@ -151,23 +160,48 @@ impl Session<'_> {
             String::new()
         };
         self.screen.say(&format!("{INPUT}: {}{hint}", rows.order()));
-        let [input, output] = rows.units();
-        let units = Units {
-            output: output.to_string(),
-            input: input.to_string(),
-        };
+        let units = self.units(&rows)?;
         if self.restored {
             self.resumed(&units)?;
         } else {
-            self.monitor = Monitor::new(self.model.clone(), self.settings, units)
+            self.monitor = Monitor::new(self.model.clone(), self.settings, units.clone())
                 .map_err(|error| blame(error, self.arguments))?;
         }
         if self.monitor.gathered().is_some() {
             self.screen.say("learning the plant from the first rows");
         }
-        self.screen.units(rows.units()[1]);
+        let names = (0..self.monitor.outputs()).map(|output| rows.output_name(output));
+        self.screen.outputs(names, &units.output);
         self.rows = Some(rows);
         Ok(is_row)
+    }
+
+    /// The units of the rows: as many readings as the model has outputs, in one unit.
+    fn units(&self, rows: &Rows) -> Result<Units, Error> {
+        let mut units = rows.units();
+        let input = units.next().unwrap_or("").to_string();
+        let outputs: Vec<&str> = units.collect();
+        let (found, needed) = (outputs.len(), self.monitor.outputs());
+        if found != needed {
+            return Err(Error::Usage(format!(
+                "{INPUT}, row {}: {found} readings where the model has {needed} outputs; name a column for each in output of [columns] of {}",
+                self.line,
+                self.arguments.model.display()
+            )));
+        }
+        let output = outputs.first().copied().unwrap_or("");
+        if let Some(other) = outputs.iter().find(|unit| **unit != output) {
+            return Err(Error::Usage(format!(
+                "{INPUT}, row {}: one reading is in [{}] and another in [{}]; give all of them in one unit",
+                self.line,
+                quoted(output),
+                quoted(other)
+            )));
+        }
+        Ok(Units {
+            output: output.to_string(),
+            input,
+        })
     }
 
     /// The saved state and the rows have to be in the same units.
@@ -200,7 +234,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// A row; `bad`: why it has no reading, where the line says so.
+    /// A row; `bad`: why it lacks a reading, where the line says so.
     fn row(&mut self, row: &Row, bad: Option<BadLine>) -> Result<(), Halt> {
         if self.restored
             && self.taken == 0
@@ -230,11 +264,13 @@ impl Session<'_> {
             ));
         }
         self.taken += 1;
-        match (bad, &step.lost) {
+        let mut lost = step.lost.iter().enumerate();
+        let first_lost = lost.find_map(|(output, lost)| Some((output, lost.as_ref()?)));
+        match (bad, first_lost) {
             (None, None) => self.trouble.good(),
             (Some(bad), _) => self.trouble_in_row(|| format!("{bad}; {LOST}")),
-            (None, Some(lost)) => {
-                let text = self.named(lost);
+            (None, Some((output, lost))) => {
+                let text = self.named(lost, output);
                 self.trouble_in_row(|| format!("{text}; {LOST}"));
             }
         }
@@ -242,10 +278,8 @@ impl Session<'_> {
         for notice in step.notices.iter().flatten() {
             self.notice(notice)?;
         }
-        if let Some(innovation) = step.innovation {
-            self.screen.innovation(row.time, innovation);
-        }
-        if let Some(scatter) = &step.scatter {
+        self.screen.innovations(row.time, &step.innovations);
+        for scatter in step.scatter.iter().flatten() {
             self.screen.warn(scatter.time, &scatter.sentence);
             self.print(scatter)?;
         }
@@ -275,16 +309,19 @@ impl Session<'_> {
     }
 
     fn refused(&mut self, refused: &Refused) {
-        let text = self.named(refused);
+        // Time and command alone refuse a row.
+        let text = self.named(refused, 0);
         self.bad(|| text);
     }
 
-    /// What is wrong with a row's value, with its column and the mend.
-    fn named(&self, refused: &Refused) -> String {
-        let column = self
-            .rows
-            .as_ref()
-            .map_or(String::new(), |rows| quoted(rows.name(refused.column())));
+    /// What is wrong with a row's value, with its column and the mend; `output`: whose reading it is, where it is one.
+    fn named(&self, refused: &Refused, output: usize) -> String {
+        let column = self.rows.as_ref().map_or(String::new(), |rows| {
+            quoted(match refused.column() {
+                "output" => rows.output_name(output),
+                column => rows.name(column),
+            })
+        });
         let mend = match refused {
             Refused::NotFinite { .. } => "check what writes it",
             Refused::BeyondRange { .. } => {

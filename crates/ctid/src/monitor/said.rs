@@ -101,7 +101,11 @@ impl Session<'_> {
                 format!(
                     "learned from {rows} rows: slowest time constant {} s, noise {} rms{blocks}; watching from here on{deaf}",
                     significant(*time_constant, 4),
-                    significant(*noise, 3)
+                    noise
+                        .iter()
+                        .map(|&noise| significant(noise, 3))
+                        .collect::<Vec<_>>()
+                        .join(" and ")
                 )
             }
             Notice::NotLearned { why } => format!("goes on learning: {why}"),

@@ -80,11 +80,7 @@ mod tests {
         let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
         let mut saver = Saver::new(Some(path.clone()), 0);
         let mut next = |saver: &mut Saver, time: f64| {
-            let row = Row {
-                time,
-                input: 5.0,
-                output: 16.0,
-            };
+            let row = Row::new(time, 5.0, &[16.0]);
             monitor.update(&row).unwrap();
             saver.save(&monitor)
         };
@@ -115,11 +111,7 @@ mod tests {
         let mut time = 0.0;
         let mut next = |saver: &mut Saver| {
             time += 1.0;
-            let row = Row {
-                time,
-                input: 5.0,
-                output: 16.0,
-            };
+            let row = Row::new(time, 5.0, &[16.0]);
             monitor.update(&row).unwrap();
             saver.save(&monitor)
         };

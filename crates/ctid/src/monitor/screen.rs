@@ -1,4 +1,4 @@
-//! What a person sees on standard error: lines, and on a terminal a plot of the innovations below them.
+//! What a person sees on standard error: lines, and on a terminal a plot of each output's innovations below them.
 
 use std::collections::VecDeque;
 use std::io::{self, Write};
@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use ::monitor::{Estimate, Innovation, Monitor, Progress, instant};
 use console::{Term, truncate_str};
+use ct_signals::quoted;
 
 use crate::look::Look;
 use crate::numbers::{significant, value_and_error};
@@ -15,7 +16,7 @@ use crate::plot::{Curve, RESIDUAL, plot};
 const DRAWN: usize = 400;
 /// The plot is drawn again after so long, where rows have come.
 pub(super) const DRAWN_EVERY: Duration = Duration::from_millis(250);
-/// Lines of the plot.
+/// Lines of a plot.
 const ROWS: usize = 6;
 /// The plot shows at least so many standard deviations.
 const LEAST: f64 = 4.0;
@@ -26,11 +27,20 @@ pub(super) struct Screen {
     term: Option<Term>,
     /// Lines of the plot on the terminal now.
     drawn: usize,
-    innovations: VecDeque<(f64, f64)>,
-    residual: f64,
+    /// The signals that are plotted, one for each output.
+    signals: Vec<Signal>,
     unit: String,
     fresh: bool,
     last: Option<Instant>,
+}
+
+/// The innovations of an output.
+struct Signal {
+    /// The output, where there are several.
+    name: Option<String>,
+    /// Time and innovation, the latest of them.
+    innovations: VecDeque<(f64, f64)>,
+    residual: f64,
 }
 
 impl Screen {
@@ -40,17 +50,24 @@ impl Screen {
             look,
             term: term.is_term().then_some(term),
             drawn: 0,
-            innovations: VecDeque::with_capacity(DRAWN),
-            residual: 0.0,
+            signals: Vec::new(),
             unit: String::new(),
             fresh: false,
             last: None,
         }
     }
 
-    /// The unit of the reading.
-    pub(super) fn units(&mut self, output: &str) {
-        self.unit = output.to_string();
+    /// The names of the outputs, and the unit of their readings.
+    pub(super) fn outputs<'a>(&mut self, names: impl Iterator<Item = &'a str>, unit: &str) {
+        let names: Vec<&str> = names.collect();
+        let several = names.len() > 1;
+        let signal = |name: &str| Signal {
+            name: several.then(|| quoted(name)),
+            innovations: VecDeque::with_capacity(DRAWN),
+            residual: 0.0,
+        };
+        self.signals = names.into_iter().map(signal).collect();
+        self.unit = unit.to_string();
     }
 
     /// A line; whoever has closed standard error does not miss it.
@@ -94,16 +111,24 @@ impl Screen {
         ));
     }
 
-    pub(super) fn innovation(&mut self, time: f64, innovation: Innovation) {
+    /// The innovations of a row, where there are any.
+    pub(super) fn innovations(&mut self, time: f64, innovations: &[Option<Innovation>]) {
         if self.term.is_none() {
             return;
         }
-        if self.innovations.len() == DRAWN {
-            self.innovations.pop_front();
+        for (signal, innovation) in self.signals.iter_mut().zip(innovations) {
+            let Some(innovation) = innovation else {
+                continue;
+            };
+            if signal.innovations.len() == DRAWN {
+                signal.innovations.pop_front();
+            }
+            signal
+                .innovations
+                .push_back((time, innovation.standardised));
+            signal.residual = innovation.residual;
+            self.fresh = true;
         }
-        self.innovations.push_back((time, innovation.standardised));
-        self.residual = innovation.residual;
-        self.fresh = true;
     }
 
     /// Takes the plot away.
@@ -131,20 +156,11 @@ impl Screen {
                 format!("learning: {rows} rows\n")
             }
             Progress::Watching { score, threshold } | Progress::Alarmed { score, threshold } => {
-                let values: Vec<f64> = self.innovations.iter().map(|(_, v)| *v).collect();
-                let most = values.iter().fold(LEAST, |most, v| most.max(v.abs()));
-                let times = match (self.innovations.front(), self.innovations.back()) {
-                    (Some((from, _)), Some((to, _))) => (*from, *to),
-                    _ => return,
-                };
-                let curve = Curve {
-                    values: &values,
-                    colour: RESIDUAL,
-                };
-                let plot = plot(&[curve], times, (-most, most), ROWS, self.look);
-                let width = self.term.as_ref().map_or(0, |term| term.size().1);
-                let heading = heading(self.residual, &self.unit, (score, threshold), width);
-                format!("{heading}\n{plot}")
+                let plots = self
+                    .signals
+                    .iter()
+                    .map(|s| self.plot(s, (score, threshold)));
+                plots.collect()
             }
         };
         self.drawn = text.lines().count();
@@ -152,10 +168,38 @@ impl Screen {
     }
 }
 
+impl Screen {
+    /// The plot of an output below its line; nothing where it has shown nothing yet.
+    fn plot(&self, signal: &Signal, scores: (f64, f64)) -> String {
+        let values: Vec<f64> = signal.innovations.iter().map(|(_, v)| *v).collect();
+        let most = values.iter().fold(LEAST, |most, v| most.max(v.abs()));
+        let times = match (signal.innovations.front(), signal.innovations.back()) {
+            (Some((from, _)), Some((to, _))) => (*from, *to),
+            _ => return String::new(),
+        };
+        let curve = Curve {
+            values: &values,
+            colour: RESIDUAL,
+        };
+        let plot = plot(&[curve], times, (-most, most), ROWS, self.look);
+        let width = self.term.as_ref().map_or(0, |term| term.size().1);
+        let of = signal.name.as_deref();
+        let heading = heading(of, signal.residual, &self.unit, scores, width);
+        format!("{heading}\n{plot}")
+    }
+}
+
 /// The line above the plot. A terminal would break a longer one in two, and one of them would stay when the plot is taken away.
-fn heading(residual: f64, unit: &str, (score, threshold): (f64, f64), width: u16) -> String {
+fn heading(
+    of: Option<&str>,
+    residual: f64,
+    unit: &str,
+    (score, threshold): (f64, f64),
+    width: u16,
+) -> String {
+    let of = of.map_or(String::new(), |name| format!(" of \"{name}\""));
     let whole = format!(
-        "innovations [standard deviations], residual now {} {unit}, score {score:.1} of {threshold:.1}",
+        "innovations{of} [standard deviations], residual now {} {unit}, score {score:.1} of {threshold:.1}",
         significant(residual, 3),
     );
     truncate_str(&whole, usize::from(width), "").into_owned()
@@ -167,10 +211,10 @@ mod tests {
 
     #[test]
     fn the_line_above_the_plot_is_one_line() {
-        let wide = heading(-0.0122, "cm", (2.7, 5.4), 100);
+        let wide = heading(None, -0.0122, "cm", (2.7, 5.4), 100);
         assert!(wide.ends_with("now -0.0122 cm, score 2.7 of 5.4"), "{wide}");
         for width in [80, 40] {
-            let line = heading(-1.23456e-7, "litres", (123.4, 105.4), width);
+            let line = heading(None, -1.23456e-7, "litres", (123.4, 105.4), width);
             assert_eq!(
                 console::measure_text_width(&line),
                 usize::from(width),

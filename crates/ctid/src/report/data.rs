@@ -1,7 +1,7 @@
 //! What the report's script draws, as JSON: the curves thinned for display, the rest as it stands.
 
 use ct_signals::Clock;
-use missing_effect::{Diagnosis, Failures, ResidualTests, Score, Shown, Step, Unknown};
+use missing_effect::{Diagnosis, Failures, OutputStep, ResidualTests, Score, Shown, Step, Unknown};
 use serde::Serialize;
 
 use super::decimate::min_max;
@@ -16,7 +16,7 @@ struct Report<'a> {
     clock: Axis,
     input_unit: &'a str,
     output_unit: &'a str,
-    noise_floor: f64,
+    outputs: Vec<Output<'a>>,
     records: Vec<Record<'a>>,
     steps: Vec<Model<'a>>,
     scores: &'a [Score],
@@ -26,6 +26,12 @@ struct Report<'a> {
     equal: Vec<bool>,
     /// What nothing explains.
     unknown: Option<&'a Unknown>,
+}
+
+#[derive(Serialize)]
+struct Output<'a> {
+    name: &'a str,
+    noise_floor: f64,
 }
 
 /// How times are drawn: as numbers in this unit or, where the records have dates, as those.
@@ -53,25 +59,38 @@ impl From<&Clock> for Axis {
 struct Record<'a> {
     name: &'a str,
     held_out: bool,
-    output: Curve,
+    /// In the order of the outputs.
+    outputs: Vec<Curve>,
     input: Curve,
     input_2: Option<Curve>,
+    /// Unit of the second input, where it is another than the first one's.
+    input_2_unit: Option<String>,
 }
 
 #[derive(Serialize)]
 struct Model<'a> {
     label: String,
+    /// Where it fails, of all outputs.
+    sentences: Vec<String>,
+    /// In the order of the outputs.
+    outputs: Vec<ModelOutput<'a>>,
+}
+
+/// What a model shows at one output.
+#[derive(Serialize)]
+struct ModelOutput<'a> {
     rmse: f64,
     rmse_test: Option<f64>,
     whiteness: String,
     input_test: String,
     tests: &'a ResidualTests,
     failures: &'a Failures,
+    /// Over each record that was simulated.
     runs: Vec<Run>,
     cloud: Option<Cloud>,
 }
 
-/// A model's run over one record.
+/// An output of a model's run over one record.
 #[derive(Serialize)]
 struct Run {
     output: Curve,
@@ -99,12 +118,20 @@ pub(crate) fn json(diagnosis: &Diagnosis) -> String {
         clock: (&diagnosis.clock).into(),
         input_unit: &diagnosis.input_unit,
         output_unit: &diagnosis.output_unit,
-        noise_floor: diagnosis.noise_floor,
+        outputs: diagnosis
+            .outputs
+            .iter()
+            .enumerate()
+            .map(|(k, name)| Output {
+                name,
+                noise_floor: diagnosis.noise.get(k).map_or(f64::NAN, |noise| noise.level),
+            })
+            .collect(),
         records: diagnosis.records.iter().map(record).collect(),
         steps: diagnosis
             .steps
             .iter()
-            .map(|step| model(step, &diagnosis.records))
+            .map(|step| model(diagnosis, step))
             .collect(),
         scores: &diagnosis.scores,
         added: scores(diagnosis, findings::is_added),
@@ -118,6 +145,7 @@ pub(crate) fn json(diagnosis: &Diagnosis) -> String {
 pub(crate) fn records(
     records: &[Shown],
     input_unit: &str,
+    outputs: &[String],
     output_unit: &str,
     clock: &Clock,
 ) -> String {
@@ -125,7 +153,13 @@ pub(crate) fn records(
         clock: clock.into(),
         input_unit,
         output_unit,
-        noise_floor: f64::NAN,
+        outputs: outputs
+            .iter()
+            .map(|name| Output {
+                name,
+                noise_floor: f64::NAN,
+            })
+            .collect(),
         records: records.iter().map(record).collect(),
         steps: Vec::new(),
         scores: &[],
@@ -161,8 +195,13 @@ fn record(shown: &Shown) -> Record<'_> {
     Record {
         name: &shown.name,
         held_out: shown.held_out,
-        output: curve(&shown.time, &shown.output),
+        outputs: shown
+            .outputs
+            .iter()
+            .map(|output| curve(&shown.time, output))
+            .collect(),
         input: curve(&shown.time, &shown.input),
+        input_2_unit: shown.input_2_unit.clone(),
         input_2: shown
             .input_2
             .as_ref()
@@ -170,51 +209,79 @@ fn record(shown: &Shown) -> Record<'_> {
     }
 }
 
-fn model<'a>(step: &'a Step, records: &[Shown]) -> Model<'a> {
+fn model<'a>(diagnosis: &Diagnosis, step: &'a Step) -> Model<'a> {
+    let outputs = step.outputs.iter().enumerate();
     Model {
         label: step_label(step),
-        rmse: step.rmse,
-        rmse_test: step.rmse_test,
-        whiteness: text::whiteness(step.tests.whiteness_p),
-        input_test: text::input_test(step.tests.input_p),
-        tests: &step.tests,
-        failures: &step.failures,
-        runs: records
-            .iter()
-            .zip(&step.simulated)
-            .map(|(record, simulated)| run(record, simulated))
+        sentences: findings::sentences(diagnosis, step),
+        outputs: outputs
+            .map(|(k, output)| model_output(output, &series(step, &diagnosis.records, k)))
             .collect(),
-        cloud: cloud(step, records),
     }
 }
 
-fn run(record: &Shown, simulated: &[f64]) -> Run {
-    Run {
-        output: curve(&record.time, simulated),
-        residual: curve(&record.time, &residual(record, simulated)),
+fn model_output<'a>(output: &'a OutputStep, series: &[Series]) -> ModelOutput<'a> {
+    ModelOutput {
+        rmse: output.rmse,
+        rmse_test: output.rmse_test,
+        whiteness: text::whiteness(output.tests.whiteness_p),
+        input_test: text::input_test(output.tests.input_p),
+        tests: &output.tests,
+        failures: &output.failures,
+        runs: series.iter().map(Series::run).collect(),
+        cloud: cloud(series),
     }
 }
 
-fn cloud(step: &Step, records: &[Shown]) -> Option<Cloud> {
-    let fitted = || {
-        records
-            .iter()
-            .zip(&step.simulated)
-            .filter(|(record, _)| !record.held_out)
-    };
-    let residual: Vec<f64> = fitted()
-        .flat_map(|(record, simulated)| residual(record, simulated))
-        .collect();
+/// An output of a record, measured and simulated.
+struct Series<'a> {
+    record: &'a Shown,
+    measured: &'a [f64],
+    simulated: &'a [f64],
+}
+
+/// The series of an output: a step has them record by record and, within a record, output by output.
+fn series<'a>(step: &'a Step, records: &'a [Shown], output: usize) -> Vec<Series<'a>> {
+    let simulated = step.simulated.iter().skip(output);
+    let simulated = simulated.step_by(step.outputs.len().max(1));
+    let series = records.iter().zip(simulated);
+    series
+        .map(|(record, simulated)| Series {
+            record,
+            measured: record.outputs.get(output).map_or(&[], Vec::as_slice),
+            simulated,
+        })
+        .collect()
+}
+
+impl Series<'_> {
+    fn run(&self) -> Run {
+        Run {
+            output: curve(&self.record.time, self.simulated),
+            residual: curve(&self.record.time, &self.residual()),
+        }
+    }
+
+    /// Measured minus model.
+    fn residual(&self) -> Vec<f64> {
+        let pairs = self.measured.iter().zip(self.simulated);
+        pairs.map(|(measured, model)| measured - model).collect()
+    }
+}
+
+fn cloud(series: &[Series]) -> Option<Cloud> {
+    let fitted = || series.iter().filter(|series| !series.record.held_out);
+    let residual: Vec<f64> = fitted().flat_map(Series::residual).collect();
     if residual.is_empty() {
         return None;
     }
     // Sample for sample with the residual.
     let level: Vec<f64> = fitted()
-        .flat_map(|(record, simulated)| simulated.iter().take(record.output.len()))
+        .flat_map(|series| series.simulated.iter().take(series.measured.len()))
         .copied()
         .collect();
     let flow: Vec<f64> = fitted()
-        .flat_map(|(record, simulated)| record.input.iter().take(simulated.len()))
+        .flat_map(|series| series.record.input.iter().take(series.simulated.len()))
         .copied()
         .collect();
     let at: Vec<usize> = (0..residual.len())
@@ -225,16 +292,6 @@ fn cloud(step: &Step, records: &[Shown]) -> Option<Cloud> {
         flow: pick(&flow, &at),
         residual: pick(&residual, &at),
     })
-}
-
-/// Measured minus model.
-fn residual(record: &Shown, simulated: &[f64]) -> Vec<f64> {
-    record
-        .output
-        .iter()
-        .zip(simulated)
-        .map(|(measured, model)| measured - model)
-        .collect()
 }
 
 fn curve(time: &[f64], values: &[f64]) -> Curve {
@@ -275,33 +332,42 @@ mod tests {
     #[test]
     fn what_is_not_finite_is_null() {
         let mut diagnosis = sample::two_tanks();
-        diagnosis.steps[0].rmse = f64::NAN;
+        diagnosis.steps[0].outputs[0].rmse = f64::NAN;
         diagnosis.steps[0].simulated[0][3] = f64::INFINITY;
         let back: serde_json::Value = serde_json::from_str(&json(&diagnosis)).expect("valid JSON");
-        assert!(back["steps"][0]["rmse"].is_null());
-        assert!(back["steps"][0]["runs"][0]["output"]["y"][3].is_null());
-        assert!(back["steps"][0]["runs"][0]["residual"]["y"][3].is_null());
+        let output = &back["steps"][0]["outputs"][0];
+        assert!(output["rmse"].is_null());
+        assert!(output["runs"][0]["output"]["y"][3].is_null());
+        assert!(output["runs"][0]["residual"]["y"][3].is_null());
     }
 
     #[test]
-    fn every_step_runs_over_every_record() {
-        let diagnosis = sample::two_tanks();
-        let back: serde_json::Value = serde_json::from_str(&json(&diagnosis)).expect("valid JSON");
-        let steps = back["steps"].as_array().expect("steps");
-        assert_eq!(steps.len(), diagnosis.steps.len());
-        for step in steps {
-            let runs = step["runs"].as_array().expect("runs");
-            assert_eq!(runs.len(), diagnosis.records.len());
-            let length = |part: &serde_json::Value| part.as_array().map(Vec::len);
-            for (run, record) in runs.iter().zip(&diagnosis.records) {
-                assert_eq!(length(&run["output"]["t"]), Some(record.time.len()));
-                assert_eq!(length(&run["residual"]["y"]), Some(record.time.len()));
-            }
-            for part in ["level", "flow", "residual"] {
-                assert_eq!(
-                    length(&step["cloud"][part]),
-                    Some(diagnosis.records[0].time.len())
-                );
+    fn every_step_runs_over_every_record_at_every_output() {
+        for diagnosis in [sample::two_tanks(), sample::two_outputs()] {
+            let back: serde_json::Value =
+                serde_json::from_str(&json(&diagnosis)).expect("valid JSON");
+            let list = |part: &serde_json::Value| part.as_array().expect("a list").clone();
+            let length = |part: &serde_json::Value| list(part).len();
+            assert_eq!(length(&back["outputs"]), diagnosis.outputs.len());
+            assert_eq!(length(&back["steps"]), diagnosis.steps.len());
+            for (step, of_step) in list(&back["steps"]).iter().zip(&diagnosis.steps) {
+                assert_eq!(length(&step["outputs"]), diagnosis.outputs.len());
+                for (index, output) in list(&step["outputs"]).iter().enumerate() {
+                    let runs = list(&output["runs"]);
+                    assert_eq!(runs.len(), diagnosis.records.len());
+                    for (k, (run, record)) in runs.iter().zip(&diagnosis.records).enumerate() {
+                        assert_eq!(length(&run["output"]["t"]), record.time.len());
+                        assert_eq!(length(&run["residual"]["y"]), record.time.len());
+                        let simulated = &of_step.simulated[k * diagnosis.outputs.len() + index];
+                        assert_eq!(run["output"]["y"][7], rounded(simulated[7], 6));
+                        let residual = record.outputs[index][7] - simulated[7];
+                        assert_eq!(run["residual"]["y"][7], rounded(residual, 6));
+                    }
+                    for part in ["level", "flow", "residual"] {
+                        let fitted = diagnosis.records[0].time.len();
+                        assert_eq!(length(&output["cloud"][part]), fitted);
+                    }
+                }
             }
         }
     }
@@ -309,7 +375,8 @@ mod tests {
     #[test]
     fn the_cloud_of_a_long_record_is_thinned_evenly() {
         let diagnosis = sample::awkward();
-        let cloud = cloud(&diagnosis.steps[0], &diagnosis.records).expect("a fitted record");
+        let cloud =
+            cloud(&series(&diagnosis.steps[0], &diagnosis.records, 0)).expect("a fitted record");
         assert_eq!(cloud.residual.len(), POINTS);
         assert_eq!(
             cloud.level[1],
@@ -328,9 +395,10 @@ mod tests {
             time: (0..n).map(|k| k as f64 * 0.1).collect(),
             input: vec![0.0; n],
             input_2: None,
-            output,
+            input_2_unit: None,
+            outputs: vec![output],
         };
-        let curve = record(&shown).output;
+        let curve = &record(&shown).outputs[0];
         assert!(curve.y.len() <= POINTS);
         assert_eq!(curve.t.len(), curve.y.len());
         let peak = curve.y.iter().position(|&y| y == 9.0).expect("the peak");
@@ -345,10 +413,15 @@ mod tests {
             time: vec![0.0, 1.0],
             input: vec![],
             input_2: None,
-            output: vec![1.0, 2.0, 3.0],
+            input_2_unit: None,
+            outputs: vec![vec![1.0, 2.0, 3.0]],
         };
-        let run = run(&shown, &[1.0]);
-        assert_eq!(run.residual.y, [0.0]);
-        assert_eq!(record(&shown).output.t.len(), 2);
+        let run = Series {
+            record: &shown,
+            measured: &shown.outputs[0],
+            simulated: &[1.0],
+        };
+        assert_eq!(run.run().residual.y, [0.0]);
+        assert_eq!(record(&shown).outputs[0].t.len(), 2);
     }
 }

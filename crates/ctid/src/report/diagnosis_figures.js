@@ -1,10 +1,12 @@
-// The figures of a diagnosis. `view` says how it is looked at: the chosen step, the record of the residual, and whether the axes
-// hold every step or the chosen one alone; it may change between two drawings.
+// The figures of a diagnosis. `view` says how it is looked at: the chosen step, the output of the figures that show one, the record of
+// the residual, and whether the axes hold every step or the chosen one alone; it may change between two drawings.
 "use strict";
 const diagnosisFigures = (report, view) => {
   const { narrow, tight, theme, plain, pretty, named, axis } = plots;
   const records = report.records || [];
   const steps = report.steps || [];
+  const outputs = report.outputs || [];
+  const several = outputs.length > 1;
 
   const DASHES = ["dash", "solid", "dot", "dashdot", "longdash", "longdashdot"];
   const stepColour = (k) => theme().steps[k % theme().steps.length];
@@ -13,7 +15,11 @@ const diagnosisFigures = (report, view) => {
 
   const OUT = pretty(report.output_unit);
   const IN = pretty(report.input_unit);
-  const sized = (value, unit) => `${value === null ? "–" : Number(value.toPrecision(2))} ${unit}`.trim();
+  const sized = (value, unit) => `${value === null || value === undefined ? "–" : Number(value.toPrecision(2))} ${unit}`.trim();
+
+  const outputName = (o) => plain(outputs[o]?.name ?? "");
+  // What a figure shows of the chosen output; its name only where there are others.
+  const ofOutput = (what) => (several ? `${what} of ${outputName(view.output)}` : what);
 
   // --- parts of a figure -------------------------------------------------------------------
 
@@ -27,8 +33,12 @@ const diagnosisFigures = (report, view) => {
   const present = (values) => values.filter((v) => v !== null && v !== undefined);
   const largest = (values) => present(values).reduce((most, v) => Math.max(most, Math.abs(v)), 0);
   // What the axes must hold: every step, so that a fall is seen as a fall, or the chosen one alone.
-  const seen = () => (view.sameAxes ? steps : [steps[view.chosen]]);
-  const level = () => (report.noise_floor > 0 ? report.noise_floor : null);
+  const seen = () => (view.sameAxes ? steps : [steps[view.chosen]]).map((step) => step.outputs[view.output]);
+  // The chosen step at the chosen output.
+  const chosen = () => steps[view.chosen].outputs[view.output];
+  const level = () => (outputs[view.output]?.noise_floor > 0 ? outputs[view.output].noise_floor : null);
+  // Another output has another range: what was zoomed into is not there.
+  const zoomOfOutput = () => (several ? `output ${view.output}` : "kept");
 
   // Times as they are drawn: numbers in the unit that fits the records' length, or dates.
   const clock = report.clock;
@@ -38,12 +48,13 @@ const diagnosisFigures = (report, view) => {
     ? axis("", { type: "date", hoverformat: "%Y-%m-%d %H:%M:%S", ...more })
     : axis(`time [${clock.unit}]`, { exponentformat: "none", hoverformat: ".6~g", ...more }));
 
-  // The windows of a record in which the chosen step fails: the larger the error, the stronger.
-  function failingWindows(r) {
+  // The windows of a record in which the chosen step fails at an output: the larger the error, the stronger.
+  function failingWindows(r, o, yref) {
     if (!steps.length) return [];
-    const most = largest(seen().flatMap((s) => s.failures.by_time.map((b) => b.rms))) || 1;
-    return steps[view.chosen].failures.by_time.filter((b) => b.fails && b.record === r).map((b) => ({
-      type: "rect", xref: "x", yref: "paper", x0: at(b.from), x1: at(b.to), y0: 0, y1: 1, layer: "below",
+    const compared = (view.sameAxes ? steps : [steps[view.chosen]]).map((step) => step.outputs[o]);
+    const most = largest(compared.flatMap((s) => s.failures.by_time.map((b) => b.rms))) || 1;
+    return steps[view.chosen].outputs[o].failures.by_time.filter((b) => b.fails && b.record === r).map((b) => ({
+      type: "rect", xref: "x", yref, x0: at(b.from), x1: at(b.to), y0: 0, y1: 1, layer: "below",
       fillcolor: theme().failing, opacity: 0.08 + 0.37 * ((b.rms || 0) / most), line: { width: 0 },
     }));
   }
@@ -67,41 +78,59 @@ const diagnosisFigures = (report, view) => {
 
   // --- the figures -------------------------------------------------------------------------
 
+  // A panel for each output, and below them one for the input.
   function recordFigure(r) {
     const record = records[r];
     const c = theme();
-    const data = [{
-      name: "measured", x: record.output.t.map(at), y: record.output.y, mode: "lines", line: { color: c.measured, width: 1.3 }, opacity: 0.75,
-      hovertemplate: `%{y:.4~g} ${OUT}`,
-    }];
-    steps.forEach((step, k) => {
-      const run = step.runs[r];
-      if (!run) return;
-      const main = k === view.chosen;
+    const count = record.outputs.length;
+    // Heights of a panel with the space below it and of the input's, in those of a figure with one output.
+    const [panel, space, low] = [0.67, 0.09, 0.24];
+    const total = count * (panel + space) + low;
+    const axisOf = (k) => (k ? `y${k + 1}` : "y");
+    const data = [];
+    const axes = {};
+    const shapes = [];
+    record.outputs.forEach((measured, o) => {
+      const yaxis = axisOf(o);
+      // One entry of the legend switches a model on and off in every panel.
+      const shared = (group) => (several ? { yaxis, legendgroup: group, showlegend: o === 0 } : {});
+      const hovertemplate = `%{y:.4~g} ${OUT}${several ? ` (${outputName(o)})` : ""}`;
       data.push({
-        name: plain(step.label), x: run.output.t.map(at), y: run.output.y, mode: "lines",
-        line: { color: stepColour(k), width: main ? 2.6 : 1.6, dash: main ? "solid" : DASHES[k % DASHES.length] },
-        visible: main || k === 0 ? true : "legendonly", legendrank: 1001 + k, zorder: main ? 2 : 1,
-        hovertemplate: `%{y:.4~g} ${OUT}`,
+        name: "measured", x: measured.t.map(at), y: measured.y, mode: "lines", line: { color: c.measured, width: 1.3 }, opacity: 0.75,
+        hovertemplate, ...shared("measured"),
       });
+      steps.forEach((step, k) => {
+        const run = step.outputs[o]?.runs[r];
+        if (!run) return;
+        const main = k === view.chosen;
+        data.push({
+          name: plain(step.label), x: run.output.t.map(at), y: run.output.y, mode: "lines",
+          line: { color: stepColour(k), width: main ? 2.6 : 1.6, dash: main ? "solid" : DASHES[k % DASHES.length] },
+          visible: main || k === 0 ? true : "legendonly", legendrank: 1001 + k, zorder: main ? 2 : 1,
+          hovertemplate, ...shared(`step ${k}`),
+        });
+      });
+      const top = 1 - (o * (panel + space)) / total;
+      axes[o ? `yaxis${o + 1}` : "yaxis"] = axis(named(several ? outputName(o) : "output", OUT), { domain: [top - panel / total, top] });
+      shapes.push(...failingWindows(r, o, several ? `${yaxis} domain` : "paper"));
     });
-    const inputs = record.input_2 ? [["input 1", record.input, c.faint, "solid"], ["input 2", record.input_2, c.text, "dot"]] : [["input", record.input, c.faint, "solid"]];
-    for (const [name, input, color, dash] of inputs) {
+    const inputs = record.input_2 ? [["input 1", record.input, c.faint, "solid", IN], [named("input 2", record.input_2_unit || ""), record.input_2, c.text, "dot", record.input_2_unit || IN]] : [["input", record.input, c.faint, "solid", IN]];
+    for (const [name, input, color, dash, unit] of inputs) {
       data.push({
-        name, x: input.t.map(at), y: input.y, yaxis: "y2", mode: "lines", showlegend: inputs.length > 1, legendrank: 2000,
-        line: { color, width: 1.2, dash, shape: "hv" }, hovertemplate: `%{y:.4~g} ${IN}`,
+        name, x: input.t.map(at), y: input.y, yaxis: axisOf(count), mode: "lines", showlegend: inputs.length > 1, legendrank: 2000,
+        line: { color, width: 1.2, dash, shape: "hv" }, hovertemplate: `%{y:.4~g} ${unit}`,
       });
     }
-    return { data, layout: layout(narrow.matches ? 400 : 460, {
-      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes: failingWindows(r),
-      xaxis: timeAxis({ anchor: "y2", showspikes: false }),
-      yaxis: axis(named("output", OUT), { domain: [0.33, 1] }),
-      yaxis2: axis(named("input", IN), { domain: [0, 0.24], nticks: 4 }),
+    return { data, layout: layout((narrow.matches ? 400 : 460) * total, {
+      showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes,
+      xaxis: timeAxis({ anchor: axisOf(count), showspikes: false }),
+      ...axes,
+      [`yaxis${count + 1}`]: axis(named("input", record.input_2_unit ? "" : IN), { domain: [0, low / total], nticks: 4 }),
     }) };
   }
 
   function byTime() {
-    const run = steps[view.chosen].runs[view.residualRecord];
+    const run = chosen().runs[view.residualRecord];
     if (!run) return null;
     const most = 1.05 * largest(seen().flatMap((s) => (s.runs[view.residualRecord] ? s.runs[view.residualRecord].residual.y : []))) || 1;
     const floor = level() === null ? [] : [across(level(), "y", theme().text, "dash"), across(-level(), "y", theme().text, "dash")];
@@ -109,16 +138,16 @@ const diagnosisFigures = (report, view) => {
       x: run.residual.t.map(at), y: run.residual.y, mode: "lines", line: { color: stepColour(view.chosen), width: 1.4 }, name: "residual",
       hovertemplate: `${DATED ? "%{x}" : `%{x:.6~g} ${clock.unit}`}: %{y:.3~g} ${OUT}<extra></extra>`,
     }], layout: layout(narrow.matches ? 240 : 280, {
-      hovermode: "x", shapes: failingWindows(view.residualRecord).concat(floor),
-      xaxis: timeAxis({}), yaxis: axis(named("residual", OUT), { range: [-most, most] }),
+      hovermode: "x", shapes: failingWindows(view.residualRecord, view.output, "paper").concat(floor),
+      xaxis: timeAxis({}), yaxis: axis(named(ofOutput("residual"), OUT), { range: [-most, most], uirevision: zoomOfOutput() }),
     }) };
   }
 
   // Every sample and the bin means above, the rms of the bins below.
   function binned(kind, at, title) {
-    const bins = steps[view.chosen].failures[kind].filter((b) => b.count > 0);
+    const bins = chosen().failures[kind].filter((b) => b.count > 0);
     if (!bins.length) return null;
-    const cloud = steps[view.chosen].cloud;
+    const cloud = chosen().cloud;
     const centre = bins.map((b) => (b.from + b.to) / 2);
     const most = 1.05 * largest(seen().flatMap((s) => (s.cloud ? s.cloud.residual : s.failures[kind].map((b) => b.mean)))) || 1;
     const data = [];
@@ -136,15 +165,15 @@ const diagnosisFigures = (report, view) => {
       hovertext: binHover(bins, (b) => `${sized(b.from, "")} to ${sized(b.to, "")}`), hoverinfo: "text", textposition: "none",
     });
     return { data, layout: layout(400, {
-      hovermode: "closest", shapes: floorLine("y2"),
+      uirevision: zoomOfOutput(), hovermode: "closest", shapes: floorLine("y2"),
       xaxis: axis(title, { anchor: "y2" }),
-      yaxis: axis(named("residual", OUT), { domain: [0.42, 1], range: [-most, most] }),
+      yaxis: axis(named(ofOutput("residual"), OUT), { domain: [0.42, 1], range: [-most, most] }),
       yaxis2: axis(named("rms", OUT), { domain: [0, 0.34], range: [0, tallest(kind)], nticks: 4 }),
     }) };
   }
 
   function bars(kind, name, means, title) {
-    const bins = steps[view.chosen].failures[kind];
+    const bins = chosen().failures[kind];
     if (!bins.length) return null;
     const names = bins.map(name);
     const data = [{
@@ -160,12 +189,12 @@ const diagnosisFigures = (report, view) => {
     }
     return { data, layout: layout(300, {
       hovermode: "closest", shapes: floorLine("y"), xaxis: axis(title, { type: "category" }),
-      yaxis: axis(named("residual", OUT), { range: [low, tallest(kind)] }),
+      yaxis: axis(named(ofOutput("residual"), OUT), { range: [low, tallest(kind)] }),
     }) };
   }
 
   function directionName(bin, k, bins) {
-    const all = bins || steps[view.chosen].failures.by_direction;
+    const all = bins || chosen().failures.by_direction;
     if (all.length === 3) return ["falling", "steady", "rising"][k];
     return `${sized(bin.from, "")} to ${sized(bin.to, "")} /s`;
   }
@@ -178,10 +207,10 @@ const diagnosisFigures = (report, view) => {
   };
 
   function correlation(kind, bound, first) {
-    const values = steps[view.chosen].tests[kind].slice(first);
+    const values = chosen().tests[kind].slice(first);
     if (!values.length) return null;
     const lags = values.map((_, k) => k + first);
-    const half = steps[view.chosen].tests[bound];
+    const half = chosen().tests[bound];
     const most = Math.min(1.05, 1.1 * largest(seen().flatMap((s) => [...s.tests[kind].slice(first), s.tests[bound]])) || 1);
     const c = theme();
     const outside = values.map((v) => (half !== null && Math.abs(v) > half ? c.failing : c.passing));
@@ -210,7 +239,7 @@ const diagnosisFigures = (report, view) => {
       marker: { color: best.map((s) => (s.added ? c.best : s.equal ? c.equal : c.passing)),
         pattern: hatch(best.map((s) => s.equal)) },
       text: best.map((s) => (s.bic_gain === null ? "" : s.bic_gain.toFixed(1).replace("-", "−"))), textposition: "outside", cliponaxis: false,
-      hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${sized(s.rmse, OUT)}`), hoverinfo: "text",
+      hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${several ? sized(s.weighted_rmse, "times the noise") : sized(s.rmse, OUT)}`), hoverinfo: "text",
     }], layout: layout(70 + 26 * best.length, {
       hovermode: "closest", margin: { l: 20, r: tight() ? 10 : 40, t: 10, b: 40 },
       // Room for the numbers at the ends of the bars.
@@ -222,9 +251,10 @@ const diagnosisFigures = (report, view) => {
     const c = theme();
     const names = steps.map((s) => plain(s.label));
     const size = steps.map((_, k) => (k === view.chosen ? 14 : 9));
-    const data = [{ name: "fitted data", x: names, y: steps.map((s) => s.rmse), mode: "lines+markers", line: { color: c.best, width: 2.5 }, marker: { size, opacity: 1 } }];
-    if (steps.some((s) => s.rmse_test !== null)) {
-      data.push({ name: "held-out data", x: names, y: steps.map((s) => s.rmse_test), mode: "lines+markers", line: { color: c.held, width: 2.5, dash: "dot" }, marker: { size, opacity: 1, symbol: "square" } });
+    const errors = steps.map((s) => s.outputs[view.output]);
+    const data = [{ name: "fitted data", x: names, y: errors.map((s) => s.rmse), mode: "lines+markers", line: { color: c.best, width: 2.5 }, marker: { size, opacity: 1 } }];
+    if (errors.some((s) => s.rmse_test !== null)) {
+      data.push({ name: "held-out data", x: names, y: errors.map((s) => s.rmse_test), mode: "lines+markers", line: { color: c.held, width: 2.5, dash: "dot" }, marker: { size, opacity: 1, symbol: "square" } });
     }
     data.forEach((d) => { d.hovertemplate = `%{y:.3~g} ${OUT}`; });
     if (level() !== null) {
@@ -232,7 +262,7 @@ const diagnosisFigures = (report, view) => {
     }
     return { data, layout: layout(340, {
       showlegend: true, hovermode: "x unified", xaxis: axis("", { type: "category", range: [-0.4, names.length - 0.6] }),
-      yaxis: axis(named("simulation error, rms", OUT), { rangemode: "tozero" }),
+      yaxis: axis(named(`${ofOutput("simulation error")}, rms`, OUT), { rangemode: "tozero" }),
     }) };
   }
 
@@ -272,7 +302,7 @@ const diagnosisFigures = (report, view) => {
     "unknown-path": unknownPath,
     "unknown-shape": unknownShape,
     "by-time": byTime,
-    "by-level": () => binned("by_level", "level", named("simulated output", OUT)),
+    "by-level": () => binned("by_level", "level", named(several ? `simulated ${outputName(view.output)}` : "simulated output", OUT)),
     "by-flow": () => binned("by_flow", "flow", named("input", IN)),
     "by-direction": () => bars("by_direction", directionName, true, ""),
     "by-frequency": () => bars("by_frequency", bandName, false, ""),
@@ -283,5 +313,5 @@ const diagnosisFigures = (report, view) => {
   };
   records.forEach((_, r) => { figures[`record-${r}`] = () => recordFigure(r); });
 
-  return { figures, stepColour, sized };
+  return { figures, stepColour, sized, several, ofOutput };
 };

@@ -20,7 +20,7 @@ mod tables;
 mod text;
 mod udink;
 
-use missing_effect::{Diagnosis, Shown, Step, Verdict};
+use missing_effect::{Diagnosis, Failures, OutputStep, ResidualTests, Shown, Step, Verdict};
 
 pub use self::baysse::html as baysse;
 pub(crate) use self::data::{json as drawing, records as drawing_of_records, rounded};
@@ -47,7 +47,7 @@ pub fn html(diagnosis: &Diagnosis) -> String {
     let data = data::json(diagnosis);
     let body: String = [
         headline(diagnosis),
-        step_buttons(diagnosis),
+        shown(diagnosis),
         "<main>".to_owned(),
         fit(diagnosis),
         unknown(diagnosis),
@@ -123,33 +123,91 @@ fn trail(diagnosis: &Diagnosis) -> String {
     if diagnosis.steps.is_empty() {
         return String::new();
     }
-    let unit = text::unit(&diagnosis.output_unit);
+    let several = findings::several(diagnosis);
     let items: String = diagnosis
         .steps
         .iter()
         .map(|step| {
-            let held_out = step.rmse_test.map_or(String::new(), |error| {
+            let (error, unit) = findings::step_error(diagnosis, step);
+            let test = if several {
+                step.weighted_rmse_test
+            } else {
+                step.rmse_test
+            };
+            let unit = text::unit(unit);
+            let mut below = test.map_or(String::new(), |error| {
                 format!(
                     "<span class=\"test\">held out {} {unit}</span>",
                     significant(error, 2)
                 )
             });
-            large(&significant(step.rmse, 2), &unit, &label(step), &held_out)
+            if several {
+                below.push_str(&errors_of_outputs(diagnosis, step));
+            }
+            large(&significant(error, 2), &unit, &label(step), &below)
         })
         .collect();
-    let held_out = if diagnosis.steps.iter().any(|step| step.rmse_test.is_some()) {
+    let held_out = |step: &Step| step.outputs.iter().any(|output| output.rmse_test.is_some());
+    let held_out = if diagnosis.steps.iter().any(held_out) {
         "; below it the same on the held-out data, which took part in no fit and no choice"
+    } else {
+        ""
+    };
+    let weighted = if several {
+        " The error of all outputs is their root mean square after each is divided by the noise floor of its output; \
+         below it each output alone."
     } else {
         ""
     };
     format!(
         "<ol class=\"trail\">\n{items}</ol>\n<p class=\"caption\">Simulation error (root mean square; \
          the model runs on the input alone and is never corrected by a measurement) \
-         on the fitted data{held_out}.</p>\n"
+         on the fitted data{held_out}.{weighted}</p>\n"
     )
 }
 
-/// The buttons that choose the model that the plots show.
+/// The error of each output by its name, a line each.
+fn errors_of_outputs(diagnosis: &Diagnosis, step: &Step) -> String {
+    let unit = text::unit(&diagnosis.output_unit);
+    let line = |output: &OutputStep| {
+        let test = output.rmse_test.map_or(String::new(), |error| {
+            format!(", held out {} {unit}", significant(error, 2))
+        });
+        format!(
+            "<span class=\"test\">{}: {} {unit}{test}</span>",
+            escape(&output.name),
+            significant(output.rmse, 2)
+        )
+    };
+    step.outputs.iter().map(line).collect()
+}
+
+/// What the plots show: buttons that choose the model, and the choice of the output, each where there are several.
+fn shown(diagnosis: &Diagnosis) -> String {
+    let (buttons, output) = (step_buttons(diagnosis), output_choice(diagnosis));
+    if buttons.is_empty() && output.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<nav id=\"steps\" aria-label=\"Model that the plots show\">\n<span>Show</span>\n{buttons}{output}\
+         <span id=\"shown\" class=\"unseen\" aria-live=\"polite\"></span>\n</nav>\n"
+    )
+}
+
+/// Chooses the output of the plots that show one.
+fn output_choice(diagnosis: &Diagnosis) -> String {
+    if !findings::several(diagnosis) || diagnosis.steps.is_empty() {
+        return String::new();
+    }
+    let outputs = diagnosis.outputs.iter().enumerate();
+    let options: String = outputs
+        .map(|(k, name)| format!("<option value=\"{k}\">{}</option>", escape(name)))
+        .collect();
+    format!(
+        "<label>Output <select id=\"shown-output\" autocomplete=\"off\">{options}</select></label>\n"
+    )
+}
+
 fn step_buttons(diagnosis: &Diagnosis) -> String {
     if diagnosis.steps.len() < 2 {
         return String::new();
@@ -160,20 +218,19 @@ fn step_buttons(diagnosis: &Diagnosis) -> String {
         .iter()
         .enumerate()
         .map(|(k, step)| {
+            let (error, unit) = findings::step_error(diagnosis, step);
             format!(
                 "<button type=\"button\" data-step=\"{k}\" aria-pressed=\"{}\">\
                  <i class=\"swatch\"></i>{} <b>{} {}</b></button>\n",
                 k == last,
                 label(step),
-                significant(step.rmse, 2),
-                text::unit(&diagnosis.output_unit)
+                significant(error, 2),
+                text::unit(unit)
             )
         })
         .collect();
     format!(
-        "<nav id=\"steps\" aria-label=\"Model that the plots show\">\n<span>Show</span>\n{buttons}\
-         <button type=\"button\" id=\"play\" aria-pressed=\"false\">▶ watch the error fall</button>\n\
-         <span id=\"shown\" class=\"unseen\" aria-live=\"polite\"></span>\n</nav>\n"
+        "{buttons}<button type=\"button\" id=\"play\" aria-pressed=\"false\">▶ watch the error fall</button>\n"
     )
 }
 
@@ -194,12 +251,19 @@ fn fit(diagnosis: &Diagnosis) -> String {
             figure(&format!("record-{k}"), &heading, "")
         })
         .collect();
+    let above = if findings::several(diagnosis) {
+        "Above the readings of each output and the models"
+    } else {
+        "Above the reading and the models"
+    };
     section(
         "fit",
         "Measured against model",
-        "Above the reading and the models, below the input. Shaded: where the chosen model clearly fails \
-         on the first fitted record, the stronger the worse. Drag to zoom (on a touch screen choose the \
-         magnifier first), double-click to see all again; the names switch the curves on and off.",
+        &format!(
+            "{above}, below the input. Shaded: where the chosen model clearly fails \
+             on the first fitted record, the stronger the worse. Drag to zoom (on a touch screen choose the \
+             magnifier first), double-click to see all again; the names switch the curves on and off."
+        ),
         &figures,
     )
 }
@@ -208,27 +272,32 @@ fn failures(diagnosis: &Diagnosis) -> String {
     let Some(last) = diagnosis.steps.last() else {
         return String::new();
     };
-    let sentences = items(&last.failures.sentences);
-    let any = |bins: fn(&Step) -> usize| diagnosis.steps.iter().any(|step| bins(step) > 0);
+    let sentences = items(findings::sentences(diagnosis, last));
+    let any = |bins: fn(&Failures) -> usize| {
+        let outputs = diagnosis.steps.iter().flat_map(|step| &step.outputs);
+        outputs
+            .map(|output| bins(&output.failures))
+            .any(|count| count > 0)
+    };
     let mut figures = String::new();
     if !diagnosis.records.is_empty() {
         figures.push_str(&figure("by-time", "Residual against time", ""));
     }
     let mut pairs = String::new();
-    if any(|step| step.failures.by_level.len()) {
+    if any(|failures| failures.by_level.len()) {
         pairs.push_str(&figure("by-level", "Against the model's output", BINNED));
     }
-    if any(|step| step.failures.by_flow.len()) {
+    if any(|failures| failures.by_flow.len()) {
         pairs.push_str(&figure("by-flow", "Against the input", BINNED));
     }
-    if any(|step| step.failures.by_direction.len()) {
+    if any(|failures| failures.by_direction.len()) {
         pairs.push_str(&figure(
             "by-direction",
             "By direction of the model's output",
             "Bars: root mean square; diamonds: mean.",
         ));
     }
-    if any(|step| step.failures.by_frequency.len()) {
+    if any(|failures| failures.by_frequency.len()) {
         pairs.push_str(&figure(
             "by-frequency",
             "By frequency",
@@ -326,15 +395,28 @@ fn role(record: &Shown) -> &'static str {
 }
 
 fn residual_tests(diagnosis: &Diagnosis) -> String {
-    let Some(tests) = diagnosis.steps.last().map(|step| &step.tests) else {
+    let Some(last) = diagnosis.steps.last() else {
         return String::new();
     };
-    let any = diagnosis.steps.iter().any(|step| {
-        step.tests.autocorrelation.len() > 1 || !step.tests.cross_correlation.is_empty()
+    let mut outputs = diagnosis.steps.iter().flat_map(|step| &step.outputs);
+    let any = outputs.any(|output| {
+        output.tests.autocorrelation.len() > 1 || !output.tests.cross_correlation.is_empty()
     });
     if !any {
         return String::new();
     }
+    // The script leaves those of the chosen output.
+    let said = |of: fn(&ResidualTests) -> String| {
+        let said = last.outputs.iter().map(|output| {
+            let finding = of(&output.tests);
+            if findings::several(diagnosis) {
+                format!("{}: {finding}", output.name)
+            } else {
+                finding
+            }
+        });
+        escape(&said.collect::<Vec<_>>().join(" "))
+    };
     section(
         "tests",
         "Is anything left in the residual?",
@@ -347,7 +429,7 @@ fn residual_tests(diagnosis: &Diagnosis) -> String {
                 "Residual against its own past",
                 &format!(
                     "<span id=\"whiteness\">{}</span>",
-                    escape(&text::whiteness(tests.whiteness_p))
+                    said(|tests| text::whiteness(tests.whiteness_p))
                 )
             ),
             figure_with(
@@ -355,7 +437,7 @@ fn residual_tests(diagnosis: &Diagnosis) -> String {
                 "Residual against past input",
                 &format!(
                     "<span id=\"input-test\">{}</span> Both were whitened first.",
-                    escape(&text::input_test(tests.input_p))
+                    said(|tests| text::input_test(tests.input_p))
                 )
             )
         ),

@@ -5,8 +5,8 @@
   const records = report.records || [];
   const steps = report.steps || [];
   const located = Math.max(0, records.findIndex((record) => !record.held_out));
-  const view = { chosen: steps.length - 1, residualRecord: located, sameAxes: true };
-  const { figures, stepColour, sized } = diagnosisFigures(report, view);
+  const view = { chosen: steps.length - 1, output: 0, residualRecord: located, sameAxes: true };
+  const { figures, stepColour, sized, several } = diagnosisFigures(report, view);
 
   // --- drawing -----------------------------------------------------------------------------
 
@@ -26,11 +26,12 @@
     const step = steps[view.chosen];
     if (!step) return;
     const put = (id, text) => { const e = document.getElementById(id); if (e) e.textContent = text; };
-    put("whiteness", step.whiteness);
-    put("input-test", step.input_test);
-    put("shown", `${step.label}: simulation error ${step.rmse === null ? "unknown" : sized(step.rmse, report.output_unit || "")}`);
+    put("whiteness", step.outputs[view.output].whiteness);
+    put("input-test", step.outputs[view.output].input_test);
+    const error = ({ rmse }, o) => `${several ? `${report.outputs[o].name} ` : ""}${rmse === null ? "unknown" : sized(rmse, report.output_unit || "")}`;
+    put("shown", `${step.label}: simulation error ${step.outputs.map(error).join(", ")}`);
     const list = document.getElementById("failure-sentences");
-    if (list) list.replaceChildren(...step.failures.sentences.map((s) => { const item = document.createElement("li"); item.textContent = s; return item; }));
+    if (list) list.replaceChildren(...step.sentences.map((s) => { const item = document.createElement("li"); item.textContent = s; return item; }));
     document.querySelectorAll("#steps [data-step]").forEach((b) => {
       const here = Number(b.dataset.step) === view.chosen;
       b.setAttribute("aria-pressed", String(here));
@@ -91,12 +92,17 @@
       });
       nav.addEventListener("keydown", (event) => {
         const move = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-        if (!move || event.target.id === "play") return;
+        if (!move || event.target.id === "play" || event.target.id === "shown-output") return;
         event.preventDefault();
         stop();
         choose(view.chosen + move);
         nav.querySelector(`[data-step="${view.chosen}"]`).focus();
       });
+    }
+    const output = document.getElementById("shown-output");
+    if (output) {
+      output.value = String(view.output);
+      output.addEventListener("change", () => { view.output = Number(output.value); choose(view.chosen); });
     }
     const select = document.getElementById("residual-record");
     if (select) {

@@ -2,8 +2,8 @@
 //! zone, with the base model, the overflow, and both. The simulations are real, the scores made up.
 
 use missing_effect::{
-    Acceptance, Bin, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor, Parameter, PlaceScore,
-    Rankings, ResidualTests, Score, Shown, Step, Verdict,
+    Acceptance, Bin, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor, OutputStep, Parameter,
+    PerOutput, PlaceScore, Rankings, ResidualTests, Score, Shown, Step, Verdict,
 };
 
 use crate::identify::rms;
@@ -11,23 +11,24 @@ use crate::identify::rms;
 const PERIOD: f64 = 4.0;
 const NOISE: f64 = 0.08;
 
-/// What the two tanks do with this command: lower level \[V\].
-fn simulate(input: &[f64], rim: f64, deadzone: f64, gain: f64) -> Vec<f64> {
+/// What the two tanks do with this command: lower and upper level \[V\].
+fn simulate(input: &[f64], rim: f64, deadzone: f64, gain: f64) -> [Vec<f64>; 2] {
     let (mut upper, mut lower) = (2.0_f64, 3.0_f64);
     let fine = 8;
-    input
+    let levels = input
         .iter()
         .map(|u| {
-            let reading = lower;
+            let readings = (lower, upper);
             for _ in 0..fine {
                 let dt = PERIOD / f64::from(fine);
                 let between = 0.085 * upper.max(0.0).sqrt();
                 upper = (upper + dt * (gain * (u - deadzone).max(0.0) - between)).clamp(0.0, rim);
                 lower = (lower + dt * (between - 0.075 * lower.max(0.0).sqrt())).max(0.0);
             }
-            reading
+            readings
         })
-        .collect()
+        .unzip();
+    levels.into()
 }
 
 /// A repeatable, nearly Gaussian sequence.
@@ -86,6 +87,16 @@ fn even_edges(values: &[f64], count: usize) -> Vec<f64> {
     (0..=count)
         .map(|i| low + (high - low) * i as f64 / count as f64)
         .collect()
+}
+
+/// The numbers of the outputs of a sample by their names.
+fn named(outputs: &[String], values: impl IntoIterator<Item = f64>) -> PerOutput {
+    PerOutput(outputs.iter().cloned().zip(values).collect())
+}
+
+/// Root mean square of errors of outputs, each divided by its noise.
+fn weighted(errors: &PerOutput) -> f64 {
+    rms(errors.values().map(|rmse| rmse / NOISE))
 }
 
 fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
@@ -171,17 +182,34 @@ fn parameter(name: &str, value: f64, std_error: Option<f64>, unit: &str) -> Para
     }
 }
 
-fn step(effects: &[(&str, Parameter)], records: &[Shown], model: (f64, f64, f64)) -> Step {
-    let simulated: Vec<Vec<f64>> = records
+fn step(
+    effects: &[(&str, Parameter)],
+    (outputs, records): (&[String], &[Shown]),
+    model: (f64, f64, f64),
+) -> Step {
+    let runs: Vec<[Vec<f64>; 2]> = records
         .iter()
         .map(|r| simulate(&r.input, model.0, model.1, model.2))
         .collect();
-    let residuals: Vec<Vec<f64>> = records
-        .iter()
-        .zip(&simulated)
-        .map(|(r, s)| r.output.iter().zip(s).map(|(y, s)| y - s).collect())
-        .collect();
-    let rmse = rms(residuals[0].iter().copied());
+    let of_output = |output: usize| {
+        let residuals: Vec<Vec<f64>> = records
+            .iter()
+            .zip(&runs)
+            .map(|(r, run)| {
+                let pairs = r.outputs[output].iter().zip(&run[output]);
+                pairs.map(|(y, s)| y - s).collect()
+            })
+            .collect();
+        OutputStep {
+            name: outputs[output].clone(),
+            rmse: rms(residuals[0].iter().copied()),
+            rmse_test: Some(rms(residuals[1].iter().copied())),
+            held_out_error: None,
+            tests: tests(&records[0].input, &residuals[0]),
+            failures: failures(&records[0], &runs[0][output], &residuals[0]),
+        }
+    };
+    let of_outputs: Vec<OutputStep> = (0..outputs.len()).map(of_output).collect();
     let mut parameters = vec![
         parameter("pump_gain", model.2, Some(0.000_31), "V^0.5/s"),
         parameter("alpha_upper", 0.085, Some(0.000_42), "V^0.5/s"),
@@ -191,19 +219,33 @@ fn step(effects: &[(&str, Parameter)], records: &[Shown], model: (f64, f64, f64)
     parameters.push(parameter("level_upper(0)", 2.0, None, "V"));
     parameters.push(parameter("level_lower(0)", 3.0, Some(0.021), "V"));
     let added = effects.last().map(|(effect, _)| (*effect).to_owned());
+    let errors = named(outputs, of_outputs.iter().map(|output| output.rmse));
+    let tested = named(
+        outputs,
+        of_outputs.iter().filter_map(|output| output.rmse_test),
+    );
+    let single = |values: &PerOutput| match values.0[..] {
+        [(_, value)] => value,
+        _ => f64::NAN,
+    };
     Step {
         place: (added.as_deref() == Some("overflow")).then(|| "upper".to_owned()),
         added,
-        rmse,
-        rmse_test: Some(rms(residuals[1].iter().copied())),
-        held_out_error: None,
-        bic: 2.0 * 600.0 * rmse.ln(),
+        rmse: single(&errors),
+        rmse_test: Some(single(&tested)).filter(|rmse| !rmse.is_nan()),
+        weighted_rmse: weighted(&errors),
+        weighted_rmse_test: Some(weighted(&tested)),
+        bic: 2.0 * 600.0 * weighted(&errors).ln(),
+        rmse_per_output: errors,
+        rmse_test_per_output: Some(tested),
         parameters,
         starts: 12,
         starts_agree: 12 - 2 * effects.len(),
-        tests: tests(&records[0].input, &residuals[0]),
-        failures: failures(&records[0], &simulated[0], &residuals[0]),
-        simulated,
+        outputs: of_outputs,
+        simulated: runs
+            .into_iter()
+            .flat_map(|run| run.into_iter().take(outputs.len()))
+            .collect(),
     }
 }
 
@@ -213,6 +255,7 @@ fn score(effect: &str, bic_gain: f64, rmse: f64, size: Option<Parameter>) -> Sco
         place: (effect == "overflow").then(|| "upper".to_owned()),
         bic_gain,
         rmse,
+        weighted_rmse: rmse / NOISE,
         visibility: 0.02 + (bic_gain.abs() / 700.0).min(0.9),
         smallest_visible: size.as_ref().map(|p| 0.08 * p.value.abs()),
         size,
@@ -221,6 +264,20 @@ fn score(effect: &str, bic_gain: f64, rmse: f64, size: Option<Parameter>) -> Sco
 
 /// Two tanks, an overflow and a dead zone found.
 pub(crate) fn two_tanks() -> Diagnosis {
+    diagnosis(&["y"])
+}
+
+/// The same of a record of both levels.
+pub(crate) fn two_outputs() -> Diagnosis {
+    let mut diagnosis = diagnosis(&["lower", "upper"]);
+    for score in &mut diagnosis.scores {
+        score.rmse = f64::NAN;
+    }
+    diagnosis
+}
+
+fn diagnosis(outputs: &[&str]) -> Diagnosis {
+    let outputs: Vec<String> = outputs.iter().map(|name| (*name).to_owned()).collect();
     let records: Vec<Shown> = [
         (600, 0.0, "tanks-estimation.csv"),
         (500, 700.0, "tanks-validation.csv"),
@@ -230,20 +287,24 @@ pub(crate) fn two_tanks() -> Diagnosis {
     .map(|((n, shift, name), seed)| {
         let input = input(n, shift);
         let truth = simulate(&input, 7.5, 0.55, 0.062);
+        let readings = truth.iter().take(outputs.len()).zip([seed, seed + 2]);
         Shown {
             name: name.to_owned(),
             held_out: seed == 2,
             time: (0..n).map(|k| k as f64 * PERIOD).collect(),
-            output: truth
-                .iter()
-                .zip(noise(seed, n))
-                .map(|(y, e)| y + e)
+            outputs: readings
+                .map(|(truth, seed)| {
+                    let noisy = truth.iter().zip(noise(seed, n));
+                    noisy.map(|(y, e)| y + e).collect()
+                })
                 .collect(),
             input,
             input_2: None,
+            input_2_unit: None,
         }
     })
     .collect();
+    let data = (&outputs[..], &records[..]);
     let rim = parameter("overflow.rim", 7.5, Some(0.034), "V");
     let zone = parameter("pump_deadzone.u_dz", 0.55, Some(0.027), "V");
     let overflow = ("overflow", rim.clone());
@@ -252,7 +313,7 @@ pub(crate) fn two_tanks() -> Diagnosis {
     Diagnosis {
         gaps: None,
         clock: ct_signals::Clock::of([]),
-        schema: 1,
+        schema: 2,
         verdict: Verdict::Undecided,
         effects: vec!["overflow".into(), "pump_deadzone".into()],
         groups: vec![
@@ -274,17 +335,21 @@ pub(crate) fn two_tanks() -> Diagnosis {
         .map(String::from)
         .to_vec(),
         steps: vec![
-            step(&[], &records, (1e3, 0.0, 0.049)),
-            step(std::slice::from_ref(&overflow), &records, (7.5, 0.0, 0.052)),
-            step(&[overflow, deadzone], &records, (7.5, 0.55, 0.062)),
+            step(&[], data, (1e3, 0.0, 0.049)),
+            step(std::slice::from_ref(&overflow), data, (7.5, 0.0, 0.052)),
+            step(&[overflow, deadzone], data, (7.5, 0.55, 0.062)),
         ],
-        noise_floor: NOISE,
-        noise: NoiseFloor {
-            level: NOISE,
-            innovation: NOISE,
-            coefficients: vec![],
-            source: "residual of overflow + pump_deadzone, which passes the tests".into(),
-        },
+        noise_floor: if outputs.len() > 1 { f64::NAN } else { NOISE },
+        noise: outputs
+            .iter()
+            .map(|output| NoiseFloor {
+                output: output.clone(),
+                level: NOISE,
+                innovation: NOISE,
+                coefficients: vec![],
+                source: "residual of overflow + pump_deadzone, which passes the tests".into(),
+            })
+            .collect(),
         scores: vec![
             score("overflow", 512.4, 0.31, Some(rim)),
             score("sensor_saturation", 401.8, 0.36, volt(6.1)),
@@ -326,6 +391,7 @@ pub(crate) fn two_tanks() -> Diagnosis {
         known_effects: vec!["sqrt_outflow".into()],
         input_unit: "V".into(),
         output_unit: "V".into(),
+        outputs,
         records,
         seconds: 0.4,
     }
@@ -333,7 +399,11 @@ pub(crate) fn two_tanks() -> Diagnosis {
 
 /// The same after `compare`: the base model alone, nothing scored, nothing held out.
 pub(crate) fn comparison() -> Diagnosis {
-    let mut diagnosis = two_tanks();
+    comparison_of(two_tanks())
+}
+
+/// What `compare` has of a diagnosis.
+pub(crate) fn comparison_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.verdict = Verdict::Unexplained;
     diagnosis.effects.clear();
     diagnosis.groups.clear();
@@ -345,8 +415,13 @@ pub(crate) fn comparison() -> Diagnosis {
     diagnosis.steps.truncate(1);
     diagnosis.records.truncate(1);
     for step in &mut diagnosis.steps {
-        step.simulated.truncate(1);
+        step.simulated.truncate(diagnosis.outputs.len());
         step.rmse_test = None;
+        step.rmse_test_per_output = None;
+        step.weighted_rmse_test = None;
+        for output in &mut step.outputs {
+            output.rmse_test = None;
+        }
     }
     diagnosis.sentences = vec!["The model errs by 7 times the noise floor.".into()];
     diagnosis
@@ -355,7 +430,11 @@ pub(crate) fn comparison() -> Diagnosis {
 /// The overflow alone, as a part of the answer: what the acceptance test, the places, the rankings, the held-out error and the limit
 /// on the time have to say.
 pub(crate) fn partial() -> Diagnosis {
-    let mut diagnosis = two_tanks();
+    partial_of(two_tanks())
+}
+
+/// A part of the answer of a diagnosis that has found the overflow first.
+pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.verdict = Verdict::Partial;
     for list in [&mut diagnosis.effects, &mut diagnosis.ranked] {
         list.retain(|effect| effect != "pump_deadzone");
@@ -375,7 +454,7 @@ pub(crate) fn partial() -> Diagnosis {
         share_test: Some(0.86),
         required: 0.9,
         required_partial: 0.5,
-        floor: NOISE,
+        floor: named(&diagnosis.outputs, diagnosis.outputs.iter().map(|_| NOISE)),
         bic_fall: Some(512.4),
         required_bic_fall: 6.0,
         reasons: vec![
@@ -396,8 +475,9 @@ pub(crate) fn partial() -> Diagnosis {
         left_out: vec!["swap steps between pairs of effects".into()],
         interrupted: false,
     };
-    for step in &mut diagnosis.steps {
-        step.held_out_error = step.rmse_test.map(|rmse| HeldOutError {
+    let steps = diagnosis.steps.iter_mut();
+    for output in steps.flat_map(|step| &mut step.outputs) {
+        output.held_out_error = output.rmse_test.map(|rmse| HeldOutError {
             offset: 0.6 * rmse,
             gain: 0.48 * rmse,
             shape: 0.64 * rmse,
@@ -419,34 +499,63 @@ pub(crate) fn awkward() -> Diagnosis {
         record.name = "<a href=\"x\">week</a> & <b>\"all\"</b>".to_owned();
         record.time = (0..n).map(|i| i as f64 * PERIOD).collect();
         record.input = record.input.repeat(repeats);
-        record.output = record.output.repeat(repeats);
-        record.output[n / 3..n / 2].fill(f64::NAN);
+        record.outputs[0] = record.outputs[0].repeat(repeats);
+        record.outputs[0][n / 3..n / 2].fill(f64::NAN);
         for step in &mut diagnosis.steps {
             step.simulated[k] = step.simulated[k].repeat(repeats);
         }
     }
     for step in &mut diagnosis.steps {
-        for bin in &mut step.failures.by_time {
+        let OutputStep {
+            failures, tests, ..
+        } = &mut step.outputs[0];
+        for bin in &mut failures.by_time {
             bin.from *= repeats as f64;
             bin.to *= repeats as f64;
         }
         for (from, to) in [(0, f64::NEG_INFINITY), (2, f64::INFINITY)] {
-            step.failures.by_direction[from].from = to;
+            failures.by_direction[from].from = to;
         }
-        step.failures.by_level[3].rms = f64::NAN;
-        step.failures.by_level[3].mean = f64::NAN;
-        step.failures.by_frequency.clear();
-        step.tests.cross_correlation.clear();
-        step.tests.input_p = f64::NAN;
-        step.tests.autocorrelation_bound = f64::NAN;
+        failures.by_level[3].rms = f64::NAN;
+        failures.by_level[3].mean = f64::NAN;
+        failures.by_frequency.clear();
+        tests.cross_correlation.clear();
+        tests.input_p = f64::NAN;
+        tests.autocorrelation_bound = f64::NAN;
     }
     diagnosis.steps[1].simulated.clear();
     diagnosis.steps[1].rmse = f64::NAN;
     diagnosis.steps[1].rmse_test = None;
-    diagnosis.steps[1].failures.by_flow.clear();
+    diagnosis.steps[1].outputs[0].rmse = f64::NAN;
+    diagnosis.steps[1].outputs[0].rmse_test = None;
+    diagnosis.steps[1].outputs[0].failures.by_flow.clear();
     diagnosis.scores[2].bic_gain = f64::NAN;
     diagnosis.noise_floor = f64::NAN;
+    diagnosis.noise[0].level = f64::NAN;
     diagnosis.output_unit = "cm^2".to_owned();
     diagnosis.input_unit = String::new();
     diagnosis
+}
+
+/// Names of outputs come from the headers of files.
+pub(crate) fn rename_outputs(diagnosis: &mut Diagnosis, names: &[&str]) {
+    let renamed = |values: &mut PerOutput| {
+        for ((name, _), new) in values.0.iter_mut().zip(names) {
+            (*new).clone_into(name);
+        }
+    };
+    for (k, new) in names.iter().enumerate() {
+        (*new).clone_into(&mut diagnosis.outputs[k]);
+        (*new).clone_into(&mut diagnosis.noise[k].output);
+    }
+    if let Some(test) = &mut diagnosis.acceptance {
+        renamed(&mut test.floor);
+    }
+    for step in &mut diagnosis.steps {
+        renamed(&mut step.rmse_per_output);
+        step.rmse_test_per_output.as_mut().map(renamed);
+        for (output, new) in step.outputs.iter_mut().zip(names) {
+            (*new).clone_into(&mut output.name);
+        }
+    }
 }

@@ -10,6 +10,7 @@ use crate::numbers::duration;
 /// What was looked at: plant, records, noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
     let output = unit(&diagnosis.output_unit);
+    let several = findings::several(diagnosis);
     let mut facts = vec![("Plant", escape(&diagnosis.plant))];
     if !diagnosis.known_effects.is_empty() {
         let known = escape(&diagnosis.known_effects.join(", "));
@@ -21,16 +22,30 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
         } else {
             "Fitted to"
         };
-        let mut text = format!("{}: {} samples", escape(&record.name), record.samples());
+        // The readings of all outputs are counted.
+        let count = if several { "readings" } else { "samples" };
+        let mut text = format!("{}: {} {count}", escape(&record.name), record.samples());
         if let (Some(first), Some(last)) = (record.time.first(), record.time.last()) {
             text.push_str(&format!(" over {}", duration(last - first)));
         }
         facts.push((role, text));
     }
-    if diagnosis.noise_floor.is_finite() {
-        let level = significant(diagnosis.noise_floor, 2);
-        let source = escape(&diagnosis.noise.source);
-        facts.push(("Noise floor", format!("{level} {output}, from: {source}")));
+    for floor in diagnosis
+        .noise
+        .iter()
+        .filter(|noise| noise.level.is_finite())
+    {
+        let level = significant(floor.level, 2);
+        let source = escape(&floor.source);
+        let of = if several {
+            format!("{}: ", escape(&floor.output))
+        } else {
+            String::new()
+        };
+        facts.push((
+            "Noise floor",
+            format!("{of}{level} {output}, from: {source}"),
+        ));
     }
     let items: String = facts
         .iter()
@@ -178,7 +193,11 @@ pub(super) fn shares(unknown: &Unknown) -> String {
 
 /// The catalogue, best effect first.
 pub(super) fn scores(diagnosis: &Diagnosis) -> String {
-    let output = unit(&diagnosis.output_unit);
+    let error_unit = if findings::several(diagnosis) {
+        findings::TIMES_THE_NOISE.to_owned()
+    } else {
+        unit(&diagnosis.output_unit)
+    };
     let rows: String = diagnosis
         .scores
         .iter()
@@ -204,7 +223,7 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
                 k + 1,
                 code(&score.effect),
                 one_decimal(score.bic_gain),
-                significant(score.rmse, 3),
+                significant(findings::score_error(diagnosis, score).0, 3),
                 percent(score.visibility),
                 size(score.size.as_ref()),
             )
@@ -215,7 +234,7 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
         &format!(
             "<tr><th scope=\"col\" class=\"number\">#</th><th scope=\"col\">Effect</th>\
              <th scope=\"col\" class=\"number\">Fall of BIC</th>\
-             <th scope=\"col\" class=\"number\">Simulation error [{output}]</th>\
+             <th scope=\"col\" class=\"number\">Simulation error [{error_unit}]</th>\
              <th scope=\"col\" class=\"number\">Visible part</th>\
              <th scope=\"col\" class=\"number\">Size ± standard error</th>\
              <th scope=\"col\" class=\"number\">Visible from</th></tr>"
@@ -230,7 +249,6 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
 /// The parameters of every step side by side, with what the fit reached.
 pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
     let steps = &diagnosis.steps;
-    let output = unit(&diagnosis.output_unit);
     let heads: String = last_first(steps)
         .map(|(k, step)| {
             let last = if k > 0 && k + 1 == steps.len() {
@@ -256,35 +274,20 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
         })
         .collect();
     rows.push_str("</tbody><tbody>");
-    rows.push_str(&row(
-        "Simulation error, fitted data (rms)",
-        &output,
-        steps,
-        |step| significant(step.rmse, 3),
-    ));
-    if steps.iter().any(|step| step.rmse_test.is_some()) {
-        rows.push_str(&row(
-            "Simulation error, held-out data (rms)",
-            &output,
-            steps,
-            |step| {
-                step.rmse_test
-                    .map_or(String::new(), |error| significant(error, 3))
-            },
-        ));
+    let split = |step: &Step| step.outputs.iter().any(|of| of.held_out_error.is_some());
+    let split = steps.iter().any(split);
+    for (index, name) in diagnosis.outputs.iter().enumerate() {
+        rows.push_str(&errors(diagnosis, index, name));
     }
-    let split = steps.iter().any(|step| step.held_out_error.is_some());
-    if split {
-        for (part, name) in ["Its offset", "Its gain", "Its shape"].iter().enumerate() {
-            rows.push_str(&row(name, &output, steps, |step| {
-                step.held_out_error.map_or(String::new(), |error| {
-                    let HeldOutError {
-                        offset,
-                        gain,
-                        shape,
-                    } = error;
-                    significant([offset, gain, shape][part], 2)
-                })
+    if findings::several(diagnosis) {
+        let of = findings::TIMES_THE_NOISE;
+        rows.push_str(&row("All outputs, fitted data", of, steps, |step| {
+            significant(step.weighted_rmse, 3)
+        }));
+        if steps.iter().any(|step| step.weighted_rmse_test.is_some()) {
+            rows.push_str(&row("All outputs, held-out data", of, steps, |step| {
+                step.weighted_rmse_test
+                    .map_or(String::new(), |error| significant(error, 3))
             }));
         }
     }
@@ -311,6 +314,55 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
              A minimum that one start alone has reached may not be the best one.{held_out}"
         ),
     )
+}
+
+/// The rows of the simulation error of an output; its name stands before them where there are several.
+fn errors(diagnosis: &Diagnosis, index: usize, name: &str) -> String {
+    let steps = &diagnosis.steps;
+    let unit = unit(&diagnosis.output_unit);
+    let of = |text: &str| {
+        if findings::several(diagnosis) {
+            format!("{}: {text}", escape(name))
+        } else {
+            text.to_owned()
+        }
+    };
+    let number = |value: Option<f64>, digits: i32| {
+        value.map_or(String::new(), |value| significant(value, digits))
+    };
+    let mut rows = row(
+        &of("Simulation error, fitted data (rms)"),
+        &unit,
+        steps,
+        |step| number(step.outputs.get(index).map(|output| output.rmse), 3),
+    );
+    let test = |step: &Step| step.outputs.get(index)?.rmse_test;
+    if steps.iter().any(|step| test(step).is_some()) {
+        rows.push_str(&row(
+            &of("Simulation error, held-out data (rms)"),
+            &unit,
+            steps,
+            |step| number(test(step), 3),
+        ));
+    }
+    let parts = |step: &Step| {
+        let error = step.outputs.get(index)?.held_out_error;
+        error.map(
+            |HeldOutError {
+                 offset,
+                 gain,
+                 shape,
+             }| [offset, gain, shape],
+        )
+    };
+    if steps.iter().any(|step| parts(step).is_some()) {
+        for (part, name) in ["Its offset", "Its gain", "Its shape"].iter().enumerate() {
+            rows.push_str(&row(&of(name), &unit, steps, |step| {
+                number(parts(step).map(|parts| parts[part]), 2)
+            }));
+        }
+    }
+    rows
 }
 
 /// Every parameter once, with its unit, in the order of the last step, which has the most.

@@ -174,12 +174,12 @@ fn every_plot_has_a_place_and_every_place_a_plot() {
 #[test]
 fn names_are_escaped_wherever_they_stand() {
     let hostile = "<script>alert('x')</script>&\"";
-    let mut diagnosis = sample::two_tanks();
+    let mut diagnosis = sample::two_outputs();
     diagnosis.plant = hostile.to_owned();
     diagnosis.output_unit = hostile.to_owned();
     diagnosis.input_unit = hostile.to_owned();
     diagnosis.sentences.push(hostile.to_owned());
-    diagnosis.noise.source = hostile.to_owned();
+    diagnosis.noise[0].source = hostile.to_owned();
     diagnosis.known_effects.push(hostile.to_owned());
     diagnosis.effects[0] = hostile.to_owned();
     diagnosis.groups[0] = vec![hostile.to_owned(), format!("{hostile} too")];
@@ -189,11 +189,12 @@ fn names_are_escaped_wherever_they_stand() {
     for step in &mut diagnosis.steps {
         step.added = Some(hostile.to_owned());
         step.place = Some(hostile.to_owned());
-        step.failures.sentences.push(hostile.to_owned());
+        let sentences = &mut step.outputs[0].failures.sentences;
+        sentences.push(hostile.to_owned());
         step.parameters[0].name = hostile.to_owned();
         step.parameters[0].unit = hostile.to_owned();
     }
-    let partial = sample::partial();
+    let partial = sample::partial_of(sample::two_outputs());
     diagnosis.acceptance = partial.acceptance.map(|mut test| {
         test.effects[0] = hostile.to_owned();
         test.reasons.push(hostile.to_owned());
@@ -209,7 +210,77 @@ fn names_are_escaped_wherever_they_stand() {
     if let Some(size) = &mut diagnosis.scores[0].size {
         size.unit = hostile.to_owned();
     }
-    assert!(!html(&diagnosis).contains("<script>alert"));
+    sample::rename_outputs(&mut diagnosis, &[hostile, "</select></script><b>"]);
+    for output in diagnosis
+        .steps
+        .iter_mut()
+        .flat_map(|step| &mut step.outputs)
+    {
+        output.held_out_error = partial.steps[0].outputs[0].held_out_error;
+    }
+    for verdict in [Verdict::Undecided, Verdict::Partial] {
+        diagnosis.verdict = verdict;
+        let page = html(&diagnosis);
+        assert!(!page.contains("<script>alert"));
+        assert!(!page.contains("</select></script>") && !page.contains("</script><b>"));
+    }
+}
+
+#[test]
+fn several_outputs_are_told_by_name_and_as_multiples_of_their_noise() {
+    let diagnosis = sample::partial_of(sample::two_outputs());
+    let page = html(&diagnosis);
+    let (words, _) = page.split_once("id=\"data\"").expect("data");
+    let step = &diagnosis.steps[1];
+    let weighted = significant(step.weighted_rmse, 2);
+    for output in &step.outputs {
+        let error = significant(output.rmse, 2);
+        let test = significant(output.rmse_test.expect("a held-out record"), 2);
+        let line = format!(
+            "<span class=\"test\">{}: {error} V, held out {test} V</span>",
+            output.name
+        );
+        assert!(words.contains(&line), "{line}");
+        let floor = format!("<dd>{}: 0.080 V, from: residual of", output.name);
+        assert!(words.contains(&floor), "{floor}");
+        for row in [
+            "Simulation error, fitted data (rms)",
+            "Simulation error, held-out data (rms)",
+            "Its offset",
+        ] {
+            let row = format!("<th scope=\"row\">{}: {row}</th>", output.name);
+            assert!(words.contains(&row), "{row}");
+        }
+        let sentence = &output.failures.sentences[0];
+        assert!(words.contains(&format!("<li>{}: {sentence}</li>", output.name)));
+    }
+    for part in [
+        &format!("<span class=\"number\">{weighted} <small>times the noise</small>"),
+        &format!("<b>{weighted} times the noise</b></button>"),
+        "<select id=\"shown-output\" autocomplete=\"off\"><option value=\"0\">lower</option><option value=\"1\">upper</option></select>",
+        "<th scope=\"row\">All outputs, held-out data</th><td>times the noise</td>",
+        "<th scope=\"col\" class=\"number\">Simulation error [times the noise]</th>",
+        "<td class=\"number\">0.080 V (lower), 0.080 V (upper)</td>",
+        "1200 readings over",
+    ] {
+        assert!(words.contains(part), "{part}");
+    }
+    // A number that there is not must not show as a dash.
+    assert!(!words.contains("<span class=\"number\">– "));
+    let alone = html(&sample::two_tanks());
+    for part in ["shown-output", "times the noise", "All outputs", "readings"] {
+        let (words, _) = alone.split_once("id=\"data\"").expect("data");
+        assert!(!words.contains(part), "{part}");
+    }
+}
+
+#[test]
+fn a_comparison_of_several_outputs_offers_the_output_alone() {
+    let page = html(&sample::comparison_of(sample::two_outputs()));
+    assert!(page.contains("<nav id=\"steps\"") && page.contains("id=\"shown-output\""));
+    assert!(!page.contains("<button type=\"button\" data-step"));
+    let (words, _) = page.split_once("id=\"data\"").expect("data");
+    assert!(!words.contains("held out"));
 }
 
 #[test]
@@ -235,7 +306,7 @@ fn an_empty_diagnosis_is_still_a_page() {
     diagnosis.steps.clear();
     diagnosis.records.clear();
     diagnosis.sentences.clear();
-    diagnosis.noise_floor = f64::NAN;
+    diagnosis.noise[0].level = f64::NAN;
     let page = html(&diagnosis);
     assert!(page.ends_with("</html>\n"));
     assert!(!page.contains("class=\"plot\""));
@@ -246,10 +317,10 @@ fn an_empty_diagnosis_is_still_a_page() {
 #[test]
 fn tests_that_were_not_made_are_left_out() {
     let mut diagnosis = sample::comparison();
-    let tests = &mut diagnosis.steps[0].tests;
-    tests.autocorrelation.clear();
-    tests.cross_correlation.clear();
-    diagnosis.steps[0].failures.by_frequency.clear();
+    let output = &mut diagnosis.steps[0].outputs[0];
+    output.tests.autocorrelation.clear();
+    output.tests.cross_correlation.clear();
+    output.failures.by_frequency.clear();
     let page = html(&diagnosis);
     assert!(!page.contains("plot-autocorrelation"));
     assert!(!page.contains("plot-by-frequency"));
@@ -279,6 +350,7 @@ fn write_the_samples() {
         ("ctid-report-partial.html", sample::partial()),
         ("ctid-report-comparison.html", sample::comparison()),
         ("ctid-report-awkward.html", sample::awkward()),
+        ("ctid-report-outputs.html", sample::two_outputs()),
     ] {
         let path = std::env::temp_dir().join(name);
         std::fs::write(&path, html(&diagnosis)).expect("a writable folder");

@@ -44,18 +44,21 @@ async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Res
             }
         }
         input::on_one_clock(&mut read);
-        let units = read.first().map(|record| {
-            let [input, output] = [&record.inputs[0], &record.outputs[0]];
-            (input.unit.clone(), output.unit.clone())
+        let signals = read.first().map(|record| {
+            let outputs = record.outputs.iter().map(|output| output.name.clone());
+            let units = [&record.inputs[0].unit, &record.outputs[0].unit];
+            (outputs.collect::<Vec<_>>(), units.map(String::clone))
         });
         let shown = read.iter().zip(held_out);
         let shown = shown.map(|(record, held_out)| Shown::of(record, held_out));
         let mut shown: Vec<Shown> = shown.collect();
-        let (input, output) = units.unwrap_or_default();
+        let (outputs, [input, output]) = signals.unwrap_or_default();
         // As in the report, those that are fitted come first.
         shown.sort_by_key(|record| record.held_out);
         let clock = Clock::of(&read);
-        Ok(report::drawing_of_records(&shown, &input, &output, &clock))
+        Ok(report::drawing_of_records(
+            &shown, &input, &outputs, &output, &clock,
+        ))
     });
     Ok(as_json(text.await?.into()))
 }

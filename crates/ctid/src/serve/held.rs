@@ -18,8 +18,8 @@ pub(super) fn of_record(record: &Record) -> usize {
 pub(super) fn of_diagnosis(diagnosis: &Diagnosis) -> usize {
     let records = diagnosis.records.iter();
     let records = records.flat_map(|shown| {
-        let always = [&shown.time, &shown.input, &shown.output];
-        always.into_iter().chain(&shown.input_2)
+        let inputs = [&shown.time, &shown.input].into_iter();
+        inputs.chain(&shown.input_2).chain(&shown.outputs)
     });
     let runs = diagnosis.steps.iter().flat_map(|step| &step.simulated);
     let paths = diagnosis.unknown.iter();

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use axum::body::Bytes;
 use ct_signals::{Columns, ReadOptions};
 use missing_effect::design::Design;
-use missing_effect::{Diagnosis, Progress};
+use missing_effect::{Diagnosis, PerOutput, Progress};
 use plants::Domain;
 
 use super::guard::{LARGEST_BODY, Refusal};
@@ -37,8 +37,9 @@ pub(super) struct Fitted {
     pub data: u64,
     /// It ran on the measured command, also where the loop could be simulated.
     pub measured: bool,
-    pub rmse: f64,
-    pub rmse_test: Option<f64>,
+    /// Simulation error of each output, on the fitted and on the held-out records.
+    pub errors: PerOutput,
+    pub errors_test: Option<PerOutput>,
     pub bic: f64,
     /// What is left of the records looks like noise.
     pub adequate: bool,

@@ -30,9 +30,18 @@ struct Known {
     area_3: Option<f64>,
     pipe_area: Option<f64>,
     gravity: Option<f64>,
-    measured: Option<String>,
+    measured: Option<Measured>,
+    disturbance: Option<String>,
     tank_height: Option<f64>,
     input_range: Option<f64>,
+}
+
+/// The tanks whose levels are measured: one, or as many as there are outputs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+enum Measured {
+    One(String),
+    Several(Vec<String>),
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -113,7 +122,6 @@ impl Settings {
         let mut document = edit::document(file, text)?;
         let root = document.as_table_mut();
         put(root, "plant", Some(self.plant.as_str().into()));
-        forget_places(root, &self.plant);
         if !root.contains_key("effects") {
             root.insert("effects", Item::Value(Array::new().into()));
         }
@@ -166,7 +174,15 @@ impl Settings {
         section(&mut document, file, "columns", columns)?;
         let number = |value: Option<f64>| value.map(Value::from);
         let known = [
-            ("measured", word(&self.known.measured)),
+            (
+                "measured",
+                match &self.known.measured {
+                    None => None,
+                    Some(Measured::One(name)) => word(&Some(name.clone())),
+                    Some(Measured::Several(all)) => names(all),
+                },
+            ),
+            ("disturbance", word(&self.known.disturbance)),
             ("area", number(self.known.area)),
             ("area_upper", number(self.known.area_upper)),
             ("area_lower", number(self.known.area_lower)),
@@ -179,6 +195,8 @@ impl Settings {
             ("input_range", number(self.known.input_range)),
         ];
         section(&mut document, file, "known", known)?;
+        // Which sensors there are is known now.
+        forget_places(document.as_table_mut(), &self.plant);
         match &self.controller {
             None => {
                 document.remove("controller");
@@ -222,6 +240,7 @@ fn forget_places(root: &mut Table, plant: &str) {
         .flatten()
         .filter_map(|id| id.as_str().map(str::to_string))
         .collect();
+    let known = known_outputs(root, plant);
     let Some(tables) = root.get_mut("effect").and_then(Item::as_table_like_mut) else {
         return;
     };
@@ -231,9 +250,26 @@ fn forget_places(root: &mut Table, plant: &str) {
             continue;
         };
         let place = table.get("where").and_then(Item::as_str);
-        if place.is_some_and(|word| model_file::vessel(plant, effect, word).is_err()) {
+        if place.is_some_and(|word| model_file::vessel(plant, &known, effect, word).is_err()) {
             table.remove("where");
         }
+    }
+}
+
+/// What the file says of the measured levels.
+fn known_outputs(root: &Table, plant: Plant) -> plants::Known {
+    let measured = root
+        .get("known")
+        .and_then(Item::as_table_like)
+        .and_then(|known| known.get("measured")?.as_array());
+    let vessel = |word: &str| (0..plant.vessels()).find(|&i| plant.vessel_name(i) == Some(word));
+    let words = measured
+        .into_iter()
+        .flatten()
+        .filter_map(|word| word.as_str());
+    plants::Known {
+        measured: words.filter_map(vessel).collect(),
+        ..plants::Known::default()
     }
 }
 
@@ -403,7 +439,7 @@ rim = 20.0
                 area: Some(154.0),
                 pipe_area: Some(0.5),
                 gravity: Some(981.0),
-                measured: Some("T3".into()),
+                measured: Some(Measured::One("T3".into())),
                 ..Known::default()
             },
             ..Settings::default()

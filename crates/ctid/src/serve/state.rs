@@ -94,7 +94,7 @@ pub(super) fn state(session: &mut Session) -> Value {
         "model_error": error,
         "settings": Settings::of(&session.text),
         "effects": words::effects(session),
-        "offered": model.as_ref().map_or(Vec::new(), |model| sites(model.plant, session.domain(model))),
+        "offered": model.as_ref().map_or(Vec::new(), |model| sites(model, session.domain(model))),
         "waiting": model.as_ref().map_or(Vec::new(), words::waiting),
         "records": records,
         "warnings": warnings,
@@ -137,7 +137,7 @@ fn about(record: &Record) -> Value {
         "interval": numbers::duration(record.sample_interval()),
         "input": signal(&record.inputs[0]),
         "input_2": record.inputs.get(1).map(signal),
-        "output": signal(&record.outputs[0]),
+        "outputs": record.outputs.iter().map(signal).collect::<Vec<_>>(),
         "reference": record.references.first().map(signal),
     })
 }
@@ -147,7 +147,7 @@ type Chain = Vec<(String, Option<String>)>;
 
 fn effects_of(model: &ModelFile) -> Chain {
     let placed = model.effects.iter().map(|placed| {
-        let place = placed.place_name(model.plant);
+        let place = placed.place_name(model.plant, &model.known);
         (placed.effect.id.to_string(), place.map(str::to_string))
     });
     let terms = model.terms.iter().map(|own| (own.term.name.clone(), None));
@@ -187,15 +187,25 @@ fn choices(session: &Session, model: &ModelFile, kin: &[&Arc<Fitted>]) -> Vec<Ch
 
 fn point(fitted: &Fitted) -> Value {
     let effects = effects_of(&fitted.model);
+    // Models that were fitted one by one have no noise in common by which errors of several outputs become one number.
+    let several = fitted.errors.0.len() > 1;
+    let errors = fitted.errors.0.iter().enumerate();
+    let errors = errors.map(|(k, (name, rmse))| {
+        let test = fitted.errors_test.as_ref();
+        let test = test.and_then(|test| test.values().nth(k));
+        json!({
+            "output": several.then_some(name),
+            "rmse": rmse,
+            "text": numbers::significant(*rmse, 3),
+            "test": test.map(|rmse| numbers::significant(rmse, 3)),
+        })
+    });
     json!({
         "id": fitted.id,
         "plant": fitted.model.plant.id(),
         "name": chain_name(&effects),
         "effects": effects,
-        "rmse": fitted.rmse,
-        "rmse_text": numbers::significant(fitted.rmse, 3),
-        "rmse_test": fitted.rmse_test,
-        "rmse_test_text": fitted.rmse_test.map(|rmse| numbers::significant(rmse, 3)),
+        "errors": errors.collect::<Vec<_>>(),
         "bic": numbers::whole(fitted.bic),
         "adequate": fitted.adequate,
     })
@@ -208,7 +218,9 @@ pub(super) fn plants() -> Value {
             "id": plant.id(),
             "known": known_of(plant),
             "pumps": plant.pumps(),
-            "measured": if plant.joined() { vessel_names(plant) } else { Vec::new() },
+            "levels": vessel_names(plant),
+            // With one reading the others have the last level.
+            "joined": plant.joined(),
             "model": equation(plant),
         })
     });
@@ -236,12 +248,13 @@ fn vessel_names(plant: Plant) -> Vec<&'static str> {
 }
 
 /// Every effect that the domain offers, at every place where it can act on a plant.
-fn sites(plant: Plant, domain: Domain) -> Vec<Value> {
+fn sites(model: &ModelFile, domain: Domain) -> Vec<Value> {
+    let (plant, known) = (model.plant, &model.known);
     let offered = CATALOGUE.iter().filter(|effect| domain.offers(effect));
     let sites = offered.flat_map(|effect| {
         effect
-            .sites(plant)
-            .map(move |vessel| json!({ "effect": effect.id, "place": Placed { effect, vessel }.place_name(plant) }))
+            .sites(plant, known)
+            .map(move |vessel| json!({ "effect": effect.id, "place": Placed { effect, vessel }.place_name(plant, known) }))
     });
     sites.collect()
 }
@@ -250,7 +263,9 @@ fn equation(plant: Plant) -> &'static str {
     match plant {
         Plant::SingleTank => "S dH/dt = pump_gain·u − alpha·√H",
         Plant::SingleTankLinear => "tau·dy/dt + y = K·u + offset",
-        Plant::CascadedTanks => "two square-root tanks in series; the lower level is measured",
+        Plant::CascadedTanks => {
+            "two square-root tanks in series; one reading is of the lower level"
+        }
         Plant::CascadedTanksLinear => "two lags in series",
         Plant::FirstOrder => "tau·dy/dt + y = K·u",
         Plant::ThreeTank => {

@@ -40,23 +40,30 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
         }),
         starts: step.map_or(0, |step| step.starts),
         starts_agree: step.map_or(0, |step| step.starts_agree),
-        held_out_error: step.and_then(|step| held_out_error(diagnosis, step)),
+        held_out_error: step.and_then(|step| held_out_errors(diagnosis, step)),
         sentences: sentences.map(String::as_str).collect(),
-        noise: with_unit(
-            &numbers::significant(diagnosis.noise_floor, 2),
-            &diagnosis.output_unit,
-        ),
+        noise: noise(diagnosis),
         seconds: diagnosis.seconds,
     };
     // Writing plain structs to memory cannot fail.
     serde_json::to_string(&body).unwrap_or_else(|_| "{}".to_owned())
 }
 
-/// `held-out error 1.9 degC: offset 1.9, gain 0.1, shape 0.3 degC`.
-fn held_out_error(diagnosis: &Diagnosis, step: &Step) -> Option<String> {
-    let error = step.held_out_error.as_ref()?;
-    let parts = findings::held_out_error(error, &diagnosis.output_unit);
-    Some(format!("held-out error {parts}"))
+/// `held-out error 1.9 degC: offset 1.9, gain 0.1, shape 0.3 degC`, of all outputs.
+fn held_out_errors(diagnosis: &Diagnosis, step: &Step) -> Option<String> {
+    let errors = findings::held_out_errors(diagnosis, step);
+    (!errors.is_empty()).then(|| errors.join("; "))
+}
+
+/// The noise floor of each output.
+fn noise(diagnosis: &Diagnosis) -> String {
+    let floors = findings::noise_floors(diagnosis);
+    findings::per_output(&floors, 2, &diagnosis.output_unit)
+}
+
+/// The simulation error of each output.
+fn errors(diagnosis: &Diagnosis, step: &Step) -> String {
+    findings::per_output(&step.rmse_per_output, 3, &diagnosis.output_unit)
 }
 
 fn with_unit(number: &str, unit: &str) -> String {
@@ -89,7 +96,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
             "effect": effect,
             "place": findings::tank(diagnosis, k),
             "size": diagnosis.steps.last().and_then(|step| own_size(step, effect)),
-            "rmse": error_after(diagnosis, k, unit),
+            "rmse": diagnosis.steps.get(k + 1).map(|step| errors(diagnosis, step)),
             "sentence": diagnosis.sentences.get(k),
             "in_doubt": diagnosis.in_doubt.get(k),
             "places": diagnosis.places.get(k).filter(|places| places.len() > 1).map(|places| findings::place_scores(diagnosis.domain(), places)),
@@ -115,11 +122,11 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "groups": groups.collect::<Vec<_>>(),
         // The first sentences are those of the groups.
         "sentences": diagnosis.sentences.get(diagnosis.groups.len()..).unwrap_or_default(),
-        "before": with_unit(&numbers::significant(diagnosis.steps.first().map_or(f64::NAN, |s| s.rmse), 3), unit),
-        "noise": with_unit(&numbers::significant(diagnosis.noise_floor, 2), unit),
+        "before": diagnosis.steps.first().map_or("-".to_owned(), |step| errors(diagnosis, step)),
+        "noise": noise(diagnosis),
         "acceptance": acceptance,
         "rankings": rankings,
-        "held_out_error": diagnosis.steps.last().and_then(|step| held_out_error(diagnosis, step)),
+        "held_out_error": diagnosis.steps.last().and_then(|step| held_out_errors(diagnosis, step)),
         "effort": findings::effort(&diagnosis.effort, Reader::Page),
         "ranking": ranked.collect::<Vec<_>>(),
         // What the shape depends on, where nothing explains it.
@@ -176,25 +183,20 @@ fn own_size(step: &Step, effect: &str) -> Option<String> {
     parameters.find(|p| p.name.starts_with(&own)).map(size)
 }
 
-/// The simulation error once the added effect of this index is on.
-fn error_after(diagnosis: &Diagnosis, index: usize, unit: &str) -> Option<String> {
-    let step = diagnosis.steps.get(index + 1)?;
-    Some(with_unit(&numbers::significant(step.rmse, 3), unit))
-}
-
 fn ranked(diagnosis: &Diagnosis, score: &Score) -> Value {
     let info = EffectInfo::find(&score.effect);
     let domain = diagnosis.domain();
     // How to confirm an effect is written for tanks.
     let confirm = info.filter(|_| domain == Domain::Hydraulic);
     let unit = score.size.as_ref().map_or("", |size| size.unit.as_str());
+    let (error, error_unit) = findings::score_error(diagnosis, score);
     let visible = score.smallest_visible.filter(|size| size.is_finite());
     json!({
         "effect": score.effect,
         "place": score.place,
         "gain": score.bic_gain.is_finite().then_some(score.bic_gain),
         "evidence": numbers::whole(score.bic_gain),
-        "rmse": with_unit(&numbers::significant(score.rmse, 3), &diagnosis.output_unit),
+        "rmse": with_unit(&numbers::significant(error, 3), error_unit),
         "size": score.size.as_ref().map(size),
         "visible": visible.map(|size| with_unit(&numbers::significant(size, 2), unit)),
         "physics": info.map(|effect| effect.in_words(domain)),
@@ -263,7 +265,7 @@ pub(super) fn effects(session: &Session) -> Vec<Value> {
     };
     let domain = session.domain(&model);
     let placed = model.effects.iter().map(|placed| {
-        let vessel = placed.place_name(model.plant);
+        let vessel = placed.place_name(model.plant, &model.known);
         json!({ "effect": placed.effect.id, "place": vessel, "physics": placed.effect.in_words(domain) })
     });
     let terms = model.terms.iter().map(

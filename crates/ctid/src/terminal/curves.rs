@@ -4,17 +4,25 @@ use console::Style;
 use missing_effect::{Diagnosis, Shown, Step};
 
 use super::{length, model_name};
+use crate::findings;
 use crate::look::Look;
 use crate::plot::{self, Curve, plot};
 
-/// Measurement and model over time, in the first record.
+/// Measurement and model over time, in the first record, output by output.
 pub(crate) fn overlay(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
-    let Some((record, model)) = first_record(diagnosis, step) else {
+    let outputs = 0..diagnosis.outputs.len();
+    outputs
+        .map(|output| overlay_of(diagnosis, step, output, look))
+        .collect()
+}
+
+fn overlay_of(diagnosis: &Diagnosis, step: &Step, output: usize, look: Look) -> String {
+    let Some((record, measured, model)) = first_record(diagnosis, step, output) else {
         return String::new();
     };
     let curves = [
         Curve {
-            values: &record.output,
+            values: measured,
             colour: plot::MEASURED,
         },
         Curve {
@@ -31,10 +39,11 @@ pub(crate) fn overlay(diagnosis: &Diagnosis, step: &Step, look: Look) -> String 
     } else {
         "measured and model".to_string()
     };
-    let limits = plot::limits([record.output.as_slice(), model]);
+    let limits = plot::limits([measured, model]);
+    let title = format!("{}{}:", record.name, of_output(diagnosis, output));
     format!(
         "{} {key}{}\n{}\n",
-        look.heading(&format!("{}:", record.name)),
+        look.heading(&title),
         in_unit(&diagnosis.output_unit),
         plot(&curves, (0.0, length(record)), limits, 9, look)
     )
@@ -48,14 +57,27 @@ fn in_unit(unit: &str) -> String {
     }
 }
 
-/// The residual of each of these steps over time in the first record, all on one scale.
+/// `, upper` where there are several outputs.
+fn of_output(diagnosis: &Diagnosis, output: usize) -> String {
+    let name = diagnosis.outputs.get(output);
+    let name = name.filter(|_| findings::several(diagnosis));
+    name.map_or(String::new(), |name| format!(", {name}"))
+}
+
+/// The residual of each of these steps over time in the first record, those of an output on one scale.
 pub(crate) fn residuals(diagnosis: &Diagnosis, steps: &[&Step], look: Look) -> String {
+    let outputs = 0..diagnosis.outputs.len();
+    outputs
+        .map(|output| residuals_of(diagnosis, steps, output, look))
+        .collect()
+}
+
+fn residuals_of(diagnosis: &Diagnosis, steps: &[&Step], output: usize, look: Look) -> String {
     let residuals: Vec<(&&Step, &Shown, Vec<f64>)> = steps
         .iter()
         .filter_map(|step| {
-            let (record, model) = first_record(diagnosis, step)?;
-            let residual = record
-                .output
+            let (record, measured, model) = first_record(diagnosis, step, output)?;
+            let residual = measured
                 .iter()
                 .zip(model)
                 .map(|(y, model)| y - model)
@@ -71,7 +93,11 @@ pub(crate) fn residuals(diagnosis: &Diagnosis, steps: &[&Step], look: Look) -> S
             values: residual,
             colour: plot::RESIDUAL,
         };
-        let title = format!("Measured minus model{}:", in_unit(&diagnosis.output_unit));
+        let title = format!(
+            "Measured minus model{}{}:",
+            of_output(diagnosis, output),
+            in_unit(&diagnosis.output_unit)
+        );
         text += &format!(
             "{} {}\n{}\n",
             look.heading(&title),
@@ -88,8 +114,14 @@ pub(crate) fn residuals(diagnosis: &Diagnosis, steps: &[&Step], look: Look) -> S
     text
 }
 
-fn first_record<'a>(diagnosis: &'a Diagnosis, step: &'a Step) -> Option<(&'a Shown, &'a [f64])> {
+/// The first record, with what was measured and simulated of this output.
+fn first_record<'a>(
+    diagnosis: &'a Diagnosis,
+    step: &'a Step,
+    output: usize,
+) -> Option<(&'a Shown, &'a [f64], &'a [f64])> {
     let record = diagnosis.records.first()?;
-    let model = step.simulated.first()?;
-    (model.len() == record.output.len() && model.len() > 1).then_some((record, model))
+    let measured = record.outputs.get(output)?;
+    let model = step.simulated.get(output)?;
+    (model.len() == measured.len() && model.len() > 1).then_some((record, measured, model))
 }

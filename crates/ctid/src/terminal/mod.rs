@@ -3,7 +3,7 @@
 mod curves;
 mod ranking;
 
-use missing_effect::{Diagnosis, ResidualTests, Shown, Step, Verdict};
+use missing_effect::{Diagnosis, OutputStep, ResidualTests, Shown, Step, Verdict};
 
 pub(crate) use self::curves::{overlay, residuals};
 pub(crate) use self::ranking::ranking;
@@ -56,10 +56,13 @@ pub fn diagnosis(diagnosis: &Diagnosis, look: Look) -> String {
 
 /// What was looked at.
 pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
-    let heading = ["record", "", "samples", "length", "input", "output"];
+    // The readings of all outputs are counted.
+    let several = findings::several(diagnosis);
+    let count = if several { "readings" } else { "samples" };
+    let heading = ["record", "", count, "length", "input", "output"];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
     for record in &diagnosis.records {
-        rows.push(vec![
+        let mut row = vec![
             record.name.clone(),
             if record.held_out {
                 "held out"
@@ -70,8 +73,18 @@ pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
             record.samples().to_string(),
             numbers::duration(length(record)),
             range(&record.input, &diagnosis.input_unit),
-            range(&record.output, &diagnosis.output_unit),
-        ]);
+        ];
+        // Further outputs stand below the first.
+        for (name, output) in diagnosis.outputs.iter().zip(&record.outputs) {
+            let range = range(output, &diagnosis.output_unit);
+            row.resize(heading.len() - 1, String::new());
+            row.push(if several {
+                format!("{name} {range}")
+            } else {
+                range
+            });
+            rows.push(std::mem::take(&mut row));
+        }
     }
     let sides = [
         Side::Left,
@@ -143,68 +156,125 @@ fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
 
-/// The error from step to step.
+/// The error from step to step: of each output, and where there are several of all together.
 pub(crate) fn trail(diagnosis: &Diagnosis, look: Look) -> String {
-    let steps = &diagnosis.steps;
-    let unit = &diagnosis.output_unit;
-    let held_out = steps.iter().any(|step| step.rmse_test.is_some());
-    let mut fitted: Vec<Option<f64>> = steps.iter().map(|step| Some(step.rmse)).collect();
-    fitted.push(Some(diagnosis.noise_floor));
-    let mut scored: Vec<Option<f64>> = steps.iter().map(|step| step.rmse_test).collect();
-    scored.push(None);
-    // One number of decimals for both, so that they can be compared at a glance.
-    let numbers = numbers::column(&[fitted.clone(), scored].concat());
-    let (fitted_text, scored_text) = numbers.split_at(fitted.len());
-    let worst = steps.iter().map(|step| step.rmse).fold(0.0, f64::max);
-
-    let mut heading = vec![String::new(), look.faint("fitted data")];
-    let mut sides = vec![Side::Left, Side::Right];
-    if held_out {
-        heading.push(look.faint("held-out data"));
-        sides.push(Side::Right);
-    }
-    sides.push(Side::Left);
-    let mut rows = vec![heading];
-    for (index, step) in steps.iter().enumerate() {
-        let mut row = vec![
-            step_name(diagnosis, step),
-            with_unit(&fitted_text[index], unit),
-        ];
-        if held_out {
-            row.push(match step.rmse_test {
-                Some(_) => with_unit(&scored_text[index], unit),
-                None => "-".to_string(),
-            });
-        }
-        row.push(bar(step.rmse, worst));
-        rows.push(row);
-    }
     // One model's residual does not tell its noise from its faults.
     let floor_known = !compared(diagnosis);
-    let mut floor = vec![
-        look.faint("noise floor"),
-        look.faint(with_unit(&fitted_text[steps.len()], unit)),
-    ];
-    if held_out {
-        floor.push(String::new());
+    let several = findings::several(diagnosis);
+    let mut text = String::new();
+    for (index, floor) in diagnosis.noise.iter().enumerate() {
+        let errors = diagnosis.steps.iter().map(|step| {
+            let output = step.outputs.get(index);
+            let rmse = output.map_or(f64::NAN, |output| output.rmse);
+            (rmse, output.and_then(|output| output.rmse_test))
+        });
+        let of = if several {
+            format!(" of {}", floor.output)
+        } else {
+            String::new()
+        };
+        let title = format!("Simulation error{of}, root mean square");
+        let errors = Errors {
+            title: &title,
+            of_steps: errors.collect(),
+            floor: floor.level,
+            floor_known,
+            unit: &diagnosis.output_unit,
+        };
+        text += &errors.table(diagnosis, look);
+        if floor_known && !floor.source.is_empty() {
+            let source = format!("(noise floor: {})", floor.source);
+            text += &look.faint(look.paragraph("  ", &source).trim_end());
+            text.push('\n');
+        }
+        if several {
+            text.push('\n');
+        }
     }
-    floor.push(look.faint(bar(diagnosis.noise_floor, worst)));
-    if floor_known {
-        rows.push(floor);
-    }
-
-    let mut text = format!("{}\n", look.heading("Simulation error, root mean square"));
-    for line in table(&sides, &rows) {
-        text += &format!("  {line}\n");
-    }
-    if floor_known && !diagnosis.noise.source.is_empty() {
-        let source = format!("(noise floor: {})", diagnosis.noise.source);
-        text += &look.faint(look.paragraph("  ", &source).trim_end());
-        text.push('\n');
+    if several && floor_known {
+        let errors = diagnosis.steps.iter();
+        let errors = errors.map(|step| (step.weighted_rmse, step.weighted_rmse_test));
+        let errors = Errors {
+            title: "Simulation error of all outputs, in multiples of their noise",
+            of_steps: errors.collect(),
+            floor: 1.0,
+            floor_known: false,
+            unit: "",
+        };
+        text += &errors.table(diagnosis, look);
     }
     text += &held_out_errors(diagnosis, look);
     text.push('\n');
     text
+}
+
+/// The error of each step on the fitted and on the held-out records.
+struct Errors<'a> {
+    title: &'a str,
+    of_steps: Vec<(f64, Option<f64>)>,
+    floor: f64,
+    /// The floor is shown.
+    floor_known: bool,
+    unit: &'a str,
+}
+
+impl Errors<'_> {
+    /// With bars, above the noise floor.
+    fn table(&self, diagnosis: &Diagnosis, look: Look) -> String {
+        let held_out = self.of_steps.iter().any(|(_, test)| test.is_some());
+        let fitted = self.of_steps.iter().map(|(rmse, _)| Some(*rmse));
+        let fitted: Vec<Option<f64>> = fitted.chain([Some(self.floor)]).collect();
+        let scored = self.of_steps.iter().map(|(_, test)| *test);
+        // One number of decimals for both, so that they can be compared at a glance.
+        let all: Vec<Option<f64>> = fitted.iter().copied().chain(scored).collect();
+        let numbers = numbers::column(&all);
+        let (fitted_text, scored_text) = numbers.split_at(fitted.len());
+        let worst = self
+            .of_steps
+            .iter()
+            .map(|(rmse, _)| *rmse)
+            .fold(0.0, f64::max);
+
+        let mut heading = vec![String::new(), look.faint("fitted data")];
+        let mut sides = vec![Side::Left, Side::Right];
+        if held_out {
+            heading.push(look.faint("held-out data"));
+            sides.push(Side::Right);
+        }
+        sides.push(Side::Left);
+        let mut rows = vec![heading];
+        for (index, (step, (rmse, test))) in diagnosis.steps.iter().zip(&self.of_steps).enumerate()
+        {
+            let mut row = vec![
+                step_name(diagnosis, step),
+                with_unit(&fitted_text[index], self.unit),
+            ];
+            if held_out {
+                row.push(match test {
+                    Some(_) => with_unit(&scored_text[index], self.unit),
+                    None => "-".to_string(),
+                });
+            }
+            row.push(bar(*rmse, worst));
+            rows.push(row);
+        }
+        if self.floor_known {
+            let mut row = vec![
+                look.faint("noise floor"),
+                look.faint(with_unit(&fitted_text[self.of_steps.len()], self.unit)),
+            ];
+            if held_out {
+                row.push(String::new());
+            }
+            row.push(look.faint(bar(self.floor, worst)));
+            rows.push(row);
+        }
+        let mut text = format!("{}\n", look.heading(self.title));
+        for line in table(&sides, &rows) {
+            text += &format!("  {line}\n");
+        }
+        text
+    }
 }
 
 /// What the error on held-out data is made of, of the first and the last model.
@@ -212,14 +282,16 @@ fn held_out_errors(diagnosis: &Diagnosis, look: Look) -> String {
     let last = diagnosis.steps.len().saturating_sub(1);
     let mut text = String::new();
     for (index, step) in diagnosis.steps.iter().enumerate() {
-        if let (Some(error), true) = (&step.held_out_error, index == 0 || index == last) {
-            let of = if last > 0 {
-                format!("{}, ", model_name(diagnosis, step))
-            } else {
-                String::new()
-            };
-            let error = findings::held_out_error(error, &diagnosis.output_unit);
-            text += &look.paragraph("  ", &format!("{of}held-out error {error}"));
+        if index > 0 && index < last {
+            continue;
+        }
+        let of = if last > 0 {
+            format!("{}, ", model_name(diagnosis, step))
+        } else {
+            String::new()
+        };
+        for error in findings::held_out_errors(diagnosis, step) {
+            text += &look.paragraph("  ", &format!("{of}{error}"));
         }
     }
     text
@@ -235,8 +307,15 @@ fn bar(value: f64, largest: f64) -> String {
     "█".repeat(eighths / 8) + rest
 }
 
-/// Where a model fails, in words.
+/// Where a model fails, in words, output by output.
 pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
+    let outputs = step.outputs.iter();
+    outputs
+        .map(|output| failures_of(diagnosis, step, output, look))
+        .collect()
+}
+
+fn failures_of(diagnosis: &Diagnosis, step: &Step, output: &OutputStep, look: Look) -> String {
     let name = step_name(diagnosis, step);
     let title = match diagnosis.verdict {
         Verdict::Adequate if !compared(diagnosis) => {
@@ -244,14 +323,19 @@ pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String
         }
         _ => format!("Where {name} fails"),
     };
+    let title = if findings::several(diagnosis) {
+        format!("{title}: {}", output.name)
+    } else {
+        title
+    };
     let mut text = format!("{}\n", look.heading(&title));
-    for sentence in step.failures.sentences.iter().take(FAILURES) {
+    for sentence in output.failures.sentences.iter().take(FAILURES) {
         text += &look.paragraph("  - ", sentence);
     }
-    if step.failures.sentences.is_empty() {
+    if output.failures.sentences.is_empty() {
         text += "  - nowhere in particular\n";
     }
-    text += &look.paragraph("  - ", &residual_tests(&step.tests));
+    text += &look.paragraph("  - ", &residual_tests(&output.tests));
     text.push('\n');
     text
 }
@@ -433,6 +517,33 @@ mod tests {
         ] {
             assert!(flat.contains(part), "{part}: {told}");
         }
+    }
+
+    #[test]
+    fn each_output_is_told_by_its_name() {
+        let found = sample::partial_of(sample::two_outputs());
+        let told = diagnosis(&found, Look::plain());
+        for part in [
+            "Simulation error of lower, root mean square",
+            "Simulation error of upper, root mean square",
+            "Simulation error of all outputs, in multiples of their noise",
+            "Where cascaded-tanks + sqrt_outflow fails: lower",
+            "Where cascaded-tanks + sqrt_outflow fails: upper",
+            "Measured minus model, lower [V]:",
+            "Measured minus model, upper [V]:",
+            "held-out error of lower ",
+            "held-out error of upper ",
+            "error/noise",
+        ] {
+            assert!(told.contains(part), "{part}: {told}");
+        }
+        let compared = comparison(&sample::comparison_of(found), Look::plain());
+        assert!(
+            compared.contains("tanks-estimation.csv, upper:"),
+            "{compared}"
+        );
+        // The noise is not known before a search.
+        assert!(!compared.contains("multiples of their noise"), "{compared}");
     }
 
     #[test]

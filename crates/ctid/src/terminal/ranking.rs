@@ -67,13 +67,20 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
 
 fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<String> {
     let scores: Vec<&Score> = diagnosis.scores.iter().take(RANKED).collect();
-    let errors: Vec<Option<f64>> = scores.iter().map(|score| Some(score.rmse)).collect();
-    let errors = numbers::column(&errors);
+    let errors = scores
+        .iter()
+        .map(|score| Some(findings::score_error(diagnosis, score).0));
+    let errors = numbers::column(&errors.collect::<Vec<_>>());
+    let (error_heading, unit) = if findings::several(diagnosis) {
+        ("error/noise", "")
+    } else {
+        ("error after", diagnosis.output_unit.as_str())
+    };
     let heading = |column: &Ranked| match column {
         Ranked::Place => String::new(),
         Ranked::Effect => look.faint("effect"),
         Ranked::Gain => look.faint("BIC falls"),
-        Ranked::Error => look.faint("error after"),
+        Ranked::Error => look.faint(error_heading),
         Ranked::Size | Ranked::SizeAlone => look.faint("size found"),
         Ranked::Visible => look.faint("visible from"),
     };
@@ -96,7 +103,7 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
                 }
             }
             Ranked::Gain => numbers::whole(score.bic_gain),
-            Ranked::Error => with_unit(&errors[index], &diagnosis.output_unit),
+            Ranked::Error => with_unit(&errors[index], unit),
             Ranked::Size => size(true),
             Ranked::SizeAlone => size(false),
             Ranked::Visible => visible_from(score),

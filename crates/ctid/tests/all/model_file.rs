@@ -496,7 +496,7 @@ fn three_tanks_are_understood() {
         model.columns.inputs.last().map(String::as_str),
         Some("u2 [V]")
     );
-    assert_eq!(model.known.measured, Some(2));
+    assert_eq!(model.known.measured, [2]);
     assert_eq!(model.known.area, [Some(154.0); 3]);
     let orifice = model.known.orifice.unwrap();
     assert!((orifice - 0.5 * 1962.0_f64.sqrt()).abs() < 1e-12);
@@ -562,7 +562,7 @@ fn what_three_tanks_lack_is_said() {
         ),
         (
             "plant = \"single-tank\"\n[known]\nmeasured = \"T1\"".to_string(),
-            "tank.toml:3: plant single-tank is measured in its last vessel",
+            "tank.toml:3: plant single-tank has one level",
             "delete measured",
         ),
         (
@@ -622,5 +622,87 @@ fn no_change_of_two_programs_is_lost() {
                 );
             }
         }
+    }
+}
+
+const BOTH: &str = "plant = \"cascaded-tanks\"\n[columns]\noutput = [\"h1\", \"h2\"]\n[known]\nmeasured = [\"upper\", \"lower\"]\n";
+
+#[test]
+fn several_levels_and_a_disturbance_are_understood() {
+    let model = parse(&(BOTH.to_string() + "disturbance = \"lower\"\n").replace(
+        "[columns]",
+        "effects = [\"sensor_drift\"]\n[columns]\ninput = [\"u\", \"d\"]",
+    ));
+    assert_eq!(model.columns.outputs, ["h1", "h2"]);
+    assert_eq!(model.known.measured, [0, 1]);
+    assert_eq!(model.known.disturbance, Some(1));
+    // Of several sensors the last one is meant where nobody says which.
+    assert_eq!(model.effects[0].vessel, 1);
+    let at_upper = BOTH.replace("[columns]", "effects = [\"sensor_drift\"]\n[columns]")
+        + "[effect.sensor_drift]\nwhere = \"upper\"\n";
+    assert_eq!(parse(&at_upper).effects[0].vessel, 0);
+    let one =
+        "plant = \"single-tank\"\n[columns]\ninput_2 = \"d\"\n[known]\ndisturbance = \"tank\"\n";
+    assert_eq!(parse(one).known.disturbance, Some(0));
+}
+
+#[test]
+fn what_several_levels_lack_is_said() {
+    for (text, start, mend) in [
+        (
+            BOTH.replace("measured = [\"upper\", \"lower\"]\n", ""),
+            "tank.toml: [columns] names 2 outputs, but nothing says which levels they are",
+            "measured = [\"upper\", \"lower\"]",
+        ),
+        (
+            BOTH.replace("\"upper\", \"lower\"", "\"lower\", \"lower\""),
+            "tank.toml:5: measured names lower twice",
+            "name each tank once",
+        ),
+        (
+            BOTH.replace("\"upper\", \"lower\"", "\"lower\""),
+            "tank.toml:5: measured names 1 of the tanks, but [columns] names 2 of the outputs",
+            "as many of both",
+        ),
+        (
+            BOTH.replace("\"h2\"]", "\"h2\", \"h3\"]"),
+            "tank.toml:3: [columns] names 3 outputs, but plant cascaded-tanks has 2 levels",
+            "name a column for each level",
+        ),
+        (
+            BOTH.replace("[\"h1\", \"h2\"]", "\"h1\"")
+                .replace("[\"upper\", \"lower\"]", "\"upper\""),
+            "tank.toml:5: the level of the lower tank is not among the outputs",
+            "plant = \"single-tank\"",
+        ),
+        (
+            BOTH.replace("[columns]", "effects = [\"sensor_drift\"]\n[columns]")
+                + "[effect.sensor_drift]\nwhere = \"middle\"\n",
+            "tank.toml:8: where = \"middle\" is no tank whose level is measured",
+            "\"upper\" or \"lower\"",
+        ),
+        (
+            BOTH.to_string() + "disturbance = \"lower\"\n",
+            "tank.toml:6: [known] says where a measured disturbance flows in, but [columns] names no column for it",
+            "input_2 = ",
+        ),
+        (
+            BOTH.replace("[columns]", "[columns]\ninput_2 = \"d\""),
+            "tank.toml:3: plant cascaded-tanks has one pump",
+            "disturbance = \"upper\" or \"lower\"",
+        ),
+        (
+            THREE.to_string() + "disturbance = \"T1\"\n",
+            "tank.toml:4: plant three-tank takes no measured disturbance",
+            "delete disturbance",
+        ),
+    ] {
+        let said = model_file::parse("tank.toml", &text)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            said.starts_with(start) && said.contains(mend) && !said.contains('\n'),
+            "{said}"
+        );
     }
 }

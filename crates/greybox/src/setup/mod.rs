@@ -8,14 +8,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_signals::{Channel, Hold, Record};
+use estimation::Noise;
 use plants::{
-    Command, Domain, MAX_VESSELS, Place, Placed, Scales, Structure, controller::Controller, deciles,
+    Command, Domain, Known, MAX_VESSELS, OutputScales, Place, Placed, Plant, Scales, Structure,
+    controller::Controller, deciles,
 };
 
-pub use self::{
-    rows::Rows,
-    simulation::{LoopRun, Simulated},
-};
+pub use self::simulation::{LoopRun, Simulated, weighted_rms};
 use crate::{
     Error, LinearPlant, Replay, TimeLimit,
     clock::{Clock, span},
@@ -50,6 +49,12 @@ pub struct Setup<'a> {
     free: Vec<usize>,
     /// How many entries come before the initial states.
     parameters: usize,
+    /// Samples of each output in all records, missing ones aside.
+    samples: Vec<usize>,
+    /// See [`estimation::Residuals::floor`].
+    floors: Vec<f64>,
+    /// Standard deviations of the outputs' noise, where they are known ([`estimation::Residuals::known_scales`]).
+    pub known_scales: Option<Vec<f64>>,
     /// The controller, where the loop is simulated.
     feedback: Option<Feedback>,
     /// When each record begins on the clock of drifts, steps and periods.
@@ -64,14 +69,17 @@ pub struct Setup<'a> {
 const STATE_PRICE: f64 = 2.0;
 
 /// Scales of records as the structure meets them first.
-pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<Scales> {
+pub(crate) fn scales_of(records: &[Record], plant: Plant, known: &Known) -> Option<Scales> {
     let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
     let input = records.iter().map(Record::input_range).reduce(wider)?;
     let input_2 = records
         .iter()
         .filter_map(|record| Some(record.inputs.get(1)?.range()))
         .reduce(wider);
-    let output = records.iter().map(Record::output_range).reduce(wider)?;
+    let ranges: Vec<(f64, f64)> = (0..known.outputs(plant).len())
+        .map(|o| output_range(records, o))
+        .collect::<Option<_>>()?;
+    let output = ranges.iter().copied().reduce(wider)?;
     let sample = records
         .iter()
         .map(Record::sample_interval)
@@ -86,18 +94,39 @@ pub(crate) fn scales_of(records: &[Record], input_range: Option<f64>) -> Option<
         commands(|record| Some(&record.inputs[0])),
         commands(|record| record.inputs.get(1)),
     ];
-    let readings = records
-        .iter()
-        .flat_map(|record| record.outputs[0].present());
-    scales.level_deciles = [deciles(readings.collect()); MAX_VESSELS];
-    if let Some((low, high)) = input_2 {
+    let readings = |o: usize| {
+        let outputs = records.iter().map(move |record| &record.outputs[o]);
+        deciles(outputs.flat_map(Channel::present).collect())
+    };
+    // A level that nobody reads is taken for one like the last that is read.
+    scales.level_deciles = [readings(ranges.len() - 1); MAX_VESSELS];
+    for (o, (vessel, (low, high))) in known.outputs(plant).into_iter().zip(ranges).enumerate() {
+        scales.level[vessel] = (low, high);
+        scales.operating_level[vessel] = 0.5 * (low + high);
+        scales.level_deciles[vessel] = readings(o);
+    }
+    // A disturbance says nothing of how far the actuator goes.
+    if let Some((low, high)) = input_2.filter(|_| plant.joined()) {
         scales.input_range = scales.input_range.max(low.abs()).max(high.abs());
     }
-    if let Some(range) = input_range {
+    if let Some(range) = known.input_range {
         scales.input_range = range;
     }
-    scales.reading_step = reading_step(records).unwrap_or(0.0);
+    scales.outputs = (0..known.outputs(plant).len())
+        .map(|o| OutputScales {
+            reading_step: reading_step(records, o).unwrap_or(0.0),
+            ..OutputScales::default()
+        })
+        .collect();
     Some(scales)
+}
+
+/// Smallest and largest reading of an output in all records; `None` where it has none.
+fn output_range(records: &[Record], output: usize) -> Option<(f64, f64)> {
+    let ranges = records
+        .iter()
+        .filter_map(|record| Some(record.outputs.get(output)?.range()));
+    ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 impl<'a> Setup<'a> {
@@ -125,6 +154,14 @@ impl<'a> Setup<'a> {
         for record in records {
             record.validate()?;
             record.require_whole_inputs()?;
+        }
+        let outputs = structure.scales.outputs.len();
+        if let Some(record) = records.iter().find(|r| r.outputs.len() != outputs) {
+            return Err(Error::Outputs {
+                record: record.name.clone(),
+                given: record.outputs.len(),
+                needed: outputs,
+            });
         }
         let plant = structure.plant;
         let mut names = structure.parameter_names();
@@ -189,7 +226,21 @@ impl<'a> Setup<'a> {
                 }
             }
         }
+        let count = |o: usize| {
+            let outputs = records.iter().map(|record| &record.outputs[o]);
+            outputs
+                .map(|output| output.values.len() - output.missing())
+                .sum()
+        };
+        // A millionth of the range: of a sensor that rounds, of a level that stands still.
+        let floor = |o: usize| {
+            let range = output_range(records, o).filter(|_| outputs > 1);
+            range.map_or(0.0, |(low, high)| 1e-6 * (high - low))
+        };
         Ok(Self {
+            known_scales: None,
+            samples: (0..outputs).map(count).collect(),
+            floors: (0..outputs).map(floor).collect(),
             structure,
             records,
             fixed,
@@ -254,6 +305,11 @@ impl<'a> Setup<'a> {
         self.rebuilt(self.structure.clone(), feedback)
     }
 
+    /// The loop is simulated.
+    pub(crate) fn is_in_loop(&self) -> bool {
+        self.feedback.is_some()
+    }
+
     /// What the controller gives on the measured reading of each record; empty where the loop is not simulated.
     #[must_use]
     pub fn replays(&self) -> &[Replay] {
@@ -271,7 +327,15 @@ impl<'a> Setup<'a> {
         records: &'a [Record],
         fixed: BTreeMap<String, f64>,
     ) -> Result<Self, Error> {
-        let scales = scales_of(records, known.input_range).ok_or(Error::NoRecord)?;
+        let known_outputs = known.outputs(plant).len();
+        if let Some(record) = records.iter().find(|r| r.outputs.len() != known_outputs) {
+            return Err(Error::Outputs {
+                record: record.name.clone(),
+                given: record.outputs.len(),
+                needed: known_outputs,
+            });
+        }
+        let scales = scales_of(records, plant, &known).ok_or(Error::NoRecord)?;
         let mut structure = Structure::new(plant, known, scales);
         if let Some(output) = records.first().and_then(|record| record.outputs.first()) {
             structure.domain = Domain::of(plant, &output.unit);
@@ -320,6 +384,7 @@ impl<'a> Setup<'a> {
         self.stop = other.stop;
         self.interrupt = other.interrupt;
         self.time_limit.clone_from(&other.time_limit);
+        self.known_scales.clone_from(&other.known_scales);
     }
 
     /// The same structure against other records, in the same scales, run on the measured command. Those that begin after the
@@ -369,7 +434,14 @@ impl<'a> Setup<'a> {
         let parameters = self.structure.parameters();
         let mut units: Vec<String> = parameters
             .iter()
-            .map(|info| self.structure.unit_label(info, level, input))
+            .map(|info| {
+                let second = record
+                    .inputs
+                    .get(1)
+                    .filter(|_| info.name == "disturbance_gain");
+                let input = second.map_or(input, |second| &second.unit);
+                self.structure.unit_label(info, level, input)
+            })
             .collect();
         for _ in self.records {
             units.extend((0..self.structure.plant.vessels()).map(|_| level.clone()));
@@ -411,7 +483,7 @@ impl<'a> Setup<'a> {
     #[must_use]
     pub fn price(&self, noise_order: usize) -> f64 {
         let states = self.free.iter().filter(|&&i| i >= self.parameters).count();
-        let lasting = self.free.len() - states + 1 + noise_order;
+        let lasting = self.free.len() - states + self.outputs() + noise_order;
         lasting as f64 * (self.samples() as f64).ln() + STATE_PRICE * states as f64
     }
 
@@ -421,13 +493,34 @@ impl<'a> Setup<'a> {
         self.free.retain(|&i| i < count);
     }
 
-    /// Samples of the output in all records, missing ones aside.
+    /// Samples of all outputs in all records, missing ones aside.
     #[must_use]
     pub fn samples(&self) -> usize {
-        self.records
-            .iter()
-            .map(|record| record.len() - record.outputs[0].missing())
-            .sum()
+        self.samples.iter().sum()
+    }
+
+    /// Samples of each output in all records, missing ones aside.
+    #[must_use]
+    pub fn samples_per_output(&self) -> &[usize] {
+        &self.samples
+    }
+
+    /// Whether the controller of the loop reads this output.
+    fn reads(&self, output: usize) -> bool {
+        let controller = self.feedback.as_ref().map(|f| f.controller.output());
+        controller == Some(output)
+    }
+
+    /// How many outputs there are.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// White noise at every output.
+    #[must_use]
+    pub fn white_noise(&self) -> Noise {
+        Noise::white(self.outputs())
     }
 
     /// Positions of the initial states of record `r`.
@@ -451,7 +544,7 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// The commands from sample `k` to the next one, that to a second pump zero where there is none.
+/// The inputs from sample `k` to the next one: the command, and that to a second pump or a measured disturbance; zero where there is none.
 pub fn commands(record: &Record, k: usize) -> [Command; 2] {
     let command = |u: &Channel| match u.hold {
         Hold::Zero => Command::held(u.values[k]),
@@ -460,7 +553,7 @@ pub fn commands(record: &Record, k: usize) -> [Command; 2] {
     [command(&record.inputs[0]), second(record, command)]
 }
 
-/// The held command to a second pump at sample `k`; zero where there is none.
+/// The second input at sample `k`, held: the command to a second pump or a measured disturbance; zero where there is none.
 fn second_command(record: &Record, k: usize) -> Command {
     second(record, |u| Command::held(u.values[k]))
 }
@@ -469,7 +562,7 @@ fn second(record: &Record, command: impl Fn(&Channel) -> Command) -> Command {
     record.inputs.get(1).map_or(Command::held(0.0), command)
 }
 
-/// What the pumps were told before a record began: its first commands.
+/// The inputs before a record began: its first ones.
 #[must_use]
 pub fn at_rest(record: &Record) -> [f64; 2] {
     let second = record.inputs.get(1);

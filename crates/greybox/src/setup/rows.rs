@@ -1,178 +1,24 @@
-//! The derivatives of a simulation, row by row, and what a fit folds them to.
+//! The derivatives of a simulation, row by row.
 
-use ct_signals::{ArModel, Record};
+use estimation::{Noise, Residuals, Rows, Sample, Triangle};
 use plants::{Dual, Simulator};
 
 use super::{Setup, at_rest, commands, reference, second_command};
-use crate::{Triangle, feedback::Response};
+use crate::feedback::Response;
 
-/// More than sums of squares over a record differ by where they are taken in another order.
-const ROUNDING: f64 = 1e-9;
-
-/// The derivatives and the residual of every sample, one record after the other.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Rows {
-    /// Entries of a row: the free entries of the vector, then the residual.
-    pub columns: usize,
-    /// Samples of each record.
-    pub lengths: Vec<usize>,
-    /// Row by row.
-    pub values: Vec<f64>,
-}
-
-/// What is known of a row's sample before it is simulated.
-#[derive(Clone, Copy)]
-struct Sample {
-    /// It is the first one of its record.
-    first: bool,
-    /// The output's sample is missing: the row has no residual.
-    missing: bool,
-}
-
-impl Rows {
-    /// The rows of one record after the other, each a slice of `length x columns` values.
-    pub fn records(&self) -> impl Iterator<Item = &[f64]> {
-        let mut rest = self.values.as_slice();
-        self.lengths.iter().map(move |&length| {
-            let (record, after) = rest.split_at(length * self.columns);
-            rest = after;
-            record
-        })
+impl Residuals for Setup<'_> {
+    fn free(&self) -> &[usize] {
+        &self.free
     }
 
-    /// The same without the rows whose sample is missing.
-    #[must_use]
-    pub fn observed(self) -> Self {
-        let residual = self.columns - 1;
-        if !self
-            .values
-            .chunks_exact(self.columns)
-            .any(|row| row[residual].is_nan())
-        {
-            return self;
-        }
-        let mut observed = Self {
-            columns: self.columns,
-            lengths: Vec::with_capacity(self.lengths.len()),
-            values: Vec::with_capacity(self.values.len()),
-        };
-        for record in self.records() {
-            let before = observed.values.len();
-            for row in record.chunks_exact(self.columns) {
-                if !row[residual].is_nan() {
-                    observed.values.extend_from_slice(row);
-                }
-            }
-            observed
-                .lengths
-                .push((observed.values.len() - before) / self.columns);
-        }
-        observed
+    fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
     }
 
-    /// The folded rows, whitened by a noise model, with columns chosen and put in this order. Rows whose residual is NaN are
-    /// missing: they are not folded in, and the rows behind them are whitened by what is there.
-    pub(crate) fn fold(&self, order: &[usize], noise: &ArModel) -> Triangle {
-        let mut triangle = Triangle::new(order.len());
-        let mut whitener = noise.whitener(order.len());
-        let mut chosen = vec![0.0; order.len()];
-        for record in self.records() {
-            whitener.reset();
-            let mut missing = 0;
-            for row in record.chunks_exact(self.columns) {
-                if row[self.columns - 1].is_nan() {
-                    missing += 1;
-                    continue;
-                }
-                whitener.skip_many(std::mem::take(&mut missing));
-                for (to, &column) in chosen.iter_mut().zip(order) {
-                    *to = row[column];
-                }
-                whitener.push(&mut chosen);
-                triangle.push(&chosen);
-            }
-        }
-        triangle.finish();
-        triangle
-    }
-}
-
-impl Setup<'_> {
-    /// The folded rows `[d model/d x_free, measured - model]`, whitened by the noise model; `None` where the
-    /// simulation is not finite.
-    #[must_use]
-    pub fn linearise(&self, x: &[f64], noise: &ArModel) -> Option<Triangle> {
-        self.linearise_below(x, noise, f64::INFINITY)
+    fn samples(&self) -> &[usize] {
+        &self.samples
     }
 
-    /// The same; `None` too where the cost is above a limit, which is known long before the last sample as a rule.
-    pub(crate) fn linearise_below(
-        &self,
-        x: &[f64],
-        noise: &ArModel,
-        limit: f64,
-    ) -> Option<Triangle> {
-        let columns = self.free.len() + 1;
-        let mut triangle = Triangle::new(columns);
-        let mut whitener = noise.whitener(columns);
-        // The triangle's cost is a sum in another order.
-        let limit = limit * (1.0 + ROUNDING);
-        let mut cost = 0.0;
-        self.each_row(x, |sample, row| {
-            if sample.first {
-                whitener.reset();
-            }
-            if sample.missing {
-                whitener.skip();
-                return true;
-            }
-            whitener.push(row);
-            cost += row[columns - 1] * row[columns - 1];
-            triangle.push(row);
-            cost <= limit
-        })?;
-        triangle.finish();
-        Some(triangle)
-    }
-
-    /// Whether the cost is above a limit, or not finite.
-    pub(crate) fn costs_more(&self, x: &[f64], noise: &ArModel, limit: f64) -> bool {
-        let mut whitener = noise.whitener(1);
-        let limit = limit * (1.0 + ROUNDING);
-        let mut cost = 0.0;
-        let within = self.each_row_in_lanes::<0>(x, &[], |sample, row| {
-            if sample.first {
-                whitener.reset();
-            }
-            if sample.missing {
-                whitener.skip();
-                return true;
-            }
-            whitener.push(row);
-            cost += row[0] * row[0];
-            cost <= limit
-        });
-        within.is_none()
-    }
-
-    /// The rows `[d model/d x_free, measured - model]`, one for each sample of all records, as they are, the residual NaN where the
-    /// output's sample is missing; `None` where the simulation is not finite.
-    #[must_use]
-    pub fn rows(&self, x: &[f64]) -> Option<Rows> {
-        let columns = self.free.len() + 1;
-        let mut values = Vec::with_capacity(self.samples() * columns);
-        self.each_row(x, |_, row| {
-            values.extend_from_slice(row);
-            true
-        })?;
-        Some(Rows {
-            columns,
-            lengths: self.records.iter().map(Record::len).collect(),
-            values,
-        })
-    }
-
-    /// Shows every row with what is known of its sample, until `each` has seen enough; `None` then too.
     fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
         // Parameters and one record's initial states; a few lane counts, so that short vectors stay cheap.
         let parameters = self
@@ -191,7 +37,42 @@ impl Setup<'_> {
         }
     }
 
-    /// The same with derivatives by some of the entries, in simulators of so many lanes.
+    fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        self.each_row_in_lanes::<0>(x, &[], each)
+    }
+
+    fn price(&self, noise_order: usize) -> f64 {
+        Setup::price(self, noise_order)
+    }
+
+    fn floor(&self, output: usize) -> f64 {
+        self.floors[output]
+    }
+
+    fn known_scales(&self) -> Option<&[f64]> {
+        self.known_scales.as_deref()
+    }
+
+    fn out_of_time(&self) -> bool {
+        Setup::out_of_time(self)
+    }
+}
+
+impl Setup<'_> {
+    /// The folded rows `[d model/d x_free, measured - model]` of all outputs ([`estimation::linearise`]); `None` where the simulation is not
+    /// finite.
+    #[must_use]
+    pub fn linearise(&self, x: &[f64], noise: &Noise) -> Option<Triangle> {
+        estimation::linearise(self, x, noise)
+    }
+
+    /// The rows `[d model/d x_free, measured - model]` of all samples ([`estimation::rows`]); `None` where the simulation is not finite.
+    #[must_use]
+    pub fn rows(&self, x: &[f64]) -> Option<Rows> {
+        estimation::rows(self, x)
+    }
+
+    /// Shows every row with derivatives by some of the entries, in simulators of so many lanes.
     fn each_row_in_lanes<const L: usize>(
         &self,
         x: &[f64],
@@ -202,7 +83,10 @@ impl Setup<'_> {
             return None;
         }
         let columns = by.len() + 1;
-        let mut row = vec![0.0; columns];
+        let outputs = self.outputs();
+        // The rows of all outputs at one instant.
+        let mut rows = vec![0.0; columns * outputs];
+        let mut models = vec![f64::NAN; outputs];
         let count = self.parameter_count();
         // What the commands of the loop do to the plant: its commands for the derivatives, for the residual what it was given
         // less that.
@@ -255,20 +139,26 @@ impl Setup<'_> {
             }
             let n = record.len();
             for k in 0..n {
-                row.fill(0.0);
-                let mut model = f64::NAN;
+                rows.fill(0.0);
                 for ((simulator, regulator), chunk) in simulators.iter_mut().zip(&chunks) {
-                    let y = simulator.read();
-                    model = y.re;
-                    for (lane, &column) in chunk.iter().enumerate() {
-                        row[column] = y.eps[lane];
+                    let mut controlled = None;
+                    for (o, model) in models.iter_mut().enumerate() {
+                        let y = simulator.read(o);
+                        *model = y.re;
+                        let row = &mut rows[o * columns..][..columns];
+                        for (lane, &column) in chunk.iter().enumerate() {
+                            row[column] = y.eps[lane];
+                        }
+                        if self.reads(o) {
+                            controlled = Some(y);
+                        }
                     }
                     if k + 1 == n {
                         continue;
                     }
                     let h = record.time[k + 1] - record.time[k];
-                    match (regulator, &self.feedback) {
-                        (Some(regulator), Some(feedback)) => {
+                    match (regulator, &self.feedback, controlled) {
+                        (Some(regulator), Some(feedback), Some(y)) => {
                             let beside = feedback.replays[r].beside[k];
                             let u = regulator.command_beside(reference(record, k), y, beside, h);
                             if let Some((_, commands)) = &mut response {
@@ -282,22 +172,27 @@ impl Setup<'_> {
                         _ => simulator.advance_both(commands(record, k), h),
                     }
                 }
-                row[columns - 1] = record.outputs[0].values[k] - model;
+                for (output, (row, model)) in
+                    rows.chunks_exact_mut(columns).zip(&models).enumerate()
+                {
+                    let measured = record.outputs[output].values[k];
+                    row[columns - 1] = measured - model;
+                    if let Some((response, _)) = &response {
+                        response.add_to(output, row);
+                    }
+                    let sample = Sample {
+                        output,
+                        first: k == 0,
+                        missing: measured.is_nan(),
+                    };
+                    let derivatives = row[..columns - 1].iter().all(|value| value.is_finite());
+                    let residual = row[columns - 1].is_finite() || sample.missing;
+                    if !(derivatives && residual && model.is_finite() && each(sample, row)) {
+                        return None;
+                    }
+                }
                 if let Some((response, commands)) = &mut response {
-                    response.add_to(&mut row);
                     response.advance(commands);
-                }
-                let sample = Sample {
-                    first: k == 0,
-                    missing: record.outputs[0].values[k].is_nan(),
-                };
-                let derivatives = row[..columns - 1].iter().all(|value| value.is_finite());
-                let residual = row[columns - 1].is_finite() || sample.missing;
-                if !(derivatives && residual && model.is_finite()) {
-                    return None;
-                }
-                if !each(sample, &mut row) {
-                    return None;
                 }
             }
         }
@@ -311,7 +206,8 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use ct_signals::Channel;
+    use ct_signals::{ArModel, Channel, Record};
+    use estimation::{costs_more, linearise_below};
     use plants::{Known, Plant};
 
     #[test]
@@ -335,17 +231,17 @@ mod tests {
         let setup = Setup::from_records(Plant::CascadedTanks, known, &[], &records, fixed).unwrap();
         let x = [0.05, 0.1, 0.08, 7.0, 9.0];
         for noise in [
-            ArModel::white(1.0),
-            ArModel::from_coefficients(&[0.9, -0.3], 0.2).unwrap(),
+            Noise::white(1),
+            Noise::of(vec![ArModel::from_coefficients(&[0.9, -0.3], 0.2).unwrap()]),
         ] {
             let cost = setup.linearise(&x, &noise).unwrap().cost();
             for (share, above) in [(1.0 - 1e-6, true), (1.0, false), (1.0 + 1e-6, false)] {
                 let limit = share * cost;
-                assert_eq!(setup.costs_more(&x, &noise, limit), above);
-                let below = setup.linearise_below(&x, &noise, limit);
+                assert_eq!(costs_more(&setup, &x, &noise, limit), above);
+                let below = linearise_below(&setup, &x, &noise, limit);
                 assert_eq!(below.map(|below| below.cost()), (!above).then_some(cost));
             }
-            assert!(setup.costs_more(&[f64::NAN; 5], &noise, f64::INFINITY));
+            assert!(costs_more(&setup, &[f64::NAN; 5], &noise, f64::INFINITY));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What a setup shows at a vector: simulations on the measured command or in the loop, and what is left of the records.
 
 use ct_signals::{Channel, Record};
-use plants::{MAX_VESSELS, Scalar, Scales, Simulator, deciles};
+use plants::{MAX_VESSELS, Scales, Simulator, deciles};
 
 use super::{Setup, at_rest, commands, reference, second_command};
 use crate::{Error, feedback::step};
@@ -9,7 +9,7 @@ use crate::{Error, feedback::step};
 /// A loop that ran on its reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopRun {
-    /// The reading, a series for each record.
+    /// The readings, a series for each record and output ([`estimation::Rows`] has their order).
     pub output: Vec<Vec<f64>>,
     /// The controller's command, a series for each record.
     pub command: Vec<Vec<f64>>,
@@ -18,7 +18,7 @@ pub struct LoopRun {
 /// What a simulation shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// The reading, a series for each record.
+    /// The readings, a series for each record and output ([`estimation::Rows`] has their order).
     pub output: Vec<Vec<f64>>,
     /// Smallest and largest level of each vessel over all records.
     pub level: [(f64, f64); MAX_VESSELS],
@@ -27,20 +27,17 @@ pub struct Simulated {
 }
 
 impl Setup<'_> {
-    /// Runs one record on any scalar; `each` sees every sample's reading and the levels; it may stop the run.
-    fn run<T: Scalar>(
+    /// Runs one record; `each` sees the simulator at every sample.
+    fn run(
         &self,
         record: &Record,
-        simulator: &mut Simulator<T>,
-        mut each: impl FnMut(usize, T, &Simulator<T>) -> bool,
+        simulator: &mut Simulator<f64>,
+        mut each: impl FnMut(&mut Simulator<f64>),
     ) {
         simulator.set_substeps(self.substeps);
         let n = record.len();
         for k in 0..n {
-            let y = simulator.read();
-            if !each(k, y, simulator) {
-                return;
-            }
+            each(simulator);
             if k + 1 < n {
                 simulator.advance_both(commands(record, k), record.time[k + 1] - record.time[k]);
             }
@@ -77,18 +74,19 @@ impl Setup<'_> {
                 &x[self.plant_states_of(r)],
                 at_rest(record),
             )?;
-            let mut output = Vec::with_capacity(record.len());
-            self.run(record, &mut simulator, |_, y, simulator| {
-                output.push(y);
+            let mut readings = vec![Vec::with_capacity(record.len()); self.outputs()];
+            self.run(record, &mut simulator, |simulator| {
+                for (o, readings) in readings.iter_mut().enumerate() {
+                    readings.push(simulator.read(o));
+                }
                 see(simulator.levels());
                 for (i, level) in simulator.levels().into_iter().enumerate() {
                     simulated.level[i].0 = simulated.level[i].0.min(level);
                     simulated.level[i].1 = simulated.level[i].1.max(level);
                     simulated.mean_level[i] += level;
                 }
-                true
             });
-            simulated.output.push(output);
+            simulated.output.extend(readings);
         }
         let rows = self.records.iter().map(Record::len).sum::<usize>() as f64;
         for mean in &mut simulated.mean_level {
@@ -120,72 +118,81 @@ impl Setup<'_> {
             let mut regulator = feedback
                 .controller
                 .start(&x[states.end..self.states_of(r).end]);
-            let (mut output, mut command) = (Vec::new(), Vec::new());
+            let mut command = Vec::with_capacity(record.len());
+            let mut readings = vec![Vec::with_capacity(record.len()); self.outputs()];
             for k in 0..record.len() {
-                let y = simulator.read();
+                for (o, readings) in readings.iter_mut().enumerate() {
+                    readings.push(simulator.read(o));
+                }
+                let y = readings[feedback.controller.output()][k];
                 let h = step(record, k);
                 let beside = feedback.replays[r].beside[k];
                 let u = regulator.command_beside(reference(record, k), y, beside, h);
                 simulator.advance_held(u, second_command(record, k), h);
-                output.push(y);
                 command.push(u);
             }
-            run.output.push(output);
+            run.output.extend(readings);
             run.command.push(command);
         }
         Ok(Some(run))
     }
 
-    /// What is taken for noise, a series for each record: measured minus model or, where the loop is simulated, the
+    /// What is taken for noise, a series for each record and output: measured minus model or, where the loop is simulated, the
     /// disturbance at the plant's output that explains it. NaN where the sample is missing.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
     pub fn disturbance(&self, x: &[f64]) -> Result<Vec<Vec<f64>>, Error> {
-        let (Some(feedback), Some(run)) = (&self.feedback, self.simulate_loop(x)?) else {
+        if self.feedback.is_none() {
             return self.residuals(x);
-        };
-        let mut response = feedback.response(1);
-        let series = self.records.iter().zip(run.output).zip(run.command);
-        Ok(series
-            .map(|((record, model), command)| {
-                response.reset();
-                let measured = record.outputs[0]
-                    .values
-                    .iter()
-                    .zip(&record.inputs[0].values);
-                measured
-                    .zip(model.iter().zip(&command))
-                    .map(|((y, u), (ym, um))| {
-                        let mut row = [y - ym];
-                        response.add_to(&mut row);
-                        response.advance(&[um - u]);
-                        row[0]
-                    })
-                    .collect()
-            })
-            .collect())
+        }
+        estimation::residuals(self, x).ok_or_else(|| {
+            if self.stopped() {
+                Error::Stopped
+            } else {
+                estimation::Error::NoFiniteStart { starts: 1 }.into()
+            }
+        })
     }
 
-    /// Measured minus model, both on the measured command, a series for each record; NaN where the sample is missing.
+    /// Measured minus model, both on the measured command, a series for each record and output; NaN where the sample is missing.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
     pub fn residuals(&self, x: &[f64]) -> Result<Vec<Vec<f64>>, Error> {
         let simulated = self.simulate(x)?;
         Ok(self
-            .records
-            .iter()
+            .measured()
             .zip(simulated.output)
-            .map(|(record, model)| {
-                record.outputs[0]
-                    .values
-                    .iter()
-                    .zip(model)
-                    .map(|(y, m)| y - m)
-                    .collect()
+            .map(|(measured, model)| {
+                let pairs = measured.values.iter().zip(model);
+                pairs.map(|(y, m)| y - m).collect()
             })
             .collect())
+    }
+
+    /// Root mean square of series at each output \[output unit\], missing samples aside.
+    #[must_use]
+    pub fn rms_per_output(&self, series: &[Vec<f64>]) -> Vec<f64> {
+        let of_output = |o: usize| {
+            let own = series.iter().skip(o).step_by(self.outputs()).flatten();
+            let (sum, count) = own
+                .filter(|v| !v.is_nan())
+                .fold((0.0, 0usize), |(sum, count), v| (sum + v * v, count + 1));
+            (sum / count.max(1) as f64).sqrt()
+        };
+        (0..self.outputs()).map(of_output).collect()
+    }
+
+    /// Root mean square of series, those of each output divided by its scale first; missing samples aside.
+    #[must_use]
+    pub fn weighted_rms(&self, series: &[Vec<f64>], scales: &[f64]) -> f64 {
+        weighted_rms(&self.rms_per_output(series), scales, &self.samples)
+    }
+
+    /// The outputs of all records, in the order of series.
+    pub fn measured(&self) -> impl Iterator<Item = &Channel> {
+        self.records.iter().flat_map(|record| &record.outputs)
     }
 
     /// Takes the smallest number of substeps for which halving the step moves no reading by more than `1e-6` of the
@@ -194,13 +201,10 @@ impl Setup<'_> {
     /// # Errors
     /// As [`Setup::simulate`].
     pub fn choose_substeps(&mut self, x: &[f64]) -> Result<(), Error> {
-        let (low, high) = self
-            .records
-            .iter()
-            .map(Record::output_range)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), range| {
-                (low.min(range.0), high.max(range.1))
-            });
+        let ranges = self.measured().map(Channel::range);
+        let (low, high) = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), range| {
+            (low.min(range.0), high.max(range.1))
+        });
         let tolerance = 1e-6 * (high - low);
         // The simulator itself cuts steps that are long against a time constant: until its cuts are the longer ones,
         // halving changes nothing, which says nothing.
@@ -252,7 +256,7 @@ impl Setup<'_> {
         for (vessel, visited) in levels.into_iter().enumerate().take(plant.vessels()) {
             let (low, high) = simulated.level[vessel];
             if low.is_finite() && high.is_finite() && high > low {
-                let measured = vessel == scales.measured;
+                let measured = scales.outputs.iter().any(|output| output.vessel == vessel);
                 scales.level[vessel] = if measured {
                     (low, high)
                 } else {
@@ -273,8 +277,24 @@ impl Setup<'_> {
         };
         scales.flow = (x[0] * mean(|record| Some(&record.inputs[0]))).abs();
         if scales.input_2.is_some() {
-            scales.flow += (x[1] * mean(|record| record.inputs.get(1))).abs();
+            // The gain of a second pump is the second parameter, that of a disturbance the plant's last one.
+            let gain = if plant.joined() {
+                1
+            } else {
+                plant.parameters(&scales).len() - 1
+            };
+            scales.flow += (x[gain] * mean(|record| record.inputs.get(1))).abs();
         }
         Ok(scales)
     }
+}
+
+/// Root mean square over outputs with so many samples each, every one divided by its scale first.
+#[must_use]
+pub fn weighted_rms(rms: &[f64], scales: &[f64], samples: &[usize]) -> f64 {
+    let outputs = rms.iter().zip(scales).zip(samples);
+    let sum: f64 = outputs
+        .map(|((rms, scale), &samples)| samples as f64 * (rms / scale).powi(2))
+        .sum();
+    (sum / samples.iter().sum::<usize>().max(1) as f64).sqrt()
 }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::support::Rig;
-use ct_signals::{ArModel, Channel, Record, excitation, noise};
-use greybox::{Error, FitOptions, Setup, coloured, fit_from, replay, robust};
+use ct_signals::{Channel, Record, excitation, noise};
+use greybox::{Error, FitOptions, Noise, Setup, coloured, fit_from, replay, robust};
 use plants::controller::Controller;
 use plants::{Command, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
@@ -46,7 +46,7 @@ fn in_loop(rig: &Rig, controller: &Controller, r: &[f64], noise: &[f64]) -> Reco
     let mut regulator = controller.start(&states);
     let (mut u, mut y) = (Vec::new(), Vec::new());
     for k in 0..r.len() {
-        let reading = simulator.read() + noise[k];
+        let reading = simulator.read(0) + noise[k];
         let command = regulator.command(r[k], reading, rig.interval);
         simulator.advance(Command::held(command), rig.interval);
         y.push(reading);
@@ -301,7 +301,7 @@ fn over_records(rig: &Rig, rho: f64, simulate: bool, metric: bool) -> Vec<(f64, 
             let setup = Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new());
             let setup = setup.unwrap();
             let stopping = FitOptions::default().stopping;
-            let white = ArModel::white(1.0);
+            let white = Noise::white(1);
             let first = fit_from(&setup, &[rig.truth(1)], &white, stopping).unwrap();
             let (setup, x) = if simulate {
                 setup.in_loop(&pi(), &first.x).unwrap()
@@ -395,7 +395,7 @@ fn a_command_at_its_limits_is_no_disturbance() {
     };
     assert!(worst(found) < 1e-8, "{}", worst(found));
     let away: Vec<f64> = x.iter().map(|value| 1.1 * value).collect();
-    let white = ArModel::white(1.0);
+    let white = Noise::white(1);
     let fit = fit_from(&setup, &[away], &white, FitOptions::default().stopping).unwrap();
     let fit = coloured(&setup, fit, 6, FitOptions::default().stopping).unwrap();
     for (i, truth) in rig.theta.iter().enumerate() {

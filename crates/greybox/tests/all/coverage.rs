@@ -3,7 +3,7 @@
 
 use crate::support::Rig;
 use ct_signals::{ArModel, Record};
-use greybox::{FitOptions, Setup, coloured, fit, fit_from, random_starts, robust};
+use greybox::{FitOptions, Noise, Setup, coloured, fit, fit_from, random_starts, robust};
 use rayon::prelude::*;
 
 /// Records of a setting in the tests; `RECORDS=800` takes so many.
@@ -123,7 +123,7 @@ fn simulation_error_under_coloured_noise() {
             fit_from(
                 setup,
                 &starts,
-                &ArModel::white(1.0),
+                &Noise::white(1),
                 FitOptions::default().stopping,
             )
             .unwrap()
@@ -184,12 +184,15 @@ fn the_colour_of_the_noise_is_not_biased_by_the_fit() {
             let records = [rig.record(seed)];
             let setup = rig.setup(&records);
             let stopping = FitOptions::default().stopping;
-            let white = ArModel::white(1.0);
+            let white = Noise::white(1);
             let first = fit_from(&setup, std::slice::from_ref(&truth), &white, stopping).unwrap();
             let fit = coloured(&setup, first, 1, stopping).unwrap();
             let residual = setup.residuals(&fit.x).unwrap();
             let bare = ArModel::fit(&[&residual[0]], 1).unwrap();
-            (fit.noise.coefficients()[0], bare.coefficients()[0])
+            (
+                fit.noise.output(0).coefficients()[0],
+                bare.coefficients()[0],
+            )
         })
         .collect();
     let mean =

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use crate::support::known;
-use ct_signals::{ArModel, Channel, Record, excitation, noise};
-use greybox::{Setup, Stopping, fit_from, keep_best_simulated, with_other_speeds};
+use ct_signals::{Channel, Record, excitation, noise};
+use greybox::{Noise, Setup, Stopping, fit_from, keep_best_simulated, with_other_speeds};
 use plants::{Command, EffectInfo, Placed, Plant, Scales, Simulator, Structure};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -137,7 +137,7 @@ impl Case {
             .iter()
             .zip(noise)
             .map(|(&u, noise)| {
-                let reading = simulator.read() + noise;
+                let reading = simulator.read(0) + noise;
                 simulator.advance(Command::held(u), INTERVAL);
                 reading
             })
@@ -160,11 +160,11 @@ fn base_fit<'a>(case: &Case, records: &'a [Record]) -> (Setup<'a>, Vec<f64>, f64
     let setup = Setup::from_records(case.plant, known(case.plant), &[], records, fixed()).unwrap();
     let (theta, levels) = case.base();
     let own = [theta, levels].concat();
-    let fit = fit_from(&setup, &[own], &ArModel::white(1.0), STOPPING).unwrap();
+    let fit = fit_from(&setup, &[own], &Noise::white(1), STOPPING).unwrap();
     let scales = setup.scales_at(&fit.x).unwrap();
     let structure = Structure::new(case.plant, known(case.plant), scales);
     let setup = setup.with_structure(structure).unwrap();
-    (setup, fit.x, fit.rmse)
+    (setup, fit.x, fit.rmse[0])
 }
 
 /// What came of one record.
@@ -213,7 +213,7 @@ fn one(case: &Case, seed: u64) -> Outcome {
         };
         grid = grid.iter().flat_map(longer).collect();
     }
-    let white = ArModel::white(1.0);
+    let white = Noise::white(1);
     let mut begun: Vec<Vec<f64>> = Vec::new();
     for values in &grid {
         let x = start(&setup, &x, &base, values);
@@ -251,7 +251,7 @@ fn one(case: &Case, seed: u64) -> Outcome {
             .map(|i| Some((fit.x[own + i] - truth[i]) / errors[own + i]?))
             .collect(),
         estimate: fit.x[own..own + truth.len()].to_vec(),
-        left: fit.rmse / sigma,
+        left: fit.rmse[0] / sigma,
         base: rmse / sigma,
     }
 }

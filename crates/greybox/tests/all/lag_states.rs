@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use crate::support::{PRECISE, Rig};
-use ct_signals::{ArModel, Record, noise};
-use greybox::{Fit, Setup, fit_from};
+use ct_signals::{Record, noise};
+use greybox::{Fit, Noise, Setup, fit_from};
 use plants::{EffectInfo, Placed};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -49,7 +49,7 @@ fn with_lag(rig: &Rig, record: &Record, lag: &str, free: bool) -> Fit {
             start
         })
         .collect();
-    fit_from(&setup, &starts, &ArModel::white(1.0), PRECISE).unwrap()
+    fit_from(&setup, &starts, &Noise::white(1), PRECISE).unwrap()
 }
 
 /// How often the lag that is there fits better than the other, and how often it fits so much worse that the other is

@@ -3,7 +3,7 @@
 use crate::support::Rig;
 use approx::assert_relative_eq;
 use ct_signals::{ArModel, Hold, Record};
-use greybox::Setup;
+use greybox::{Noise, Setup};
 use nalgebra::DMatrix;
 use plants::Plant;
 use std::collections::BTreeMap;
@@ -192,7 +192,7 @@ fn more_columns_than_lanes() {
 #[test]
 fn whitening_is_that_of_dense_algebra() {
     let (a1, a2): (f64, f64) = (1.1, -0.4);
-    let noise = ArModel::from_coefficients(&[a1, a2], 0.3).unwrap();
+    let noise = Noise::of(vec![ArModel::from_coefficients(&[a1, a2], 0.3).unwrap()]);
     let correlation = {
         let mut rho = vec![1.0, a1 / (1.0 - a2)];
         for k in 2..60 {

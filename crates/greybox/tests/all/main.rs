@@ -3,11 +3,13 @@
 
 mod closed_loop;
 mod coverage;
+mod disturbance;
 mod effects;
 mod lag_states;
 mod linearise;
 mod minima;
 mod minimise;
+mod outputs;
 mod parts;
 mod records;
 mod sandwich;

@@ -2,8 +2,7 @@
 //! better one must be named.
 
 use crate::support::{PRECISE, Rig};
-use ct_signals::ArModel;
-use greybox::{FitOptions, fit_from, random_starts};
+use greybox::{FitOptions, Noise, fit_from, random_starts};
 use rayon::prelude::*;
 
 /// The time constants of both tanks at a vector, at the mean command.
@@ -19,7 +18,7 @@ fn time_constants(x: &[f64], command: f64) -> (f64, f64) {
 fn starts_reach_both_basins_and_the_best_is_named() {
     let rig = Rig::cascaded_tanks();
     let stopping = FitOptions::default().stopping;
-    let white = ArModel::white(1.0);
+    let white = Noise::white(1);
     let (mut upper_first, mut lower_first) = (0, 0);
     for seed in 0..10 {
         let records = [rig.record(seed)];
@@ -97,7 +96,7 @@ fn a_right_model_is_found_at_least_twice() {
         command: (3.5, 6.5),
         ..Rig::cascaded_tanks()
     };
-    let white = ArModel::white(1.0);
+    let white = Noise::white(1);
     let missed = (0..20)
         .filter(|&seed| {
             let records = [rig.record(seed)];

@@ -6,7 +6,8 @@ use crate::support::{PRECISE, Rig};
 use approx::assert_relative_eq;
 use ct_signals::ArModel;
 use greybox::{
-    Error, FitOptions, Setup, Start, Stop, Stopping, fit, fit_from, fit_onward, random_starts,
+    Error, FitOptions, NoFit, Noise, Setup, Start, Stop, Stopping, fit, fit_from, fit_onward,
+    random_starts,
 };
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
@@ -52,7 +53,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Peer<'_> {
 
 /// Euclidean length of the gradient over the lengths of its factors, the worst of all entries: the cosine between
 /// residual and sensitivity.
-fn slope(setup: &Setup, x: &[f64], noise: &ArModel) -> Vec<f64> {
+fn slope(setup: &Setup, x: &[f64], noise: &Noise) -> Vec<f64> {
     let triangle = setup.linearise(x, noise).unwrap();
     (0..setup.free().len())
         .map(|j| triangle.descent(j) / (triangle.column_norm(j) * triangle.cost().sqrt()))
@@ -71,7 +72,7 @@ fn ends_where_another_implementation_ends() {
         };
         let (peer, report) = LevenbergMarquardt::new().minimize(peer);
         assert!(report.termination.was_successful());
-        let ours = fit_from(&setup, &[start], &ArModel::white(1.0), PRECISE).unwrap();
+        let ours = fit_from(&setup, &[start], &Noise::white(1), PRECISE).unwrap();
         for (a, b) in ours.x.iter().zip(&peer.x) {
             assert_relative_eq!(a, b, max_relative = 1e-8);
         }
@@ -128,7 +129,7 @@ fn a_parameter_that_ends_at_its_bound_has_no_error() {
     )
     .unwrap();
     let start = std::slice::from_ref(&fit.x);
-    let reference = fit_from(&setup, start, &ArModel::white(1.0), PRECISE).unwrap();
+    let reference = fit_from(&setup, start, &Noise::white(1), PRECISE).unwrap();
     for i in [0, 1, 3] {
         assert_relative_eq!(fit.x[i], reference.x[i], max_relative = 1e-5);
         assert_relative_eq!(
@@ -154,7 +155,7 @@ fn fixed_parameters_stay_put() {
     let other = fit_from(
         &setup,
         &[vec![10.0, 99.0, 12.0, 7.0, 14.0]],
-        &ArModel::white(1.0),
+        &Noise::white(1),
         PRECISE,
     );
     assert_eq!(other.unwrap().x[1], 17.3);
@@ -168,7 +169,7 @@ fn a_start_far_away_stays_physical() {
             let setup = rig.setup(&records);
             for size in [1.0, 1e-2, 1e3] {
                 let start = vec![size; setup.names().len()];
-                let white = ArModel::white(1.0);
+                let white = Noise::white(1);
                 let fit =
                     fit_from(&setup, &[start], &white, FitOptions::default().stopping).unwrap();
                 for ((name, x), (lower, upper)) in
@@ -193,7 +194,7 @@ fn a_start_far_away_stays_physical() {
 #[test]
 fn what_it_says_of_its_end_is_true() {
     let options = FitOptions::default();
-    let white = ArModel::white(1.0);
+    let white = Noise::white(1);
     let mut converged = 0;
     for rig in [
         Rig::single_tank(),
@@ -236,8 +237,8 @@ fn a_fit_that_goes_on_is_the_fit_from_there() {
         evaluations: 4,
         cost: 1e-3,
     };
-    let coloured = ArModel::from_coefficients(&[0.8], 0.3).unwrap();
-    let white = ArModel::white(0.2);
+    let coloured = Noise::of(vec![ArModel::from_coefficients(&[0.8], 0.3).unwrap()]);
+    let white = Noise::white(1);
     for rig in Rig::all() {
         let records = [rig.record(1)];
         let setup = rig.setup(&records);
@@ -268,11 +269,14 @@ fn a_simulation_that_is_not_finite_is_no_fit() {
     let records = [rig.record(1)];
     let setup = rig.setup(&records);
     let starts = vec![vec![f64::NAN, 12.5, 14.0], vec![10.0, f64::NAN, 14.0]];
-    let result = fit_from(&setup, &starts, &ArModel::white(1.0), PRECISE);
-    assert!(matches!(result, Err(Error::NoFiniteStart { starts: 2 })));
+    let result = fit_from(&setup, &starts, &Noise::white(1), PRECISE);
+    assert!(matches!(
+        result,
+        Err(Error::Estimation(NoFit::NoFiniteStart { starts: 2 }))
+    ));
     // One good start among them is enough.
     let starts = vec![vec![f64::NAN, 12.5, 14.0], rig.truth(1)];
-    let found = fit_from(&setup, &starts, &ArModel::white(1.0), PRECISE).unwrap();
+    let found = fit_from(&setup, &starts, &Noise::white(1), PRECISE).unwrap();
     assert_eq!((found.starts, found.agree), (2, 1));
     // Numbers that no arithmetic holds.
     let mut record = rig.record(1);
@@ -283,7 +287,7 @@ fn a_simulation_that_is_not_finite_is_no_fit() {
     let setup = rig.setup(&records);
     let result = fit(&setup, &FitOptions::default());
     assert!(
-        matches!(result, Err(Error::NoFiniteStart { .. })),
+        matches!(result, Err(Error::Estimation(NoFit::NoFiniteStart { .. }))),
         "{:?}",
         result.map(|f| f.cost)
     );

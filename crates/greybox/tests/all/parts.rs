@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Channel, Record, excitation, noise};
-use greybox::{Setup, Stopping, fit_from};
+use ct_signals::{Channel, Record, excitation, noise};
+use greybox::{Noise, Setup, Stopping, fit_from};
 use plants::{
     Command, EffectInfo, Fitted, Known, Place, Placed, Plant, Scales, Simulator, Structure, Term,
     Variable,
@@ -75,7 +75,7 @@ fn whole(structure: &Structure, own: &[f64], seed: u64) -> (Record, f64) {
         if k == CUT {
             at_cut = simulator.levels()[0];
         }
-        y.push(simulator.read());
+        y.push(simulator.read(0));
         simulator.advance(Command::held(u), INTERVAL);
     }
     let record = Record {
@@ -111,11 +111,7 @@ fn what_follows_time_runs_through_the_parts() {
             // The rows with derivatives are of the same simulation.
             let rows = setup.rows(&x).unwrap();
             let residuals = setup.residuals(&x).unwrap().concat();
-            let columns = setup.free().len() + 1;
-            let of_rows: Vec<f64> = rows
-                .records()
-                .flat_map(|record| record.chunks(columns).map(|row| row[columns - 1]))
-                .collect();
+            let of_rows = rows.residuals().concat();
             assert!(apart(&residuals, &of_rows) < 1e-9);
             setup.simulate(&x).unwrap().output
         };
@@ -184,7 +180,7 @@ fn the_same_drift_is_found_in_the_parts_and_in_the_whole() {
             INTERVAL * (SAMPLES - 1) as f64
         );
         let start = [&BASE[..], &[0.0], levels].concat();
-        let fit = fit_from(&setup, &[start], &ArModel::white(0.05), stopping).unwrap();
+        let fit = fit_from(&setup, &[start], &Noise::white(1), stopping).unwrap();
         (fit.x[2], fit.std_errors()[2].unwrap())
     };
     let (one, error) = found(std::slice::from_ref(&whole), &[16.0]);

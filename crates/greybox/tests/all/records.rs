@@ -3,7 +3,7 @@
 use crate::support::{PRECISE, Rig};
 use approx::assert_relative_eq;
 use ct_signals::{ArModel, Channel, Record};
-use greybox::{FitOptions, fit, fit_from, fit_initial_levels};
+use greybox::{FitOptions, Noise, fit, fit_from, fit_initial_levels};
 
 #[test]
 fn two_records_together_say_more_than_either() {
@@ -63,10 +63,10 @@ fn two_records_together_say_more_than_either() {
     )
     .unwrap();
     assert!(
-        wrong.rmse > 5.0 * both_fit.rmse,
+        wrong.rmse[0] > 5.0 * both_fit.rmse[0],
         "{} {}",
-        wrong.rmse,
-        both_fit.rmse
+        wrong.rmse[0],
+        both_fit.rmse[0]
     );
 }
 
@@ -85,7 +85,7 @@ fn two_records_have_the_likelihood_of_each() {
         }
         .record(2),
     ];
-    let noise = ArModel::from_coefficients(&[0.8], 1.0).unwrap();
+    let noise = Noise::of(vec![ArModel::from_coefficients(&[0.8], 1.0).unwrap()]);
     let both = rig.setup(&records);
     let fit = fit_from(&both, &[rig.truth(2)], &noise, PRECISE).unwrap();
     let cost: f64 = (0..2)
@@ -97,7 +97,7 @@ fn two_records_have_the_likelihood_of_each() {
         .sum();
     assert_relative_eq!(fit.cost, cost, max_relative = 1e-12);
     let n = fit.samples as f64;
-    let log_det = noise.log_det(400) + noise.log_det(150);
+    let log_det = noise.output(0).log_det(400) + noise.output(0).log_det(150);
     let deviance = n * (1.0 + (std::f64::consts::TAU * cost / n).ln()) + log_det;
     assert_relative_eq!(fit.deviance, deviance, max_relative = 1e-12);
 }

@@ -3,7 +3,7 @@
 use crate::support::{PRECISE, Rig};
 use approx::assert_relative_eq;
 use ct_signals::ArModel;
-use greybox::{fit_from, robust};
+use greybox::{Noise, fit_from, robust};
 use nalgebra::DMatrix;
 
 /// The covariance of unit innovations, one block for each record.
@@ -42,8 +42,8 @@ fn agrees_with_dense_algebra_whatever_the_metric() {
     });
     let setup = rig.setup(&records);
     for metric in [
-        ArModel::white(1.0),
-        ArModel::from_coefficients(&[0.6, 0.2], 1.0).unwrap(),
+        Noise::white(1),
+        Noise::of(vec![ArModel::from_coefficients(&[0.6, 0.2], 1.0).unwrap()]),
     ] {
         let fit = fit_from(&setup, &[rig.truth(2)], &metric, PRECISE).unwrap();
         let ours = robust(&setup, &fit, 3).unwrap();
@@ -52,16 +52,20 @@ fn agrees_with_dense_algebra_whatever_the_metric() {
         let j = DMatrix::from_row_slice(115, rows.columns, &rows.values)
             .columns(0, rows.columns - 1)
             .into_owned();
-        let weighted = covariance(&metric, &[70, 45]).try_inverse().unwrap() * &j;
+        let weighted = covariance(metric.output(0), &[70, 45])
+            .try_inverse()
+            .unwrap()
+            * &j;
         let bread = (j.transpose() * &weighted).try_inverse().unwrap();
-        let filling = weighted.transpose() * covariance(&ours.noise, &[70, 45]) * &weighted;
-        let dense = &bread * filling * &bread * ours.noise.sigma().powi(2);
+        let filling =
+            weighted.transpose() * covariance(ours.noise.output(0), &[70, 45]) * &weighted;
+        let dense = &bread * filling * &bread * ours.noise.output(0).sigma().powi(2);
         for (i, ours) in ours.std_errors.iter().enumerate() {
             assert_relative_eq!(ours.unwrap(), dense[(i, i)].sqrt(), max_relative = 1e-7);
         }
     }
     // In its own metric it is the ordinary standard error.
-    let fit = fit_from(&setup, &[rig.truth(2)], &ArModel::white(1.0), PRECISE).unwrap();
+    let fit = fit_from(&setup, &[rig.truth(2)], &Noise::white(1), PRECISE).unwrap();
     let same = robust(&setup, &fit, 0).unwrap().std_errors;
     for (a, b) in same.iter().zip(fit.std_errors()) {
         assert_relative_eq!(a.unwrap(), b.unwrap(), max_relative = 1e-9);

@@ -1,8 +1,7 @@
 //! Three tanks that are joined by valves, fitted to one level under two commands.
 
 use crate::support::{PRECISE, Rig};
-use ct_signals::ArModel;
-use greybox::{FitOptions, fit, fit_from};
+use greybox::{FitOptions, Noise, fit, fit_from};
 use rayon::prelude::*;
 
 const RECORDS: u64 = 100;
@@ -38,7 +37,7 @@ fn intervals_hold_the_truth() {
             let records = [rig.record(seed)];
             let setup = rig.setup(&records);
             let near: Vec<f64> = truth.iter().map(|x| 1.02 * x).collect();
-            let fit = fit_from(&setup, &[near], &ArModel::white(1.0), PRECISE).unwrap();
+            let fit = fit_from(&setup, &[near], &Noise::white(1), PRECISE).unwrap();
             let half = fit.half_widths(0.95);
             let all = fit.x.iter().zip(&half).zip(&truth);
             all.map(|((x, half), truth)| half.is_some_and(|half| (x - truth).abs() <= half))

@@ -85,10 +85,7 @@ impl Search<'_, '_> {
         before: &Before,
     ) -> Option<SecondSensor> {
         let plant = self.problem.plant;
-        let measured = self.nodes[0].setup.structure.scales.measured;
-        if plant.vessels() < 2 {
-            return None;
-        }
+        let vessel = second_sensor::place(&self.nodes[0].setup.structure)?;
         let played = self.played(&best.values, bounds.interval)?;
         let existing = |truth: usize| {
             let [truth, other] = [&self.nodes[truth], &self.nodes[1 - truth]];
@@ -104,10 +101,8 @@ impl Search<'_, '_> {
         let fewer = b - a;
         let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };
         Some(SecondSensor {
-            level: plant
-                .level_name(second_sensor::place(plant, measured))
-                .to_string(),
-            existing_without: fresh(before.misfit.map(|misfit| misfit / self.metric.variance)),
+            level: plant.level_name(vessel).to_string(),
+            existing_without: fresh(before.misfit.map(|misfit| misfit / self.metric.variance())),
             existing_with: fresh([existing(0)?, existing(1)?]),
             best_with: power([experiment(0)?, experiment(1)?], self.ahead_of_each()),
         })

@@ -104,7 +104,7 @@ impl Search<'_, '_> {
         };
         Ok(Before {
             levels: (0..self.problem.plant.vessels()).map(either).collect(),
-            known: [information(a), information(b)],
+            known: [information(a, self.metric), information(b, self.metric)],
             imagined,
             misfit,
         })

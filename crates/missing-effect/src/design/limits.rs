@@ -46,9 +46,9 @@ pub enum Refused {
         /// The effect.
         effect: String,
     },
-    /// A record with two commands.
+    /// A record with two inputs.
     #[error(
-        "{record} has two commands, {first} and {second}, and an experiment is designed for one: record the second pump off and delete input_2, or play an experiment of your own"
+        "{record} has two inputs, {first} and {second}, and an experiment is designed for one command: take a record in which the second pump is off, or nothing disturbs, and delete input_2 (and disturbance), or play an experiment of your own"
     )]
     TwoCommands {
         /// The record.

@@ -19,7 +19,6 @@ mod tests;
 
 use std::time::Instant;
 
-use ct_signals::ArModel;
 use plants::{Domain, EffectInfo, Placed};
 
 pub use limits::{Bounds, Limits, Refused};
@@ -32,7 +31,7 @@ use crate::{
     diagnose::{allow, effort},
     gaps::Mended,
     groups::GROUP_MARGIN,
-    node::{FINE, Node, refine},
+    node::{FINE, Node, in_time, refine},
     noise_floor::colour,
     problem::base,
     proposal::place,
@@ -168,8 +167,7 @@ pub fn design(
             values: found.values,
         },
         limits: bounds,
-        noise_floor: fitted.metric.noise.stationary_std() / fitted.metric.noise.sigma()
-            * fitted.metric.variance.sqrt(),
+        noise_floor: fitted.metric.noise_floor(),
         sentences: Vec::new(),
         effort: effort(&fitted.base, options),
         plant: problem.plant.id().to_string(),
@@ -197,12 +195,12 @@ fn fitted<'a>(
     let (base, _) = base(problem, options, BELIEVED)?;
     allow(&base, BOTH);
     for Candidacy { effect, vessel } in between {
-        let vessel = vessel.unwrap_or_else(|| effect.usual_site(problem.plant));
+        let vessel = vessel.unwrap_or_else(|| effect.usual_site(problem.plant, &problem.known));
         base.setup.structure.with(Placed { effect, vessel })?;
     }
-    let white = ArModel::white(1.0);
+    let white = base.setup.white_noise();
     let fits = |candidacy: Candidacy| -> Result<Vec<Node<'a>>, Refused> {
-        let sites = candidacy.effect.sites(problem.plant);
+        let sites = candidacy.effect.sites(problem.plant, &problem.known);
         let mut nodes: Vec<Node<'a>> = sites
             .filter(|site| candidacy.vessel.is_none_or(|vessel| vessel == *site))
             .filter_map(|vessel| {
@@ -232,11 +230,9 @@ fn fitted<'a>(
             .ok_or_else(|| no_fit(between[i]).into())
     };
     let nodes = [refined(0)?, refined(1)?];
-    let variance = if nodes[1].fit.bic() < nodes[0].fit.bic() {
-        nodes[1].fit.variance()
-    } else {
-        nodes[0].fit.variance()
-    };
+    let fit = &nodes[usize::from(nodes[1].fit.bic() < nodes[0].fit.bic())].fit;
+    let sigma = fit.variance().sqrt();
+    let scales = fit.weights.iter().map(|weight| sigma / weight).collect();
     let base = refine(&base, &noise, &[])?;
     // What was fitted in part would seem to be a twin of the model without it.
     if base.setup.out_of_time() {
@@ -245,18 +241,20 @@ fn fitted<'a>(
     Ok(Fitted {
         nodes,
         base,
-        metric: Metric { noise, variance },
+        metric: Metric { noise, scales },
     })
 }
 
-/// Sum of the squares by which two fits differ on the records.
+/// Sum of the squares by which two fits differ on the records, outputs by their weights.
 fn apart([a, b]: [&Node; 2]) -> f64 {
-    let residuals = |node: &Node| node.setup.residuals(&node.fit.x);
+    let residuals = |node: &Node| {
+        let series = node.setup.residuals(&node.fit.x)?;
+        Ok::<_, Error>(in_time(&node.setup, &series, &a.fit.weights))
+    };
     let (Ok(a), Ok(b)) = (residuals(a), residuals(b)) else {
         return f64::INFINITY;
     };
-    let pairs = a.iter().flatten().zip(b.iter().flatten());
-    let pairs = pairs.filter(|(a, _)| !a.is_nan());
+    let pairs = a.iter().zip(&b);
     pairs.map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
@@ -276,7 +274,7 @@ fn rival(fitted: &Fitted, i: usize) -> Rival {
         place: step::place_name(node, placed),
         size: parameters.into_iter().find(|p| p.name.starts_with(&own)),
         at_the_edge: node.at_the_edge(placed),
-        rmse: node.fit.rmse,
+        rmse: node.fit.mean_rmse(),
         bic_gain: node.gain_over(&fitted.base),
         confirm: match node.setup.structure.domain {
             Domain::Hydraulic => placed.effect.confirm.to_string(),

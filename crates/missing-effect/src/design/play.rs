@@ -92,7 +92,8 @@ fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64)
             let mut command = middle;
             let steps = (SETTLE * slowest / interval) as usize;
             for _ in 0..steps.clamp(1, MOST_SETTLING) {
-                command = regulator.command(first, simulator.read(), interval);
+                let read = simulator.read(controller.output());
+                command = regulator.command(first, read, interval);
                 simulator.advance(Command::held(command), interval);
             }
             Some(Rest {
@@ -125,30 +126,33 @@ pub(crate) fn play(
     let mut simulator =
         Simulator::<f64>::new(&setup.structure, theta, &initial, rest.command).ok()?;
     simulator.set_substeps(setup.substeps);
-    let (mut input, mut output, mut at_limit) = (Vec::new(), Vec::new(), false);
+    let (mut input, mut at_limit) = (Vec::with_capacity(values.len()), false);
+    let mut outputs = vec![Vec::with_capacity(values.len()); setup.outputs()];
     let mut levels = vec![(f64::INFINITY, f64::NEG_INFINITY); vessels];
     for (k, &value) in values.iter().enumerate() {
-        let reading = simulator.read();
+        for (o, output) in outputs.iter_mut().enumerate() {
+            output.push(simulator.read(o));
+        }
         for (range, level) in levels.iter_mut().zip(simulator.levels()) {
             *range = (range.0.min(level), range.1.max(level));
         }
-        let command = match &mut rest.regulator {
-            Some(regulator) => {
+        let command = match (&mut rest.regulator, into) {
+            (Some(regulator), Loop::Closed(controller)) => {
+                let reading = outputs[controller.output()][k];
                 let command = regulator.command(value, reading, interval);
                 at_limit |= regulator.limited();
                 Command::held(command)
             }
-            None if of.hold() == Hold::First => {
+            _ if of.hold() == Hold::First => {
                 Command::ramp(value, values.get(k + 1).copied().unwrap_or(value))
             }
-            None => Command::held(value),
+            _ => Command::held(value),
         };
         simulator.advance(command, interval);
         input.push(command.from);
-        output.push(reading);
     }
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-    if !(finite(&input) && finite(&output) && finite(&initial)) {
+    if !(finite(&input) && outputs.iter().all(|output| finite(output)) && finite(&initial)) {
         return None;
     }
     Some(Played {
@@ -156,7 +160,12 @@ pub(crate) fn play(
             name: "the experiment".to_string(),
             time: (0..values.len()).map(|k| k as f64 * interval).collect(),
             inputs: vec![of.inputs[0].with_values(input)],
-            outputs: vec![of.outputs[0].with_values(output)],
+            outputs: of
+                .outputs
+                .iter()
+                .zip(outputs)
+                .map(|(of, output)| of.with_values(output))
+                .collect(),
             references: match (into, of.references.first()) {
                 (Loop::Closed(_), Some(reference)) => vec![reference.with_values(values.to_vec())],
                 _ => Vec::new(),

@@ -1,130 +1,110 @@
-//! What a sensor in the other tank would add: its level measured too, with the same noise.
+//! What a sensor in a tank whose level is not measured would add: it is measured too, with the noise of the first output.
 
 use ct_signals::Record;
-use greybox::{Setup, Triangle, at_rest, commands};
-use plants::{Outlet, Plant, Simulator};
+use greybox::{Noise, Setup, Triangle};
+use plants::{Outlet, OutputScales, Structure};
 
 use super::{
     play::Played,
     separation::{Metric, imagined, least, unlooped, vector},
 };
-use crate::node::Node;
+use crate::{Error, node::Node};
 
-/// Step of a central difference, as a part of the value or of the typical size of its like.
-const STEP: f64 = 1e-5;
-
-/// The vessel that it would stand in: the first one, or the last where the first is the measured one.
-pub(crate) fn place(plant: Plant, measured: usize) -> usize {
-    if measured == 0 {
-        plant.vessels() - 1
-    } else {
-        0
-    }
-}
-
-/// The level of that vessel at every sample.
-fn other_level(setup: &Setup, x: &[f64]) -> Option<Vec<Vec<f64>>> {
-    let theta = &x[..setup.parameter_count()];
-    let other = place(setup.structure.plant, setup.structure.scales.measured);
-    let run = |(r, record): (usize, &Record)| {
-        let n = record.len();
-        let states = &x[setup.plant_states_of(r)];
-        let mut simulator =
-            Simulator::<f64>::with_inputs(&setup.structure, theta, states, at_rest(record)).ok()?;
-        simulator.set_substeps(setup.substeps);
-        let mut levels = Vec::with_capacity(n);
-        for k in 0..n {
-            levels.push(simulator.levels()[other]);
-            simulator.read();
-            if k + 1 < n {
-                let h = record.time[k + 1] - record.time[k];
-                simulator.advance_both(commands(record, k), h);
-            }
-        }
-        Some(levels)
+/// The vessel that it would stand in: the first one that is not measured; `None` where all are.
+pub(crate) fn place(structure: &Structure) -> Option<usize> {
+    let measured = |vessel| {
+        let mut outputs = structure.scales.outputs.iter();
+        outputs.any(|output| output.vessel == vessel)
     };
-    setup.records.iter().enumerate().map(run).collect()
+    (0..structure.plant.vessels()).find(|vessel| !measured(*vessel))
 }
 
-/// The rows of the sensor that there is and of the one that there might be, `truth` what the latter shows.
+/// The structure with that sensor as its last output.
+fn with_sensor(structure: &Structure) -> Option<Structure> {
+    let vessel = place(structure)?;
+    let mut with = structure.clone();
+    with.known.measured = structure.known.outputs(structure.plant);
+    with.known.measured.push(vessel);
+    with.scales.outputs.push(OutputScales {
+        vessel,
+        ..OutputScales::default()
+    });
+    Some(with)
+}
+
+/// Records with a further output, of which no sample is there yet.
+fn with_output(records: &[Record]) -> Vec<Record> {
+    let mut records = records.to_vec();
+    for record in &mut records {
+        let mut further = record.outputs[0].with_values(vec![0.0; record.len()]);
+        further.name = "second sensor".to_string();
+        record.outputs.push(further);
+    }
+    records
+}
+
+/// The setup of a node's structure with that sensor on records that have it.
+fn setup<'a>(node: &Node, records: &'a [Record]) -> Option<Setup<'a>> {
+    let structure = with_sensor(&node.setup.structure)?;
+    let mut setup = Setup::new(structure, records, node.setup.fixed.clone()).ok()?;
+    setup.substeps = node.setup.substeps;
+    Some(setup)
+}
+
+/// Records as one model shows them, with that sensor; `x`: its vector for these records.
+fn shown(truth: &Node, records: &[Record], x: &[f64]) -> Option<Vec<Record>> {
+    let mut records = with_output(records);
+    let mut series = setup(truth, &records)?.simulate(x).ok()?.output.into_iter();
+    for output in records.iter_mut().flat_map(|record| &mut record.outputs) {
+        output.values = series.next()?;
+    }
+    Some(records)
+}
+
+/// The folded rows of a model against what the other shows, that sensor among the outputs.
 ///
 /// Where the areas are not known, a level of the other tank is known in units of its own alone: then its sensor's scale and zero are
 /// fitted too.
-fn rows(setup: &Setup, x: &[f64], truth: &[Vec<f64>], metric: &Metric) -> Option<Triangle> {
-    let free = setup.free();
+fn rows(stand_in: &Node, x: &[f64], records: &[Record], metric: &Metric) -> Option<Triangle> {
+    let setup = setup(stand_in, records)?;
     let structure = &setup.structure;
     let known = structure.plant.outlet() == Outlet::Torricelli && structure.known.area[0].is_some();
-    let own = free.len();
+    let own = setup.free().len();
     let columns = own + if known { 0 } else { 2 } + 1;
-    let level = other_level(setup, x)?;
-    let size = structure.scales.largest_level();
-    let mut derivatives = Vec::with_capacity(own);
-    for &i in free {
-        let step = STEP
-            * if x[i] == 0.0 {
-                size.max(1e-3)
-            } else {
-                x[i].abs()
-            };
-        let at = |moved: f64| {
-            let mut x = x.to_vec();
-            x[i] += moved;
-            other_level(setup, &x)
-        };
-        let (above, below) = (at(step)?, at(-step)?);
-        let difference = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| (a - b) / (2.0 * step))
-                .collect()
-        };
-        derivatives.push(above.iter().zip(&below).map(difference).collect::<Vec<_>>());
-    }
-    let measured = setup.rows(x)?;
-    let mut triangle = Triangle::new(columns);
-    let mut whitener = metric.noise.whitener(columns);
-    let mut row = vec![0.0; columns];
-    for (r, record) in measured.records().enumerate() {
-        whitener.reset();
-        for values in record.chunks_exact(own + 1) {
-            row.fill(0.0);
-            row[..own].copy_from_slice(&values[..own]);
-            row[columns - 1] = values[own];
-            whitener.push(&mut row);
-            triangle.push(&row);
+    let last = setup.outputs() - 1;
+    let mut rows = setup.rows(x)?;
+    if !known {
+        let mut series = setup.simulate(x).ok()?.output.into_iter();
+        let mut values = Vec::with_capacity(rows.values.len() / rows.columns * columns);
+        for (output, own_rows) in rows.series() {
+            let levels = series.next()?;
+            for (row, level) in own_rows.chunks_exact(own + 1).zip(levels) {
+                values.extend_from_slice(&row[..own]);
+                let scale_and_zero = [level, 1.0];
+                values.extend(scale_and_zero.map(|v| if output == last { v } else { 0.0 }));
+                values.push(row[own]);
+            }
         }
-        whitener.reset();
-        for k in 0..level[r].len() {
-            row.fill(0.0);
-            for (to, derivative) in row.iter_mut().zip(&derivatives) {
-                *to = derivative[r][k];
-            }
-            if !known {
-                (row[own], row[own + 1]) = (level[r][k], 1.0);
-            }
-            row[columns - 1] = truth[r][k] - level[r][k];
-            if !row.iter().all(|value| value.is_finite()) {
-                return None;
-            }
-            whitener.push(&mut row);
-            triangle.push(&row);
-        }
+        (rows.columns, rows.values) = (columns, values);
     }
-    triangle.finish();
-    Some(triangle)
+    let mut models: Vec<_> = metric.noise.iter().cloned().collect();
+    models.push(models[0].clone());
+    let mut scales = metric.scales.clone();
+    scales.push(scales[0]);
+    let weights: Vec<f64> = scales.iter().map(|scale| scales[0] / scale).collect();
+    let all: Vec<usize> = (0..columns).collect();
+    Some(rows.fold(&all, &Noise::of(models), &weights))
 }
 
-/// The separation in records like the existing ones, with the other level measured too.
+/// The separation in records like the existing ones, with that level measured too.
 pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Option<f64> {
     let records = imagined(truth).ok()?;
-    let own = truth.setup.with_records(&records).ok()?;
-    let shown = other_level(&own, &unlooped(truth))?;
-    let setup = stand_in.setup.with_records(&records).ok()?;
-    let rows = rows(&setup, &unlooped(stand_in), &shown, metric)?;
-    Some(least(&rows, &Triangle::new(0)) / metric.variance)
+    let records = shown(truth, &records, &unlooped(truth))?;
+    let rows = rows(stand_in, &unlooped(stand_in), &records, metric)?;
+    Some(least(&rows, &Triangle::new(0)) / metric.variance())
 }
 
-/// The separation in an experiment that was played on the truth, with the other level measured too.
+/// The separation in an experiment that was played on the truth, with that level measured too.
 pub(crate) fn in_experiment(
     played: &Played,
     truth: &Node,
@@ -133,9 +113,10 @@ pub(crate) fn in_experiment(
     metric: &Metric,
 ) -> Option<f64> {
     let records = std::slice::from_ref(&played.record);
-    let own = truth.setup.with_records(records).ok()?;
-    let shown = other_level(&own, &vector(truth, &own, played))?;
-    let setup = stand_in.setup.with_records(records).ok()?;
-    let rows = rows(&setup, &vector(stand_in, &setup, played), &shown, metric)?;
-    Some(least(&rows, known) / metric.variance)
+    let begun = |node: &Node| -> Result<Vec<f64>, Error> {
+        Ok(vector(node, &node.setup.with_records(records)?, played))
+    };
+    let records = shown(truth, records, &begun(truth).ok()?)?;
+    let rows = rows(stand_in, &begun(stand_in).ok()?, &records, metric)?;
+    Some(least(&rows, known) / metric.variance())
 }

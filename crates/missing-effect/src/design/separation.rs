@@ -22,8 +22,8 @@
 //! **The refit** does without the straight line: B is fitted to A's simulation of the existing records and of the experiment, both free of
 //! noise; from its misfit the one to the existing records alone is taken off.
 
-use ct_signals::{ArModel, Record};
-use greybox::{Setup, Triangle, fit_from, starts_around};
+use ct_signals::Record;
+use greybox::{Noise, Setup, Triangle, fit_from, starts_around};
 
 use super::play::Played;
 use crate::{
@@ -38,19 +38,54 @@ const STARTS_AROUND: usize = 4;
 #[derive(Debug, Clone)]
 pub(crate) struct Metric {
     /// The noise.
-    pub noise: ArModel,
-    /// Variance of its innovations \[output unit squared\].
-    pub variance: f64,
+    pub noise: Noise,
+    /// Standard deviation of its innovations at each output \[output unit\].
+    pub scales: Vec<f64>,
+}
+
+impl Metric {
+    /// What costs are divided by: the variance of the first output's innovations, in units of which outputs count \[output unit squared\].
+    pub fn variance(&self) -> f64 {
+        self.scales[0].powi(2)
+    }
+
+    /// Standard deviation of the first output's noise \[output unit\].
+    pub fn noise_floor(&self) -> f64 {
+        let noise = self.noise.output(0);
+        noise.stationary_std() / noise.sigma() * self.scales[0]
+    }
+
+    /// A setup with other records in which outputs count by this noise, and not by what a model without noise leaves of them.
+    pub fn with_records<'a, 'b>(
+        &self,
+        setup: &Setup<'a>,
+        records: &'b [Record],
+    ) -> Result<Setup<'b>, Error>
+    where
+        'a: 'b,
+    {
+        let mut setup = setup.with_records(records)?;
+        setup.known_scales = Some(self.scales.clone());
+        Ok(setup)
+    }
 }
 
 /// A model's information on its free parameters from the records that are there: rows `[R | 0]`, the initial states eliminated.
-pub(crate) fn information(node: &Node) -> Triangle {
+pub(crate) fn information(node: &Node, metric: &Metric) -> Triangle {
     let setup = &node.setup;
+    // A fit weighs its outputs by their own residuals; here they count as in the metric.
+    let weighed = || {
+        let mut setup = setup.clone();
+        setup.known_scales = Some(metric.scales.clone());
+        setup.linearise(&node.fit.x, &metric.noise)
+    };
+    let several = (setup.outputs() > 1).then(weighed).flatten();
+    let rows = several.as_ref().unwrap_or(&node.fit.triangle);
     let count = setup.parameter_count();
     let (parameters, states): (Vec<usize>, Vec<usize>) =
         (0..setup.free().len()).partition(|&column| setup.free()[column] < count);
     let order: Vec<usize> = states.iter().chain(&parameters).copied().collect();
-    let all = node.fit.triangle.select(&order);
+    let all = rows.select(&order);
     let mut own = Triangle::new(parameters.len());
     for i in states.len()..order.len() {
         let row: Vec<f64> = (states.len()..order.len()).map(|j| all.at(i, j)).collect();
@@ -100,23 +135,20 @@ pub(crate) fn linear(
     metric: &Metric,
 ) -> Option<f64> {
     let records = std::slice::from_ref(&played.record);
-    let setup = stand_in.setup.with_records(records).ok()?;
+    let setup = metric.with_records(&stand_in.setup, records).ok()?;
     let x = vector(stand_in, &setup, played);
     let rows = setup.linearise(&x, &metric.noise)?;
-    Some(least(&rows, known) / metric.variance)
+    Some(least(&rows, known) / metric.variance())
 }
 
 /// One model's simulation of the existing records.
 pub(crate) fn imagined(truth: &Node) -> Result<Vec<Record>, Error> {
-    let outputs = truth.setup.simulate(&truth.fit.x)?.output;
-    let records = truth.setup.records.iter().zip(outputs);
-    Ok(records
-        .map(|(record, output)| {
-            let mut record = record.clone();
-            record.outputs[0].values = output;
-            record
-        })
-        .collect())
+    let mut series = truth.setup.simulate(&truth.fit.x)?.output.into_iter();
+    let mut records = truth.setup.records.to_vec();
+    for output in records.iter_mut().flat_map(|record| &mut record.outputs) {
+        output.values = series.next().unwrap_or_default();
+    }
+    Ok(records)
 }
 
 /// The parameters and the plant's initial states of a node, in the order of a setup without a loop.
@@ -134,7 +166,7 @@ pub(crate) fn misfit_before(
     stand_in: &Node,
     metric: &Metric,
 ) -> Result<f64, Error> {
-    let setup = stand_in.setup.with_records(existing)?;
+    let setup = metric.with_records(&stand_in.setup, existing)?;
     Ok(fit_from(&setup, &[unlooped(stand_in)], &metric.noise, FINE)?.cost)
 }
 
@@ -148,12 +180,12 @@ pub(crate) fn refitted(
 ) -> Result<f64, Error> {
     let mut records = existing.to_vec();
     records.push(played.record.clone());
-    let setup = stand_in.setup.with_records(&records)?;
+    let setup = metric.with_records(&stand_in.setup, &records)?;
     let mut own = unlooped(stand_in);
     own.extend(&played.initial);
     own.resize(setup.names().len(), 0.0);
     let mut starts = starts_around(&setup, &own, STARTS_AROUND, 1);
     starts.push(own);
     let fit = fit_from(&setup, &starts, &metric.noise, FINE)?;
-    Ok(((fit.cost - before) / metric.variance).max(0.0))
+    Ok(((fit.cost - before) / metric.variance()).max(0.0))
 }

@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use ct_signals::{ArModel, Record, excitation, noise};
-use greybox::{Triangle, fit_from};
+use ct_signals::{Record, excitation, noise};
+use greybox::{Noise, Triangle, fit_from};
 use plants::{EffectInfo, Known, Placed, Plant, Scales, Structure};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
@@ -59,8 +59,8 @@ fn leak_or_curve(problem: &Problem) -> Fitted<'_> {
     let two = between("const_leak", "pump_nonlinearity");
     let mut fitted = fitted(problem, two, &Options::default()).unwrap();
     fitted.metric = Metric {
-        noise: ArModel::white(1.0),
-        variance: NOISE * NOISE,
+        noise: Noise::white(1),
+        scales: vec![NOISE],
     };
     fitted
 }
@@ -137,7 +137,7 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
     for truth in 0..2 {
         let (a, b) = (&fitted.nodes[truth], &fitted.nodes[1 - truth]);
         let played = play(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
-        let promised = linear(&played, b, &information(b), metric).unwrap();
+        let promised = linear(&played, b, &information(b, metric), metric).unwrap();
         let existing = imagined(a).unwrap();
         let before = misfit_before(&existing, b, metric).unwrap();
         let confirmed = refitted(&existing, &played, b, before, metric).unwrap();
@@ -162,7 +162,7 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
                 both.push(played.record.clone());
                 let both = noisy(&both, 100 + seed);
                 let ratio = |records: &[Record]| cost(b, records) - cost(a, records);
-                (ratio(&both) - ratio(&both[..1])) / metric.variance
+                (ratio(&both) - ratio(&both[..1])) / metric.variance()
             })
             .collect();
         let n = ratios.len() as f64;

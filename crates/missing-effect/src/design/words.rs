@@ -28,8 +28,11 @@ fn sized(rival: &Rival, domain: Domain) -> String {
 pub(super) fn named(rival: &Rival, domain: Domain) -> String {
     match &rival.place {
         Some(place) => {
-            let (which, kind) = domain.vessel_words(place);
-            format!("{} in the {which} {kind}", rival.effect)
+            format!(
+                "{} {}",
+                rival.effect,
+                domain.place_words(&rival.effect, place)
+            )
         }
         None => rival.effect.clone(),
     }

@@ -11,7 +11,7 @@ mod smooth;
 #[cfg(test)]
 mod smooth_tests;
 
-use plants::{Fitted, Place, Plant, Term, Variable};
+use plants::{Fitted, Place, Structure, Term, Variable};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -38,7 +38,7 @@ const CLEARLY: f64 = 1.64;
 /// How likely the missing term acts at a place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlaceLikelihood {
-    /// `actuator`, `vessel` (`upper` or `lower` of two) or `sensor`.
+    /// `actuator`, `vessel` (`upper` or `lower` of two) or `sensor` (`sensor upper` of several).
     pub place: String,
     /// Restricted log-likelihood below that of the best place.
     pub below_best: f64,
@@ -85,7 +85,7 @@ pub struct Unknown {
     pub std_error: Vec<f64>,
     /// The random walk's standard deviation after one second, in the term's unit.
     pub intensity: f64,
-    /// Standard deviation of the measurement noise beside it, in the output's unit.
+    /// Standard deviation of the measurement noise beside it, in the output's unit; of several outputs relative to the weighted mean.
     pub noise: f64,
     /// Where it is clearly not zero, the strongest first.
     pub windows: Vec<Window>,
@@ -108,12 +108,16 @@ pub struct Unknown {
 }
 
 /// The name of a place, as files have it.
-fn place_name(plant: Plant, spot: Spot) -> String {
+fn place_name(structure: &Structure, spot: Spot) -> String {
+    let plant = structure.plant;
     match spot.place {
-        Place::Vessel => plant.vessel_name(spot.vessel).unwrap_or("vessel"),
-        other => other.name(),
+        Place::Vessel => plant.vessel_name(spot.vessel).unwrap_or("vessel").into(),
+        Place::Sensor if structure.scales.outputs.len() > 1 => {
+            let vessel = structure.scales.outputs[spot.vessel].vessel;
+            format!("sensor {}", plant.vessel_name(vessel).unwrap_or_default())
+        }
+        other => other.name().into(),
     }
-    .to_string()
 }
 
 /// What is left out where the time limit has passed.
@@ -122,19 +126,19 @@ pub(crate) const PART: &str = "the shape of what is not explained";
 /// The missing term beside a fitted node; `None` where nothing moves, and where the time limit of its setup passes: what was looked at by
 /// then says nothing of the other places and variables.
 pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
-    let plant = node.setup.structure.plant;
+    let structure = &node.setup.structure;
     let mut spots = vec![Spot {
         place: Place::Actuator,
         vessel: 0,
     }];
-    spots.extend((0..plant.vessels()).map(|vessel| Spot {
+    spots.extend((0..structure.plant.vessels()).map(|vessel| Spot {
         place: Place::Vessel,
         vessel,
     }));
-    spots.push(Spot {
+    spots.extend((0..node.setup.outputs()).map(|output| Spot {
         place: Place::Sensor,
-        vessel: 0,
-    });
+        vessel: output,
+    }));
     let mut smoothed: Vec<Smoothed> = spots
         .into_par_iter()
         .map(|spot| smooth(node, spot))
@@ -149,7 +153,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     let places = smoothed
         .iter()
         .map(|s| PlaceLikelihood {
-            place: place_name(plant, s.spot),
+            place: place_name(structure, s.spot),
             below_best: most - s.log_likelihood,
         })
         .collect();
@@ -182,7 +186,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     let shares = shapes
         .iter()
         .map(|s| Share {
-            place: place_name(plant, s.spot),
+            place: place_name(structure, s.spot),
             variable: s.variable.name(),
             share: s.share,
             std_error: s.share_error,
@@ -263,7 +267,7 @@ fn report(
         .map(|e| e * e)
         .sum();
     Unknown {
-        place: place_name(structure.plant, spot),
+        place: place_name(structure, spot),
         unit: label(term.unit()),
         places,
         time: path.time.iter().map(|t| begin + t).collect(),

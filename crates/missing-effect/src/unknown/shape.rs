@@ -18,8 +18,8 @@ use super::{
 };
 use crate::{
     Error,
-    node::{Node, observed},
-    noise_floor::slowness,
+    node::{Node, in_time},
+    noise_floor::slowness_of,
 };
 
 /// Knots of a polyline.
@@ -72,7 +72,7 @@ fn visited(node: &Node, smoothed: &Smoothed, variable: Variable) -> Result<Vec<f
             Simulator::<f64>::with_inputs(&structure, &theta, &path.states, at_rest(record))?;
         simulator.set_substeps(setup.substeps);
         let vessel = match spot.place {
-            plants::Place::Sensor => setup.structure.scales.measured,
+            plants::Place::Sensor => setup.structure.scales.outputs[spot.vessel].vessel,
             _ => spot.vessel,
         };
         let area = setup.structure.scales.area[vessel];
@@ -152,7 +152,8 @@ pub(super) fn shape(
         count += 1.0;
     }
     let size = SIZES * f64::sqrt(sum / count);
-    let Some(fitted) = fit(&setup, start, own..own + k, size) else {
+    let weights = &node.fit.weights;
+    let Some(fitted) = fit(&setup, start, own..own + k, size, weights) else {
         return Ok(None);
     };
     let Fit { x, j, residual, .. } = &fitted;
@@ -175,7 +176,7 @@ pub(super) fn shape(
     let (mine, theirs) = (j.select_columns(&at), j.select_columns(&others));
     let freedom = residual.len().saturating_sub(columns).max(1) as f64;
     let series: Vec<f64> = residual.iter().copied().collect();
-    let inflation = slowness(&ArModel::fit(&[&series], crate::noise_floor::NOISE_ORDER)?);
+    let inflation = slowness_of(&ArModel::fit(&[&series], crate::noise_floor::NOISE_ORDER)?);
     let variance = inflation * residual.norm_squared() / freedom;
     let mut information = mine.tr_mul(&mine);
     if let Some(factor) = regularised(theirs.tr_mul(&theirs)).cholesky() {
@@ -235,12 +236,20 @@ struct Fit {
 
 /// Least squares with a prior, by Levenberg and Marquardt's steps. Without a prior the plant's parameters and the ordinates
 /// would run off together, since the ones imitate the others. `None` too where the time limit passes.
-fn fit(setup: &Setup, start: Vec<f64>, ordinates: Range<usize>, size: f64) -> Option<Fit> {
+fn fit(
+    setup: &Setup,
+    start: Vec<f64>,
+    ordinates: Range<usize>,
+    size: f64,
+    weights: &[f64],
+) -> Option<Fit> {
     let mean = x_free(setup, &start);
+    let of_outputs = weights;
     let rows = |x: &[f64]| {
-        let rows = setup.rows(x)?.observed();
-        let samples = rows.values.len() / rows.columns;
-        let j = DMatrix::from_row_slice(samples, rows.columns, &rows.values);
+        let rows = setup.rows(x)?;
+        let values = rows.in_time(of_outputs);
+        let samples = values.len() / rows.columns;
+        let j = DMatrix::from_row_slice(samples, rows.columns, &values);
         let residual = j.column(rows.columns - 1).into_owned();
         Some((j.remove_column(rows.columns - 1), residual))
     };
@@ -336,7 +345,8 @@ fn unseen(
     free: &DVector<f64>,
     states: usize,
 ) -> Result<(f64, f64), Error> {
-    let before = observed(node.setup.records, node.setup.residuals(&node.fit.x)?).concat();
+    let before = node.setup.residuals(&node.fit.x)?;
+    let before = in_time(&node.setup, &before, &node.fit.weights);
     let j = j.columns(0, states);
     let weights = weights.view((0, 0), (states, states)).into_owned();
     let target = residual + j * (free - mean).rows(0, states);

@@ -24,7 +24,7 @@ use plants::{Fitted, Place, Term, Variable};
 use super::PART;
 use crate::{
     Error,
-    node::{Node, observed},
+    node::{Node, in_time},
 };
 
 /// Instants of a path: at most so many, and so many samples for each at least.
@@ -51,7 +51,7 @@ pub(super) struct Path {
     pub covariance: DMatrix<f64>,
     /// Initial states with the path.
     pub states: Vec<f64>,
-    /// Measured minus model with the path.
+    /// Measured minus model with the path, samples that are there in the order of time, times the weight of their output.
     pub residual: Vec<f64>,
 }
 
@@ -133,6 +133,8 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
         x.extend(&node.fit.x[setup.plant_states_of(r)]);
         runs.push((with, x, time));
     }
+    // Noise is as large beside the path as it is beside the node, output by output.
+    let weights = &node.fit.weights;
     let mut best = None;
     for _ in 0..ROUNDS {
         if best.is_some() && node.setup.leaves_out(PART) {
@@ -140,7 +142,7 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
         }
         let Some(blocks) = runs
             .iter()
-            .map(|(setup, x, time)| block(setup, x, count, time))
+            .map(|(setup, x, time)| block(setup, x, count, time, weights))
             .collect::<Option<Vec<Block>>>()
         else {
             break;
@@ -176,7 +178,7 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
                 let (low, high) = setup.bounds()[position];
                 x[position] = solved[m + k].clamp(low, high);
             }
-            let residual = observed(setup.records, setup.residuals(x)?).remove(0);
+            let residual = in_time(setup, &setup.residuals(x)?, weights);
             paths.push(Path {
                 time: time.clone(),
                 value,
@@ -205,14 +207,21 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
 }
 
 /// The normal equations about `x`, in steps of the path and in states as they are (not as changes).
-fn block(setup: &greybox::Setup, x: &[f64], count: usize, time: &[f64]) -> Option<Block> {
-    let rows = setup.rows(x)?.observed();
+fn block(
+    setup: &greybox::Setup,
+    x: &[f64],
+    count: usize,
+    time: &[f64],
+    weights: &[f64],
+) -> Option<Block> {
+    let rows = setup.rows(x)?;
+    let values = rows.in_time(weights);
     let m = time.len();
     let columns = rows.columns - 1;
-    let samples = rows.values.len() / rows.columns;
+    let samples = values.len() / rows.columns;
     let free: Vec<f64> = setup.free().iter().map(|&i| x[i]).collect();
     debug_assert_eq!(setup.free().first(), Some(&count));
-    let mut j = DMatrix::from_row_slice(samples, rows.columns, &rows.values);
+    let mut j = DMatrix::from_row_slice(samples, rows.columns, &values);
     let mut target = j.column(columns).into_owned();
     j = j.remove_column(columns);
     target += &j * DVector::from_vec(free);

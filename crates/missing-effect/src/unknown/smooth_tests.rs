@@ -3,8 +3,8 @@
 
 use std::ops::RangeInclusive;
 
-use ct_signals::{ArModel, Channel, Record, noise};
-use greybox::{Setup, Stopping, fit_from};
+use ct_signals::{Channel, Record, noise};
+use greybox::{Noise, Setup, Stopping, fit_from};
 use nalgebra::{Matrix3, Vector3};
 use plants::{Command, Known, Place, Plant, Simulator, Term, Variable};
 use rand::SeedableRng;
@@ -58,7 +58,7 @@ fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
     let theta: Vec<f64> = THETA.iter().chain(&term.ordinates).copied().collect();
     let mut simulator = Simulator::<f64>::new(&structure, &theta, &[14.0], u[0]).unwrap();
     for k in 0..N {
-        record.outputs[0].values[k] = simulator.read() + e[k];
+        record.outputs[0].values[k] = simulator.read(0) + e[k];
         simulator.advance(Command::held(u[k]), H);
     }
     record
@@ -80,7 +80,7 @@ fn node(records: &[Record]) -> Node<'_> {
         evaluations: 1,
         cost: 1.0,
     };
-    let mut fit = fit_from(&setup, std::slice::from_ref(&x), &ArModel::white(1.0), stop).unwrap();
+    let mut fit = fit_from(&setup, std::slice::from_ref(&x), &Noise::white(1), stop).unwrap();
     fit.x = x;
     Node {
         setup,

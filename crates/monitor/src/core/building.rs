@@ -6,8 +6,9 @@ use plants::Domain;
 use super::{Core, Running};
 use crate::{
     bank::windows,
+    learn::OutputNoise,
     scatter::{Most, SHARE},
-    threshold::{relative_error, threshold},
+    threshold::threshold,
     tracker::Tracker,
     watch::{Watch, tracked},
 };
@@ -65,14 +66,17 @@ impl Core {
             .tracker
             .as_ref()
             .and_then(|state| Tracker::new(state, &tracked(learned), memory));
-        let lanes: Vec<usize> = (0..bank.directions() - 1).collect();
+        let lanes: Vec<usize> = (0..bank.parameters()).collect();
+        let outputs = &learned.outputs;
+        let most =
+            |output: &OutputNoise, samples| Most::new(&output.scatter, samples, outputs.len());
         // The promise is in rows; scores and blocks count means of so many.
         let samples = self.settings.rows_between_false_alarms / self.now.every as f64;
         let threshold = threshold(
             &windows(learned.rows_per_time_constant()),
             bank.directions(),
             samples / (1.0 - SHARE),
-            relative_error(&learned.noise()?, learned.rows),
+            learned.relative_error()?,
         );
         Some(Running {
             structure,
@@ -80,7 +84,7 @@ impl Core {
             tracker,
             covariance: learned.covariance_of(&lanes),
             threshold,
-            most: Most::new(&learned.scatter, samples),
+            most: outputs.iter().map(|output| most(output, samples)).collect(),
         })
     }
 

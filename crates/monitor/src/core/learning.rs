@@ -2,9 +2,11 @@
 
 use std::collections::VecDeque;
 
+use ct_signals::ArModel;
+
 use super::{Core, Fed, KEPT, Phase};
 use crate::{
-    Gathered, Notice,
+    Gathered, MAX_OUTPUTS, Notice,
     bank::Bank,
     intake::{LONGEST_BLOCK, Sample},
     isolate::Kept,
@@ -27,7 +29,7 @@ impl Core {
         self.now.settling = 0;
         self.now.learned = None;
         self.now.bank = None;
-        self.now.scatter = Scatter::default();
+        self.now.scatter.fill(Scatter::default());
         self.now.tracker = None;
         self.running = None;
         self.set_checkpoint();
@@ -54,8 +56,8 @@ impl Core {
             sample,
             levels: [0.0; plants::MAX_VESSELS],
             stands: sample.input,
-            modelled: 0.0,
-            innovation: 0.0,
+            modelled: [0.0; MAX_OUTPUTS],
+            innovations: [0.0; MAX_OUTPUTS],
         });
         if self.now.kept.len() < next.min(KEPT) {
             return Fed::default();
@@ -64,7 +66,7 @@ impl Core {
         let notice = match learn(&self.model, &samples, self.hold()) {
             Err(why) => {
                 // The older half goes: what comes next may say more.
-                self.later(2 * next, span, |kept| {
+                self.later(2 * next, span, |kept, _| {
                     kept.drain(..KEPT / 2);
                 });
                 Some(Notice::NotLearned { why })
@@ -94,11 +96,16 @@ impl Core {
     }
 
     /// Puts the next try off to so many rows; where no more fit in, room is made.
-    fn later(&mut self, next: usize, span: Option<f64>, room: impl FnOnce(&mut VecDeque<Kept>)) {
+    fn later(
+        &mut self,
+        next: usize,
+        span: Option<f64>,
+        room: impl FnOnce(&mut VecDeque<Kept>, usize),
+    ) {
         let next = if self.now.kept.len() < KEPT {
             next.min(KEPT)
         } else {
-            room(&mut self.now.kept);
+            room(&mut self.now.kept, self.now.scatter.len());
             KEPT
         };
         self.now.phase = Phase::Learning { next, span };
@@ -109,11 +116,15 @@ impl Core {
 
     /// The learned model is run over the rows that it was learned from, and watched from now on.
     fn take_over(&mut self, learned: Learned, levels: &[f64]) -> Option<Notice> {
-        let (rows, time_constant) = (learned.rows * self.now.every, learned.time_constant);
-        let noise = learned.noise()?.stationary_std();
+        let (rows, time_constant) = (learned.rows() * self.now.every, learned.time_constant);
+        let noise = learned
+            .noise()?
+            .iter()
+            .map(ArModel::stationary_std)
+            .collect();
         let unit = learned.rows_per_time_constant();
         let lanes = crate::sensitivity::lanes(learned.theta.len());
-        self.now.bank = Some(Bank::new(unit, lanes));
+        self.now.bank = Some(Bank::new(unit, lanes, learned.outputs.len()));
         self.now.tracker = Some(as_learned(&learned));
         self.now.learned = Some(learned);
         self.now.phase = Phase::Watching;
@@ -140,20 +151,25 @@ impl Core {
     }
 }
 
-/// Means of pairs of rows; a pair without any reading has none.
-fn halve(kept: &mut VecDeque<Kept>) {
+/// Means of pairs of rows; a pair without any reading of an output has none of it.
+fn halve(kept: &mut VecDeque<Kept>, outputs: usize) {
     let pairs = kept.len() / 2;
-    let readings: Vec<Option<f64>> = kept.iter().map(|kept| kept.sample.output).collect();
-    let filled = interpolated(&readings).unwrap_or_default();
+    let of_output = |output: usize| {
+        let readings: Vec<Option<f64>> = kept.iter().map(|k| k.sample.outputs[output]).collect();
+        interpolated(&readings).unwrap_or_default()
+    };
+    let filled: Vec<Vec<f64>> = (0..outputs).map(of_output).collect();
     for i in 0..pairs {
         let (a, b) = (kept[2 * i].sample, kept[2 * i + 1].sample);
+        let mut means = [None; MAX_OUTPUTS];
+        for (output, filled) in filled.iter().enumerate() {
+            let any = a.outputs[output].or(b.outputs[output]);
+            means[output] = any.map(|_| 0.5 * (filled[2 * i] + filled[2 * i + 1]));
+        }
         kept[i].sample = Sample {
             time: 0.5 * (a.time + b.time),
             input: 0.5 * (a.input + b.input),
-            output: a
-                .output
-                .or(b.output)
-                .map(|_| 0.5 * (filled[2 * i] + filled[2 * i + 1])),
+            outputs: means,
             follows: a.follows,
         };
     }

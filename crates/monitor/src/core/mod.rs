@@ -15,7 +15,7 @@ use plants::Structure;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Alarm, Estimate, Model, Notice, ScatterAlarm, Settings, Units,
+    Alarm, Estimate, MAX_OUTPUTS, Model, Notice, ScatterAlarm, Settings, Units,
     bank::Bank,
     intake::{Follows, LONGEST_BLOCK, Sample},
     isolate::Kept,
@@ -32,6 +32,8 @@ const STRETCH: usize = 2048;
 /// Half the width of the interval that holds a Gaussian value with a probability of 95 %.
 const BAND: f64 = 1.96;
 
+const OTHER_NUMBERS: &str = "its numbers are not those of this model";
+
 /// Where the watching is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Phase {
@@ -46,8 +48,9 @@ pub(crate) enum Phase {
 /// An alarm that is followed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Following {
-    /// What passed.
+    /// What passed, and the output at which it shows most.
     score: f64,
+    output: usize,
     /// When it was raised \[s\].
     since: f64,
     /// So many rows ago.
@@ -73,7 +76,8 @@ pub(crate) struct Checkpoint {
     pub settling: usize,
     pub learned: Option<Learned>,
     pub bank: Option<Bank>,
-    pub scatter: Scatter,
+    /// Of each output.
+    pub scatter: Vec<Scatter>,
     pub tracker: Option<TrackerState>,
 }
 
@@ -83,7 +87,7 @@ pub(crate) struct Fed {
     pub said: Option<Said>,
     pub notice: Option<Notice>,
     pub alarm: Option<Alarm>,
-    pub scatter: Option<ScatterAlarm>,
+    pub scatter: [Option<ScatterAlarm>; MAX_OUTPUTS],
 }
 
 /// What is built from the learned numbers.
@@ -93,8 +97,8 @@ struct Running {
     tracker: Option<Tracker>,
     covariance: Vec<f64>,
     threshold: f64,
-    /// Pairs beyond the limit that make the scatter an alarm.
-    most: Most,
+    /// Of each output the pairs beyond the limit that make the scatter an alarm.
+    most: Vec<Most>,
 }
 
 pub(crate) struct Core {
@@ -110,6 +114,7 @@ pub(crate) struct Core {
 
 impl Core {
     pub(crate) fn new(model: Model, settings: Settings, units: Units) -> Self {
+        let outputs = model.known.outputs(model.plant).len();
         let now = Checkpoint {
             phase: Phase::Learning {
                 next: settings.learning_rows,
@@ -121,7 +126,7 @@ impl Core {
             settling: 0,
             learned: None,
             bank: None,
-            scatter: Scatter::default(),
+            scatter: vec![Scatter::default(); outputs],
             tracker: None,
         };
         Self {
@@ -156,7 +161,12 @@ impl Core {
             return Err("what it has learned does not agree with its phase".into());
         }
         let mut core = Self::new(model, settings, units);
+        let outputs = core.now.scatter.len();
         core.now = checkpoint;
+        let scatter = &core.now.scatter;
+        if scatter.len() != outputs || !scatter.iter().all(Scatter::sound) {
+            return Err(OTHER_NUMBERS.into());
+        }
         if let Some(learned) = &core.now.learned {
             let parameters = core
                 .model
@@ -165,10 +175,10 @@ impl Core {
                 .parameters()
                 .len();
             let lanes = crate::sensitivity::lanes(parameters);
-            let bank = core.now.bank.as_ref().is_some_and(|b| b.sound(lanes));
-            let scores = bank && core.now.scatter.sound();
-            if !learned.sound(parameters) || !scores || core.now.kept.is_empty() {
-                return Err("its numbers are not those of this model".into());
+            let bank = core.now.bank.as_ref();
+            let scores = bank.is_some_and(|bank| bank.sound(lanes, outputs));
+            if !learned.sound(parameters, outputs) || !scores || core.now.kept.is_empty() {
+                return Err(OTHER_NUMBERS.into());
             }
         }
         core.checkpoint = core.now.clone();
@@ -240,6 +250,12 @@ impl Core {
     pub(crate) fn score(&self) -> Option<(f64, f64)> {
         let (bank, running) = (self.now.bank.as_ref()?, self.running.as_ref()?);
         Some((bank.largest(&running.covariance), running.threshold))
+    }
+
+    /// The output at which a change shows most.
+    fn most_at(&self) -> Option<usize> {
+        let (bank, running) = (self.now.bank.as_ref()?, self.running.as_ref()?);
+        Some(bank.most_at(&running.covariance))
     }
 
     pub(crate) fn feed(&mut self, sample: Sample) -> Fed {

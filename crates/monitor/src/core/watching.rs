@@ -2,12 +2,11 @@
 
 use super::{Core, Fed, Following, KEPT, Phase, STRETCH};
 use crate::{
-    Alarm, Notice, ScatterAlarm, Stage, Verdict,
-    alarm::alarm,
-    bank::Bank,
+    Alarm, Innovation, MAX_OUTPUTS, Notice, ScatterAlarm, Stage, Verdict,
+    alarm::{alarm, output_name},
     intake::Sample,
     isolate::{Kept, isolate},
-    scatter::Moved,
+    scatter::{Moved, Scatter},
 };
 
 /// After a long gap the levels are not known for so many slowest time constants.
@@ -43,24 +42,25 @@ impl Core {
             following.quiet = 0;
         }
         self.now.settling = (SETTLING * learned.rows_per_time_constant()).ceil() as usize;
-        // The last vessel is read; the others are taken where they were.
+        // What is read is where it is read; the others are taken where they were.
         let mut levels = self
             .now
             .kept
             .back()
             .map_or(learned.scales.operating_level, |k| k.levels);
-        let last = self.model.plant.vessels() - 1;
-        if let Some(output) = sample.output {
-            levels[last] = output;
+        let read = self.model.known.outputs(self.model.plant);
+        for (vessel, reading) in read.into_iter().zip(sample.outputs) {
+            levels[vessel] = reading.unwrap_or(levels[vessel]);
         }
         self.now.kept.clear();
         self.now.judged = 0;
-        self.now.scatter.begin();
+        self.now.scatter.iter_mut().for_each(Scatter::begin);
         self.start(&levels, sample.input);
         None
     }
 
     pub(super) fn watch(&mut self, sample: Sample) -> Fed {
+        let growth = self.growth();
         let (Some(running), Some(bank)) = (&mut self.running, &mut self.now.bank) else {
             return Fed::default();
         };
@@ -73,10 +73,8 @@ impl Core {
             said: Some(said),
             ..Fed::default()
         };
-        if said
-            .innovation
-            .is_some_and(|said| !said.standardised.is_finite())
-        {
+        let finite = |said: &Innovation| said.standardised.is_finite();
+        if !said.innovations.iter().flatten().all(finite) {
             // A level that left all bounds: what was learned is of no use any more.
             let every = self.now.every;
             self.begin(every);
@@ -92,7 +90,7 @@ impl Core {
             self.now.judged = (self.now.judged + 1).min(self.now.kept.len());
         }
         // A row without a reading says nothing.
-        if let (0, Some(innovation)) = (settling, said.innovation) {
+        if settling == 0 && said.any() {
             let share = match self.now.phase {
                 Phase::Alarmed(_) => QUIET,
                 _ => 1.0,
@@ -102,11 +100,16 @@ impl Core {
                 running.tracker.as_mut(),
                 &running.covariance,
                 share * running.threshold,
-                (said.step, self.now.scatter.growth()),
+                (said.step, growth),
             );
-            fed.scatter = self.scatter(innovation.standardised, sample.time);
+            for (output, innovation) in said.innovations.iter().enumerate() {
+                if let Some(innovation) = innovation {
+                    let e = innovation.standardised;
+                    fed.scatter[output] = self.scatter(output, e, sample.time);
+                }
+            }
             // A score of the smaller noise says nothing of the larger.
-            let passed = passed && fed.scatter.is_none();
+            let passed = passed && fed.scatter.iter().all(Option::is_none);
             (fed.alarm, fed.notice) = self.judge(passed, sample.time);
         }
         if self.since.len() >= STRETCH {
@@ -115,34 +118,54 @@ impl Core {
         fed
     }
 
-    /// Whether the scatter has moved. Where an effect explains an alarm, its residual is no noise.
-    fn scatter(&mut self, innovation: f64, time: f64) -> Option<ScatterAlarm> {
+    /// How many times as large as learned the noise of each output is.
+    fn growth(&self) -> [f64; MAX_OUTPUTS] {
+        let mut growth = [1.0; MAX_OUTPUTS];
+        for (growth, scatter) in growth.iter_mut().zip(&self.now.scatter) {
+            *growth = scatter.growth();
+        }
+        growth
+    }
+
+    /// Whether the scatter of an output has moved. Where an effect explains an alarm, its residual is no noise.
+    fn scatter(&mut self, output: usize, innovation: f64, time: f64) -> Option<ScatterAlarm> {
         let (learned, running) = (self.now.learned.as_ref()?, self.running.as_ref()?);
+        let scatter = self.now.scatter.get_mut(output)?;
         if matches!(self.now.phase, Phase::Alarmed(following) if following.explained) {
-            self.now.scatter.begin();
+            scatter.begin();
             return None;
         }
-        let scatter = &mut self.now.scatter;
-        let moved = scatter.update(innovation, &learned.scatter, &running.most)?;
+        let noise = learned.outputs.get(output)?;
+        let moved = scatter.update(innovation, &noise.scatter, running.most.get(output)?)?;
         if let Some(bank) = &mut self.now.bank
             && matches!(moved, Moved::Grown(_))
         {
             // What was summed up of larger noise than was reckoned with says nothing.
-            *bank = Bank::new(learned.rows_per_time_constant(), bank.directions() - 1);
+            bank.begin();
         }
-        let noise = learned.noise()?.stationary_std();
-        Some(ScatterAlarm::new(moved, time, noise, &self.units))
+        let structure = &running.structure;
+        let name = output_name(structure.plant, &structure.known, output);
+        let noise = noise.model()?.stationary_std();
+        let domain = structure.domain;
+        Some(ScatterAlarm::new(
+            moved,
+            time,
+            (name, noise),
+            domain,
+            &self.units,
+        ))
     }
 
     /// What follows from whether a score has passed, or, while an alarm is followed, has not stayed small.
     fn judge(&mut self, passed: bool, time: f64) -> (Option<Alarm>, Option<Notice>) {
         match self.now.phase {
-            Phase::Watching if passed && !self.now.scatter.is_suspicious() => {
+            Phase::Watching if passed && !self.now.scatter.iter().any(Scatter::is_suspicious) => {
                 let Some((score, _)) = self.score() else {
                     return (None, None);
                 };
                 self.now.phase = Phase::Alarmed(Following {
                     score,
+                    output: self.most_at().unwrap_or(0),
                     since: time,
                     rows: 0,
                     looks: 0,
@@ -216,11 +239,11 @@ impl Core {
         let (learned, running) = (self.now.learned.as_ref()?, self.running.as_ref()?);
         let from = self.now.kept.len() - self.now.judged;
         let rows: Vec<Kept> = self.now.kept.range(from..).copied().collect();
-        let growth = self.now.scatter.growth();
+        let growth = self.growth();
         let suspects = isolate(&running.structure, learned, self.hold(), &rows, growth);
         let alarm = alarm(
             (stage, time, following.since),
-            (following.score, running.threshold),
+            (following.score, running.threshold, following.output),
             &suspects,
             &running.structure,
             &self.units,

@@ -35,11 +35,7 @@ fn a_leak_behind_a_dead_time_is_named_and_measured() {
     let mut alarms: Vec<Alarm> = Vec::new();
     let mut level = 16.0_f64;
     for k in 0..count {
-        let row = Row {
-            time: 2.0 * k as f64,
-            input: command[k],
-            output: level + noise[k],
-        };
+        let row = Row::new(2.0 * k as f64, command[k], &[level + noise[k]]);
         alarms.extend(monitor.update(&row).unwrap().alarm);
         let (u, lost) = (
             command[k.saturating_sub(DELAY)],

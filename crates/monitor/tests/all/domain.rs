@@ -15,11 +15,7 @@ fn heated_block() -> Vec<Row> {
     (0..ROWS)
         .map(|k| {
             let time = 2.0 * k as f64;
-            let row = Row {
-                time,
-                input: power[k],
-                output: temperature + noise[k],
-            };
+            let row = Row::new(time, power[k], &[temperature + noise[k]]);
             for _ in 0..200 {
                 let on = time < 4000.0 || temperature < 60.0;
                 let heater = if on { power[k] } else { 0.0 };

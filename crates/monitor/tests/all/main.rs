@@ -4,4 +4,5 @@
 mod dead_time;
 mod domain;
 mod monitor;
+mod outputs;
 mod play;

@@ -45,11 +45,7 @@ impl Tank {
         (0..self.rows)
             .map(|k| {
                 let time = k as f64 * self.interval;
-                let row = Row {
-                    time,
-                    input: command[k],
-                    output: level + noise[k],
-                };
+                let row = Row::new(time, command[k], &[level + noise[k]]);
                 let h = self.interval / f64::from(parts);
                 for i in 0..parts {
                     let t = time + h * f64::from(i);
@@ -202,10 +198,10 @@ fn a_scatter_that_grows_is_said_in_words_and_is_no_effect() {
             &mut ChaCha8Rng::seed_from_u64(77),
         );
         for (row, extra) in rows[2000..3500].iter_mut().zip(extra) {
-            row.output += extra;
+            row.outputs[0] += extra;
         }
         let steps = all(&mut new(), &rows);
-        let said: Vec<&ScatterAlarm> = steps.iter().filter_map(|s| s.scatter.as_ref()).collect();
+        let said: Vec<&ScatterAlarm> = steps.iter().filter_map(|s| s.scatter[0].as_ref()).collect();
         let [up, down] = said[..] else {
             panic!("{said:?}");
         };
@@ -226,10 +222,13 @@ fn a_scatter_that_grows_is_said_in_words_and_is_no_effect() {
 fn readings_that_alternate_are_no_fit() {
     let mut rows = Tank::default().run();
     for (k, row) in rows[2000..].iter_mut().enumerate() {
-        row.output += [0.25, -0.25][k % 2];
+        row.outputs[0] += [0.25, -0.25][k % 2];
     }
     let steps = all(&mut new(), &rows);
-    let first = steps.iter().find_map(|step| step.scatter.as_ref()).unwrap();
+    let first = steps
+        .iter()
+        .find_map(|step| step.scatter[0].as_ref())
+        .unwrap();
     assert!(
         first.time <= rows[2040].time && first.now > 4.0 * first.learned,
         "{first:?}"
@@ -245,7 +244,7 @@ fn a_leak_grows_no_scatter() {
     };
     let steps = all(&mut new(), &tank.run());
     assert!(!alarms(&steps).is_empty());
-    assert!(steps.iter().all(|step| step.scatter.is_none()));
+    assert!(steps.iter().all(|step| step.scatter[0].is_none()));
 }
 
 #[test]
@@ -263,7 +262,7 @@ fn nothing_is_seen_where_nothing_is() {
         // The innovations are white and of the size that was learned.
         let e: Vec<f64> = steps
             .iter()
-            .filter_map(|step| Some(step.innovation?.standardised))
+            .filter_map(|step| Some(step.innovations[0]?.standardised))
             .collect();
         let n = e.len() as f64;
         let rms = (e.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
@@ -379,7 +378,14 @@ fn a_state_of_another_model_or_a_damaged_one_is_refused() {
         ("/checkpoint/every", 0.into()),
         ("/checkpoint/learned/theta", serde_json::json!([1.0])),
         ("/checkpoint/learned", serde_json::Value::Null),
-        ("/checkpoint/learned/coefficients", serde_json::json!([3.0])),
+        (
+            "/checkpoint/learned/outputs/0/coefficients",
+            serde_json::json!([3.0]),
+        ),
+        ("/checkpoint/learned/outputs/0/sigma", 0.0.into()),
+        ("/checkpoint/learned/outputs", serde_json::json!([])),
+        ("/checkpoint/scatter", serde_json::json!([])),
+        ("/intake/outputs", serde_json::json!([])),
         ("/checkpoint/bank/z", serde_json::json!([])),
         ("/checkpoint/kept", serde_json::json!([])),
         ("/intake/every", 0.into()),
@@ -441,7 +447,7 @@ fn without_steps(rows: &[Row], behind: usize) -> Vec<Row> {
     for k in 1..rows.len() {
         if rows[k].input != rows[k - 1].input {
             for row in &mut lost[k..(k + 1 + behind).min(rows.len())] {
-                row.output = f64::NAN;
+                row.outputs[0] = f64::NAN;
             }
         }
     }
@@ -459,13 +465,13 @@ fn the_command_of_a_row_counts_where_its_reading_is_lost() {
         let rows = tank.run();
         let steps = all(&mut new(), &without_steps(&rows, 2));
         assert_eq!(alarms(&steps), Vec::<&Alarm>::new());
-        let lost = steps.iter().filter(|step| step.lost.is_some()).count();
+        let lost = steps.iter().filter(|step| step.lost[0].is_some()).count();
         assert!(lost > 100, "{lost}");
         // What was learned and what is said of the readings that are left is what it was with all of them.
         let whole = all(&mut new(), &rows);
         for (step, whole) in steps.iter().zip(&whole).skip(2000) {
-            let (Some(said), Some(of_all)) = (step.innovation, whole.innovation) else {
-                assert!(step.lost.is_some());
+            let (Some(said), Some(of_all)) = (step.innovations[0], whole.innovations[0]) else {
+                assert!(step.lost[0].is_some());
                 continue;
             };
             assert!((said.residual - of_all.residual).abs() < 0.5 * tank.noise);
@@ -475,16 +481,12 @@ fn the_command_of_a_row_counts_where_its_reading_is_lost() {
 
 #[test]
 fn a_reading_that_cannot_be_used_is_lost_and_said() {
-    let row = Row {
-        time: 0.0,
-        input: 5.0,
-        output: 16.0,
-    };
+    let row = Row::new(0.0, 5.0, &[16.0]);
     for output in [f64::NAN, f64::INFINITY, 1e200] {
-        let step = new().update(&Row { output, ..row }).unwrap();
-        assert_eq!(step.lost.unwrap().column(), "output");
+        let step = new().update(&Row::new(0.0, 5.0, &[output])).unwrap();
+        assert_eq!(step.lost[0].as_ref().unwrap().column(), "output");
     }
-    assert_eq!(new().update(&row).unwrap().lost, None);
+    assert_eq!(new().update(&row).unwrap().lost[0], None);
 }
 
 #[test]
@@ -509,7 +511,7 @@ fn lost_readings_are_no_alarm_in_means_of_rows() {
     .run();
     for (k, row) in rows.iter_mut().enumerate() {
         if k % 11 == 3 || (k / 50) % 40 == 7 {
-            row.output = f64::NAN;
+            row.outputs[0] = f64::NAN;
         }
     }
     let steps = all(&mut new(), &rows);
@@ -520,7 +522,9 @@ fn lost_readings_are_no_alarm_in_means_of_rows() {
     let every = every.unwrap_or_else(|| panic!("{:?}", notices(&steps)));
     assert!(every > 1);
     assert_eq!(alarms(&steps), Vec::<&Alarm>::new());
-    let said = steps[25_000..].iter().filter(|s| s.innovation.is_some());
+    let said = steps[25_000..]
+        .iter()
+        .filter(|s| s.innovations[0].is_some());
     assert!(said.count() > 3000 / every);
 }
 
@@ -546,7 +550,7 @@ fn too_few_readings_are_not_learned_from() {
     let mut rows = Tank::default().run();
     for (k, row) in rows.iter_mut().enumerate() {
         if k % 3 > 0 {
-            row.output = f64::NAN;
+            row.outputs[0] = f64::NAN;
         }
     }
     let mut monitor = new();
@@ -598,11 +602,7 @@ fn gaps_are_said_and_bridged_or_waited_out() {
 /// Why a first row of input and output is refused, beside one that is taken.
 fn refused(model: Model, row: [f64; 2], taken: [f64; 2]) -> Refused {
     let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
-    let row_of = |[input, output]: [f64; 2]| Row {
-        time: 0.0,
-        input,
-        output,
-    };
+    let row_of = |[input, output]: [f64; 2]| Row::new(0.0, input, &[output]);
     let refused = monitor.update(&row_of(row)).unwrap_err();
     assert_eq!(monitor.rows(), 0);
     monitor.update(&row_of(taken)).unwrap();
@@ -625,12 +625,8 @@ fn a_reading_that_no_tank_of_this_height_gives_is_lost() {
     model.known.tank_height = Some(30.0);
     let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
     let mut lost = |time, output| {
-        let row = Row {
-            time,
-            input: 5.0,
-            output,
-        };
-        monitor.update(&row).unwrap().lost
+        let row = Row::new(time, 5.0, &[output]);
+        monitor.update(&row).unwrap().lost[0].clone()
     };
     assert!(matches!(lost(0.0, 160.0), Some(Refused::AboveTank { .. })));
     assert_eq!(lost(1.0, 33.0), None);
@@ -750,11 +746,11 @@ fn false_alarms_are_promised_in_rows_whatever_the_blocks() {
     assert!(every >= 8, "{every}");
     let mean = |rows: &[Row]| {
         let of = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
-        Row {
-            time: of(|row| row.time),
-            input: of(|row| row.input),
-            output: of(|row| row.output),
-        }
+        Row::new(
+            of(|row| row.time),
+            of(|row| row.input),
+            &[of(|row| row.outputs[0])],
+        )
     };
     let means: Vec<Row> = rows.chunks_exact(every).map(mean).collect();
     let (one, same) = learned(&means, Hold::First, 1e6 / every as f64);
@@ -776,11 +772,8 @@ fn a_command_that_stands_still_teaches_nothing() {
     let moved = rows.split_off(2500);
     let mut monitor = new();
     for (k, row) in rows.iter().enumerate() {
-        let still = Row {
-            input: 5.0,
-            output: 16.0 + 0.01 * ((k * 7919) % 13) as f64,
-            ..*row
-        };
+        let output = 16.0 + 0.01 * ((k * 7919) % 13) as f64;
+        let still = Row::new(row.time, 5.0, &[output]);
         monitor.update(&still).unwrap();
         let state = serde_json::to_string(&monitor.state());
         if k % 500 == 499 {

@@ -30,11 +30,7 @@ fn a_command_that_rests_within_the_play_raises_no_alarm() {
     let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
     let (mut level, mut stem) = (16.0_f64, command[0]);
     for (k, (&u, noise)) in command.iter().zip(noise).enumerate() {
-        let row = Row {
-            time: 2.0 * k as f64,
-            input: u,
-            output: level + noise,
-        };
+        let row = Row::new(2.0 * k as f64, u, &[level + noise]);
         let step = monitor.update(&row).unwrap();
         assert_eq!(step.alarm, None);
         stem = stem.clamp(u - 0.5 * PLAY, u + 0.5 * PLAY);

@@ -25,8 +25,8 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
     let span = (high - low).max(f64::MIN_POSITIVE);
-    let seen = site.scales.reading_step;
-    let hidden = site.scales.hidden_step.map(|step| step.value);
+    let seen = site.output().reading_step;
+    let hidden = site.output().hidden_step.map(|step| step.value);
     // Readings in steps show the step themselves, and to more digits than any grid of starts has. Under noise that comes behind the
     // steps what is not explained shows it.
     let step = if seen > 0.0 {

@@ -1,7 +1,7 @@
 //! The catalogue: one file per effect. To add an effect, write its file and name it in the list below,
 //! at its position in the chain.
 
-use crate::{Domain, Law, ParameterInfo, Plant, Scalar, Site};
+use crate::{Domain, Known, Law, ParameterInfo, Plant, Scalar, Site};
 
 /// Where in the chain an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,7 +43,7 @@ pub struct EffectInfo {
     pub general: Option<&'static str>,
     /// Its equation.
     pub equation: &'static str,
-    /// The plants, and their vessels (or pumps), it makes sense in; the sensor asks for vessel zero.
+    /// The plants, and their vessels (or pumps), it makes sense in; the sensor asks for an output.
     pub applies: fn(Plant, usize) -> bool,
     /// Its parameters at a place: the leading one, whose absent value switches the effect off, comes first.
     pub parameters: fn(&Site) -> Vec<ParameterInfo>,
@@ -91,18 +91,27 @@ impl EffectInfo {
         physical.contains(&self.id)
     }
 
-    /// The vessel that it acts in, or the pump, where nobody says which.
+    /// The vessel that it acts in, or the pump, or the output, where nobody says which: of outputs the last one, into which the others lead.
     #[must_use]
-    pub fn usual_site(&'static self, plant: Plant) -> usize {
-        self.sites(plant).next().unwrap_or(0)
+    pub fn usual_site(&'static self, plant: Plant, known: &Known) -> usize {
+        let mut sites = self.sites(plant, known);
+        let usual = match self.place {
+            Place::Sensor => sites.last(),
+            _ => sites.next(),
+        };
+        usual.unwrap_or(0)
     }
 
-    /// The vessels of a plant that it may act in, or its pumps: zero alone for one at the sensor, none where it makes no sense.
-    pub fn sites(&'static self, plant: Plant) -> impl Iterator<Item = usize> {
+    /// The vessels of a plant that it may act in, or its pumps, or its outputs; none where it makes no sense.
+    pub fn sites(
+        &'static self,
+        plant: Plant,
+        known: &Known,
+    ) -> impl Iterator<Item = usize> + use<> {
         let places = match self.place {
             Place::Vessel => plant.vessels(),
             Place::Actuator => plant.pumps(),
-            Place::Sensor => 1,
+            Place::Sensor => known.outputs(plant).len(),
         };
         (0..places).filter(move |&vessel| (self.applies)(plant, vessel))
     }

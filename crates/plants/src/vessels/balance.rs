@@ -88,25 +88,20 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     #[inline(always)]
     pub(super) fn balance(&self, i: usize, inflow: T, levels: &Levels<T, N>, t: f64) -> (T, T) {
         let level = &levels[i];
-        if !self.vessels[i].laws.any {
-            let outflow = self.own_outflow(i, &self.own_head(i, level, levels));
-            return (outflow, inflow - outflow);
-        }
         let laws = &self.vessels[i].laws;
-        if laws.outflow.is_empty()
-            && laws.net.is_empty()
-            && laws.head.is_empty()
-            && self.side.is_none()
-        {
-            // Only its surface changes.
+        if !laws.flows {
+            // At most its surface changes.
             let outflow = self.own_outflow(i, &self.own_head(i, level, levels));
             return (outflow, inflow - outflow);
         }
-        let t = self.time(t);
-        let outflow = self.outflow(i, level, levels, &t);
+        let now = self.time(t);
+        let outflow = self.outflow(i, level, levels, &now);
         let mut net = inflow - outflow;
-        for &law in &self.vessels[i].laws.net {
-            self.laws[law].net(level, &mut net, &t);
+        if !Self::JOINED && laws.fed {
+            net = net + self.disturbance(t);
+        }
+        for &law in &laws.net {
+            self.laws[law].net(level, &mut net, &now);
         }
         if let Some(side) = &self.side {
             net = net - self.exchange(side) * (*level - levels[i + 1]);
@@ -180,7 +175,10 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     }
 
     /// Rates of linear vessels without effects, written as in [`Vessels::rates`].
-    pub(super) fn linear_rates(&self, levels: &Levels<T, N>, q: T) -> Levels<T, N> {
+    pub(super) fn linear_rates(&self, levels: &Levels<T, N>, q: T, t: f64) -> Levels<T, N> {
+        if self.feed.is_some() {
+            return self.fed_linear_rates(levels, q, t);
+        }
         let mut rates = [T::constant(0.0); N];
         let mut inflow = q;
         for (i, vessel) in self.vessels.iter().enumerate() {

@@ -25,7 +25,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         let (there, coupling) = values.settled(h.value(), q.end.value(), end);
         let next = self.newton(&coupling, &there, h, q.end, end);
         if let Some(watch) = watch {
-            let (before, after) = (self.levels[self.measured], next[self.measured]);
+            let (before, after) = (self.levels[self.watched], next[self.watched]);
             watch(&Stretch::straight(h, before, after));
         }
         self.levels = next;

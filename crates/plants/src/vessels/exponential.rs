@@ -6,12 +6,14 @@
 
 use crate::{Scalar, damped::Damped, inflow::Inflow, linear::Propagators};
 
-use super::{Levels, Vessels};
+use super::{Levels, Vessels, fed::brought};
 
 /// Linear vessels have an exact flow; what effects add to it is integrated beside it, so that it vanishes with them.
 pub(super) struct LinearFlow<T> {
     pub whole: Propagators<T>,
     pub half: Propagators<T>,
+    /// The second vessel alone, where a measured disturbance flows into it: what that brings adds to the rest.
+    pub fed: Option<Propagators<T>>,
     /// Effects act, so that the exact flow is not all.
     pub disturbed: bool,
 }
@@ -38,15 +40,24 @@ struct Handed<T> {
 impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// The levels after a step without events.
     pub(super) fn flow(&mut self, h: T, q: &Inflow<T>, t: f64) -> Levels<T, N> {
+        let linear = self.linear.as_ref();
+        let fed = linear.and_then(|flow| flow.fed.as_ref().and(self.feed_over(h, t)));
         let Some(flow) = &mut self.linear else {
             return self.trial(h, q, t);
         };
-        let whole = flow.whole.advance(&self.levels, h, q);
+        let (begin, middle) = (T::constant(0.0), T::constant(0.5));
+        let mut whole = flow.whole.advance(&self.levels, h, q);
+        if let (Some(lower), Some(fed)) = (&mut flow.fed, &fed) {
+            whole[1] = whole[1] + brought(lower, h, fed);
+        }
         if !flow.disturbed {
             return whole;
         }
-        let first = q.part(T::constant(0.0), T::constant(0.5));
-        let half = flow.half.advance(&self.levels, h * 0.5, &first);
+        let first = q.part(begin, middle);
+        let mut half = flow.half.advance(&self.levels, h * 0.5, &first);
+        if let (Some(lower), Some(fed)) = (&mut flow.fed, &fed) {
+            half[1] = half[1] + brought(lower, h * 0.5, &fed.part(begin, middle));
+        }
         let handed = (self.vessels.len() == 2 && h.value() > 0.0).then(|| {
             // A drive of the level is an inflow over the area.
             let area = self.vessels[0].area;
@@ -75,7 +86,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
         let added = |levels: &Levels<T, N>, flow: &Levels<T, N>, q: T, t: f64| {
             let mut rates = self.rates(levels, q, t);
-            let linear = self.linear_rates(flow, q);
+            let linear = self.linear_rates(flow, q, t);
             for (rate, linear) in rates.iter_mut().zip(linear) {
                 *rate = *rate - linear;
             }
@@ -125,7 +136,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
                 drive[i] = drive[i] + deviation[i] * rates[i];
             }
             if flow.is_some() {
-                for (drive, own) in drive.iter_mut().zip(self.linear_rates(at, q)) {
+                for (drive, own) in drive.iter_mut().zip(self.linear_rates(at, q, t)) {
                     *drive = *drive - own;
                 }
                 for i in 1..self.vessels.len() {

@@ -41,7 +41,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
         if let Some(watch) = watch {
             // The transient is over at once; what is left looks straight.
-            let (before, after) = (self.levels[self.measured], next[self.measured]);
+            let (before, after) = (self.levels[self.watched], next[self.watched]);
             watch(&Stretch::straight(h, before, after));
         }
         self.levels = next;

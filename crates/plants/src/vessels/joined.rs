@@ -4,7 +4,7 @@
 //! `s(d) = sign(d) sqrt(|d|)`, either way.
 //!
 //! **Where the levels are equal** the slope of `s` is infinite. A real orifice is laminar there, with a finite one. Within
-//! `|d| < w` ([`WIDTH`] of the largest measured level) `s` is the odd polynomial of degree five that meets value, slope and curvature at
+//! `|d| < w` ([`WIDTH`] of the largest level that is read) `s` is the odd polynomial of degree five that meets value, slope and curvature at
 //! `w`, `sqrt(w) (45 x - 18 x^3 + 5 x^5)/32`, `x = d/w`: smooth to the second derivative and monotone, exact beyond `w`. Within it a flow
 //! errs by less than `0.18 a sqrt(w)`, which is 0.2 % of that at the largest level; a level errs by far less, since a head
 //! that moves is through soon, and one that rests errs by less than `w`. Flows are shared by both tanks, so the balance of mass is kept
@@ -21,14 +21,17 @@
 //!
 //! **Source**: Amira, DTS200 laboratory setup three-tank-system, 1996, for the balance.
 
-use crate::{Scalar, inflow::Inflow};
+use crate::{
+    Scalar,
+    inflow::{Feed, Inflow},
+};
 
 use super::{
     Levels, Vessels, Watch,
     torricelli::{A_LITTLE, NEARLY_EMPTY, slope_of_root},
 };
 
-/// `w` as a share of the largest measured level.
+/// `w` as a share of the largest level that is read.
 const WIDTH: f64 = 1e-4;
 /// A step may change a head by this share of itself.
 const SHARE: f64 = 0.125;
@@ -45,7 +48,7 @@ pub(crate) struct Valves {
 }
 
 impl Valves {
-    /// `largest`: the largest measured level, by magnitude.
+    /// `largest`: the largest level that is read, by magnitude.
     pub(crate) fn new(largest: f64) -> Self {
         let width = WIDTH * largest;
         Self {
@@ -84,14 +87,6 @@ impl Valves {
     }
 }
 
-/// What the second pump brings over a step that begins at `start`: `a + b s + c s^2`, `s` the share of its length.
-pub(super) struct Feed<T> {
-    start: T,
-    length: T,
-    coefficients: [T; 3],
-    held: bool,
-}
-
 impl<T: Scalar, const N: usize> Vessels<T, N> {
     /// Has its steps cut as these vessels say, which are the same without derivatives.
     pub(crate) fn cut_by(&mut self, values: Vessels<f64, N>) {
@@ -106,38 +101,21 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         start: T,
         watch: &mut Watch<T>,
     ) {
-        let coefficients = second.coefficients();
-        let [_, b, c] = coefficients;
-        let nothing = |x: T| x.value() == 0.0 && x.same_derivatives(T::constant(0.0));
+        let feed = Feed::new(start, h, second.coefficients());
         if let Some(values) = &mut self.values {
-            values.feed = Some(Feed {
-                start: start.value(),
-                length: h.value(),
-                coefficients: coefficients.map(T::value),
-                held: b.value() == 0.0 && c.value() == 0.0,
-            });
+            values.feed = Some(feed.values());
         }
-        self.feed = Some(Feed {
-            start,
-            length: h,
-            coefficients,
-            held: nothing(b) && nothing(c),
-        });
+        self.feed = Some(feed);
         self.step(h, q, start, watch);
     }
 
-    /// The second pump's inflow.
+    /// The inflow beside that of the first pump: of the second one, or a measured disturbance.
     #[inline(always)]
     pub(super) fn fed(&self, t: f64) -> T {
         let Some(feed) = &self.feed else {
             return T::constant(0.0);
         };
-        let [a, b, c] = feed.coefficients;
-        if feed.held || feed.length.value() == 0.0 {
-            return a;
-        }
-        let share = (self.time(t) - feed.start) / feed.length;
-        a + (b + c * share) * share
+        feed.at(|| self.time(t))
     }
 
     /// What the valve behind vessel `i` lets through at a head.

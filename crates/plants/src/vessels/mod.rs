@@ -2,11 +2,12 @@
 //!
 //! [`balance`] has the equations, [`losses`] how fast they become by what leaves beside the outlets, [`parts`] cuts a step,
 //! [`rims`] finds what happens in a part, [`runge_kutta`], [`exponential`] and [`implicit`] take it. [`joined`] has the valves between
-//! tanks, and how steps are cut there, [`exchange`] the implicit one.
+//! tanks, and how steps are cut there, [`exchange`] the implicit one, [`fed`] a measured disturbance into the lower of two vessels.
 
 mod balance;
 mod exchange;
 mod exponential;
+mod fed;
 mod implicit;
 mod joined;
 mod losses;
@@ -16,17 +17,19 @@ mod runge_kutta;
 mod torricelli;
 
 use crate::{
-    Balance, Law, Outlet, Rim, Scalar, Side, inflow::Inflow, linear::Propagators, structure::SERIES,
+    Balance, Law, Outlet, Rim, Scalar, Side,
+    inflow::{Feed, Inflow},
+    linear::Propagators,
+    structure::SERIES,
 };
 
 use exponential::LinearFlow;
-use joined::Feed;
 pub(crate) use joined::Valves;
 pub(crate) use torricelli::square_root;
 
 pub(crate) type Levels<T, const N: usize> = [T; N];
 
-/// Who wants to see the smooth stretches of the measured level, if anybody.
+/// Who wants to see the smooth stretches of a level, if anybody.
 pub(crate) type Watch<'a, T> = Option<&'a mut dyn FnMut(&Stretch<T>)>;
 
 /// One vessel as the balance sees it.
@@ -55,6 +58,10 @@ struct VesselLaws {
     area: Vec<usize>,
     /// Any of them, or a side tank.
     any: bool,
+    /// Any of them that changes a flow, a side tank, or a disturbance: the surface alone is not enough.
+    flows: bool,
+    /// A measured disturbance flows in ([`Vessels::feed`]).
+    fed: bool,
 }
 
 /// The vessels: at most [`SERIES`] in series, or three joined by valves. `N` is known at compile time, so that neither pays for the
@@ -79,18 +86,20 @@ pub(crate) struct Vessels<T: Scalar, const N: usize> {
     rims: bool,
     /// All are Torricelli's, of areas without derivatives, and nothing acts in them.
     bare: bool,
-    /// Of vessels that are joined: their valves, and what the second pump brings.
+    /// Of vessels that are joined: their valves.
     valves: Option<Valves>,
+    /// What flows into the last vessel beside what the one before lets out: of vessels that are joined from the second pump, of two in
+    /// series a measured disturbance.
     feed: Option<Feed<T>>,
     /// The same vessels without derivatives, where they are joined: how a step is cut is found on them.
     values: Option<Box<Vessels<f64, N>>>,
-    /// The vessel whose level is measured.
-    measured: usize,
+    /// The vessel whose level a lagging sensor reads.
+    watched: usize,
     /// One over the shortest time constant of linear vessels; zero for others \[1/s\].
     fastest: f64,
 }
 
-/// A stretch of time over which the measured level moved smoothly.
+/// A stretch of time over which the level moved smoothly.
 pub(crate) struct Stretch<T> {
     pub h: T,
     pub before: T,
@@ -118,12 +127,12 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     const JOINED: bool = N > SERIES;
 
     /// `parts`: area, outlet and its coefficient for each vessel; `laws`: the vessel each acts in, and the law; then the vessel that is
-    /// measured, and the valves of vessels that are joined.
+    /// watched, and the valves of vessels that are joined.
     pub(crate) fn new(
         parts: Vec<(T, Outlet, T)>,
         laws: Vec<(usize, Box<dyn Law<T>>)>,
         levels: &[T],
-        (measured, valves): (usize, Option<Valves>),
+        (watched, valves): (usize, Option<Valves>),
     ) -> Self {
         let mut vessels: Vec<Vessel<T>> = parts
             .into_iter()
@@ -165,6 +174,17 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
         let side = bound.iter().find_map(|law| law.side());
         let states = vessels.len() + usize::from(side.is_some());
+        for VesselLaws {
+            head,
+            outflow,
+            net,
+            flows,
+            ..
+        } in vessels.iter_mut().map(|vessel| &mut vessel.laws)
+        {
+            let none = head.is_empty() && outflow.is_empty() && net.is_empty();
+            *flows = !none || side.is_some();
+        }
         let switches = (0..bound.len()).filter(|&law| bound[law].switch().is_some());
         let switches = switches.collect();
         let rims = vessels.iter().any(|v| v.rim.level.value() != f64::INFINITY);
@@ -184,6 +204,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         let linear = linear.then(|| LinearFlow {
             whole: propagators(),
             half: propagators(),
+            fed: None,
             disturbed: vessels.iter().any(|v| v.laws.any),
         });
         let mut initial = [T::constant(0.0); N];
@@ -205,7 +226,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             valves,
             feed: None,
             values: None,
-            measured,
+            watched,
             fastest,
         };
         all.keep_within();
@@ -230,14 +251,14 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
 
     fn accept(&mut self, next: Levels<T, N>, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if let Some(watch) = watch {
-            let measured = self.measured;
+            let watched = self.watched;
             let before = self.levels;
-            let rate_before = self.rates(&before, q.start, t)[measured];
-            let rate_after = self.rates(&next, q.end, t + h.value())[measured];
+            let rate_before = self.rates(&before, q.start, t)[watched];
+            let rate_after = self.rates(&next, q.end, t + h.value())[watched];
             watch(&Stretch {
                 h,
-                before: before[measured],
-                after: next[measured],
+                before: before[watched],
+                after: next[watched],
                 rate_before,
                 rate_after,
             });

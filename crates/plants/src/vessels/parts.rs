@@ -24,7 +24,7 @@ const SETTLING: f64 = 0.2;
 const SETTLED: [f64; 2] = [1e-4, 1e-2];
 
 impl<T: Scalar, const N: usize> Vessels<T, N> {
-    /// Moves on by `h` from time `start`; `watch` sees every smooth stretch of the measured level in turn.
+    /// Moves on by `h` from time `start`; `watch` sees every smooth stretch of the watched level in turn.
     pub(crate) fn step(&mut self, h: T, q: &Inflow<T>, start: T, watch: &mut Watch<T>) {
         if self.switches.is_empty() {
             self.stretch(h, q, start, watch);
@@ -63,7 +63,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     fn stretch(&mut self, h: T, q: &Inflow<T>, start: T, watch: &mut Watch<T>) {
         let zero = T::constant(0.0);
         let plain = h.same_derivatives(zero) && start.same_derivatives(zero);
-        let timed = !self.laws.is_empty() || (Self::JOINED && self.feed.is_some());
+        let timed = !self.laws.is_empty() || self.feed.is_some();
         self.clock = (!plain && timed).then_some((start, h));
         let t = start.value();
         let wanted = self.fastest * h.value();
@@ -192,11 +192,14 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     fn calm(&self, rates: &[T; N], h: f64, q: &Inflow<T>, t: f64, done: usize) -> usize {
         let left = UNITS - done;
         let mut longest = left;
-        let mut inflows = [Some(q.start), Some(q.end)];
-        if q.start.value() == q.end.value() {
-            inflows[1] = None;
+        let mut inflows = [Some((q.start, t)), Some((q.end, t))];
+        match &self.feed {
+            // It too is asked at both ends.
+            Some(feed) if !feed.is_held() => inflows[1] = Some((q.end, t + h)),
+            _ if q.start.value() == q.end.value() => inflows[1] = None,
+            _ => {}
         }
-        for q in inflows.into_iter().flatten() {
+        for (q, t) in inflows.into_iter().flatten() {
             let moves = self.rates(&self.levels, q, t);
             for i in 0..self.states {
                 let fast = rates[i].value() * h > STEP_LIMIT;

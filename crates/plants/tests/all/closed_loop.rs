@@ -35,7 +35,7 @@ fn the_loop_reaches_its_set_point() {
                 // Joined tanks are slow for their sampling interval.
                 let samples = if plant.joined() { 12_000 } else { 3000 };
                 for _ in 0..samples {
-                    y = simulator.read();
+                    y = simulator.read(0);
                     overshoot = overshoot.max((y - reference) * (reference - 10.5).signum());
                     let u = pi.command(reference, y, case.h);
                     assert!((0.0..=10.0).contains(&u));
@@ -65,11 +65,11 @@ fn out_of_reach_the_command_stays_at_its_limit_and_comes_back_at_once() {
     let mut pi = controller();
     let mut last = 0.0;
     for _ in 0..2000 {
-        last = pi.command(100.0, simulator.read(), case.h);
+        last = pi.command(100.0, simulator.read(0), case.h);
         simulator.advance(Command::held(last), case.h);
     }
     assert_eq!(last, 10.0);
     // Back within reach the command leaves its limit within one sample.
-    let y = simulator.read();
+    let y = simulator.read(0);
     assert!(pi.command(y - 2.0, y, case.h) < 10.0);
 }

@@ -14,7 +14,7 @@ use plants::{Placed, Plant};
 ///
 /// `floor` is the smallest change of the output, as a share of the largest reading, that a variable's whole size is taken to
 /// bring: the derivative by what is forgotten at once is zero, and rounding has no share of that.
-fn disagreement(
+pub fn disagreement(
     case: &Case,
     input: &[(plants::Command, f64)],
     substeps: usize,

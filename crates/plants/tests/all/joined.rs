@@ -9,7 +9,7 @@ fn rig(measured: usize, second: bool) -> Structure {
     scales.input_2 = second.then_some((0.0, 10.0));
     let known = Known {
         area: [Some(154.0); 3],
-        measured: Some(measured),
+        measured: vec![measured],
         orifice: Some(0.5 * (2.0 * 981.0_f64).sqrt()),
         ..Known::default()
     };
@@ -52,7 +52,7 @@ fn a_flow_coefficient_of_a_known_orifice_is_at_most_two() {
     let mut scales = Scales::from_ranges((0.0, 10.0), (5.0, 50.0), 1.0, 1000.0);
     scales.input_2 = Some((0.0, 10.0));
     let known = Known {
-        measured: Some(1),
+        measured: vec![1],
         ..Known::default()
     };
     let unknown = Structure::new(Plant::ThreeTank, known, scales);
@@ -193,7 +193,7 @@ fn derivatives_are_finite_and_right_where_levels_cross_and_rest() {
         (0..600)
             .map(|k| {
                 simulator.advance_both(held(back_and_forth(k, 90)), 1.0);
-                simulator.read()
+                simulator.read(0)
             })
             .collect()
     };
@@ -207,7 +207,7 @@ fn derivatives_are_finite_and_right_where_levels_cross_and_rest() {
     let exact: Vec<Dual<16>> = (0..600)
         .map(|k| {
             simulator.advance_both(held(back_and_forth(k, 90)), 1.0);
-            simulator.read()
+            simulator.read(0)
         })
         .collect();
     let plain = run(&variables);
@@ -264,7 +264,7 @@ fn valves_that_are_over_within_a_step_settle() {
                 let out = 0.6 * 0.5 * (2.0 * 981.0 * level).sqrt();
                 content += (9.0 * u[0] + 8.5 * u[1] - out) / 154.0 / f64::from(steps);
             }
-            let read = simulator.read();
+            let read = simulator.read(0);
             assert!(read.re.is_finite() && read.eps.iter().all(|e| e.is_finite()));
             if k > 5 {
                 let head = 3.0 * (80.0 / (11.0 * ratio)).powi(2) + 0.02;
@@ -310,7 +310,7 @@ fn any_tank_may_be_measured() {
     let base = base(Plant::ThreeTank);
     let at = |measured: usize| -> Vec<f64> {
         let mut case: Case = base.clone();
-        case.structure.scales.measured = measured;
+        case.structure.scales.outputs[0].vessel = measured;
         // The width of a valve's laminar part goes with the measured level.
         case.structure.scales.level = base.structure.scales.level;
         case.run(&input, 1)

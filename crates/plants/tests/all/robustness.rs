@@ -40,7 +40,7 @@ fn run(case: &Case, input: &[(Command, f64)], substeps: usize) -> Result<f64, Te
         .map(|p| p.vessel);
     let mut largest = 0.0_f64;
     for &(command, h) in input {
-        let y = simulator.read();
+        let y = simulator.read(0);
         prop_assert!(
             y.re.is_finite(),
             "reading {} of {names:?} at {:?}",

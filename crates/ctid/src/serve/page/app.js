@@ -60,14 +60,17 @@ function fall(state) {
   const trail = state.trail;
   const todo = state.job ? "" : next(state);
   fill($("next"), todo ? [make("span", {}, "Next: "), todo] : "");
-  const unit = state.records.find((one) => one.read)?.read.output.unit || "";
+  const unit = state.records.find((one) => one.read)?.read.outputs[0].unit || "";
   $("fall").hidden = !trail.length;
   if (!trail.length) return;
-  const numbers = trail.map((one, k) => make("b", { className: k === trail.length - 1 && (k > 0 || one.adequate) ? "last" : "" }, one.rmse_text));
+  const number = (one, k, o) => make("b", { className: k === trail.length - 1 && (k > 0 || one.adequate) ? "last" : "" }, one.errors[o].text);
   const last = trail[trail.length - 1];
+  // The error of each output, which has a name where there are several.
+  const falls = last.errors.map(({ output }, o) => [o ? "; " : "", output === null ? "" : `${output} `,
+    trail.flatMap((one, k) => (k ? [" → ", number(one, k, o)] : [number(one, k, o)])), ` ${unit}`]);
   const explained = last.adequate && state.current === last.id ? make("span", { className: "explained" }, " What is left looks like noise.") : null;
-  fill($("fall"), "Simulation error ", numbers.flatMap((one, k) => (k ? [" → ", one] : [one])), ` ${unit}.`, explained);
-  if (state.current === last.id) say(`${last.name}: simulation error ${last.rmse_text} ${unit}`);
+  fill($("fall"), "Simulation error ", falls.flat(2), ".", explained);
+  if (state.current === last.id) say(`${last.name}: simulation error ${last.errors.map(({ output, text }) => `${output === null ? "" : `${output} `}${text} ${unit}`).join(", ")}`);
 }
 
 const compare = () => server.run("compare").catch((e) => fail(e.message));
@@ -107,7 +110,7 @@ function show(state, trouble) {
     $(`download-${id}`).href = server.link(id);
   }
   model.show(state, fail);
-  data.show(state, fail, model.pumps(), model.drafting());
+  data.show(state, fail, model.signals(), model.drafting());
   model.askForPlant();
   findings.show(state, fail);
   experiment.show(state);

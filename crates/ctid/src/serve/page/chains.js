@@ -61,8 +61,11 @@ function result(pair, bodies) {
     return one ? [one.value, one.error ? ` ± ${one.error}` : "", " ", ...units(one.unit)] : "";
   };
   const sheet = make("table");
-  const rows = [["Simulation error", ...pair.map((one) => [one.rmse_text, " ", ...units(out)])]];
-  if (pair.some((one) => one.rmse_test_text)) rows.push(["On held-out data", ...pair.map((one) => [one.rmse_test_text, " ", ...units(out)])]);
+  const rows = pair[0].errors.flatMap(({ output }, o) => {
+    const of = output === null ? "" : `${output}: `;
+    const row = (title, key) => [`${of}${title}`, ...pair.map((one) => [one.errors[o][key], " ", ...units(out)])];
+    return [row("Simulation error", "text"), ...(pair.some((one) => one.errors[o].test) ? [row("On held-out data", "test")] : [])];
+  });
   rows.push(["BIC (smaller is better)", ...pair.map((one) => one.bic)]);
   for (const name of names) rows.push([make("code", {}, name), ...bodies.map((body) => estimate(body, name))]);
   table(sheet, [[""], [pair[0].name, true], [pair[1].name, true]], rows);
@@ -76,7 +79,7 @@ export function draw() {
   const box = $("plot-chains");
   if (!box || !report || !window.Plotly) return;
   const record = Math.max(0, report.records.findIndex((one) => !one.held_out));
-  const { figures } = diagnosisFigures(report, { chosen: 1, residualRecord: record, sameAxes: true });
+  const { figures } = diagnosisFigures(report, { chosen: 1, output: 0, residualRecord: record, sameAxes: true });
   const made = figures[`record-${record}`]();
   made.layout.shapes = [];
   plot(box, `record-${record}`, made);

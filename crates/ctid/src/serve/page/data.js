@@ -2,9 +2,28 @@
 import { $, button, fill, make } from "./dom.js";
 import * as server from "./server.js";
 
-const ROLES = [["time", "Time"], ["input", "Command u"], ["input_2", "Command of pump 2"], ["output", "Reading y"], ["reference", "Reference r"]];
+const OUTPUTS = ["output", "output_2", "output_3"];
+const ROLES = [["time", "Time"], ["input", "Command u"], ["input_2", "Command of pump 2"],
+  ["output", "Reading y"], ["output_2", "Second reading"], ["output_3", "Third reading"], ["reference", "Reference r"]];
 // Without these columns a record is one.
-const OPTIONAL = { reference: "none", input_2: "none (off)" };
+const OPTIONAL = { reference: "none", input_2: "none (off)", output_2: "none", output_3: "none" };
+
+/** Several names are a list in the model, and fields of their own in the form. */
+const listed = (names) => (Array.isArray(names) ? names : [names]).filter(Boolean);
+
+/** How many outputs the model's columns name; one is guessed. */
+export const outputs = (columns) => Math.max(1, listed(columns.output).length);
+
+/** The columns as the form has them. */
+const apart = (columns) => ({ ...columns, ...Object.fromEntries(OUTPUTS.map((role, k) => [role, listed(columns.output)[k]])) });
+
+/** The columns as the model has them. */
+function together(said) {
+  const columns = Object.fromEntries(Object.entries(said).filter(([role]) => !OUTPUTS.includes(role)));
+  const names = listed(OUTPUTS.map((role) => said[role]));
+  if (names.length) columns.output = names.length > 1 ? names : names[0];
+  return columns;
+}
 
 /** Another model in place of this one; what stands in a file of the user's goes, so it is asked first. */
 async function replace(file) {
@@ -51,7 +70,7 @@ export function start(changed, fail) {
   $("column-fields").addEventListener("change", changed);
 }
 
-const signals = (read) => [read.input, read.input_2, read.output].filter(Boolean).map((one) => `${one.name} ${one.range}`).join(", ");
+const signals = (read) => [read.input, read.input_2, ...read.outputs].filter(Boolean).map((one) => `${one.name} ${one.range}`).join(", ");
 
 function record(one, fail) {
   const { read } = one;
@@ -98,7 +117,7 @@ export function columns() {
     const unit = input.value.trim();
     said[role] = heading && !heading.unit && unit ? `${heading.name} [${unit}]` : select.value;
   }
-  return said;
+  return together(said);
 }
 
 export const hold = () => $("hold").value;
@@ -111,18 +130,20 @@ export function wrote(said) {
   from.columns = said.columns;
 }
 
-/** The columns as the model names them; before there is one, as they were chosen. */
-export function columnFields(state, pumps) {
+/** The columns as the model names them; before there is one, as they were chosen. `plant` is that of the form: pumps and levels. */
+export function columnFields(state, { pumps, levels }) {
   from.columns = state.settings.columns;
   const { columns: named, plant } = state.settings;
-  const kept = plant ? named : Object.fromEntries(Object.entries(columns()).filter(([, said]) => meant(state.headings || [], said)));
-  const roles = ROLES.filter(([role]) => role !== "input_2" || pumps > 1);
-  const title = (role, alone) => (role === "input" && pumps > 1 ? "Command of pump 1" : alone);
+  const chosen = () => Object.fromEntries(Object.entries(apart(columns())).filter(([, said]) => said && meant(state.headings || [], said)));
+  const kept = plant ? apart(named) : chosen();
+  const roles = ROLES.filter(([role]) => (role !== "input_2" || pumps > 1 || named.input_2) && OUTPUTS.indexOf(role) < levels);
+  const of = pumps > 1 ? { input: "Command of pump 1" } : { input_2: "Measured disturbance" };
+  const title = (role, alone) => of[role] ?? alone;
   fill($("column-fields"), roles.flatMap(([role, alone]) => field(role, title(role, alone), state.headings || [], kept[role], state.guessed[role])));
 }
 
-/** `pumps` are those of the plant in the form; a draft keeps what was chosen. */
-export function show(state, fail, pumps, draft) {
+/** `signals` are pumps and levels of the plant in the form; a draft keeps what was chosen. */
+export function show(state, fail, signals, draft) {
   fill($("records"), state.records.map((one) => record(one, fail)));
   fill($("record-warnings"), state.warnings.map((warning) => make("p", { className: "warning" }, warning)));
   $("after-record").hidden = !state.records.length;
@@ -138,6 +159,6 @@ export function show(state, fail, pumps, draft) {
     from.columns = state.settings.columns;
     return;
   }
-  if (!draft || !$("column-fields").childElementCount) columnFields(state, pumps);
+  if (!draft || !$("column-fields").childElementCount) columnFields(state, signals);
   if (state.records.some((one) => one.error)) $("columns").open = true;
 }

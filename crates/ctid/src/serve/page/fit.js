@@ -12,7 +12,7 @@ const FAILS = [
 ];
 
 let drawing = null;
-let view = { chosen: 0, residualRecord: 0, sameAxes: true };
+let view = { chosen: 0, output: 0, residualRecord: 0, sameAxes: true };
 let fits = [];
 let key = "";
 let state = null;
@@ -45,10 +45,12 @@ export async function show(next) {
   if (key !== wanted) return;
   fits = bodies;
   const held = report.records.findIndex((record) => !record.held_out);
-  view = { ...view, chosen: Math.max(0, bodies.length - 1), residualRecord: Math.max(0, held) };
+  const output = view.output < report.outputs.length ? view.output : 0;
+  view = { ...view, chosen: Math.max(0, bodies.length - 1), output, residualRecord: Math.max(0, held) };
   drawing = diagnosisFigures(report, view);
   places(report);
-  words(trail);
+  offer(report.outputs);
+  words(trail, report);
   draw();
 }
 
@@ -73,20 +75,42 @@ function places(report) {
   }
 }
 
-function words(trail) {
+/** The choice of the output that the figures show, where there are several. */
+function offer(outputs) {
+  $("output-choice").hidden = outputs.length < 2;
+  fill($("shown-output"), outputs.map(({ name }, o) => make("option", { value: String(o) }, name)));
+  $("shown-output").value = String(view.output);
+  $("shown-output").onchange = () => {
+    view.output = Number($("shown-output").value);
+    draw();
+  };
+}
+
+/** The error of each output: large where there is one, else each on a line with its name. */
+function errors(one, unit) {
+  const several = one.errors.length > 1;
+  const line = ({ output, text }) => [text, " ", make("small", {}, units(unit), several ? ` ${output}` : null)];
+  const held = ({ output, test }) => make("span", { className: "test" }, `held out ${test} `, units(unit), several ? ` ${output}` : null);
+  return {
+    number: make("span", { className: several ? "number several" : "number" }, several ? one.errors.map((error) => make("span", {}, line(error))) : line(one.errors[0])),
+    held: one.errors.filter(({ test }) => test !== null).map(held),
+  };
+}
+
+function words(trail, report) {
   const some = fits.length > 0;
   $("fit-part").hidden = false;
   $("h-fit").textContent = some ? "Measured against model" : "The record";
   $("fit-lead").textContent = some
-    ? "Above the reading and the models, below the input. Shaded: where the chosen model clearly fails. Drag to zoom, double-click to see all again."
+    ? `Above the ${report.outputs.length > 1 ? "readings of each output" : "reading"} and the models, below the input. Shaded: where the chosen model clearly fails. Drag to zoom, double-click to see all again.`
     : "As it was measured. Choose a plant, and the model is drawn over it.";
   for (const part of ["trail-part", "fails-part", "parameters-part"]) $(part).hidden = !some;
   if (!some) return;
   const out = fits[0].drawing.output_unit;
-  const held = trail.some((one) => one.rmse_test !== null);
+  const held = trail.some((one) => one.errors.some(({ test }) => test !== null));
   fill($("trail"), trail.map((one, k) => {
-    const text = [make("span", { className: "number" }, one.rmse_text, " ", make("small", {}, units(out))), make("span", { className: "label" }, label(trail, k)),
-      one.rmse_test_text ? make("span", { className: "test" }, `held out ${one.rmse_test_text} `, units(out)) : null];
+    const of = errors(one, out);
+    const text = [of.number, make("span", { className: "label" }, label(trail, k)), ...of.held];
     const pick = make("button", { type: "button", id: `step-${k}`, className: "step", ariaPressed: String(k === view.chosen), title: "show this model" }, text);
     pick.addEventListener("click", () => choose(k));
     return make("li", {}, pick);
@@ -99,7 +123,7 @@ function chosenWords() {
   const fit = fits[view.chosen];
   const step = fit.drawing.steps[fit.drawing.steps.length - 1];
   document.querySelectorAll("#trail .step").forEach((one, k) => one.setAttribute("aria-pressed", String(k === view.chosen)));
-  fill($("fails"), step.failures.sentences.map((sentence) => make("li", {}, units(sentence))));
+  fill($("fails"), step.sentences.map((sentence) => make("li", {}, units(sentence))));
   fill($("fit-sentences"), fit.sentences.map((sentence) => make("p", {}, units(sentence))));
   $("held-out-parts").hidden = !fit.held_out_error;
   fill($("held-out-parts"), units(fit.held_out_error));
@@ -124,7 +148,7 @@ export function draw() {
     const made = id === "trail" && fits.length < 2 ? null : figure();
     if (made && id === "trail") {
       made.layout.height = 240;
-      made.layout.yaxis.title.text = "error";
+      made.layout.yaxis.title.text = drawing.ofOutput("error");
     }
     box.parentElement.hidden = !made;
     if (made) plot(box, id, made);

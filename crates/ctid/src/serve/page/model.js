@@ -31,12 +31,20 @@ const LAWS = {
 const LIMITS = [["u_min", "Smallest command"], ["u_max", "Largest command"]];
 
 const plant = (id) => plants.find((one) => one.id === id);
-const label = (key, of) => (key === "area" && of.measured.length ? ALIKE : KNOWN[key]);
+const label = (key, of) => (key === "area" && of.joined ? ALIKE : KNOWN[key]);
 
 /** What the form says is not the model's yet. */
 export const drafting = () => draft !== null && draft === JSON.stringify(server.current().settings);
-/** Pumps of the plant that the form says. */
-export const pumps = () => plant($("plant").value)?.pumps ?? 1;
+/** Pumps and levels of a plant, by default the one in the form. */
+export const signals = (of = plant($("plant").value)) => ({ pumps: of?.pumps ?? 1, levels: Math.max(1, of?.levels.length ?? 1) });
+
+const READINGS = ["The reading", "The second reading", "The third reading"];
+/** Which levels are measured has to be said of several readings, and where tanks are joined. */
+const asked = (known, columns) => {
+  const count = Math.min(data.outputs(columns), signals(known).levels);
+  return count > 1 || known.joined ? READINGS.slice(0, count).map((title, k) => [k ? `known-measured-${k + 1}` : "known-measured", title]) : [];
+};
+const measuredOf = (known) => [known.measured ?? []].flat();
 
 const keep = () => { draft = JSON.stringify(server.current().settings); };
 
@@ -81,42 +89,57 @@ function settings() {
   const was = server.current().settings.known;
   // What another plant's form said is nothing of this one; what has no field yet stays.
   for (const key of chosen.known) known[key] = $(`known-${key}`) ? number(`known-${key}`, label(key, chosen)) : was[key] ?? null;
-  if (chosen.measured.length) {
-    known.measured = $("known-measured") ? $("known-measured").value || null : was.measured;
-    if (!known.measured) throw new Error("Say first of which tank the reading is the level.");
+  const columns = data.columns();
+  const fields = asked(chosen, columns);
+  if (fields.length) {
+    const levels = fields.map(([id], k) => ($(id) ? $(id).value : measuredOf(was)[k]));
+    // The choice appears with a further reading.
+    if (!fields.every(([id]) => $(id))) knownFields(chosen, server.current(), columns);
+    if (!levels.every(Boolean)) throw new Error(fields.length > 1 ? "Say first of which tanks the readings are the levels." : "Say first of which tank the reading is the level.");
+    known.measured = levels.length > 1 ? levels : levels[0];
+  } else if (measuredOf(was).length > 1) {
+    // Of several readings one is left, and nobody has said which: the level of the reading that stays.
+    const before = server.current().settings.columns.output;
+    const at = [before].flat().indexOf(columns.output);
+    known.measured = measuredOf(was)[at] ?? null;
   }
   if (chosen.known.includes("gravity") && (known.pipe_area === null) !== (known.gravity === null)) {
     throw new Error("The cross-section of the pipes and gravity make the flow coefficients pure numbers together: give both, or neither.");
   }
-  const columns = data.columns();
-  if (chosen.pumps < 2) delete columns.input_2;
+  if (chosen.pumps < 2) {
+    // A measured disturbance stays; what another plant's vessels are called says nothing of this one's.
+    const stays = columns.input_2 && was.disturbance && server.current().settings.plant === chosen.id;
+    if (stays) known.disturbance = was.disturbance;
+    else delete columns.input_2;
+  }
   return { plant: chosen.id, hold: data.hold(), columns, known, controller: controller() };
 }
 
-/** The fields of what may be known of a plant. */
-function knownFields(known, state) {
+/** The fields of what may be known of a plant, with these columns. */
+function knownFields(known, state, columns = state.settings.columns) {
+  const fields = asked(known, columns);
   const read = state.records.find((one) => one.read)?.read;
-  const [level, command] = [read?.output.unit || "", read?.input.unit || ""];
+  const [level, command] = [read?.outputs[0].unit || "", read?.input.unit || ""];
   const units = { tank_height: level, input_range: command, gravity: level ? `${level}/s^2` : "" };
   const square = level ? `${level}^2` : "";
   const values = state.settings.known;
-  const form = JSON.stringify([known.id, level, command]);
+  const form = JSON.stringify([known.id, level, command, fields.length]);
   const at = document.activeElement;
   if ($("known-fields").contains(at) && $("known-fields").dataset.of === form) {
     // The field in which somebody is stays as it is.
-    for (const key of [...known.known, ...(known.measured.length ? ["measured"] : [])]) {
-      const box = $(`known-${key}`);
-      if (box !== at) box.value = values[key] ?? "";
+    const now = [...known.known.map((key) => [`known-${key}`, values[key]]), ...fields.map(([id], k) => [id, measuredOf(values)[k]])];
+    for (const [id, value] of now) {
+      if ($(id) !== at) $(id).value = value ?? "";
     }
-    const here = at.id.replace("known-", "");
+    const here = at.id.replace("known-", "").replace(/^measured-.*/, "measured");
     from.known = { ...values, [here]: from.known[here] };
     return;
   }
   from.known = values;
   $("known-fields").dataset.of = form;
-  const measured = known.measured.length ? [make("label", { htmlFor: "known-measured" }, "The reading is the level of"),
-    make("select", { id: "known-measured" }, make("option", { value: "" }, "choose…"),
-      known.measured.map((name) => make("option", { value: name, selected: values.measured === name }, name)))] : [];
+  const measured = fields.flatMap(([id, title], k) => [make("label", { htmlFor: id }, `${title} is the level of`),
+    make("select", { id }, make("option", { value: "" }, "choose…"),
+      known.levels.map((name) => make("option", { value: name, selected: measuredOf(values)[k] === name }, name)))]);
   fill($("known-fields"), measured, known.known.flatMap((key) => input(`known-${key}`, label(key, known), values[key], units[key] ?? square)));
 }
 
@@ -139,18 +162,19 @@ function chosen() {
   if (!known) {
     draft = null;
     form(state);
-    data.columnFields(state, pumps());
+    data.columnFields(state, signals());
     return;
   }
-  if (known.measured.length) knownFields(known, state);
-  if (!known.measured.length || state.settings.known.measured) {
+  const fields = asked(known, data.columns());
+  if (fields.length) knownFields(known, state, data.columns());
+  if (measuredOf(state.settings.known).length >= fields.length) {
     changed();
     return;
   }
   keep();
   $("known").hidden = false;
   $("equation").textContent = `${known.model}. Say of which tank the reading is the level, and which column is the command of pump 2.`;
-  data.columnFields(state, known.pumps);
+  data.columnFields(state, signals(known));
   $("columns").open = true;
   $("known-measured").focus();
 }
@@ -181,6 +205,8 @@ export async function changed() {
     data.wrote(said);
   } catch (error) {
     refused = error;
+    // What waits for more stays also where a change that was sent before is answered after it.
+    await turn;
   }
   unanswered -= 1;
   if (!refused) settle(server.current());
@@ -201,7 +227,7 @@ async function refill(why) {
   const state = server.current();
   overtaken = { why, text: state.text };
   form(state);
-  if (state.headings) data.columnFields(state, pumps());
+  if (state.headings) data.columnFields(state, signals());
   trouble(why);
   $("model-error").scrollIntoView({ block: "nearest" });
   if (at.id) $(at.id)?.focus();

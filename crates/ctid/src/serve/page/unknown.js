@@ -15,7 +15,7 @@ export async function show(state) {
   shown = found.id;
   const { drawing: report } = await server.fit(found.id);
   if (shown !== found.id) return;
-  drawing = diagnosisFigures(report, { chosen: report.steps.length - 1, residualRecord: 0, sameAxes: true });
+  drawing = diagnosisFigures(report, { chosen: report.steps.length - 1, output: 0, residualRecord: 0, sameAxes: true });
   const last = found.groups.length ? `with ${found.groups.map((one) => one.effect).join(", ")}` : "as it was diagnosed";
   $("unknown-lead").textContent = `The term that has to be added to the model ${last} so that it meets the data.`;
   const path = figure("unknown-path", "Against time", "Smoothed, with its 95 % band, on the first fitted record; shaded where the band does not hold zero.");

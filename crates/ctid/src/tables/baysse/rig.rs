@@ -183,7 +183,7 @@ impl Rig {
         let mut filtered = self.level;
         for (r, noise) in r.iter().zip(noise.chunks(periods)) {
             for (period, noise) in noise.iter().enumerate() {
-                let reading = sensor.value(tank.read() + noise);
+                let reading = sensor.value(tank.read(0) + noise);
                 let command = pump.value(pi.command(*r, filtered, self.period));
                 if period == 0 {
                     y.push(filtered);

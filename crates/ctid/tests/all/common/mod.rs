@@ -329,7 +329,7 @@ impl Tanks {
                 until += 30 + random.below(60);
             }
             inputs.push(u);
-            outputs.push(simulator.read() + self.noise * random.normal());
+            outputs.push(simulator.read(0) + self.noise * random.normal());
             simulator.advance(plants::Command::held(u), INTERVAL);
         }
         (inputs, outputs)

@@ -20,7 +20,7 @@ pub fn known(plant: Plant) -> Known {
     Known {
         area,
         input_range: Some(10.0),
-        measured: plant.joined().then_some(1),
+        measured: plant.joined().then_some(1).into_iter().collect(),
         ..Known::default()
     }
 }
@@ -185,7 +185,7 @@ impl Rig {
             Simulator::with_inputs(&structure, theta, &self.levels, at_rest).unwrap();
         let y = (0..u.len())
             .map(|k| {
-                let reading = simulator.read() + noise[k];
+                let reading = simulator.read(0) + noise[k];
                 if k + 1 < u.len() {
                     let command = match self.hold {
                         Hold::Zero => Command::held(u[k]),

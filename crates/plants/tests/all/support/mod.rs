@@ -19,6 +19,8 @@ pub struct Case {
     /// Of each vessel, then what stood behind each lag.
     pub levels: Vec<f64>,
     pub at_rest: f64,
+    /// What the second input is while the first one is this.
+    pub second: fn(Command) -> Command,
     /// Nominal sampling interval \[s\].
     pub h: f64,
 }
@@ -64,7 +66,7 @@ pub fn base(plant: Plant) -> Case {
     };
     let known = Known {
         area,
-        measured: plant.joined().then_some(1),
+        measured: plant.joined().then_some(1).into_iter().collect(),
         ..Known::default()
     };
     let mut scales = Scales::from_ranges((3.5, 6.5), (6.0, 17.0), h, 400.0 * h);
@@ -77,8 +79,23 @@ pub fn base(plant: Plant) -> Case {
         theta,
         levels,
         at_rest: 4.7,
+        second: mirrored,
         h,
     }
+}
+
+/// The plant with a measured disturbance into a vessel: a quarter of what the pump brings, but for sign.
+pub fn disturbed(plant: Plant, vessel: usize, sign: f64) -> Case {
+    let mut case = base(plant);
+    let mut scales = case.structure.scales.clone();
+    scales.input_2 = Some((3.3, 6.3));
+    let known = Known {
+        disturbance: Some(vessel),
+        ..case.structure.known.clone()
+    };
+    case.structure = Structure::new(plant, known, scales);
+    case.theta.push(0.25 * sign * case.theta[0]);
+    case
 }
 
 /// The plant with a vessel whose time constant is the sampling interval over `ratio`, at the same levels.
@@ -99,7 +116,7 @@ pub fn placements(plant: Plant) -> Vec<Placed> {
     CATALOGUE
         .iter()
         .flat_map(|&effect| {
-            let sites = effect.sites(plant);
+            let sites = effect.sites(plant, &Known::default());
             sites.map(move |vessel| Placed { effect, vessel })
         })
         .collect()
@@ -212,7 +229,7 @@ impl Case {
             &self.structure,
             &self.theta,
             &self.levels,
-            self.at_rest,
+            (self.at_rest, self.second),
             input,
             substeps,
         )
@@ -235,7 +252,7 @@ impl Case {
             &self.structure,
             theta,
             levels,
-            self.at_rest,
+            (self.at_rest, self.second),
             input,
             substeps,
         )
@@ -268,19 +285,18 @@ pub fn simulate<T: Scalar>(
     structure: &Structure,
     theta: &[T],
     levels: &[T],
-    at_rest: f64,
+    (at_rest, second): (f64, fn(Command) -> Command),
     input: &[(Command, f64)],
     substeps: usize,
 ) -> Vec<T> {
-    let second = mirrored(Command::held(at_rest)).from;
-    let at_rest = [at_rest, second];
+    let at_rest = [at_rest, second(Command::held(at_rest)).from];
     let mut simulator = Simulator::with_inputs(structure, theta, levels, at_rest).expect("counts");
     simulator.set_substeps(substeps);
     input
         .iter()
         .map(|&(command, h)| {
-            let y = simulator.read();
-            simulator.advance_both([command, mirrored(command)], h);
+            let y = simulator.read(0);
+            simulator.advance_both([command, second(command)], h);
             y
         })
         .collect()

@@ -6,7 +6,7 @@ use ode_solvers::dopri5::Dopri5;
 use ode_solvers::{DVector, OutputType, System};
 use plants::{Command, Outlet, Plant};
 
-use super::{Case, mirrored};
+use super::Case;
 
 /// A pump, and what acts on its command.
 #[derive(Clone, Copy)]
@@ -73,6 +73,8 @@ struct Equations {
     rim: [f64; 3],
     fraction: [f64; 3],
     pumps: [Pump; 2],
+    /// The vessel into which the second input flows.
+    second_into: usize,
     input_range: f64,
     /// The heads of valves between tanks are parabolas of degree five within it; zero where there are none.
     width: f64,
@@ -95,7 +97,7 @@ impl Equations {
         let mut e = Self {
             linear: structure.plant.outlet() == Outlet::Linear,
             n: structure.plant.vessels(),
-            measured: scales.measured,
+            measured: scales.outputs[0].vessel,
             area: scales.area,
             operating: scales.operating_level,
             rim: [f64::INFINITY; 3],
@@ -118,9 +120,10 @@ impl Equations {
             Plant::FirstOrder => e.area[0] = theta[1],
             Plant::ThreeTank => {
                 e.pumps[1].gain = theta[1];
-                e.pumps[1].at_rest = mirrored(Command::held(case.at_rest)).from;
+                e.pumps[1].at_rest = (case.second)(Command::held(case.at_rest)).from;
+                e.second_into = 2;
                 e.outlet.copy_from_slice(&theta[2..5]);
-                e.width = 1e-4 * scales.level[scales.measured].1;
+                e.width = 1e-4 * scales.level[scales.outputs[0].vessel].1;
             }
         }
         let names = structure.parameter_names();
@@ -128,9 +131,13 @@ impl Equations {
             let placed = structure.effects().iter().find(|p| p.effect.id == id);
             placed.map_or(0, |p| p.vessel)
         };
-        let (low, high) = scales.level[scales.measured];
+        let (low, high) = scales.level[scales.outputs[0].vessel];
         e.sensor_range = high;
         let own = structure.plant.parameters(scales).len();
+        if let Some(vessel) = structure.known.disturbance {
+            e.second_into = vessel;
+            e.pumps[1].gain = theta[own - 1];
+        }
         for (name, &value) in names.iter().zip(theta).skip(own) {
             let (id, parameter) = name.split_once('.').expect("effect.parameter");
             let v = vessel(id);
@@ -234,11 +241,20 @@ impl Equations {
         self.pumps[pump].gain * (1.0 + change * done(t) / done(self.duration))
     }
 
+    /// Where what a pump moves stands before the record begins.
+    fn rests(&self, pump: usize) -> f64 {
+        let Pump {
+            at_rest, sticks, ..
+        } = self.pumps[pump];
+        let (width, jump, begin) = sticks;
+        at_rest + begin * 0.5 * width * (1.0 + jump)
+    }
+
     /// The commands that act behind what sticks.
     fn moved(&self, pump: usize, input: &[(Command, f64)]) -> Vec<(Command, f64)> {
-        let (width, jump, begin) = self.pumps[pump].sticks;
+        let (width, jump, _) = self.pumps[pump].sticks;
         let (breaks, left) = (0.5 * width * (1.0 + jump), 0.5 * width * (1.0 - jump));
-        let mut position = self.pumps[pump].at_rest + begin * breaks;
+        let mut position = self.rests(pump);
         let mut follow = |u: f64| {
             if u > position + breaks {
                 position = u - left;
@@ -275,7 +291,7 @@ impl Equations {
         }
         let mut inflow = fed[0];
         for i in 0..self.n {
-            if i == 2 {
+            if i == self.second_into {
                 inflow += fed[1];
             }
             let out = self.outflow(i, &x[..self.n], t, late[i]);
@@ -324,7 +340,7 @@ impl Signal<'_> {
     /// The command as given at a time within piece `k` (or before all).
     fn raw(&self, pump: usize, k: Option<usize>, t: f64) -> f64 {
         let Some(k) = k else {
-            return self.equations.pumps[pump].at_rest;
+            return self.equations.rests(pump);
         };
         let (begin, h, command) = self.pieces[pump][k];
         match command.to {
@@ -406,7 +422,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
     let mut t = 0.0;
     let second: Vec<(Command, f64)> = input
         .iter()
-        .map(|&(command, h)| (mirrored(command), h))
+        .map(|&(command, h)| ((case.second)(command), h))
         .collect();
     let mut pieces = [Vec::new(), Vec::new()];
     for (of_first, of_second) in e.moved(0, input).into_iter().zip(e.moved(1, &second)) {
@@ -426,7 +442,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
         *to = level.min(e.rim[i]);
     }
     for (pump, at) in PUMPS.into_iter().enumerate() {
-        x[at] = e.command(pump, e.pumps[pump].at_rest);
+        x[at] = e.command(pump, e.rests(pump));
     }
     x[SENSOR] = x[e.measured];
     // What stood behind a lag decays for a sample before the record begins.

@@ -11,8 +11,11 @@
 //! -2 log l = (N - p) log(R_rr^2) + log|V| + 2 sum_j log|R_jj|,   V the noise's covariance over sigma^2,
 //! ```
 //! minimised over the partial correlations of the model, `k_i = tanh z_i`, by BFGS from Burg's solution.
-//! `R_rr^2/(N - p)` is then the innovations' variance. The order is Burg's. Rows without a reading, whose residual is NaN, are left out
-//! of all of this exactly: `N` counts the others, and `V` is their covariance.
+//! `R_rr^2/(N - p)` is then the innovations' variance. The order is Burg's. Rows whose sample is missing, with a residual that is NaN, are
+//! left out of all of this exactly: `N` counts the others, and `V` is their covariance.
+//!
+//! **Several outputs** share the entries and have a noise model each. `V` has a block for each, with variances over that of the first
+//! output, `s_o = exp(z)`, whose logarithms are estimated with the partial correlations.
 //!
 //! **Cost**: `O(N (p + 1) (p + q))` for an evaluation, about ten evaluations for each coefficient, most of them side by side.
 //!
@@ -22,59 +25,53 @@
 use ct_signals::ArModel;
 use rayon::prelude::*;
 
-use crate::{Error, Rows};
+use crate::{Error, Noise, Rows};
 
-/// The noise model of a residual that was fitted.
+/// The noise of a residual that was fitted, the model of each output of order zero to `most`.
 ///
 /// `columns` are the columns of `rows` that were free to follow the noise: those of entries at a bound are not.
 ///
 /// # Errors
 /// Where the residual is not finite.
-pub(crate) fn noise(rows: &Rows, columns: &[usize], most: usize) -> Result<ArModel, Error> {
-    let residual = rows.columns - 1;
-    let series: Vec<Vec<f64>> = rows
-        .records()
-        .map(|record| {
-            record
-                .chunks_exact(rows.columns)
-                .map(|row| row[residual])
-                .collect()
-        })
-        .collect();
-    let segments: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
-    let burg = ArModel::fit(&segments, most)?;
-    let mut z = coordinates(&burg);
+pub(crate) fn noise(rows: &Rows, columns: &[usize], most: usize) -> Result<Noise, Error> {
+    let (first, _) = Noise::fit(&rows.residuals(), rows.outputs, most)?.relative();
+    let orders = orders(&first);
+    let mut z = coordinates(&first);
     if !z.is_empty() {
         z = bfgs(z, |z| {
-            model(z).map_or(f64::INFINITY, |model| {
-                Criterion::of(rows, columns, &model).value
+            model(z, &orders).map_or(f64::INFINITY, |noise| {
+                Criterion::of(rows, columns, &noise).value
             })
         });
     }
-    let variance = Criterion::of(rows, columns, &model(&z)?).variance;
-    Ok(ArModel::from_reflections(&tanh(&z), variance.sqrt())?)
+    let noise = model(&z, &orders)?;
+    let sigma = Criterion::of(rows, columns, &noise).variance.sqrt();
+    let scaled = |model: &ArModel| model.with_sigma(sigma * model.sigma());
+    Ok(Noise::of(noise.iter().map(scaled).collect()))
 }
 
 /// The degrees of freedom of variances that depend on an estimated noise model (F. E. Satterthwaite, An approximate
 /// distribution of estimates of variance components, Biometrics Bulletin 2 (1946) 110-114): twice over the variance
 /// of the variance's logarithm.
 ///
-/// `variances` gives them for a noise model of unit innovations and the innovations' variance.
+/// `variances` gives them for noise whose scales are relative to that of the first output, and the variance of that.
 pub(crate) fn freedom(
     rows: &Rows,
     columns: &[usize],
-    noise: &ArModel,
-    variances: impl Fn(&ArModel, f64) -> Option<Vec<f64>> + Sync,
+    noise: &Noise,
+    variances: impl Fn(&Noise, f64) -> Option<Vec<f64>> + Sync,
 ) -> Option<Vec<f64>> {
     const STEP: f64 = 1e-3;
-    let z = coordinates(noise);
+    let (noise, _) = noise.relative();
+    let orders = orders(&noise);
+    let z = coordinates(&noise);
     let q = z.len();
     let at = |moves: &[(usize, f64)]| {
         let mut z = z.clone();
         for (i, by) in moves {
             z[*i] += by * STEP;
         }
-        let model = model(&z).ok()?;
+        let model = model(&z, &orders).ok()?;
         let criterion = Criterion::of(rows, columns, &model);
         Some((model, criterion))
     };
@@ -113,7 +110,7 @@ pub(crate) fn freedom(
         .into_iter()
         .unzip();
     let factor = cholesky(hessian)?;
-    let count = variances(&model(&z).ok()?, centre.variance)?.len();
+    let count = variances(&model(&z, &orders).ok()?, centre.variance)?.len();
     Some(
         (0..count)
             .map(|entry| {
@@ -148,24 +145,34 @@ fn cholesky(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
     Some(a)
 }
 
-fn coordinates(noise: &ArModel) -> Vec<f64> {
-    noise.reflections().iter().map(|k| k.atanh()).collect()
+/// Order of each output's model.
+fn orders(noise: &Noise) -> Vec<usize> {
+    noise.iter().map(ArModel::order).collect()
 }
 
-fn tanh(z: &[f64]) -> Vec<f64> {
-    z.iter().map(|z| z.tanh()).collect()
+/// The partial correlations of all outputs, then the scales of all but the first.
+fn coordinates(noise: &Noise) -> Vec<f64> {
+    let correlations = noise.iter().flat_map(|model| model.reflections());
+    let scales = noise.iter().skip(1).map(|model| model.sigma().ln());
+    correlations.map(|k| k.atanh()).chain(scales).collect()
 }
 
-fn model(z: &[f64]) -> Result<ArModel, Error> {
-    Ok(ArModel::from_reflections(&tanh(z), 1.0)?)
-}
-
-/// Record by record, whether each row's reading is there: the residual of a missing one is NaN.
-pub(crate) fn observed(rows: &Rows) -> impl Iterator<Item = Vec<bool>> {
-    let columns = rows.columns;
-    let there = move |row: &[f64]| !row[columns - 1].is_nan();
-    rows.records()
-        .map(move |record| record.chunks_exact(columns).map(there).collect())
+/// The noise at such coordinates, scales relative to that of the first output.
+fn model(z: &[f64], orders: &[usize]) -> Result<Noise, Error> {
+    let (correlations, scales) = z.split_at(orders.iter().sum());
+    let mut rest = correlations;
+    let mut sigma = std::iter::once(1.0).chain(scales.iter().map(|z| z.exp()));
+    let of_order = |&order: &usize| {
+        let (own, after) = rest.split_at(order);
+        rest = after;
+        let reflections: Vec<f64> = own.iter().map(|z| z.tanh()).collect();
+        Ok(ArModel::from_reflections(
+            &reflections,
+            sigma.next().unwrap_or(1.0),
+        )?)
+    };
+    let models: Result<_, Error> = orders.iter().map(of_order).collect();
+    Ok(Noise::of(models?))
 }
 
 struct Criterion {
@@ -178,12 +185,20 @@ struct Criterion {
 }
 
 impl Criterion {
-    fn of(rows: &Rows, columns: &[usize], model: &ArModel) -> Self {
+    /// `noise`: scales relative to that of the first output.
+    fn of(rows: &Rows, columns: &[usize], noise: &Noise) -> Self {
         let p = columns.len();
         let mut order = columns.to_vec();
         order.push(rows.columns - 1);
-        let triangle = rows.fold(&order, model);
-        let log_det: f64 = observed(rows).map(|record| model.log_det_of(record)).sum();
+        let triangle = rows.fold(&order, noise, &noise.inverse_scales());
+        let log_det: f64 = rows
+            .present()
+            .map(|(output, present)| {
+                let model = noise.output(output);
+                let samples = present.iter().filter(|there| **there).count() as f64;
+                2.0 * samples * model.sigma().ln() + model.log_det_of(present)
+            })
+            .sum();
         let mut rank = 0.0;
         let mut volume = 0.0;
         for j in 0..p {
@@ -277,17 +292,18 @@ pub(crate) mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    /// Covariance, of unit innovations, of the rows that are there, one block for each record.
-    pub(crate) fn covariance(noise: &ArModel, lengths: &[usize], there: &[usize]) -> DMatrix<f64> {
+    /// Covariance of the rows that are there, one block for each series.
+    pub(crate) fn covariance(noise: &Noise, lengths: &[usize], there: &[usize]) -> DMatrix<f64> {
         let n = lengths.iter().sum();
         let mut all = DMatrix::zeros(n, n);
         let mut from = 0;
-        for &length in lengths {
+        for (i, &length) in lengths.iter().enumerate() {
+            let model = noise.of_series(i);
             let mut inverse = DMatrix::zeros(length, length);
             for j in 0..length {
                 let mut unit = vec![0.0; length];
-                unit[j] = 1.0;
-                inverse.set_column(j, &DVector::from_vec(noise.whiten(&unit)));
+                unit[j] = 1.0 / model.sigma();
+                inverse.set_column(j, &DVector::from_vec(model.whiten(&unit)));
             }
             let factor = inverse.try_inverse().unwrap();
             all.view_mut((from, from), (length, length))
@@ -297,9 +313,11 @@ pub(crate) mod tests {
         all.select_rows(there).select_columns(there)
     }
 
-    /// Rows of two records with two columns and the residual, NaN in some; of the rows that are there the columns, the
-    /// residuals, and which these rows are.
-    pub(crate) fn rows_with_missing() -> (Rows, DMatrix<f64>, DVector<f64>, Vec<usize>) {
+    /// Rows of two series, of one output or of two, with two columns and the residual, NaN in some; of the rows that are there the
+    /// columns, the residuals, and which these rows are.
+    pub(crate) fn rows_with_missing(
+        outputs: usize,
+    ) -> (Rows, DMatrix<f64>, DVector<f64>, Vec<usize>) {
         let lengths = vec![40, 23];
         let missing = |k: usize| matches!(k, 0 | 4 | 6 | 7 | 20..=29 | 45 | 47 | 61 | 62);
         let mut values = Vec::new();
@@ -311,6 +329,7 @@ pub(crate) mod tests {
         }
         let rows = Rows {
             columns: 3,
+            outputs,
             lengths,
             values,
         };
@@ -320,29 +339,57 @@ pub(crate) mod tests {
         (rows, j, r, there)
     }
 
+    /// Noise of one output or of two, scales relative to that of the first.
+    pub(crate) fn some_noise(outputs: usize) -> Vec<Noise> {
+        let of =
+            |coefficients: &[f64], sigma| ArModel::from_coefficients(coefficients, sigma).unwrap();
+        let first = [&[][..], &[0.8], &[0.7, -0.3, 0.2]];
+        let second = [of(&[0.5], 3.0), of(&[], 0.2), of(&[-0.4, 0.1], 1.0)];
+        let pairs = first.into_iter().zip(second);
+        pairs
+            .map(|(first, second)| {
+                let mut models = vec![of(first, 1.0), second];
+                models.truncate(outputs);
+                Noise::of(models)
+            })
+            .collect()
+    }
+
     #[test]
     fn criterion_is_that_of_dense_algebra_where_rows_are_missing() {
-        let (rows, j, r, there) = rows_with_missing();
-        for coefficients in [&[][..], &[0.8], &[0.7, -0.3, 0.2]] {
-            let model = ArModel::from_coefficients(coefficients, 1.0).unwrap();
-            let ours = Criterion::of(&rows, &[0, 1], &model);
-            let v = covariance(&model, &rows.lengths, &there);
-            let weight = v.clone().try_inverse().unwrap();
-            let normal = j.transpose() * &weight * &j;
-            let solved = normal.clone().try_inverse().unwrap() * j.transpose() * &weight * &r;
-            let left = &r - &j * solved;
-            let squares = (left.transpose() * &weight * &left)[(0, 0)];
-            let freedom = there.len() as f64 - 2.0;
-            let dense = freedom * squares.ln() + v.determinant().ln() + normal.determinant().ln();
-            assert_relative_eq!(ours.value, dense, max_relative = 1e-9);
-            assert_relative_eq!(ours.variance, squares / freedom, max_relative = 1e-9);
-            assert_relative_eq!(ours.left, freedom);
+        for outputs in [1, 2] {
+            let (rows, j, r, there) = rows_with_missing(outputs);
+            for model in some_noise(outputs) {
+                let ours = Criterion::of(&rows, &[0, 1], &model);
+                let v = covariance(&model, &rows.lengths, &there);
+                let weight = v.clone().try_inverse().unwrap();
+                let normal = j.transpose() * &weight * &j;
+                let solved = normal.clone().try_inverse().unwrap() * j.transpose() * &weight * &r;
+                let left = &r - &j * solved;
+                let squares = (left.transpose() * &weight * &left)[(0, 0)];
+                let freedom = there.len() as f64 - 2.0;
+                let dense =
+                    freedom * squares.ln() + v.determinant().ln() + normal.determinant().ln();
+                assert_relative_eq!(ours.value, dense, max_relative = 1e-9);
+                assert_relative_eq!(ours.variance, squares / freedom, max_relative = 1e-9);
+                assert_relative_eq!(ours.left, freedom);
+            }
+            // The search starts from the model of the samples that are there, and lowers the criterion.
+            let most = noise(&rows, &[0, 1], 3).unwrap();
+            let (relative, variance) = most.relative();
+            let at = Criterion::of(&rows, &[0, 1], &relative);
+            let white = Criterion::of(&rows, &[0, 1], &Noise::white(outputs));
+            assert!(most.order() > 0 && at.value < white.value);
+            assert_relative_eq!(variance, at.variance, max_relative = 1e-9);
+            // The scale of the second output is at its best.
+            for factor in [0.97, 1.03] {
+                let moved = |(o, model): (usize, &ArModel)| {
+                    model.with_sigma(model.sigma() * if o > 0 { factor } else { 1.0 })
+                };
+                let moved = Noise::of(relative.iter().enumerate().map(moved).collect());
+                let beside = Criterion::of(&rows, &[0, 1], &moved).value;
+                assert!(outputs == 1 || beside > at.value);
+            }
         }
-        // The search starts from the model of the readings that are there, and lowers the criterion.
-        let most = noise(&rows, &[0, 1], 3).unwrap();
-        let at = Criterion::of(&rows, &[0, 1], &most);
-        let white = Criterion::of(&rows, &[0, 1], &ArModel::white(1.0));
-        assert!(most.order() > 0 && at.value < white.value);
-        assert_relative_eq!(most.sigma().powi(2), at.variance, max_relative = 1e-9);
     }
 }

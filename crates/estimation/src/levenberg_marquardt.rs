@@ -38,7 +38,7 @@ pub(crate) struct Minimum {
 }
 
 /// The nearest value between two bounds. Unlike `clamp` it takes bounds of any order; what is not a number stays so.
-pub(crate) fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
+pub fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
     if x < lower {
         lower
     } else if x > upper {

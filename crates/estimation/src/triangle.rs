@@ -1,5 +1,7 @@
 //! Least squares on the fly: an upper triangle that rows are folded into, in `O(p^2)` memory.
 
+use crate::Squares;
+
 /// Rows are collected in blocks and folded in by Householder reflections.
 const BLOCK: usize = 32;
 
@@ -17,7 +19,21 @@ pub struct Triangle {
     block: Vec<f64>,
     filled: usize,
     rows: usize,
+    /// Of several outputs the triangle of each, whose weights hang on what is left of its residual.
+    outputs: Option<Box<Outputs>>,
 }
+
+/// The rows of each output, not weighted.
+#[derive(Debug, Clone)]
+struct Outputs {
+    triangles: Vec<Triangle>,
+    /// What outputs count by; its sums are those of the residuals.
+    squares: Squares,
+}
+
+/// Weights are found again so often in a step, and until they change by less than this part.
+const ROUNDS: usize = 20;
+const SAME_WEIGHTS: f64 = 1e-3;
 
 impl Triangle {
     /// `columns` counts the residual's column too.
@@ -29,6 +45,7 @@ impl Triangle {
             block: vec![0.0; columns * BLOCK],
             filled: 0,
             rows: 0,
+            outputs: None,
         }
     }
 
@@ -109,9 +126,12 @@ impl Triangle {
         (0..=j).map(|i| self.at(i, j).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Sum of squares of the last column: the cost.
+    /// The cost: the sum of squares of the last column or, of several outputs, [`Squares::cost`].
     #[must_use]
     pub fn cost(&self) -> f64 {
+        if let Some(outputs) = &self.outputs {
+            return outputs.squares.cost();
+        }
         self.column_norm(self.columns - 1).powi(2)
     }
 
@@ -139,10 +159,59 @@ impl Triangle {
         chosen
     }
 
+    /// The triangle of the rows of all outputs, each times its weight by `squares`, those of the residuals: of an only output its own.
+    #[must_use]
+    pub(crate) fn of_outputs(mut triangles: Vec<Self>, squares: Squares) -> Self {
+        if triangles.len() == 1 {
+            return triangles.remove(0);
+        }
+        let mut all = Self::weighted(&triangles, &squares.weights());
+        all.outputs = Some(Box::new(Outputs { triangles, squares }));
+        all
+    }
+
+    /// The triangle of the rows of several, each times its weight.
+    fn weighted(triangles: &[Self], weights: &[f64]) -> Self {
+        let columns = triangles.first().map_or(0, Self::columns);
+        let mut all = Self::new(columns);
+        let mut row = vec![0.0; columns];
+        for (triangle, weight) in triangles.iter().zip(weights) {
+            for i in 0..columns {
+                for (j, to) in row.iter_mut().enumerate() {
+                    *to = weight * triangle.at(i, j);
+                }
+                all.push(&row);
+            }
+        }
+        all.finish();
+        all.rows = triangles.iter().map(Self::rows).sum();
+        all
+    }
+
     /// Minimises `|J x - r|^2 + damping sum_j (scale_j x_j)^2` over the `free` parameters; the others stay zero.
-    /// Directions that no row speaks of stay zero too.
+    /// Directions that no row speaks of stay zero too. Outputs count by what is left of their residuals there, not here
+    /// (iteratively reweighted least squares).
     #[must_use]
     pub fn solve(&self, free: &[usize], scale: &[f64], damping: f64) -> Vec<f64> {
+        let mut step = self.solve_weighted(free, scale, damping);
+        let Some(outputs) = &self.outputs else {
+            return step;
+        };
+        let mut weights = outputs.squares.weights();
+        for _ in 0..ROUNDS {
+            let next = outputs.left(&step).weights();
+            let moved = next.iter().zip(&weights).map(|(a, b)| (a / b - 1.0).abs());
+            if moved.fold(0.0, f64::max) < SAME_WEIGHTS {
+                break;
+            }
+            weights = next;
+            let weighted = Self::weighted(&outputs.triangles, &weights);
+            step = weighted.solve_weighted(free, scale, damping);
+        }
+        step
+    }
+
+    fn solve_weighted(&self, free: &[usize], scale: &[f64], damping: f64) -> Vec<f64> {
         let p = free.len();
         let mut order = free.to_vec();
         order.push(self.columns - 1);
@@ -171,9 +240,16 @@ impl Triangle {
         all
     }
 
-    /// `|J x - r|^2`.
+    /// `|J x - r|^2`; of several outputs the cost of what is left of each ([`Squares::cost`]).
     #[must_use]
     pub fn predicted(&self, x: &[f64]) -> f64 {
+        match &self.outputs {
+            Some(outputs) => outputs.left(x).cost(),
+            None => self.left(x),
+        }
+    }
+
+    fn left(&self, x: &[f64]) -> f64 {
         let last = self.columns - 1;
         (0..self.columns)
             .map(|i| {
@@ -215,6 +291,17 @@ impl Triangle {
                 })
                 .collect(),
         )
+    }
+}
+
+impl Outputs {
+    /// What a step leaves of each output.
+    fn left(&self, x: &[f64]) -> Squares {
+        let mut squares = self.squares.clone();
+        for (sum, triangle) in squares.sums.iter_mut().zip(&self.triangles) {
+            *sum = triangle.left(x);
+        }
+        squares
     }
 }
 
@@ -278,6 +365,43 @@ mod tests {
                 .unwrap();
             for (k, i) in [0, 2, 4].into_iter().enumerate() {
                 assert_relative_eq!(damped[i], reference[k], max_relative = 1e-10);
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_of_two_outputs_is_that_of_the_likelihood() {
+        // One output is explained by the columns but for a little, the other is noise.
+        let (n, p) = (120, 3);
+        let rows = rows(2 * n, p);
+        let mut triangles = vec![Triangle::new(p + 1), Triangle::new(p + 1)];
+        let mut squares = Squares::new(&[n, n], |_| 0.0);
+        for (k, row) in rows.iter().enumerate() {
+            let mut row = row.clone();
+            if k % 2 == 0 {
+                row[p] = 3.0 * row[0] - row[1] + 0.1 * row[p];
+            }
+            triangles[k % 2].push(&row);
+            squares.sums[k % 2] += row[p] * row[p];
+        }
+        for triangle in &mut triangles {
+            triangle.finish();
+        }
+        let all = Triangle::of_outputs(triangles, squares.clone());
+        assert_relative_eq!(all.cost(), squares.cost(), max_relative = 1e-12);
+        assert_relative_eq!(
+            all.predicted(&[0.0; 3]),
+            squares.cost(),
+            max_relative = 1e-12
+        );
+        let x = all.solve(&[0, 1, 2], &[], 0.0);
+        let best = all.predicted(&x);
+        assert!(best < all.cost());
+        for i in 0..p {
+            for by in [-0.03, 0.03] {
+                let mut moved = x.clone();
+                moved[i] += by;
+                assert!(all.predicted(&moved) > best);
             }
         }
     }

@@ -1,0 +1,18 @@
+//! What can go wrong in a fit.
+
+/// What can go wrong in a fit.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A series cannot be used.
+    #[error(transparent)]
+    Series(#[from] ct_signals::Error),
+    /// No start led anywhere.
+    #[error(
+        "none of {starts} starts gave a finite simulation: check the units of the data and the constants under [known]"
+    )]
+    NoFiniteStart {
+        /// How many were tried.
+        starts: usize,
+    },
+}

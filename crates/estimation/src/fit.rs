@@ -1,0 +1,423 @@
+//! Fits from many starts in the metric of a noise, the noise's colour, and the uncertainty of what was fitted.
+
+use ct_signals::ArModel;
+use rayon::prelude::*;
+
+use crate::{
+    Error, Noise, Residuals, Squares, Stop, Stopping, Triangle, costs_more,
+    levenberg_marquardt::{held, minimise, within},
+    linearise_below, marginal, residuals, rows,
+};
+
+/// Two ends are one minimum where twice the logarithm of their likelihood ratio is below this.
+const SAME_MINIMUM: f64 = 0.1;
+
+/// A fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The fitted vector.
+    pub x: Vec<f64>,
+    /// Cost of the whitened residual: its sum of squares or, of several outputs, [`crate::Squares::cost`] \[output unit squared\].
+    pub cost: f64,
+    /// Root mean square of the residual at each output, not whitened \[output unit\].
+    pub rmse: Vec<f64>,
+    /// The noise in whose metric it was fitted. After [`coloured`] its innovations are those of the residual; in a
+    /// metric that was given they are as they were given.
+    pub noise: Noise,
+    /// What the rows of each output were multiplied by, beside whitening ([`crate::Squares::weights`]).
+    pub weights: Vec<f64>,
+    /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance of each output at its best.
+    pub deviance: f64,
+    /// Fitted numbers, those of the noise included.
+    pub parameters: usize,
+    /// What they cost in [`Fit::bic`].
+    pub price: f64,
+    /// Samples of all outputs.
+    pub samples: usize,
+    /// Samples of each output.
+    pub samples_per_output: Vec<usize>,
+    /// How many starts were tried.
+    pub starts: usize,
+    /// How many of them ended in the best minimum.
+    pub agree: usize,
+    /// Why the best one stopped.
+    pub stop: Stop,
+    /// The folded rows at the minimum.
+    pub triangle: Triangle,
+    /// Positions (among the fitted entries) that the gradient does not hold at a bound.
+    interior: Vec<usize>,
+    free: Vec<usize>,
+    /// Degrees of freedom of the variance of every interior entry.
+    freedom: Vec<f64>,
+}
+impl Fit {
+    /// Whether two fits of one model in one metric ended in the same minimum.
+    #[must_use]
+    pub fn same_minimum(&self, other: &Self) -> bool {
+        self.samples as f64 * (self.cost / other.cost).ln().abs() <= SAME_MINIMUM
+            || self.cost == other.cost
+    }
+
+    /// The better of this fit and one of the same model in the same metric from other starts. Starts are counted
+    /// together; those of both count as agreed where both ended in the same minimum.
+    #[must_use]
+    pub fn or_better(self, other: Self) -> Self {
+        let starts = self.starts + other.starts;
+        let agree = self
+            .same_minimum(&other)
+            .then_some(self.agree + other.agree);
+        let mut best = if other.cost < self.cost { other } else { self };
+        best.starts = starts;
+        best.agree = agree.unwrap_or(best.agree);
+        best
+    }
+
+    /// The same fit, with the starts counted of the one it continues.
+    #[must_use]
+    pub fn continuing(mut self, first: &Self) -> Self {
+        self.starts = first.starts;
+        self.agree = first.agree;
+        self
+    }
+
+    /// [`Fit::rmse`] of an only output; of several their geometric mean, by samples, on which no choice of units has an influence.
+    #[must_use]
+    pub fn mean_rmse(&self) -> f64 {
+        if let [only] = self.rmse[..] {
+            return only;
+        }
+        let outputs = self.rmse.iter().zip(&self.samples_per_output);
+        let sum: f64 = outputs
+            .map(|(rmse, &samples)| samples as f64 * rmse.max(f64::MIN_POSITIVE).ln())
+            .sum();
+        (sum / self.samples.max(1) as f64).exp()
+    }
+
+    /// Bayesian information criterion: smaller is better.
+    #[must_use]
+    pub fn bic(&self) -> f64 {
+        self.deviance + self.price
+    }
+
+    /// Variance of the innovations, with the degrees of freedom that are left.
+    #[must_use]
+    pub fn variance(&self) -> f64 {
+        self.cost / (self.samples.saturating_sub(self.free.len())).max(1) as f64
+    }
+
+    /// Standard error of every entry of the vector; `None` for one that is fixed, held at a bound, or not determined.
+    #[must_use]
+    pub fn std_errors(&self) -> Vec<Option<f64>> {
+        let Some(covariance) = self.triangle.covariance(&self.interior) else {
+            return vec![None; self.x.len()];
+        };
+        let variance = self.variance();
+        self.spread((0..self.interior.len()).map(|i| (covariance[i][i] * variance).sqrt()))
+    }
+
+    /// Values of the entries that are not at a bound, in their places of the vector; `None` for the others.
+    #[must_use]
+    pub fn spread(&self, values: impl Iterator<Item = f64>) -> Vec<Option<f64>> {
+        let mut all = vec![None; self.x.len()];
+        for (&column, value) in self.interior.iter().zip(values) {
+            all[self.free[column]] = Some(value);
+        }
+        all
+    }
+
+    /// Columns of the triangle whose entries are not at a bound.
+    #[must_use]
+    pub fn interior(&self) -> &[usize] {
+        &self.interior
+    }
+
+    /// Degrees of freedom of every standard error: the quantile of Student's distribution with as many makes an
+    /// interval of it. A noise model that was estimated with the fit leaves fewer than the samples do.
+    #[must_use]
+    pub fn freedom(&self) -> Vec<Option<f64>> {
+        self.spread(self.freedom.iter().copied())
+    }
+
+    /// Half the width of the interval that holds the truth with probability `level` (0.95, say), for every entry that
+    /// has a standard error.
+    #[must_use]
+    pub fn half_widths(&self, level: f64) -> Vec<Option<f64>> {
+        self.std_errors()
+            .into_iter()
+            .zip(self.freedom())
+            .map(|(error, freedom)| Some(error? * ct_signals::student_half_width(level, freedom?)))
+            .collect()
+    }
+
+    /// Correlations between the entries that have a standard error: their positions and the matrix.
+    #[must_use]
+    pub fn correlations(&self) -> Option<(Vec<usize>, Vec<Vec<f64>>)> {
+        let covariance = self.triangle.covariance(&self.interior)?;
+        let matrix = covariance
+            .iter()
+            .enumerate()
+            .map(|(i, row)| {
+                row.iter()
+                    .enumerate()
+                    .map(|(j, c)| c / (covariance[i][i] * covariance[j][j]).sqrt())
+                    .collect()
+            })
+            .collect();
+        Some((
+            self.interior
+                .iter()
+                .map(|&column| self.free[column])
+                .collect(),
+            matrix,
+        ))
+    }
+}
+
+/// Where a fit begins.
+#[derive(Debug, Clone)]
+pub struct Start {
+    /// The vector.
+    pub x: Vec<f64>,
+    /// What [`crate::linearise`] gives there in the metric of the fit, where it is known: it is not computed again.
+    pub triangle: Option<Triangle>,
+}
+
+impl From<Vec<f64>> for Start {
+    fn from(x: Vec<f64>) -> Self {
+        Self { x, triangle: None }
+    }
+}
+
+impl Start {
+    /// Where a fit of the same model ended, for one in the metric of a given noise.
+    #[must_use]
+    pub fn at_end(fit: &Fit, noise: &Noise) -> Self {
+        Self {
+            x: fit.x.clone(),
+            triangle: fit.noise.same_colour(noise).then(|| fit.triangle.clone()),
+        }
+    }
+}
+
+/// Fits from the given starts, in parallel, in the metric of a given noise, of which the colour counts alone. The best one is given, and how
+/// many agree with it.
+///
+/// # Errors
+/// Where the model is not finite at any start.
+pub fn fit_from(
+    model: &impl Residuals,
+    starts: Vec<Start>,
+    noise: &Noise,
+    stopping: Stopping,
+) -> Result<Fit, Error> {
+    let free = model.free();
+    let bounds: Vec<(f64, f64)> = free.iter().map(|&i| model.bounds()[i]).collect();
+    let count = starts.len();
+    let minima: Vec<_> = starts
+        .into_par_iter()
+        .enumerate()
+        .filter_map(|(k, Start { x: given, triangle })| {
+            // Out of time a fit still needs one start.
+            if k > 0 && model.out_of_time() {
+                return None;
+            }
+            let mut start = given.clone();
+            for (&i, bounds) in free.iter().zip(&bounds) {
+                start[i] = within(start[i], *bounds);
+            }
+            let known = triangle.filter(|_| start == given);
+            let full = |x: &[f64]| {
+                let mut full = start.clone();
+                for (&i, value) in free.iter().zip(x) {
+                    full[i] = *value;
+                }
+                full
+            };
+            let x: Vec<f64> = free.iter().map(|&i| start[i]).collect();
+            let minimum = minimise(
+                x,
+                known,
+                &bounds,
+                stopping,
+                |x, limit| linearise_below(model, &full(x), noise, limit),
+                |x, limit| costs_more(model, &full(x), noise, limit),
+                || model.out_of_time(),
+            );
+            Some((full(&minimum.x), minimum))
+        })
+        .filter(|(_, minimum)| minimum.stop != Stop::NotFinite)
+        .collect();
+    let best = minima
+        .iter()
+        .map(|(_, minimum)| minimum.triangle.cost())
+        .fold(f64::INFINITY, f64::min);
+    // Ends that the likelihood can hardly tell apart are one minimum.
+    let samples: usize = model.samples().iter().sum();
+    let same = best * (SAME_MINIMUM / samples as f64).exp();
+    let agree = minima
+        .iter()
+        .filter(|(_, minimum)| minimum.triangle.cost() <= same)
+        .count();
+    let (x, minimum) = minima
+        .into_iter()
+        .find(|(_, minimum)| minimum.triangle.cost() <= best)
+        .ok_or(Error::NoFiniteStart { starts: count })?;
+    let interior: Vec<usize> = (0..free.len())
+        .filter(|&j| {
+            // What no sample speaks of has no error: the state behind a lag that is zero.
+            minimum.triangle.column_norm(j) > 0.0
+                && !held(minimum.x[j], bounds[j], minimum.triangle.descent(j))
+        })
+        .collect();
+    let cost = minimum.triangle.cost();
+    let n = samples as f64;
+    let end = End::of(model, &x, noise).ok_or(Error::NoFiniteStart { starts: count })?;
+    Ok(Fit {
+        x,
+        cost,
+        rmse: end.rmse,
+        noise: noise.clone(),
+        weights: end.weights,
+        deviance: n * (1.0 + (std::f64::consts::TAU * (cost / n).max(f64::MIN_POSITIVE)).ln())
+            + end.log_det,
+        parameters: free.len() + model.samples().len() + noise.order(),
+        price: model.price(noise.order()),
+        samples,
+        samples_per_output: model.samples().to_vec(),
+        starts: count,
+        agree,
+        stop: minimum.stop,
+        triangle: minimum.triangle,
+        freedom: vec![samples.saturating_sub(free.len()).max(1) as f64; interior.len()],
+        interior,
+        free: free.to_vec(),
+    })
+}
+
+/// What one pass over the residuals at the end of a fit says.
+struct End {
+    rmse: Vec<f64>,
+    weights: Vec<f64>,
+    /// Logarithm of the determinant of the noise's covariance, of unit innovations.
+    log_det: f64,
+}
+
+impl End {
+    fn of(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Self> {
+        let samples = model.samples();
+        let mut sums = vec![0.0; samples.len()];
+        let mut whiteners = noise.whiteners(1);
+        let mut squares = Squares::of(model);
+        let mut log_det = 0.0;
+        model.each_residual(x, |sample, row| {
+            let whitener = &mut whiteners[sample.output];
+            if sample.first {
+                whitener.reset();
+            }
+            if sample.missing {
+                whitener.skip();
+                return true;
+            }
+            sums[sample.output] += row[0] * row[0];
+            let variance = whitener.push_with_variance(row);
+            // Most rows have seen all that matters to them.
+            if variance != 1.0 {
+                log_det += variance.ln();
+            }
+            squares.sums[sample.output] += row[0] * row[0];
+            true
+        })?;
+        let of_output = |(sum, &count): (&f64, &usize)| (sum / count.max(1) as f64).sqrt();
+        Some(Self {
+            rmse: sums.iter().zip(samples).map(of_output).collect(),
+            weights: squares.weights(),
+            log_det,
+        })
+    }
+}
+
+/// Estimates the noise's colour from a fit's residual and refits in that metric, until the two agree.
+///
+/// # Errors
+/// As [`fit_from`].
+pub fn coloured(
+    model: &impl Residuals,
+    fit: Fit,
+    order: usize,
+    stopping: Stopping,
+) -> Result<Fit, Error> {
+    let (starts, agree) = (fit.starts, fit.agree);
+    let mut fit = prewhitened(model, fit, order, None, stopping)?;
+    // The likelihood, by which models are compared, is at its best now; the errors follow from the colour that
+    // the fit has not bent.
+    if fit.noise.order() > 0 {
+        let (deviance, parameters, price) = (fit.deviance, fit.parameters, fit.price);
+        let noise = noise_of(model, &fit, order)?;
+        fit = fit_from(model, vec![fit.x.into()], &noise, stopping)?;
+        // A likelihood is paid for with the coefficients that it had.
+        (fit.deviance, fit.parameters, fit.price) = (deviance, parameters, price);
+        if let Some(rows) = rows(model, &fit.x) {
+            let own: Vec<usize> = (0..fit.interior.len()).collect();
+            let mut order = fit.interior.clone();
+            order.push(rows.columns - 1);
+            let variances = |noise: &Noise, variance: f64| {
+                let folded = rows.fold(&order, noise, &noise.inverse_scales());
+                let covariance = folded.covariance(&own)?;
+                Some(own.iter().map(|&i| covariance[i][i] * variance).collect())
+            };
+            if let Some(freedom) = marginal::freedom(&rows, &fit.interior, &fit.noise, variances) {
+                fit.freedom = freedom;
+            }
+        }
+    } else {
+        // A white metric's scale plays no part in a fit, and may stand for any: here it becomes the noise's own.
+        let sigma = fit.variance().sqrt();
+        let white = |weight: &f64| ArModel::white(sigma / weight);
+        fit.noise = Noise::of(fit.weights.iter().map(white).collect());
+    }
+    fit.starts = starts;
+    fit.agree = agree;
+    Ok(fit)
+}
+
+/// The prewhitened fit (iterated GLS): an autoregressive noise model of order zero to `order` for each output from its residual, a fit in
+/// their weighting, until the two agree. `memory`: the noise model's memory is at most so many samples, so that no root near one takes
+/// slow physics for noise ([`ct_signals::ArModel::with_memory_at_most`]).
+///
+/// # Errors
+/// As [`fit_from`].
+pub fn prewhitened(
+    model: &impl Residuals,
+    fit: Fit,
+    order: usize,
+    memory: Option<f64>,
+    stopping: Stopping,
+) -> Result<Fit, Error> {
+    let mut fit = fit;
+    for _ in 0..8 {
+        let residuals = residuals(model, &fit.x).ok_or(Error::NoFiniteStart { starts: 1 })?;
+        let mut noise = Noise::fit(&residuals, model.samples().len(), order)?;
+        if let Some(memory) = memory {
+            noise = noise.with_memory_at_most(memory);
+        }
+        if noise.difference(&fit.noise) < 1e-4 {
+            break;
+        }
+        let next = fit_from(model, vec![fit.x.clone().into()], &noise, stopping)?;
+        let settled = fit.noise.order() > 0 && (next.deviance - fit.deviance).abs() < 1e-3;
+        fit = next;
+        if settled {
+            break;
+        }
+    }
+    Ok(fit)
+}
+
+/// The noise of a fit's residual, of order zero to `order` at each output, without the bias that fitting leaves in it.
+///
+/// # Errors
+/// Where the model is not finite.
+pub fn noise_of(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Noise, Error> {
+    let rows = rows(model, &fit.x).ok_or(Error::NoFiniteStart { starts: 1 })?;
+    marginal::noise(&rows, &fit.interior, order)
+}

@@ -1,0 +1,224 @@
+//! What is fitted: residuals with their Jacobian, and what a fit folds them to.
+
+use ct_signals::Whitener;
+
+use crate::{Noise, Rows, Squares, Triangle};
+
+/// More than sums of squares over a record differ by where they are taken in another order.
+const ROUNDING: f64 = 1e-9;
+/// Of several outputs the cost is looked at after so many samples.
+const LOOK: usize = 64;
+
+/// What is known of a row's sample before it is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sample {
+    /// Its output, counted from zero.
+    pub output: usize,
+    /// It is the first one of its series.
+    pub first: bool,
+    /// It is missing: the row has no residual.
+    pub missing: bool,
+}
+
+/// A model against measurements: residuals, measured minus model, with their Jacobian.
+///
+/// The vector holds free entries, which are fitted, and fixed ones. Samples of several outputs may come in any order, as long as those of
+/// one output come in that of time, record by record.
+pub trait Residuals: Sync {
+    /// Positions of the entries that are fitted.
+    fn free(&self) -> &[usize];
+
+    /// Bounds of all entries.
+    fn bounds(&self) -> &[(f64, f64)];
+
+    /// How many samples of each output there are, missing ones aside.
+    fn samples(&self) -> &[usize];
+
+    /// Shows every row `[d model/d x_free, measured - model]` with what is known of its sample, until `each` says that it has seen enough;
+    /// `None` then, and where the model is not finite.
+    fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
+
+    /// The same without derivatives: rows of the residual alone.
+    fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
+
+    /// What the fitted numbers cost in [`crate::Fit::bic`] with so many coefficients of the noise: the logarithm of the samples each, scales of
+    /// the outputs' noise included.
+    fn price(&self, noise_order: usize) -> f64 {
+        let samples: usize = self.samples().iter().sum();
+        let fitted = self.free().len() + self.samples().len() + noise_order;
+        fitted as f64 * (samples as f64).ln()
+    }
+
+    /// Standard deviation below which no noise of this output is believed where there are several \[output unit\].
+    fn floor(&self, _output: usize) -> f64 {
+        0.0
+    }
+
+    /// Standard deviations of the outputs' noise where these are known: outputs then count by them, and not by their residuals.
+    fn known_scales(&self) -> Option<&[f64]> {
+        None
+    }
+
+    /// No time is left: no further step is taken.
+    fn out_of_time(&self) -> bool {
+        false
+    }
+}
+
+/// Whitens rows as they come and adds up the squares of their residuals, until these cost more than a limit.
+struct Filter {
+    whiteners: Vec<Whitener>,
+    squares: Squares,
+    limit: f64,
+    seen: usize,
+}
+
+impl Filter {
+    fn new(model: &impl Residuals, noise: &Noise, columns: usize, limit: f64) -> Self {
+        Self {
+            whiteners: noise.whiteners(columns),
+            squares: Squares::of(model),
+            // The triangle's cost is a sum in another order.
+            limit: limit * (1.0 + ROUNDING),
+            seen: 0,
+        }
+    }
+
+    /// Whitens a row in place; `false` where it is missing.
+    fn push(&mut self, sample: Sample, row: &mut [f64]) -> bool {
+        let whitener = &mut self.whiteners[sample.output];
+        if sample.first {
+            whitener.reset();
+        }
+        if sample.missing {
+            whitener.skip();
+            return false;
+        }
+        whitener.push(row);
+        if let Some(residual) = row.last() {
+            self.squares.sums[sample.output] += residual * residual;
+        }
+        self.seen += 1;
+        true
+    }
+
+    /// The cost may still be within the limit.
+    fn within(&self) -> bool {
+        let several = self.squares.sums.len() > 1;
+        (several && !self.seen.is_multiple_of(LOOK)) || self.squares.cost() <= self.limit
+    }
+}
+
+/// The folded rows, whitened by the noise model and weighted by outputs as the residuals there have it ([`Squares::weights`]), so that
+/// the triangle's cost is [`Squares::cost`]; `None` where the model is not finite.
+#[must_use]
+pub fn linearise(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Triangle> {
+    linearise_below(model, x, noise, f64::INFINITY)
+}
+
+/// The same; `None` too where the cost is above a limit, which is known long before the last sample as a rule.
+#[must_use]
+pub fn linearise_below(
+    model: &impl Residuals,
+    x: &[f64],
+    noise: &Noise,
+    limit: f64,
+) -> Option<Triangle> {
+    let columns = model.free().len() + 1;
+    let mut triangles = vec![Triangle::new(columns); model.samples().len()];
+    let mut filter = Filter::new(model, noise, columns, limit);
+    model.each_row(x, |sample, row| {
+        if filter.push(sample, row) {
+            triangles[sample.output].push(row);
+            return filter.within();
+        }
+        true
+    })?;
+    for triangle in &mut triangles {
+        triangle.finish();
+    }
+    (filter.squares.cost() <= filter.limit).then(|| Triangle::of_outputs(triangles, filter.squares))
+}
+
+/// Whether the cost is above a limit, or not finite.
+#[must_use]
+pub fn costs_more(model: &impl Residuals, x: &[f64], noise: &Noise, limit: f64) -> bool {
+    let mut filter = Filter::new(model, noise, 1, limit);
+    let within = model.each_residual(x, |sample, row| {
+        !filter.push(sample, row) || filter.within()
+    });
+    // A cost that is no number is above every limit.
+    let cost = filter.squares.cost();
+    within.is_none() || cost.is_nan() || cost > filter.limit
+}
+
+/// The sums of squares of the whitened residuals of each output; `None` where the model is not finite.
+#[must_use]
+pub fn squares(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Squares> {
+    let mut filter = Filter::new(model, noise, 1, f64::INFINITY);
+    model.each_residual(x, |sample, row| {
+        filter.push(sample, row);
+        true
+    })?;
+    Some(filter.squares)
+}
+
+/// The rows of all samples as they are, one output's samples of a record after the other; `None` where the model is not finite.
+#[must_use]
+pub fn rows(model: &impl Residuals, x: &[f64]) -> Option<Rows> {
+    let columns = model.free().len() + 1;
+    let mut collected = Collected::new(model, columns);
+    model.each_row(x, |sample, row| collected.push(sample, row))?;
+    Some(collected.rows())
+}
+
+/// The residuals, measured minus model, series by series, NaN where the sample is missing; `None` where the model is not finite.
+#[must_use]
+pub fn residuals(model: &impl Residuals, x: &[f64]) -> Option<Vec<Vec<f64>>> {
+    let mut collected = Collected::new(model, 1);
+    model.each_residual(x, |sample, row| collected.push(sample, row))?;
+    Some(collected.rows().residuals())
+}
+
+/// Rows that come in any order of outputs, sorted by series.
+struct Collected {
+    rows: Rows,
+    /// Of each output what has come of the present record.
+    own: Vec<Vec<f64>>,
+}
+
+impl Collected {
+    fn new(model: &impl Residuals, columns: usize) -> Self {
+        let outputs = model.samples().len();
+        let samples: usize = model.samples().iter().sum();
+        Self {
+            rows: Rows {
+                columns,
+                outputs,
+                lengths: Vec::new(),
+                values: Vec::with_capacity(samples * columns),
+            },
+            own: vec![Vec::new(); outputs],
+        }
+    }
+
+    fn push(&mut self, sample: Sample, row: &[f64]) -> bool {
+        if sample.first && !self.own[sample.output].is_empty() {
+            self.end_record();
+        }
+        self.own[sample.output].extend_from_slice(row);
+        true
+    }
+
+    fn end_record(&mut self) {
+        for series in &mut self.own {
+            self.rows.lengths.push(series.len() / self.rows.columns);
+            self.rows.values.append(series);
+        }
+    }
+
+    fn rows(mut self) -> Rows {
+        self.end_record();
+        self.rows
+    }
+}

@@ -1,0 +1,181 @@
+//! Standard errors of a fit whose residual has another colour than the metric it was fitted in.
+//!
+//! **Model**: the fit solves `J' M r = 0`, `M = W^-1` the inverse covariance of the noise that it took for granted
+//! (`M = I` for a fit by simulation error); the noise in truth has the covariance `sigma^2 V`. Then
+//! ```text
+//! cov(theta) = sigma^2 (J' M J)^-1 (J' M V M J) (J' M J)^-1 = sigma^2 C G'G C,   G = L' M J,   V = L L'
+//! ```
+//! and `G` is the transposed colouring filter run backwards over the rows of `M J`. Of several outputs `M` and `V` have a block for each.
+//!
+//! **Cost**: `O(N p (p + q))`, `O(N p)` memory.
+//!
+//! **Reference**: P. J. Huber, The behavior of maximum likelihood estimates under nonstandard conditions, Proc. 5th
+//! Berkeley Symposium 1 (1967) 221-233; H. White, Econometrica 48 (1980) 817-838.
+
+use crate::{Error, Fit, Noise, Residuals, Rows, Triangle, marginal, noise_factor::Factor, rows};
+
+/// The uncertainty of a fit whose residual has another colour than its metric.
+#[derive(Debug, Clone)]
+pub struct Robust {
+    /// Standard error of every entry of the vector; `None` for one that is fixed, at a bound, or not determined.
+    pub std_errors: Vec<Option<f64>>,
+    /// Degrees of freedom of each of them.
+    pub freedom: Vec<Option<f64>>,
+    /// The noise of the residual.
+    pub noise: Noise,
+}
+
+impl Robust {
+    /// Half the width of the interval that holds the truth with probability `level` (0.95, say).
+    #[must_use]
+    pub fn half_widths(&self, level: f64) -> Vec<Option<f64>> {
+        self.std_errors
+            .iter()
+            .zip(&self.freedom)
+            .map(|(error, freedom)| {
+                Some((*error)? * ct_signals::student_half_width(level, (*freedom)?))
+            })
+            .collect()
+    }
+}
+
+/// The uncertainty of a fit under the colour of its own residual, an autoregressive model of order zero to `order` for each output.
+///
+/// # Errors
+/// Where the model is not finite at the fit.
+pub fn robust(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Robust, Error> {
+    let rows = rows(model, &fit.x).ok_or(Error::NoFiniteStart { starts: 1 })?;
+    let noise = marginal::noise(&rows, fit.interior(), order)?;
+    let bread = fit.triangle.covariance(fit.interior());
+    let sandwich = Sandwich::new(&rows, fit.interior(), (&fit.noise, &fit.weights), bread);
+    let variances = |noise: &Noise, variance: f64| sandwich.variances(noise, variance);
+    let (relative, variance) = noise.relative();
+    let own = variances(&relative, variance).unwrap_or_default();
+    let freedom =
+        marginal::freedom(&rows, fit.interior(), &noise, variances).unwrap_or_else(|| {
+            vec![fit.samples.saturating_sub(fit.interior().len()).max(1) as f64; own.len()]
+        });
+    Ok(Robust {
+        std_errors: fit.spread(own.into_iter().map(f64::sqrt)),
+        freedom: fit.spread(freedom.into_iter()),
+        noise,
+    })
+}
+
+/// `C` and the rows `M J` of the entries that are not at a bound. Rows whose reading is missing have no part in either.
+struct Sandwich {
+    bread: Option<Vec<Vec<f64>>>,
+    lanes: usize,
+    /// For each series its output, its rows, zero where missing, and whether each is there.
+    series: Vec<(usize, Vec<f64>, Vec<bool>)>,
+}
+
+impl Sandwich {
+    /// From the rows' columns of these entries, the metric of the fit, `W` (noise and weights), and `C` over them.
+    fn new(
+        rows: &Rows,
+        columns: &[usize],
+        (metric, weights): (&Noise, &[f64]),
+        bread: Option<Vec<Vec<f64>>>,
+    ) -> Self {
+        let lanes = columns.len();
+        let series = rows
+            .series()
+            .zip(rows.present())
+            .map(|((output, series), (_, present))| {
+                let mut whitener = metric.output(output).whitener(lanes);
+                let mut own = Vec::with_capacity(present.len() * lanes);
+                for (row, there) in series.chunks_exact(rows.columns).zip(&present) {
+                    let from = own.len();
+                    own.extend(columns.iter().map(|&column| row[column]));
+                    if *there {
+                        whitener.push(&mut own[from..]);
+                    } else {
+                        whitener.skip();
+                    }
+                }
+                if lanes > 0 {
+                    let factor = Factor::new(metric.output(output), &present);
+                    factor.whiten_transposed(&mut own, lanes);
+                }
+                let weight = weights[output].powi(2);
+                if weight != 1.0 {
+                    own.iter_mut().for_each(|value| *value *= weight);
+                }
+                (output, own, present)
+            })
+            .collect();
+        Self {
+            bread,
+            lanes,
+            series,
+        }
+    }
+
+    /// Under noise of scales relative to that of the first output, and the variance of that.
+    fn variances(&self, noise: &Noise, variance: f64) -> Option<Vec<f64>> {
+        let bread = self.bread.as_ref()?;
+        if self.lanes == 0 {
+            return Some(Vec::new());
+        }
+        let mut filling = Triangle::new(self.lanes);
+        for (output, series, present) in &self.series {
+            let model = noise.output(*output);
+            let mut rows = series.clone();
+            Factor::new(model, present).colour_transposed(&mut rows, self.lanes);
+            for row in rows.chunks_exact_mut(self.lanes) {
+                row.iter_mut().for_each(|value| *value *= model.sigma());
+                filling.push(row);
+            }
+        }
+        filling.finish();
+        Some(
+            bread
+                .iter()
+                .map(|row| {
+                    (0..self.lanes)
+                        .map(|i| {
+                            let sum: f64 = (i..self.lanes).map(|j| filling.at(i, j) * row[j]).sum();
+                            sum * sum
+                        })
+                        .sum::<f64>()
+                        * variance
+                })
+                .collect(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::marginal::tests::{covariance, rows_with_missing, some_noise};
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn agrees_with_dense_algebra_where_rows_are_missing() {
+        for outputs in [1, 2] {
+            let (rows, j, _, there) = rows_with_missing(outputs);
+            let noise = some_noise(outputs).remove(2);
+            for metric in some_noise(outputs) {
+                let weights = metric.inverse_scales();
+                let bread = rows.fold(&[0, 1, 2], &metric, &weights).covariance(&[0, 1]);
+                let ours = Sandwich::new(&rows, &[0, 1], (&metric, &weights), bread)
+                    .variances(&noise, 0.5)
+                    .unwrap();
+                let weighted = covariance(&metric, &rows.lengths, &there)
+                    .try_inverse()
+                    .unwrap()
+                    * &j;
+                let bread = (j.transpose() * &weighted).try_inverse().unwrap();
+                let filling =
+                    weighted.transpose() * covariance(&noise, &rows.lengths, &there) * &weighted;
+                let dense = &bread * filling * &bread * 0.5;
+                for (i, ours) in ours.iter().enumerate() {
+                    assert_relative_eq!(*ours, dense[(i, i)], max_relative = 1e-9);
+                }
+            }
+        }
+    }
+}

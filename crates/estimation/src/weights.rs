@@ -1,0 +1,164 @@
+//! What outputs of unknown noise count against each other.
+//!
+//! **Model**: the whitened residuals of output `o`, `N_o` of them, have the unknown variance `s_o^2`. At its best for a sum of squares `C_o`
+//! it is `C_o/N_o`, and minus twice the logarithm of the likelihood is, but for constants,
+//! ```text
+//! sum_o N_o log(C_o/N_o) = N log(C/N),   C = N prod_o (C_o/N_o)^(N_o/N),   N = sum_o N_o
+//! ```
+//! So `C`, N times the weighted geometric mean of the variances, is to several outputs what the sum of squares is to one: the smaller the
+//! more likely, and `N log(C_a/C_b)` compares two models. Of one output it is the sum of squares.
+//!
+//! **Weights**: `dC = sum_o w_o^2 dC_o` with `w_o^2 = (C/N)/(C_o/N_o)`, so rows of output `o` times `w_o` have the gradient of `C`; and since a
+//! geometric mean is at most the arithmetic one, a step that lowers the weighted sum of squares lowers `C` by at least as much. The weights
+//! are those of iteratively reweighted least squares.
+//!
+//! **Known variances** leave the plain weighted sum of squares, in units of that of the first output.
+//!
+//! **Reference**: G. A. F. Seber, C. J. Wild, Nonlinear Regression, 1989, ch. 11 (multiresponse models), for independent responses.
+
+use crate::Residuals;
+
+/// Sums of squares of each output, and how many samples they are of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Squares {
+    /// Sum of squares of each output's whitened residual \[its unit squared\].
+    pub sums: Vec<f64>,
+    /// Samples of each output.
+    pub samples: Vec<usize>,
+    /// Standard deviation of each output below which no noise is believed: it keeps one that is met exactly from counting alone.
+    floors: Vec<f64>,
+    /// Weights where the outputs' noise is known.
+    known: Option<Vec<f64>>,
+}
+
+impl Squares {
+    /// None so far, of outputs with so many samples each and these floors.
+    #[must_use]
+    pub(crate) fn new(samples: &[usize], floor: impl Fn(usize) -> f64) -> Self {
+        Self {
+            sums: vec![0.0; samples.len()],
+            samples: samples.to_vec(),
+            floors: (0..samples.len()).map(floor).collect(),
+            known: None,
+        }
+    }
+
+    /// None so far, of a model's outputs.
+    pub(crate) fn of(model: &impl Residuals) -> Self {
+        let known = model.known_scales().filter(|scales| scales.len() > 1);
+        Self {
+            known: known.map(|scales| scales.iter().map(|scale| scales[0] / scale).collect()),
+            ..Self::new(model.samples(), |output| model.floor(output))
+        }
+    }
+
+    /// Variance of an output.
+    fn variance(&self, output: usize) -> f64 {
+        let variance = self.sums[output] / self.samples[output].max(1) as f64;
+        variance
+            .max(self.floors[output].powi(2))
+            .max(f64::MIN_POSITIVE)
+    }
+
+    /// All samples.
+    fn count(&self) -> f64 {
+        self.samples.iter().sum::<usize>() as f64
+    }
+
+    /// `C`.
+    #[must_use]
+    pub fn cost(&self) -> f64 {
+        if let [sum] = self.sums[..] {
+            return sum;
+        }
+        if let Some(weights) = &self.known {
+            let outputs = self.sums.iter().zip(weights);
+            return outputs.map(|(sum, weight)| weight * weight * sum).sum();
+        }
+        let n = self.count();
+        let outputs = 0..self.sums.len();
+        let mean: f64 = outputs
+            .map(|o| self.samples[o] as f64 / n * self.variance(o).ln())
+            .sum();
+        n * mean.exp()
+    }
+
+    /// `w_o`.
+    #[must_use]
+    pub fn weights(&self) -> Vec<f64> {
+        if self.sums.len() == 1 {
+            return vec![1.0];
+        }
+        if let Some(weights) = &self.known {
+            return weights.clone();
+        }
+        let mean = self.cost() / self.count();
+        (0..self.sums.len())
+            .map(|o| (mean / self.variance(o)).sqrt())
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn squares(sums: &[f64], samples: &[usize]) -> Squares {
+        let mut squares = Squares::new(samples, |_| 0.0);
+        squares.sums = sums.to_vec();
+        squares
+    }
+
+    #[test]
+    fn one_output_is_its_sum_of_squares() {
+        let one = squares(&[7.3], &[40]);
+        assert_eq!((one.cost(), one.weights()), (7.3, vec![1.0]));
+    }
+
+    #[test]
+    fn cost_is_that_of_the_likelihood_and_weights_are_its_slopes() {
+        let (sums, samples) = ([3.0, 500.0, 0.02], [100, 70, 30]);
+        let at = |sums: &[f64]| squares(sums, &samples).cost();
+        let likelihood: f64 = sums
+            .iter()
+            .zip(samples)
+            .map(|(sum, n)| n as f64 * (sum / n as f64).ln())
+            .sum();
+        assert_relative_eq!(
+            200.0 * (at(&sums) / 200.0).ln(),
+            likelihood,
+            max_relative = 1e-12
+        );
+        let weights = squares(&sums, &samples).weights();
+        let mut weighted = 0.0;
+        for o in 0..3 {
+            let moved = |by: f64| {
+                let mut moved = sums;
+                moved[o] *= 1.0 + by;
+                at(&moved)
+            };
+            let slope = (moved(1e-5) - moved(-1e-5)) / (2e-5 * sums[o]);
+            assert_relative_eq!(weights[o].powi(2), slope, max_relative = 1e-8);
+            weighted += weights[o].powi(2) * sums[o];
+        }
+        // The weighted sum of squares is the cost here, and nowhere less.
+        assert_relative_eq!(weighted, at(&sums), max_relative = 1e-12);
+        for other in [[1.0, 900.0, 0.02], [30.0, 1.0, 5.0], [0.1, 0.1, 0.1]] {
+            let sum: f64 = weights.iter().zip(other).map(|(w, c)| w * w * c).sum();
+            assert!(at(&other) <= sum);
+        }
+    }
+
+    #[test]
+    fn an_output_that_is_met_exactly_counts_no_more_than_its_floor_says() {
+        let mut met = Squares::new(&[50, 50], |_| 1e-3);
+        met.sums = vec![0.0, 50.0];
+        assert_relative_eq!(met.cost(), 100.0 * 1e-3, max_relative = 1e-12);
+        assert_relative_eq!(
+            met.weights()[0] / met.weights()[1],
+            1e3,
+            max_relative = 1e-9
+        );
+    }
+}

@@ -30,7 +30,7 @@ def names(value):
     return isinstance(value, list) and all(isinstance(name, str) and name for name in value)
 
 
-check(result.get("schema") == 1, f"schema is {result.get('schema')!r} instead of 1")
+check(result.get("schema") == 2, f"schema is {result.get('schema')!r} instead of 2")
 keys = ("verdict", "effects", "groups", "places", "acceptance", "ranked", "rankings", "steps", "noise_floor", "effort", "seconds")
 for key in keys:
     check(key in result, f"no key {key!r}")
@@ -61,7 +61,9 @@ check(verdict != "adequate" or acceptance is None, "an acceptance test of an ade
 check(verdict != "partial" or acceptance is not None, "a partial answer without an acceptance test")
 if acceptance is not None:
     check(names(acceptance["effects"]) and names(acceptance["reasons"]), f"acceptance {acceptance}")
-    for key in ("required", "required_partial", "floor", "required_bic_fall"):
+    floors = acceptance["floor"]
+    check(list(floors) == result["outputs"] and all(map(number, floors.values())), f"floor of the acceptance test is {floors}")
+    for key in ("required", "required_partial", "required_bic_fall"):
         check(number(acceptance[key]), f"{key} of the acceptance test is {acceptance[key]!r}")
     for key in ("share", "share_test", "bic_fall"):
         check(acceptance[key] is None or number(acceptance[key]), f"{key} of the acceptance test is {acceptance[key]!r}")
@@ -91,7 +93,7 @@ for step in steps:
     check(step["rmse"] > 0, "an error of zero")
     check("rmse_test" in step, "a step without rmse_test")
     check(step["rmse_test"] is None or number(step["rmse_test"]), "rmse_test is no number")
-    parts = step["held_out_error"]
+    parts = step["outputs"][0]["held_out_error"]
     if parts is not None:
         check(step["rmse_test"] is not None, "parts of an error on held-out records that are not there")
         squares = sum(parts[key] ** 2 for key in ("offset", "gain", "shape"))

@@ -60,11 +60,9 @@ pub(crate) fn place_of(plant: Plant, known: &Known, word: &str) -> Result<(Place
         "vessel" if plant.vessels() == 1 => return Ok((Place::Vessel, 0)),
         _ => {}
     }
-    let sensor = |vessel: &usize| Some(format!("sensor {}", plant.vessel_name(*vessel)?));
     let at_sensor = || {
-        outputs
-            .iter()
-            .position(|vessel| sensor(vessel).as_deref() == Some(word))
+        let read = word.strip_prefix("sensor ")?;
+        (0..outputs.len()).find(|&output| known.output_name(plant, output) == Some(read))
     };
     (0..plant.vessels())
         .find(|&vessel| plant.vessel_name(vessel) == Some(word))
@@ -85,8 +83,10 @@ pub(crate) fn place_of(plant: Plant, known: &Known, word: &str) -> Result<(Place
                 match &outputs[..] {
                     [_] => "sensor".to_string(),
                     several => {
-                        let names: Vec<String> = several.iter().filter_map(sensor).collect();
-                        names.join(" or ")
+                        let names = (0..several.len())
+                            .filter_map(|output| known.output_name(plant, output))
+                            .map(|name| format!("sensor {name}"));
+                        names.collect::<Vec<String>>().join(" or ")
                     }
                 }
             )

@@ -120,7 +120,7 @@ fn diagnose_whole(
         share_test: None,
         required: WHOLE,
         required_partial: PART,
-        floor: per_output(problem, &innovations(&found.noise)),
+        floor: PerOutput::of(&problem.records[0].outputs, &innovations(&found.noise)),
         bic_fall: None,
         required_bic_fall: BIC_MARGIN,
         reasons: Vec::new(),
@@ -365,12 +365,6 @@ pub(crate) fn floors(problem: &Problem, noise: &Noise, source: &str) -> Floors {
 /// Standard deviation of the innovations at each output.
 fn innovations(noise: &Noise) -> Vec<f64> {
     noise.iter().map(ArModel::sigma).collect()
-}
-
-/// Numbers by the names of the outputs.
-fn per_output(problem: &Problem, values: &[f64]) -> PerOutput {
-    let names = problem.records[0].outputs.iter().map(|y| y.name.clone());
-    PerOutput(names.zip(values.iter().copied()).collect())
 }
 
 /// Everything but the findings.

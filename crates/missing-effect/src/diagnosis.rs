@@ -1,7 +1,7 @@
 //! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
 //! printed or plotted is derived from them.
 
-use ct_signals::{ArModel, Clock, Record};
+use ct_signals::{ArModel, Channel, Clock, Record};
 use greybox::Noise;
 use plants::{Domain, Plant};
 use serde::Serialize;
@@ -155,6 +155,12 @@ fn none(value: &f64) -> bool {
 pub struct PerOutput(pub Vec<(String, f64)>);
 
 impl PerOutput {
+    /// Values in the order of the outputs.
+    pub(crate) fn of(outputs: &[Channel], values: &[f64]) -> Self {
+        let names = outputs.iter().map(|output| output.name.clone());
+        Self(names.zip(values.iter().copied()).collect())
+    }
+
     /// The numbers in order.
     pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
         self.0.iter().map(|(_, value)| *value)

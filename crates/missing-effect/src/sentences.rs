@@ -150,8 +150,6 @@ pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
 /// The best that the catalogue has where it is not the answer.
 pub(crate) fn of_a_part(last: &Node) -> String {
     let outputs = &last.setup.records[0].outputs;
-    let errors = outputs.iter().zip(&last.fit.rmse);
-    let errors = errors.map(|(output, rmse)| (output.name.clone(), *rmse));
     let names: Vec<String> = last
         .added
         .iter()
@@ -160,7 +158,7 @@ pub(crate) fn of_a_part(last: &Node) -> String {
     format!(
         "What comes nearest by more than chance, a course of time aside, is {}, which leaves {}: too much would be left that is not noise, so it is not taken for the answer.",
         list(&names, "and"),
-        rms(&PerOutput(errors.collect()), &outputs[0].unit)
+        rms(&PerOutput::of(outputs, &last.fit.rmse), &outputs[0].unit)
     )
 }
 
@@ -483,12 +481,11 @@ fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> String {
         "vessel" if domain == Domain::General => "in the balance".to_string(),
         "vessel" => "in the vessel's balance".to_string(),
         which => {
-            let (at, which) = match which.strip_prefix("sensor ") {
-                Some(read) => ("at the sensor", read),
-                None => ("in the balance", which),
-            };
+            if let Some(read) = which.strip_prefix("sensor ") {
+                return format!("at the {}", domain.sensor_words(read));
+            }
             let (which, kind) = domain.vessel_words(which);
-            format!("{at} of the {which} {kind}")
+            format!("in the balance of the {which} {kind}")
         }
     };
     let mut said = format!("What is missing acts {}", place(&unknown.place));

@@ -255,10 +255,7 @@ pub(crate) fn report(
     if widen {
         errors = widened(node, errors)?;
     }
-    let named = |values: &[f64]| {
-        let names = first.outputs.iter().map(|output| output.name.clone());
-        PerOutput(names.zip(values.iter().copied()).collect())
-    };
+    let named = |values: &[f64]| PerOutput::of(&first.outputs, values);
     let floors: Vec<f64> = judge.iter().map(ArModel::stationary_std).collect();
     let of_test = held_out.as_ref().map(|held_out| {
         let of = |(count, rmse, _): &(usize, f64, HeldOutError)| (*count, *rmse);

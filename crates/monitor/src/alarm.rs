@@ -1,7 +1,7 @@
 //! An alarm, and its sentence.
 
 use missing_effect::numbers::significant;
-use plants::{Domain, Known, Place, Plant, Structure};
+use plants::{Domain, Place, Structure};
 use serde::{Deserialize, Serialize};
 
 use crate::isolate::Suspect;
@@ -97,19 +97,6 @@ pub struct Units {
     pub input: String,
 }
 
-/// The name of an output, where there are several: that of the vessel whose level it reads.
-pub(crate) fn output_name(plant: Plant, known: &Known, output: usize) -> Option<&'static str> {
-    let outputs = known.outputs(plant);
-    let vessel = outputs.get(output).filter(|_| outputs.len() > 1)?;
-    plant.vessel_name(*vessel)
-}
-
-/// Where a sensor is, in words; `name`: of the output.
-pub(crate) fn at_sensor(name: &str, domain: Domain) -> String {
-    let (which, kind) = domain.vessel_words(name);
-    format!("at the sensor of the {which} {kind}")
-}
-
 /// What a look at the rows found; `raised`: when the alarm was; `output`: at which it shows most.
 pub(crate) fn alarm(
     (event, time, raised): (Stage, f64, f64),
@@ -133,7 +120,10 @@ pub(crate) fn alarm(
         size: None,
         score,
         threshold,
-        output: output_name(structure.plant, &structure.known, output).map(str::to_string),
+        output: structure
+            .known
+            .output_name(structure.plant, output)
+            .map(str::to_string),
         sentence: String::new(),
     };
     let mut place = Place::Vessel;
@@ -184,7 +174,7 @@ fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain) -> String 
     let (Some(since), Some(evidence), Some(size)) = (alarm.since, alarm.evidence, &alarm.size)
     else {
         let most = alarm.output.as_ref().map_or(String::new(), |output| {
-            format!("; it shows most {}", at_sensor(output, domain))
+            format!("; it shows most at the {}", domain.sensor_words(output))
         });
         return format!(
             "The model does not fit since about t = {} s or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
@@ -199,12 +189,11 @@ fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain) -> String 
         format!(" {}", size.unit)
     };
     let vessel = size.vessel.as_ref().map_or(String::new(), |vessel| {
+        if place == Place::Sensor {
+            return format!(", {}", domain.sensor_words(vessel));
+        }
         let (which, kind) = domain.vessel_words(vessel);
-        let sensor = match place {
-            Place::Sensor => "sensor of the ",
-            _ => "",
-        };
-        format!(", {sensor}{which} {kind}")
+        format!(", {which} {kind}")
     });
     let against = alarm.next.as_ref().map_or(String::new(), |next| {
         format!(

@@ -8,8 +8,7 @@
 //! evidence = sum_o (sum_{j >= k} e_jo^2 - cost_o/sigma_o^2) - (parameters + 1) ln n
 //! ```
 //! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs `o`.
-//! Effects
-//! within [`GROUP_MARGIN`] of the best cannot be told apart yet.
+//! Effects within [`GROUP_MARGIN`] of the best cannot be told apart yet.
 
 use std::collections::BTreeMap;
 

@@ -15,7 +15,7 @@ use plants::Domain;
 use serde::{Deserialize, Serialize};
 use statrs::function::{beta::ln_beta, factorial::ln_binomial};
 
-use crate::{Units, alarm::at_sensor};
+use crate::Units;
 
 /// The share of the false alarms that is promised for the scatter; the scores have the rest.
 pub(crate) const SHARE: f64 = 0.1;
@@ -258,7 +258,7 @@ impl ScatterAlarm {
     ) -> Self {
         let unit = &units.output;
         let of = output.map_or(String::new(), |name| {
-            format!(" {}", at_sensor(name, domain))
+            format!(" at the {}", domain.sensor_words(name))
         });
         let written = |value: f64| {
             let number = missing_effect::numbers::significant(value, 3);

@@ -69,13 +69,20 @@ impl Domain {
         }
     }
 
+    /// What the sensor is called that reads a vessel of this name: `sensor of the upper tank`.
+    #[must_use]
+    pub fn sensor_words(self, name: &str) -> String {
+        let (which, kind) = self.vessel_words(name);
+        format!("sensor of the {which} {kind}")
+    }
+
     /// Where an effect acts whose place has this name ([`crate::Placed::place_name`]): `in the upper tank`, `at the sensor of the lower tank`,
     /// `at pump 1`.
     #[must_use]
     pub fn place_words(self, effect: &str, name: &str) -> String {
         let (which, kind) = self.vessel_words(name);
         match EffectInfo::find(effect).map(|effect| effect.place) {
-            Some(Place::Sensor) => format!("at the sensor of the {which} {kind}"),
+            Some(Place::Sensor) => format!("at the {}", self.sensor_words(name)),
             Some(Place::Actuator) => format!("at {}", name.replace('_', " ")),
             _ => format!("in the {which} {kind}"),
         }

@@ -197,8 +197,8 @@ impl Plant {
             )
         };
         let gain = |area: f64| pump("pump_gain", area, input);
-        // Torricelli: tau = 2 S sqrt(H)/alpha = 2 S Q/alpha^2. The measured vessel, of a series the last one, is the shortest at
-        // its largest level; that bounds the throughput Q, and Q the upper vessel, whose level is not known.
+        // Torricelli: tau = 2 S sqrt(H)/alpha = 2 S Q/alpha^2. The shortest tau at the largest level of a measured vessel bounds the
+        // throughput Q, and Q bounds alpha of the vessels whose levels are not known. Of several measured vessels the largest content counts.
         let contents = scales.outputs.iter().map(|output| {
             let (low, high) = scales.level[output.vessel];
             scales.area[output.vessel] * positive(low.abs().max(high.abs()))

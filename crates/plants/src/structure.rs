@@ -149,6 +149,14 @@ impl Known {
         }
     }
 
+    /// The name of an output where there are several: that of the vessel whose level it reads.
+    #[must_use]
+    pub fn output_name(&self, plant: Plant, output: usize) -> Option<&'static str> {
+        let outputs = self.outputs(plant);
+        let vessel = outputs.get(output).filter(|_| outputs.len() > 1)?;
+        plant.vessel_name(*vessel)
+    }
+
     /// The vessel into which a measured disturbance flows, if one does.
     #[must_use]
     pub fn disturbed_vessel(&self, plant: Plant) -> Option<usize> {
@@ -173,11 +181,7 @@ impl Placed {
         match self.effect.place {
             Place::Vessel => plant.vessel_name(self.vessel),
             Place::Actuator => plant.pump_name(self.vessel),
-            Place::Sensor => {
-                let outputs = known.outputs(plant);
-                let vessel = outputs.get(self.vessel).filter(|_| outputs.len() > 1)?;
-                plant.vessel_name(*vessel)
-            }
+            Place::Sensor => known.output_name(plant, self.vessel),
         }
     }
 }

@@ -112,11 +112,11 @@ fn place_name(structure: &Structure, spot: Spot) -> String {
     let plant = structure.plant;
     match spot.place {
         Place::Vessel => plant.vessel_name(spot.vessel).unwrap_or("vessel").into(),
-        Place::Sensor if structure.scales.outputs.len() > 1 => {
-            let vessel = structure.scales.outputs[spot.vessel].vessel;
-            format!("sensor {}", plant.vessel_name(vessel).unwrap_or_default())
-        }
-        other => other.name().into(),
+        Place::Sensor => match structure.known.output_name(plant, spot.vessel) {
+            Some(read) => format!("sensor {read}"),
+            None => Place::Sensor.name().into(),
+        },
+        Place::Actuator => Place::Actuator.name().into(),
     }
 }
 

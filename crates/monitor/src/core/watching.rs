@@ -3,7 +3,7 @@
 use super::{Core, Fed, Following, KEPT, Phase, STRETCH};
 use crate::{
     Alarm, Innovation, MAX_OUTPUTS, Notice, ScatterAlarm, Stage, Verdict,
-    alarm::{alarm, output_name},
+    alarm::alarm,
     intake::Sample,
     isolate::{Kept, isolate},
     scatter::{Moved, Scatter},
@@ -144,7 +144,7 @@ impl Core {
             bank.begin();
         }
         let structure = &running.structure;
-        let name = output_name(structure.plant, &structure.known, output);
+        let name = structure.known.output_name(structure.plant, output);
         let noise = noise.model()?.stationary_std();
         let domain = structure.domain;
         Some(ScatterAlarm::new(

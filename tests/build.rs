@@ -29,6 +29,9 @@ fn main() {
                 println!("cargo::rerun-if-changed={}", path.display());
             }
             println!("cargo::rustc-cfg={name}");
+        } else {
+            // A file that is not there: the script runs again at the next build, when there may be more.
+            println!("cargo::rerun-if-changed={name} is missing");
         }
     }
 }

@@ -1,9 +1,12 @@
 //! Packs the plotting script of the report: plotly.js as the `plotly` crate carries it (without
 //! MathJax), gzipped and in base64, so that a report can hold it and unpack it without a network.
+//!
+//! For the tests it sets `cfg(strace)` where strace can make calls of the system fail; where it cannot those tests are ignored.
 
 use std::error::Error;
 use std::io::Write;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 use base64::Engine;
 use flate2::Compression;
@@ -22,7 +25,26 @@ fn main() -> Result<(), Box<dyn Error>> {
     let text = base64::engine::general_purpose::STANDARD.encode(packed.finish()?);
     let folder = std::env::var("OUT_DIR")?;
     std::fs::write(Path::new(&folder).join("plotly.js.gz.base64"), text)?;
+    println!("cargo:rerun-if-env-changed=PATH");
+    println!("cargo:rustc-check-cfg=cfg(strace)");
+    if calls_can_fail() {
+        println!("cargo:rustc-cfg=strace");
+    } else {
+        // A file that is not there: the script runs again at the next build, when strace may be there.
+        println!("cargo:rerun-if-changed=strace is missing");
+    }
     Ok(())
+}
+
+/// Whether strace is there and may make a call fail.
+fn calls_can_fail() -> bool {
+    Command::new("strace")
+        .args(["-qq", "-o", "/dev/null"])
+        .args(["-e", "inject=getppid:error=EIO", "true"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
 }
 
 /// The first script of the crate's list, plotly.js; MathJax comes after it and is left out.

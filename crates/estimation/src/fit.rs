@@ -6,7 +6,9 @@ use rayon::prelude::*;
 use crate::{
     Error, Noise, Residuals, Squares, Stop, Stopping, Triangle, costs_more,
     levenberg_marquardt::{held, minimise, within},
-    linearise_below, marginal, residuals, rows,
+    linearise_below, marginal,
+    prior::free_priors,
+    residuals, rows,
 };
 
 /// Two ends are one minimum where twice the logarithm of their likelihood ratio is below this.
@@ -26,7 +28,8 @@ pub struct Fit {
     pub noise: Noise,
     /// What the rows of each output were multiplied by, beside whitening ([`crate::Squares::weights`]).
     pub weights: Vec<f64>,
-    /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance of each output at its best.
+    /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance of each output at its best; priors are part of it, but
+    /// for what does not change.
     pub deviance: f64,
     /// Fitted numbers, those of the noise included.
     pub parameters: usize,
@@ -36,6 +39,8 @@ pub struct Fit {
     pub samples: usize,
     /// Samples of each output.
     pub samples_per_output: Vec<usize>,
+    /// Priors of fitted entries, which count as a sample each.
+    pub priors: usize,
     /// How many starts were tried.
     pub starts: usize,
     /// How many of them ended in the best minimum.
@@ -49,6 +54,8 @@ pub struct Fit {
     free: Vec<usize>,
     /// Degrees of freedom of the variance of every interior entry.
     freedom: Vec<f64>,
+    /// See [`Squares::prior_weight`].
+    prior_weight: f64,
 }
 impl Fit {
     /// Whether two fits of one model in one metric ended in the same minimum.
@@ -102,7 +109,18 @@ impl Fit {
     /// Variance of the innovations, with the degrees of freedom that are left.
     #[must_use]
     pub fn variance(&self) -> f64 {
-        self.cost / (self.samples.saturating_sub(self.free.len())).max(1) as f64
+        self.cost / self.degrees_left()
+    }
+
+    /// Samples and priors, less the fitted entries.
+    pub(crate) fn degrees_left(&self) -> f64 {
+        let rows = self.samples + self.priors;
+        rows.saturating_sub(self.free.len()).max(1) as f64
+    }
+
+    /// What the rows of priors count by in the metric of the fit.
+    pub(crate) fn prior_weight(&self) -> f64 {
+        self.prior_weight
     }
 
     /// Standard error of every entry of the vector; `None` for one that is fixed, held at a bound, or not determined.
@@ -222,6 +240,9 @@ pub fn fit_from(
                 return None;
             }
             let mut start = given.clone();
+            for (_, prior) in free_priors(model) {
+                start[prior.entry] = prior.near(start[prior.entry]);
+            }
             for (&i, bounds) in free.iter().zip(&bounds) {
                 start[i] = within(start[i], *bounds);
             }
@@ -272,7 +293,7 @@ pub fn fit_from(
     let cost = minimum.triangle.cost();
     let n = samples as f64;
     let end = End::of(model, &x, noise).ok_or(Error::NoFiniteStart { starts: count })?;
-    Ok(Fit {
+    let mut fit = Fit {
         x,
         cost,
         rmse: end.rmse,
@@ -284,20 +305,25 @@ pub fn fit_from(
         price: model.price(noise.order()),
         samples,
         samples_per_output: model.samples().to_vec(),
+        priors: free_priors(model).count(),
+        prior_weight: end.prior_weight,
         starts: count,
         agree,
         stop: minimum.stop,
         triangle: minimum.triangle,
-        freedom: vec![samples.saturating_sub(free.len()).max(1) as f64; interior.len()],
+        freedom: Vec::new(),
         interior,
         free: free.to_vec(),
-    })
+    };
+    fit.freedom = vec![fit.degrees_left(); fit.interior.len()];
+    Ok(fit)
 }
 
 /// What one pass over the residuals at the end of a fit says.
 struct End {
     rmse: Vec<f64>,
     weights: Vec<f64>,
+    prior_weight: f64,
     /// Logarithm of the determinant of the noise's covariance, of unit innovations.
     log_det: f64,
 }
@@ -307,7 +333,7 @@ impl End {
         let samples = model.samples();
         let mut sums = vec![0.0; samples.len()];
         let mut whiteners = noise.whiteners(1);
-        let mut squares = Squares::of(model);
+        let mut squares = Squares::of(model, x);
         let mut log_det = 0.0;
         model.each_residual(x, |sample, row| {
             let whitener = &mut whiteners[sample.output];
@@ -331,6 +357,7 @@ impl End {
         Some(Self {
             rmse: sums.iter().zip(samples).map(of_output).collect(),
             weights: squares.weights(),
+            prior_weight: squares.prior_weight(),
             log_det,
         })
     }
@@ -361,7 +388,9 @@ pub fn coloured(
             let mut order = fit.interior.clone();
             order.push(rows.columns - 1);
             let variances = |noise: &Noise, variance: f64| {
-                let folded = rows.fold(&order, noise, &noise.inverse_scales());
+                let mut folded = rows.fold(&order, noise, &noise.inverse_scales());
+                rows.each_prior(&order, variance.sqrt(), |row| folded.push(row));
+                folded.finish();
                 let covariance = folded.covariance(&own)?;
                 Some(own.iter().map(|&i| covariance[i][i] * variance).collect())
             };

@@ -4,6 +4,7 @@
 //! - [`coloured`]: the noise of each output as an autoregressive process, from the residual by marginal likelihood ([`noise_of`]), and the
 //!   fit in that metric.
 //! - [`Squares`]: several outputs, each with a variance of its own, by the sum of their likelihoods.
+//! - [`Prior`]: what is known of an entry beside the records, as one more row.
 //! - [`Fit`]: standard errors with their degrees of freedom, correlations, likelihood and information criterion; [`robust`]: standard
 //!   errors where the residual has another colour than the metric of the fit.
 //!
@@ -59,6 +60,7 @@ mod levenberg_marquardt;
 mod marginal;
 mod noise;
 mod noise_factor;
+mod prior;
 mod residuals;
 mod rows;
 mod sandwich;
@@ -69,6 +71,7 @@ pub use error::Error;
 pub use fit::{Fit, Start, coloured, fit_from, noise_of, prewhitened};
 pub use levenberg_marquardt::{Stop, Stopping, within};
 pub use noise::Noise;
+pub use prior::Prior;
 pub use residuals::{
     Residuals, Sample, costs_more, linearise, linearise_below, residuals, rows, squares,
 };

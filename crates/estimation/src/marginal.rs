@@ -328,6 +328,7 @@ pub(crate) mod tests {
             values.extend([(0.2 * t).sin(), 1.0 / (1.0 + t), residual]);
         }
         let rows = Rows {
+            priors: Vec::new(),
             columns: 3,
             outputs,
             lengths,

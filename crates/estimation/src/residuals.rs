@@ -2,7 +2,7 @@
 
 use ct_signals::Whitener;
 
-use crate::{Noise, Rows, Squares, Triangle};
+use crate::{Noise, Prior, Rows, Squares, Triangle, prior::prior_rows};
 
 /// More than sums of squares over a record differ by where they are taken in another order.
 const ROUNDING: f64 = 1e-9;
@@ -59,6 +59,11 @@ pub trait Residuals: Sync {
         None
     }
 
+    /// What is known of entries beside the records. Those of entries that are not fitted play no part.
+    fn priors(&self) -> &[Prior] {
+        &[]
+    }
+
     /// No time is left: no further step is taken.
     fn out_of_time(&self) -> bool {
         false
@@ -74,10 +79,10 @@ struct Filter {
 }
 
 impl Filter {
-    fn new(model: &impl Residuals, noise: &Noise, columns: usize, limit: f64) -> Self {
+    fn new(model: &impl Residuals, x: &[f64], noise: &Noise, columns: usize, limit: f64) -> Self {
         Self {
             whiteners: noise.whiteners(columns),
-            squares: Squares::of(model),
+            squares: Squares::of(model, x),
             // The triangle's cost is a sum in another order.
             limit: limit * (1.0 + ROUNDING),
             seen: 0,
@@ -126,7 +131,7 @@ pub fn linearise_below(
 ) -> Option<Triangle> {
     let columns = model.free().len() + 1;
     let mut triangles = vec![Triangle::new(columns); model.samples().len()];
-    let mut filter = Filter::new(model, noise, columns, limit);
+    let mut filter = Filter::new(model, x, noise, columns, limit);
     model.each_row(x, |sample, row| {
         if filter.push(sample, row) {
             triangles[sample.output].push(row);
@@ -137,13 +142,15 @@ pub fn linearise_below(
     for triangle in &mut triangles {
         triangle.finish();
     }
-    (filter.squares.cost() <= filter.limit).then(|| Triangle::of_outputs(triangles, filter.squares))
+    let priors = prior_rows(model, x);
+    (filter.squares.cost() <= filter.limit)
+        .then(|| Triangle::of_outputs(triangles, &priors, filter.squares))
 }
 
 /// Whether the cost is above a limit, or not finite.
 #[must_use]
 pub fn costs_more(model: &impl Residuals, x: &[f64], noise: &Noise, limit: f64) -> bool {
-    let mut filter = Filter::new(model, noise, 1, limit);
+    let mut filter = Filter::new(model, x, noise, 1, limit);
     let within = model.each_residual(x, |sample, row| {
         !filter.push(sample, row) || filter.within()
     });
@@ -155,7 +162,7 @@ pub fn costs_more(model: &impl Residuals, x: &[f64], noise: &Noise, limit: f64) 
 /// The sums of squares of the whitened residuals of each output; `None` where the model is not finite.
 #[must_use]
 pub fn squares(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Squares> {
-    let mut filter = Filter::new(model, noise, 1, f64::INFINITY);
+    let mut filter = Filter::new(model, x, noise, 1, f64::INFINITY);
     model.each_residual(x, |sample, row| {
         filter.push(sample, row);
         true
@@ -169,7 +176,9 @@ pub fn rows(model: &impl Residuals, x: &[f64]) -> Option<Rows> {
     let columns = model.free().len() + 1;
     let mut collected = Collected::new(model, columns);
     model.each_row(x, |sample, row| collected.push(sample, row))?;
-    Some(collected.rows())
+    let mut rows = collected.rows();
+    rows.priors = prior_rows(model, x);
+    Some(rows)
 }
 
 /// The residuals, measured minus model, series by series, NaN where the sample is missing; `None` where the model is not finite.
@@ -196,6 +205,7 @@ impl Collected {
                 columns,
                 outputs,
                 lengths: Vec::new(),
+                priors: Vec::new(),
                 values: Vec::with_capacity(samples * columns),
             },
             own: vec![Vec::new(); outputs],

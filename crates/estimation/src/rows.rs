@@ -14,6 +14,8 @@ pub struct Rows {
     pub lengths: Vec<usize>,
     /// Row by row.
     pub values: Vec<f64>,
+    /// The rows of the priors, in standard errors.
+    pub priors: Vec<Vec<f64>>,
 }
 
 impl Rows {
@@ -98,7 +100,19 @@ impl Rows {
         }
     }
 
-    /// The folded rows, whitened and weighted, with columns chosen and put in this order.
+    /// The rows of the priors with columns chosen and put in this order, times the standard deviation `sigma` of the rows that they stand
+    /// beside.
+    pub fn each_prior(&self, order: &[usize], sigma: f64, mut each: impl FnMut(&[f64])) {
+        let mut chosen = vec![0.0; order.len()];
+        for row in &self.priors {
+            for (to, &column) in chosen.iter_mut().zip(order) {
+                *to = sigma * row[column];
+            }
+            each(&chosen);
+        }
+    }
+
+    /// The folded rows of the samples, whitened and weighted, with columns chosen and put in this order.
     #[must_use]
     pub fn fold(&self, order: &[usize], noise: &Noise, weights: &[f64]) -> Triangle {
         let mut triangle = Triangle::new(order.len());

@@ -5,7 +5,8 @@
 //! ```text
 //! cov(theta) = sigma^2 (J' M J)^-1 (J' M V M J) (J' M J)^-1 = sigma^2 C G'G C,   G = L' M J,   V = L L'
 //! ```
-//! and `G` is the transposed colouring filter run backwards over the rows of `M J`. Of several outputs `M` and `V` have a block for each.
+//! and `G` is the transposed colouring filter run backwards over the rows of `M J`. Of several outputs `M` and `V` have a block for each. A
+//! prior is a row more, whose variance is known.
 //!
 //! **Cost**: `O(N p (p + q))`, `O(N p)` memory.
 //!
@@ -47,14 +48,16 @@ pub fn robust(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Robust,
     let rows = rows(model, &fit.x).ok_or(Error::NoFiniteStart { starts: 1 })?;
     let noise = marginal::noise(&rows, fit.interior(), order)?;
     let bread = fit.triangle.covariance(fit.interior());
-    let sandwich = Sandwich::new(&rows, fit.interior(), (&fit.noise, &fit.weights), bread);
+    let mut sandwich = Sandwich::new(&rows, fit.interior(), (&fit.noise, &fit.weights), bread);
+    let weight = fit.prior_weight().powi(2);
+    rows.each_prior(fit.interior(), weight, |row| {
+        sandwich.priors.push(row.to_vec())
+    });
     let variances = |noise: &Noise, variance: f64| sandwich.variances(noise, variance);
     let (relative, variance) = noise.relative();
     let own = variances(&relative, variance).unwrap_or_default();
-    let freedom =
-        marginal::freedom(&rows, fit.interior(), &noise, variances).unwrap_or_else(|| {
-            vec![fit.samples.saturating_sub(fit.interior().len()).max(1) as f64; own.len()]
-        });
+    let freedom = marginal::freedom(&rows, fit.interior(), &noise, variances)
+        .unwrap_or_else(|| vec![fit.degrees_left(); own.len()]);
     Ok(Robust {
         std_errors: fit.spread(own.into_iter().map(f64::sqrt)),
         freedom: fit.spread(freedom.into_iter()),
@@ -68,6 +71,8 @@ struct Sandwich {
     lanes: usize,
     /// For each series its output, its rows, zero where missing, and whether each is there.
     series: Vec<(usize, Vec<f64>, Vec<bool>)>,
+    /// The rows `M J` of the priors, of variance one.
+    priors: Vec<Vec<f64>>,
 }
 
 impl Sandwich {
@@ -109,6 +114,7 @@ impl Sandwich {
             bread,
             lanes,
             series,
+            priors: Vec::new(),
         }
     }
 
@@ -127,6 +133,11 @@ impl Sandwich {
                 row.iter_mut().for_each(|value| *value *= model.sigma());
                 filling.push(row);
             }
+        }
+        // In units of the variance, as the rest.
+        let scale = 1.0 / variance.sqrt();
+        for row in &self.priors {
+            filling.push(&row.iter().map(|value| scale * value).collect::<Vec<f64>>());
         }
         filling.finish();
         Some(

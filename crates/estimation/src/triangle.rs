@@ -19,7 +19,7 @@ pub struct Triangle {
     block: Vec<f64>,
     filled: usize,
     rows: usize,
-    /// Of several outputs the triangle of each, whose weights hang on what is left of its residual.
+    /// Of several outputs, or with priors, the triangle of each, whose weights hang on what is left of its residual.
     outputs: Option<Box<Outputs>>,
 }
 
@@ -27,6 +27,8 @@ pub struct Triangle {
 #[derive(Debug, Clone)]
 struct Outputs {
     triangles: Vec<Triangle>,
+    /// The rows of priors, in standard errors.
+    priors: Triangle,
     /// What outputs count by; its sums are those of the residuals.
     squares: Squares,
 }
@@ -159,32 +161,29 @@ impl Triangle {
         chosen
     }
 
-    /// The triangle of the rows of all outputs, each times its weight by `squares`, those of the residuals: of an only output its own.
+    /// The triangle of the rows of all outputs and of the priors, each times its weight by `squares`, those of the residuals: of an only
+    /// output without priors its own.
     #[must_use]
-    pub(crate) fn of_outputs(mut triangles: Vec<Self>, squares: Squares) -> Self {
-        if triangles.len() == 1 {
+    pub(crate) fn of_outputs(
+        mut triangles: Vec<Self>,
+        prior_rows: &[Vec<f64>],
+        squares: Squares,
+    ) -> Self {
+        if triangles.len() == 1 && prior_rows.is_empty() {
             return triangles.remove(0);
         }
-        let mut all = Self::weighted(&triangles, &squares.weights());
-        all.outputs = Some(Box::new(Outputs { triangles, squares }));
-        all
-    }
-
-    /// The triangle of the rows of several, each times its weight.
-    fn weighted(triangles: &[Self], weights: &[f64]) -> Self {
-        let columns = triangles.first().map_or(0, Self::columns);
-        let mut all = Self::new(columns);
-        let mut row = vec![0.0; columns];
-        for (triangle, weight) in triangles.iter().zip(weights) {
-            for i in 0..columns {
-                for (j, to) in row.iter_mut().enumerate() {
-                    *to = weight * triangle.at(i, j);
-                }
-                all.push(&row);
-            }
+        let mut priors = Self::new(triangles.first().map_or(0, Self::columns));
+        for row in prior_rows {
+            priors.push(row);
         }
-        all.finish();
-        all.rows = triangles.iter().map(Self::rows).sum();
+        priors.finish();
+        let outputs = Outputs {
+            triangles,
+            priors,
+            squares,
+        };
+        let mut all = outputs.weighted(&outputs.squares);
+        all.outputs = Some(Box::new(outputs));
         all
     }
 
@@ -197,16 +196,21 @@ impl Triangle {
         let Some(outputs) = &self.outputs else {
             return step;
         };
-        let mut weights = outputs.squares.weights();
+        let all = |squares: &Squares| {
+            let mut weights = squares.weights();
+            weights.push(squares.prior_weight());
+            weights
+        };
+        let mut weights = all(&outputs.squares);
         for _ in 0..ROUNDS {
-            let next = outputs.left(&step).weights();
+            let left = outputs.left(&step);
+            let next = all(&left);
             let moved = next.iter().zip(&weights).map(|(a, b)| (a / b - 1.0).abs());
             if moved.fold(0.0, f64::max) < SAME_WEIGHTS {
                 break;
             }
             weights = next;
-            let weighted = Self::weighted(&outputs.triangles, &weights);
-            step = weighted.solve_weighted(free, scale, damping);
+            step = outputs.weighted(&left).solve_weighted(free, scale, damping);
         }
         step
     }
@@ -295,13 +299,39 @@ impl Triangle {
 }
 
 impl Outputs {
-    /// What a step leaves of each output.
+    /// What a step leaves of each output, and of the priors.
     fn left(&self, x: &[f64]) -> Squares {
-        let mut squares = self.squares.clone();
+        let mut squares = self.squares.clone().with_prior(self.priors.left(x));
         for (sum, triangle) in squares.sums.iter_mut().zip(&self.triangles) {
             *sum = triangle.left(x);
         }
         squares
+    }
+
+    /// The triangle of all rows, each times the weight that it has where so much is left.
+    fn weighted(&self, left: &Squares) -> Triangle {
+        let columns = self.priors.columns();
+        let mut all = Triangle::new(columns);
+        let mut row = vec![0.0; columns];
+        let mut add = |triangle: &Triangle, weight: f64| {
+            for i in 0..columns {
+                for (j, to) in row.iter_mut().enumerate() {
+                    *to = weight * triangle.at(i, j);
+                }
+                all.push(&row);
+            }
+        };
+        for (triangle, weight) in self.triangles.iter().zip(left.weights()) {
+            add(triangle, weight);
+        }
+        let mut rows = self.triangles.iter().map(Triangle::rows).sum();
+        if self.priors.rows() > 0 {
+            add(&self.priors, left.prior_weight());
+            rows += self.priors.rows();
+        }
+        all.finish();
+        all.rows = rows;
+        all
     }
 }
 
@@ -387,7 +417,7 @@ mod tests {
         for triangle in &mut triangles {
             triangle.finish();
         }
-        let all = Triangle::of_outputs(triangles, squares.clone());
+        let all = Triangle::of_outputs(triangles, &[], squares.clone());
         assert_relative_eq!(all.cost(), squares.cost(), max_relative = 1e-12);
         assert_relative_eq!(
             all.predicted(&[0.0; 3]),

@@ -14,9 +14,15 @@
 //!
 //! **Known variances** leave the plain weighted sum of squares, in units of that of the first output.
 //!
+//! **Priors** ([`crate::Prior`]) are readings of known variance, one each: with `Q` the sum of their squares, in standard errors,
+//! ```text
+//! N log(C/N) = sum_o N_o log(C_o/N_o) + Q,     C = exp(Q/N) N prod_o (C_o/N_o)^(N_o/N)
+//! ```
+//! so `dC = sum_o w_o^2 dC_o + (C/N) dQ`: a prior's row counts by the root of `C/N`, the noise's standard deviation.
+//!
 //! **Reference**: G. A. F. Seber, C. J. Wild, Nonlinear Regression, 1989, ch. 11 (multiresponse models), for independent responses.
 
-use crate::Residuals;
+use crate::{Residuals, prior::free_priors};
 
 /// Sums of squares of each output, and how many samples they are of.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,8 +33,10 @@ pub struct Squares {
     pub samples: Vec<usize>,
     /// Standard deviation of each output below which no noise is believed: it keeps one that is met exactly from counting alone.
     floors: Vec<f64>,
-    /// Weights where the outputs' noise is known.
+    /// Standard deviation of each output where it is known.
     known: Option<Vec<f64>>,
+    /// Sum of squares of the priors, in standard errors.
+    prior: f64,
 }
 
 impl Squares {
@@ -40,16 +48,24 @@ impl Squares {
             samples: samples.to_vec(),
             floors: (0..samples.len()).map(floor).collect(),
             known: None,
+            prior: 0.0,
         }
     }
 
-    /// None so far, of a model's outputs.
-    pub(crate) fn of(model: &impl Residuals) -> Self {
-        let known = model.known_scales().filter(|scales| scales.len() > 1);
+    /// None so far, of a model's outputs; its priors at `x`.
+    pub(crate) fn of(model: &impl Residuals, x: &[f64]) -> Self {
+        let prior = free_priors(model).map(|(_, prior)| prior.residual(x).powi(2));
         Self {
-            known: known.map(|scales| scales.iter().map(|scale| scales[0] / scale).collect()),
+            known: model.known_scales().map(<[f64]>::to_vec),
+            prior: prior.sum(),
             ..Self::new(model.samples(), |output| model.floor(output))
         }
+    }
+
+    /// The same sums with the priors' squares replaced.
+    pub(crate) fn with_prior(mut self, squares: f64) -> Self {
+        self.prior = squares;
+        self
     }
 
     /// Variance of an output.
@@ -68,29 +84,40 @@ impl Squares {
     /// `C`.
     #[must_use]
     pub fn cost(&self) -> f64 {
-        if let [sum] = self.sums[..] {
-            return sum;
-        }
-        if let Some(weights) = &self.known {
-            let outputs = self.sums.iter().zip(weights);
-            return outputs.map(|(sum, weight)| weight * weight * sum).sum();
+        if let Some(scales) = &self.known {
+            let outputs = self.sums.iter().zip(scales);
+            let squares = outputs.map(|(sum, scale)| (scales[0] / scale).powi(2) * sum);
+            return squares.sum::<f64>() + scales[0].powi(2) * self.prior;
         }
         let n = self.count();
+        if let [sum] = self.sums[..] {
+            // Without priors the sum as it is.
+            return sum * (self.prior / n).exp();
+        }
         let outputs = 0..self.sums.len();
         let mean: f64 = outputs
             .map(|o| self.samples[o] as f64 / n * self.variance(o).ln())
             .sum();
-        n * mean.exp()
+        n * (mean + self.prior / n).exp()
+    }
+
+    /// What the rows of priors, in standard errors, count by: the noise's standard deviation in the metric of the cost.
+    #[must_use]
+    pub fn prior_weight(&self) -> f64 {
+        match &self.known {
+            Some(scales) => scales[0],
+            None => (self.cost() / self.count()).sqrt(),
+        }
     }
 
     /// `w_o`.
     #[must_use]
     pub fn weights(&self) -> Vec<f64> {
-        if self.sums.len() == 1 {
-            return vec![1.0];
+        if let Some(scales) = &self.known {
+            return scales.iter().map(|scale| scales[0] / scale).collect();
         }
-        if let Some(weights) = &self.known {
-            return weights.clone();
+        if self.sums.len() == 1 {
+            return vec![(self.prior / self.count() / 2.0).exp()];
         }
         let mean = self.cost() / self.count();
         (0..self.sums.len())

@@ -166,6 +166,7 @@ impl Rig {
             terms: Vec::new(),
             start: Default::default(),
             fixed: Vec::new(),
+            priors: Default::default(),
             controller: None,
             records: vec![record],
             test: Vec::new(),

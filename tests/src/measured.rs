@@ -299,6 +299,7 @@ fn problem(source: Source, record: Record, test: Vec<Record>) -> Problem {
         terms: Vec::new(),
         start: Default::default(),
         fixed: Vec::new(),
+        priors: Default::default(),
         controller: None,
         records: vec![record],
         test,

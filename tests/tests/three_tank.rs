@@ -18,6 +18,7 @@ fn problem(record: Record) -> Problem {
         terms: Vec::new(),
         start: [].into(),
         fixed: Vec::new(),
+        priors: Default::default(),
         records: vec![record],
         controller: None,
         test: Vec::new(),

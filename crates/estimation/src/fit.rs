@@ -118,8 +118,9 @@ impl Fit {
         rows.saturating_sub(self.free.len()).max(1) as f64
     }
 
-    /// What the rows of priors count by in the metric of the fit.
-    pub(crate) fn prior_weight(&self) -> f64 {
+    /// What the rows of priors count by in the metric of the fit ([`crate::Squares::prior_weight`]).
+    #[must_use]
+    pub fn prior_weight(&self) -> f64 {
         self.prior_weight
     }
 

@@ -21,6 +21,18 @@ pub enum Error {
         /// The names that there are.
         known: String,
     },
+    /// What is known of a parameter beside the records is no number with an error.
+    #[error(
+        "the prior of {name} is {value} with a standard error of {std_error}: give a finite value and an error above zero"
+    )]
+    Prior {
+        /// The parameter.
+        name: String,
+        /// The value.
+        value: f64,
+        /// Its standard error.
+        std_error: f64,
+    },
     /// A record has another number of outputs than the structure.
     #[error(
         "{record}: it has {given} outputs, but the model has {needed}: name as many columns as there are measured levels"

@@ -23,6 +23,6 @@ pub use fit::{
 pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use reading_grid::{ReadingGrid, reading_grid};
 pub use reading_step::exact_reading_step;
-pub use setup::{LoopRun, Setup, Simulated, at_rest, commands, weighted_rms};
+pub use setup::{LoopRun, PriorValue, Setup, Simulated, at_rest, commands, weighted_rms};
 pub use starts::{random_starts, starts_around};
 pub use time_limit::TimeLimit;

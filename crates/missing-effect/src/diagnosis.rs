@@ -2,11 +2,11 @@
 //! printed or plotted is derived from them.
 
 use ct_signals::{ArModel, Channel, Clock, Record};
-use greybox::Noise;
+use greybox::{Noise, PriorValue};
 use plants::{Domain, Plant};
 use serde::Serialize;
 
-use crate::{MendedGaps, Unknown};
+use crate::{MendedGaps, Unknown, numbers::value_and_error};
 
 /// What the search found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -36,6 +36,27 @@ pub struct Parameter {
     pub std_error: Option<f64>,
     /// Unit, for example `cm^2.5/s`.
     pub unit: String,
+    /// What is known of it beside the records, where the model says so; the estimate has it in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorValue>,
+}
+
+/// An estimate further from its prior than so many of the prior's standard errors disagrees with it.
+const DISAGREES: f64 = 3.0;
+
+impl Parameter {
+    /// Its prior in words, and how far it is from there where the two disagree.
+    #[must_use]
+    pub fn prior_words(&self) -> Option<String> {
+        let prior = self.prior?;
+        let (value, error) = value_and_error(prior.value, Some(prior.std_error));
+        let away = (self.value - prior.value).abs() / prior.std_error;
+        let mut words = format!("prior {value} ± {}", error.unwrap_or_default());
+        if away > DISAGREES {
+            words += &format!("; the records disagree with it by {away:.1} standard errors");
+        }
+        Some(words)
+    }
 }
 
 /// Residual tests of one fit, of its first record but for `input_p`; the bounds are for 95 %.

@@ -50,7 +50,7 @@ pub(crate) fn joint_pairs<'a>(
     taken: impl Fn(&[Placed]) -> bool,
 ) -> Vec<Proposal<'a>> {
     // Outputs count against each other as beside the base.
-    let metric = (noise, &base.fit.weights[..]);
+    let metric = (noise, &base.fit.weights[..], base.fit.prior_weight());
     let Some((own, residual)) = whitened(&base.setup, &base.fit.x, metric, |_| true) else {
         return Vec::new();
     };
@@ -127,7 +127,7 @@ pub(crate) fn joint_pairs<'a>(
 fn whitened(
     setup: &Setup,
     x: &[f64],
-    (noise, weights): (&Noise, &[f64]),
+    (noise, weights, of_priors): (&Noise, &[f64], f64),
     wanted: impl Fn(usize) -> bool,
 ) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
     let rows = setup.rows(x)?;
@@ -141,6 +141,11 @@ fn whitened(
             column.push(*value);
         }
     });
+    rows.each_prior(&chosen, of_priors, |row| {
+        for (column, value) in columns.iter_mut().zip(row) {
+            column.push(*value);
+        }
+    });
     let residual = columns.pop()?;
     Some((columns, residual))
 }
@@ -150,7 +155,7 @@ fn linearise<'a>(
     setup: &Setup<'a>,
     x: Vec<f64>,
     residual: &[f64],
-    metric: (&Noise, &[f64]),
+    metric: (&Noise, &[f64], f64),
 ) -> Option<Linearised<'a>> {
     let parameters = setup.structure.effect_parameters(placed);
     let own: Vec<usize> = parameters

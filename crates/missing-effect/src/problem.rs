@@ -5,7 +5,7 @@ use std::sync::{Arc, atomic::AtomicBool};
 use std::time::Duration;
 
 use ct_signals::{Record, require_samples};
-use greybox::{Setup, Stopping, TimeLimit, fit_from, random_starts};
+use greybox::{PriorValue, Setup, Stopping, TimeLimit, fit_from, random_starts};
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 use rayon::prelude::*;
 
@@ -43,6 +43,8 @@ pub struct Problem {
     pub start: BTreeMap<String, f64>,
     /// Names in `start` that are not fitted.
     pub fixed: Vec<String>,
+    /// What is known of parameters beside the records, by the same names.
+    pub priors: BTreeMap<String, PriorValue>,
     /// The records that are fitted together.
     pub records: Vec<Record>,
     /// The controller of the loop, where there is one: it must make the fitted plant stable.
@@ -125,7 +127,7 @@ pub(crate) fn base<'a>(
         .try_fold(without.structure, |structure, term| {
             structure.with_term(term.clone())
         })?;
-    let mut setup = Setup::new(structure, &problem.records, fixed)?;
+    let mut setup = Setup::new(structure, &problem.records, fixed)?.with_priors(&problem.priors)?;
     setup.stop = options.stop;
     setup.interrupt = options.interrupt;
     let limit = Arc::new(TimeLimit::new(options.time_limit));

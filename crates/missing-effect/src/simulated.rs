@@ -90,6 +90,7 @@ pub(crate) fn problem(plant: Plant, known: Known, records: Vec<Record>) -> Probl
         terms: Vec::new(),
         start: Default::default(),
         fixed: Vec::new(),
+        priors: Default::default(),
         records,
         controller: None,
         test: Vec::new(),

@@ -138,6 +138,7 @@ fn std_errors(node: &Node) -> Result<Vec<Option<f64>>, Error> {
 
 /// All entries of the vector with their standard errors.
 pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -> Vec<Parameter> {
+    let priors = setup.prior_values();
     setup
         .names()
         .iter()
@@ -149,6 +150,7 @@ pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -
             value: *value,
             std_error: *std_error,
             unit,
+            prior: priors.get(name).copied(),
         })
         .collect()
 }

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use greybox::PriorValue;
+
 use crate::Model;
 
 /// A longer value is not quoted: a term may have 512 knots.
@@ -53,6 +55,12 @@ pub(crate) fn fingerprint(model: &Model) -> Fingerprint {
     }
     for (name, value) in &model.start {
         add(&format!("start of {name}"), Some(value.to_string()));
+    }
+    for (name, PriorValue { value, std_error }) in &model.priors {
+        add(
+            &format!("prior of {name}"),
+            Some(format!("{value} +- {std_error}")),
+        );
     }
     let fixed = model.fixed.join(", ");
     add("fixed", (!fixed.is_empty()).then_some(fixed));

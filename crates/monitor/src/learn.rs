@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Channel, Hold, Record};
-use greybox::{Fit, FitOptions, LinearPlant, Noise, Setup, coloured, fit_from, random_starts};
+use greybox::{
+    Fit, FitOptions, LinearPlant, Noise, PriorValue, Setup, coloured, fit_from, random_starts,
+};
 use plants::{Known, Placed, Plant, Scales, Structure, Term};
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +47,8 @@ pub struct Model {
     pub start: BTreeMap<String, f64>,
     /// Names in `start` that are not fitted, but watched.
     pub fixed: Vec<String>,
+    /// What is known of parameters beside the rows, by the same names.
+    pub priors: BTreeMap<String, PriorValue>,
     /// What the command does between rows.
     pub hold: Hold,
 }
@@ -60,6 +64,7 @@ impl Model {
             terms: Vec::new(),
             start: BTreeMap::new(),
             fixed: Vec::new(),
+            priors: BTreeMap::new(),
             hold: Hold::Zero,
         }
     }
@@ -261,7 +266,9 @@ pub(crate) fn learn(
     let structure = model
         .structure(bare.structure.scales)
         .map_err(|error| said(&error))?;
-    let mut setup = Setup::new(structure, records, fixed).map_err(|error| said(&error))?;
+    let mut setup = Setup::new(structure, records, fixed)
+        .and_then(|setup| setup.with_priors(&model.priors))
+        .map_err(|error| said(&error))?;
     let record = records.first().ok_or("no row")?;
     ct_signals::require_samples(records, setup.free().len()).map_err(|error| said(&error))?;
     let (low, high) = record.input_range();
@@ -397,7 +404,9 @@ fn again(
             output.values[k] += expected[k] - residual[k];
         }
     }
-    let setup = setup.with_records(&*records)?;
+    let setup = setup
+        .with_records(&*records)?
+        .with_priors(&setup.prior_values())?;
     let next = fit_from(
         &setup,
         std::slice::from_ref(&fit.x),

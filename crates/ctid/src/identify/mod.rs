@@ -342,6 +342,7 @@ pub fn identify(record: &Record, request: &Request) -> Result<Identification, Er
         .into_iter()
         .enumerate()
         .map(|(i, (name, unit))| Parameter {
+            prior: None,
             name,
             unit,
             value: bands.values[i].last().copied().unwrap_or(f64::NAN),

@@ -155,6 +155,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
         .map(|parameter| {
             let (name, unit) = name_and_unit(parameter.kind, request.integrator, first);
             Parameter {
+                prior: None,
                 name,
                 unit,
                 value: parameter.value,

@@ -292,6 +292,7 @@ pub fn problem(
         terms: model.terms.into_iter().map(|own| own.term).collect(),
         start: model.start,
         fixed: model.fixed,
+        priors: model.priors,
         controller,
         records,
         test,

@@ -1,4 +1,4 @@
-//! Effects, terms of the user's own, and first guesses.
+//! Effects, and terms of the user's own.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use plants::{EffectInfo, Fitted, Known, Place, Placed, Plant, Scales, Structure,
 use toml::Spanned;
 
 use super::{
-    ModelFile, OwnTerm,
+    OwnTerm,
     raw::{EffectTable, Entry, Number, RawTerm},
     source::Source,
 };
@@ -179,40 +179,6 @@ impl Source<'_> {
             .map_err(|error| self.at(name.span().start, error.to_string()))?;
         Ok(placed)
     }
-
-    pub(super) fn start(
-        &self,
-        model: &mut ModelFile,
-        raw: &BTreeMap<Spanned<String>, Spanned<Number>>,
-    ) -> Result<(), Error> {
-        let structure = model.structure(any_scales(model.columns.inputs.len() > 1))?;
-        let infos = structure.parameters();
-        let names = structure.parameter_names();
-        for (name, number) in raw {
-            let key = name.as_ref();
-            let Some(index) = names.iter().position(|known| known == key) else {
-                return Err(self.at(
-                    name.span().start,
-                    format!(
-                        "[start] has {}, which is not a parameter of this model; it has {}{}",
-                        quoted(key),
-                        names.join(", "),
-                        names::suggestion(key, names.iter().map(String::as_str))
-                    ),
-                ));
-            };
-            // Gains, outflow coefficients and time constants of the plant are above zero whatever
-            // the data; the bounds of an effect follow from the data.
-            let above_zero = infos[index].lower > 0.0 && !key.contains('.');
-            let value = if above_zero {
-                self.positive(key, number)?
-            } else {
-                self.finite(key, number)?
-            };
-            model.start.insert(key.clone(), value);
-        }
-        Ok(())
-    }
 }
 
 /// The vessel, the pump or the output that `where = "..."` names.
@@ -258,7 +224,7 @@ pub(crate) fn vessel(
 }
 
 /// Names and places do not depend on the data: any ranges will do to ask for them.
-fn any_scales(second_pump: bool) -> Scales {
+pub(super) fn any_scales(second_pump: bool) -> Scales {
     let mut scales = Scales::from_ranges((0.0, 1.0), (0.0, 1.0), 1.0, 100.0);
     scales.input_2 = second_pump.then_some((0.0, 1.0));
     scales

@@ -26,6 +26,7 @@
 
 mod controller;
 mod effects;
+mod guesses;
 mod raw;
 mod source;
 
@@ -33,6 +34,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ct_signals::{Columns, Hold, read_file};
+use greybox::PriorValue;
 use plants::{Domain, Known, Placed, Plant, Scales, Structure, Term};
 
 use crate::Error;
@@ -62,6 +64,8 @@ pub struct ModelFile {
     pub start: BTreeMap<String, f64>,
     /// Names of the parameters that stay at their value in `start`.
     pub fixed: Vec<String>,
+    /// What is known of parameters beside the records, by the same names.
+    pub priors: BTreeMap<String, PriorValue>,
     /// The controller of the loop, where it is known.
     pub controller: Option<ControllerSettings>,
     /// What the input does between samples.
@@ -179,6 +183,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
         known,
         start: BTreeMap::new(),
         fixed: Vec::new(),
+        priors: BTreeMap::new(),
         controller,
         hold: raw.hold,
         waiting: Vec::new(),
@@ -221,6 +226,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
             }
         }
     }
+    source.priors(&mut model, &raw.prior)?;
     let on = |name: &str| raw.effects.iter().any(|effect| effect.as_ref() == name);
     let effects = settings.keys().map(|name| ("effect", *name));
     let own = terms.keys().map(|name| ("term", name.as_str()));

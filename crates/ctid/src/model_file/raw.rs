@@ -19,6 +19,8 @@ pub(super) struct Raw {
     pub(super) known: RawKnown,
     #[serde(default)]
     pub(super) start: BTreeMap<Spanned<String>, Spanned<Number>>,
+    #[serde(default)]
+    pub(super) prior: BTreeMap<Spanned<String>, Spanned<RawPrior>>,
     pub(super) controller: Option<Spanned<RawController>>,
     #[serde(default)]
     pub(super) effect: BTreeMap<Spanned<String>, Spanned<EffectTable>>,
@@ -92,6 +94,16 @@ impl Words {
             Self::Several(words) => words,
         }
     }
+}
+
+/// A side measurement: value and standard error.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "not understood: write the value and its standard error, such as [2.1, 0.1]"
+)]
+pub(super) enum RawPrior {
+    ValueAndError([Number; 2]),
 }
 
 /// A number, written with or without a decimal point.

@@ -233,6 +233,7 @@ fn believed(file: ModelFile) -> Model {
         terms: file.terms.into_iter().map(|own| own.term).collect(),
         start: file.start,
         fixed: file.fixed,
+        priors: file.priors,
         hold: file.hold,
     }
 }

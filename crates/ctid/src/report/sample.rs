@@ -175,6 +175,7 @@ fn tests(input: &[f64], residual: &[f64]) -> ResidualTests {
 
 fn parameter(name: &str, value: f64, std_error: Option<f64>, unit: &str) -> Parameter {
     Parameter {
+        prior: None,
         name: name.to_owned(),
         value,
         std_error,

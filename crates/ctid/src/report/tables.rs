@@ -391,10 +391,13 @@ fn row(name: &str, unit: &str, steps: &[Step], cell: impl Fn(&Step) -> String) -
 }
 
 fn estimate(parameter: &Parameter) -> String {
-    let value = with_error(parameter.value, parameter.std_error);
-    match parameter.std_error {
-        Some(_) => value,
-        None => format!("{value} *"),
+    let mut value = with_error(parameter.value, parameter.std_error);
+    if parameter.std_error.is_none() {
+        value += " *";
+    }
+    match parameter.prior_words() {
+        Some(words) => format!("{value}<br><small>{}</small>", escape(&words)),
+        None => value,
     }
 }
 

@@ -446,6 +446,7 @@ fn without_effects(model: &ModelFile) -> ModelFile {
         let own = format!("{name}.");
         bare.start.retain(|name, _| !name.starts_with(&own));
         bare.fixed.retain(|name| !name.starts_with(&own));
+        bare.priors.retain(|name, _| !name.starts_with(&own));
     }
     bare.effects.clear();
     bare.terms.clear();

@@ -380,7 +380,10 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
                 "(no error: at a bound, fixed, or not determined)".to_string(),
                 |error| format!("± {error}"),
             ),
-            parameter.unit.clone(),
+            match parameter.prior_words() {
+                Some(words) => format!("{} ({words})", parameter.unit),
+                None => parameter.unit.clone(),
+            },
         ]);
     }
     let model = match diagnosis.effects.as_slice() {

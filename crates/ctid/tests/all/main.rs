@@ -13,6 +13,7 @@ mod injected;
 mod model_file;
 mod monitor;
 mod own_term;
+mod prior;
 mod program;
 mod results;
 mod side_by_side;

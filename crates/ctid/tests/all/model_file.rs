@@ -295,6 +295,46 @@ fn an_unknown_start() {
 }
 
 #[test]
+fn a_prior() {
+    let model =
+        parse("plant = \"single-tank\"\n[prior]\nalpha = [2, 0.5]\n[start]\npump_gain = 3.0");
+    let prior = model.priors["alpha"];
+    assert_eq!((prior.value, prior.std_error), (2.0, 0.5));
+    // The fit begins there, but where a guess says otherwise.
+    assert_eq!(model.start["alpha"], 2.0);
+    let model = parse("plant = \"single-tank\"\n[prior]\nalpha = [2, 0.5]\n[start]\nalpha = 3.0");
+    assert_eq!(model.start["alpha"], 3.0);
+}
+
+#[test]
+fn an_impossible_prior() {
+    let prior = |line: &str| format!("plant = \"single-tank\"\n[prior]\n{line}");
+    refuses(
+        &prior("alfa = [1.0, 0.1]"),
+        "tank.toml:3: [prior] has alfa, which is not a parameter of this model; it has pump_gain, alpha",
+        "alpha",
+    );
+    refuses(&prior("alpha = 1.0"), "tank.toml:3", "such as [2.1, 0.1]");
+    refuses(&prior("alpha = [1.0]"), "tank.toml:3", "such as [2.1, 0.1]");
+    refuses(
+        &prior("alpha = [1.0, 0.1, 2]"),
+        "tank.toml:3",
+        "such as [2.1, 0.1]",
+    );
+    refuses(&prior("alpha = [-1.0, 0.1]"), "tank.toml:3", "above zero");
+    refuses(
+        &prior("alpha = [1.0, 0.0]"),
+        "tank.toml:3: the standard error of alpha = 0",
+        "above zero",
+    );
+    refuses(
+        "plant = \"single-tank\"\neffects = [\"overflow\"]\n[effect.overflow]\nrim = 2.0\nfixed = [\"rim\"]\n[prior]\n\"overflow.rim\" = [2.0, 0.1]",
+        "tank.toml:7: overflow.rim has a prior and is fixed",
+        "keep one of the two",
+    );
+}
+
+#[test]
 fn an_impossible_start() {
     refuses(
         "plant = \"single-tank\"\n[start]\nalpha = -1.0",

@@ -1,5 +1,6 @@
 //! A structure set against records: the vector that is fitted, and its bounds.
 
+mod priors;
 mod rows;
 mod simulation;
 
@@ -8,12 +9,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_signals::{Channel, Hold, Record};
-use estimation::Noise;
+use estimation::{Noise, Prior};
 use plants::{
     Command, Domain, Known, MAX_VESSELS, OutputScales, Place, Placed, Plant, Scales, Structure,
     controller::Controller, deciles,
 };
 
+pub use self::priors::PriorValue;
 pub use self::simulation::{LoopRun, Simulated, weighted_rms};
 use crate::{
     Error, LinearPlant, Replay, TimeLimit,
@@ -55,6 +57,8 @@ pub struct Setup<'a> {
     floors: Vec<f64>,
     /// Standard deviations of the outputs' noise, where they are known ([`estimation::Residuals::known_scales`]).
     pub known_scales: Option<Vec<f64>>,
+    /// What is known of parameters beside the records.
+    priors: Vec<Prior>,
     /// The controller, where the loop is simulated.
     feedback: Option<Feedback>,
     /// When each record begins on the clock of drifts, steps and periods.
@@ -239,6 +243,7 @@ impl<'a> Setup<'a> {
         };
         Ok(Self {
             known_scales: None,
+            priors: Vec::new(),
             samples: (0..outputs).map(count).collect(),
             floors: (0..outputs).map(floor).collect(),
             structure,
@@ -286,7 +291,9 @@ impl<'a> Setup<'a> {
         let mut setup = Self::build(structure, self.records, self.fixed.clone(), feedback)?;
         setup.limited_as(self);
         setup.clock = self.clock.clone();
-        Ok(setup)
+        let mut priors = self.prior_values();
+        priors.retain(|name, _| setup.names[..setup.parameters].contains(name));
+        setup.with_priors(&priors)
     }
 
     /// The same setup with the controller's initial states fitted like the others.
@@ -387,8 +394,8 @@ impl<'a> Setup<'a> {
         self.known_scales.clone_from(&other.known_scales);
     }
 
-    /// The same structure against other records, in the same scales, run on the measured command. Those that begin after the
-    /// records of this setup have ended continue its clock.
+    /// The same structure against other records, in the same scales, run on the measured command, without priors. Those that begin after
+    /// the records of this setup have ended continue its clock.
     ///
     /// # Errors
     /// As [`Setup::new`].

@@ -1,6 +1,6 @@
 //! The derivatives of a simulation, row by row.
 
-use estimation::{Noise, Residuals, Rows, Sample, Triangle};
+use estimation::{Noise, Prior, Residuals, Rows, Sample, Triangle};
 use plants::{Dual, Simulator};
 
 use super::{Setup, at_rest, commands, reference, second_command};
@@ -51,6 +51,10 @@ impl Residuals for Setup<'_> {
 
     fn known_scales(&self) -> Option<&[f64]> {
         self.known_scales.as_deref()
+    }
+
+    fn priors(&self) -> &[Prior] {
+        &self.priors
     }
 
     fn out_of_time(&self) -> bool {

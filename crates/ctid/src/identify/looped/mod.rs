@@ -179,6 +179,7 @@ impl Task<'_> {
         let parameters: Vec<Parameter> = named
             .zip(&found.std_errors)
             .map(|(((name, unit), value), std_error)| Parameter {
+                prior: None,
                 name,
                 unit,
                 value: *value,

@@ -1,0 +1,73 @@
+//! What is known of parameters beside the records.
+
+use std::collections::BTreeMap;
+
+use estimation::Prior;
+use serde::Serialize;
+
+use super::Setup;
+use crate::Error;
+
+/// A side measurement of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PriorValue {
+    /// What was measured \[unit of the parameter\].
+    pub value: f64,
+    /// Its standard error, above zero \[unit of the parameter\].
+    pub std_error: f64,
+}
+
+impl Setup<'_> {
+    /// The same setup with what is known of parameters beside the records, by name: each counts as a reading of its own
+    /// ([`estimation::Prior`]). Those of parameters that are fixed play no part.
+    ///
+    /// They are part of every fit of these records, and stay with other structures; other records ([`Setup::with_records`]) go without them,
+    /// so that what is known counts once.
+    ///
+    /// # Errors
+    /// Where the structure has no parameter of a name, or a standard error is not above zero.
+    pub fn with_priors(mut self, priors: &BTreeMap<String, PriorValue>) -> Result<Self, Error> {
+        let parameters = &self.names[..self.parameters];
+        self.priors = priors
+            .iter()
+            .map(|(name, prior)| {
+                let unknown = || Error::UnknownParameter {
+                    name: name.clone(),
+                    known: parameters.join(", "),
+                };
+                let entry = parameters.iter().position(|own| own == name);
+                let PriorValue { value, std_error } = *prior;
+                if !(value.is_finite() && std_error > 0.0 && std_error.is_finite()) {
+                    return Err(Error::Prior {
+                        name: name.clone(),
+                        value,
+                        std_error,
+                    });
+                }
+                Ok(Prior {
+                    entry: entry.ok_or_else(unknown)?,
+                    value,
+                    std_error,
+                })
+            })
+            .collect::<Result<_, Error>>()?;
+        Ok(self)
+    }
+
+    /// What is known of parameters beside the records, by name.
+    #[must_use]
+    pub fn prior_values(&self) -> BTreeMap<String, PriorValue> {
+        let priors = self.priors.iter();
+        priors
+            .map(
+                |&Prior {
+                     entry,
+                     value,
+                     std_error,
+                 }| {
+                    (self.names[entry].clone(), PriorValue { value, std_error })
+                },
+            )
+            .collect()
+    }
+}

@@ -3,7 +3,7 @@
 use crate::Squares;
 
 /// Rows are collected in blocks and folded in by Householder reflections.
-const BLOCK: usize = 32;
+const BLOCK: usize = 128;
 
 /// The triangular factor `R` of all rows pushed so far: `R'R = sum row row'`. Each row is `[j_1 .. j_p, r]`, so the
 /// last column holds the residual's coordinates.
@@ -18,6 +18,8 @@ pub struct Triangle {
     /// Rows not yet folded in, column by column.
     block: Vec<f64>,
     filled: usize,
+    /// For folding: the product of each column of the block with the pivot's.
+    products: Vec<f64>,
     rows: usize,
     /// Of several outputs, or with priors, the triangle of each, whose weights hang on what is left of its residual.
     outputs: Option<Box<Outputs>>,
@@ -46,6 +48,7 @@ impl Triangle {
             r: vec![0.0; columns * columns],
             block: vec![0.0; columns * BLOCK],
             filled: 0,
+            products: vec![0.0; columns],
             rows: 0,
             outputs: None,
         }
@@ -75,33 +78,62 @@ impl Triangle {
         }
     }
 
+    /// Folds in rows that are given column by column: each of [`Triangle::columns`] slices, the residual's last, holds one entry for every row.
+    pub fn push_columns(&mut self, columns: &[&[f64]]) {
+        let rows = columns.first().map_or(0, |column| column.len());
+        let mut from = 0;
+        while from < rows {
+            let take = (BLOCK - self.filled).min(rows - from);
+            for (own, column) in self.block.chunks_exact_mut(BLOCK).zip(columns) {
+                own[self.filled..][..take].copy_from_slice(&column[from..][..take]);
+            }
+            self.filled += take;
+            from += take;
+            if self.filled == BLOCK {
+                self.fold();
+            }
+        }
+        self.rows += rows;
+    }
+
     fn fold(&mut self) {
         let n = self.columns;
         let filled = std::mem::take(&mut self.filled);
-        for column in self.block.chunks_exact_mut(BLOCK) {
-            column[filled..].fill(0.0);
+        let Some((mut pivot, mut rest)) = self.block.split_at_mut_checked(BLOCK) else {
+            return;
+        };
+        // A pass over a column applies one reflection and takes the product for the next.
+        let products = &mut self.products;
+        products[0] = dot(&pivot[..filled], &pivot[..filled]);
+        for (product, column) in products[1..].iter_mut().zip(rest.chunks_exact(BLOCK)) {
+            *product = dot(&pivot[..filled], &column[..filled]);
         }
         for j in 0..n {
-            let (head, tail) = self.block.split_at_mut((j + 1) * BLOCK);
-            let v = &head[j * BLOCK..];
-            let below: f64 = v.iter().map(|x| x * x).sum();
-            if below == 0.0 {
-                continue;
-            }
-            let diagonal = self.r[j * n + j];
+            let r = &mut self.r[j * n..][..n];
+            let (diagonal, below) = (r[j], products[j]);
             let norm = (diagonal * diagonal + below).sqrt();
-            let alpha = if diagonal > 0.0 { -norm } else { norm };
-            let v0 = diagonal - alpha;
-            let scale = 1.0 / (norm * (norm + diagonal.abs()));
-            self.r[j * n + j] = alpha;
-            for (k, column) in (j + 1..n).zip(tail.chunks_exact_mut(BLOCK)) {
-                let dot: f64 = v.iter().zip(&*column).map(|(a, b)| a * b).sum();
-                let factor = (v0 * self.r[j * n + k] + dot) * scale;
-                self.r[j * n + k] -= factor * v0;
-                for (b, a) in column.iter_mut().zip(v) {
-                    *b -= factor * a;
-                }
+            let (v0, scale) = if below == 0.0 {
+                (0.0, 0.0)
+            } else {
+                r[j] = if diagonal > 0.0 { -norm } else { norm };
+                (diagonal - r[j], 1.0 / (norm * (norm + diagonal.abs())))
+            };
+            let mut factor = |k: usize, product: f64| {
+                let factor = (v0 * r[k] + product) * scale;
+                r[k] -= factor * v0;
+                factor
+            };
+            let Some((next, after)) = rest.split_at_mut_checked(BLOCK) else {
+                break;
+            };
+            let (v, own) = (&pivot[..filled], &mut next[..filled]);
+            subtract(own, factor(j + 1, products[j + 1]), v);
+            products[j + 1] = dot(own, own);
+            let others = products.iter_mut().enumerate().skip(j + 2);
+            for ((k, product), column) in others.zip(after.chunks_exact_mut(BLOCK)) {
+                *product = subtract_and_dot(&mut column[..filled], factor(k, *product), v, own);
             }
+            (pivot, rest) = (next, after);
         }
     }
 
@@ -221,13 +253,7 @@ impl Triangle {
         order.push(self.columns - 1);
         let mut system = self.select(&order);
         if damping > 0.0 {
-            let mut row = vec![0.0; p + 1];
-            for (i, &j) in free.iter().enumerate() {
-                row[i] = damping.sqrt() * scale[j];
-                system.push(&row);
-                row[i] = 0.0;
-            }
-            system.finish();
+            system.damp(free.iter().map(|&j| scale[j]), damping);
         }
         let mut x = vec![0.0; p];
         for i in (0..p).rev() {
@@ -263,6 +289,69 @@ impl Triangle {
             .sum()
     }
 
+    /// `|J x|^2`, x with an entry for each column but the residual's.
+    #[must_use]
+    pub fn squared_length(&self, x: &[f64]) -> f64 {
+        let last = self.columns - 1;
+        let row = |i: usize| -> f64 { (i..last).map(|j| self.at(i, j) * x[j]).sum() };
+        (0..last).map(|i| row(i).powi(2)).sum()
+    }
+
+    /// `log |J'J|`.
+    #[must_use]
+    pub fn log_det(&self) -> f64 {
+        let last = self.columns - 1;
+        (0..last).map(|i| 2.0 * self.at(i, i).abs().ln()).sum()
+    }
+
+    /// No entry is infinite or NaN.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.r.iter().all(|value| value.is_finite())
+    }
+
+    /// No column of J is a combination of those before it to within `1e-10` of its length: the rows determine all parameters.
+    #[must_use]
+    pub fn determined(&self) -> bool {
+        (0..self.columns - 1).all(|j| self.independent(j))
+    }
+
+    fn independent(&self, j: usize) -> bool {
+        let own = self.at(j, j);
+        own.abs() > 1e-10 * self.column_norm(j) && own.is_finite()
+    }
+
+    /// The triangle of the same rows and those of a damping: `J'J + damping diag(scale_j^2)` in place of `J'J`.
+    #[must_use]
+    pub fn damped(&self, scale: &[f64], damping: f64) -> Self {
+        let mut damped = self.clone();
+        damped.damp(scale.iter().copied(), damping);
+        damped
+    }
+
+    fn damp(&mut self, scale: impl Iterator<Item = f64>, damping: f64) {
+        let mut row = vec![0.0; self.columns];
+        for (j, scale) in scale.enumerate() {
+            row[j] = damping.sqrt() * scale;
+            self.push(&row);
+            row[j] = 0.0;
+        }
+        self.finish();
+    }
+
+    /// Folds in the rows of a finished triangle, its column j to column `places[j]`; the others count as zero.
+    pub fn append(&mut self, other: &Self, places: &[usize]) {
+        let rows = self.rows + other.rows;
+        let mut row = vec![0.0; self.columns];
+        for i in 0..other.columns {
+            for (j, &place) in places.iter().enumerate() {
+                row[place] = other.at(i, j);
+            }
+            self.push(&row);
+        }
+        self.rows = rows;
+    }
+
     /// The inverse of `J'J` over the `free` parameters, row by row; `None` where a column is a combination of the
     /// others to within `1e-10` of its length.
     #[must_use]
@@ -271,10 +360,10 @@ impl Triangle {
         let system = self.select(free);
         let mut inverse = vec![vec![0.0; p]; p];
         for i in (0..p).rev() {
-            let diagonal = system.at(i, i);
-            if diagonal.abs() <= 1e-10 * system.column_norm(i) || !diagonal.is_finite() {
+            if !system.independent(i) {
                 return None;
             }
+            let diagonal = system.at(i, i);
             inverse[i][i] = 1.0 / diagonal;
             let (above, below) = inverse.split_at_mut(i + 1);
             for (j, entry) in above[i].iter_mut().enumerate().skip(i + 1) {
@@ -296,6 +385,52 @@ impl Triangle {
                 .collect(),
         )
     }
+}
+
+/// Eight sums side by side, which the compiler turns into vectors.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a8, a_rest) = a.as_chunks::<8>();
+    let (b8, b_rest) = b.as_chunks::<8>();
+    for (a, b) in a8.iter().zip(b8) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    let [a, b, c, d, e, f, g, h] = sums;
+    rest + (((a + c) + (e + g)) + ((b + d) + (f + h)))
+}
+
+/// `b - factor a`, eight entries at a time.
+fn subtract(b: &mut [f64], factor: f64, a: &[f64]) {
+    let (b8, b_rest) = b.as_chunks_mut::<8>();
+    let (a8, a_rest) = a.as_chunks::<8>();
+    for (b, a) in b8.iter_mut().zip(a8) {
+        for (b, a) in b.iter_mut().zip(a) {
+            *b -= factor * a;
+        }
+    }
+    for (b, a) in b_rest.iter_mut().zip(a_rest) {
+        *b -= factor * a;
+    }
+}
+
+/// `b - factor a`, and its product with c.
+fn subtract_and_dot(b: &mut [f64], factor: f64, a: &[f64], c: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (b8, b_rest) = b.as_chunks_mut::<8>();
+    let (a8, a_rest) = a.as_chunks::<8>();
+    let (c8, c_rest) = c.as_chunks::<8>();
+    for ((b, a), c) in b8.iter_mut().zip(a8).zip(c8) {
+        let new: [f64; 8] = std::array::from_fn(|i| b[i] - factor * a[i]);
+        sums = std::array::from_fn(|i| sums[i] + new[i] * c[i]);
+        *b = new;
+    }
+    subtract(b_rest, factor, a_rest);
+    let rest: f64 = b_rest.iter().zip(c_rest).map(|(b, c)| b * c).sum();
+    let [a, b, c, d, e, f, g, h] = sums;
+    rest + (((a + c) + (e + g)) + ((b + d) + (f + h)))
 }
 
 impl Outputs {
@@ -351,7 +486,7 @@ mod tests {
 
     #[test]
     fn agrees_with_a_dense_solution() {
-        for n in [9, 32, 33, 200] {
+        for n in [9, 32, 33, 200, 300] {
             let p = 5;
             let rows = rows(n, p);
             let mut triangle = Triangle::new(p + 1);
@@ -437,13 +572,87 @@ mod tests {
     }
 
     #[test]
+    fn rows_given_by_columns_are_the_same_rows() {
+        let p = 3;
+        for n in [1, 127, 128, 129, 400] {
+            let rows = rows(n, p);
+            let mut by_rows = Triangle::new(p + 1);
+            rows.iter().for_each(|row| by_rows.push(row));
+            by_rows.finish();
+            let columns: Vec<Vec<f64>> = (0..=p)
+                .map(|j| rows.iter().map(|row| row[j]).collect())
+                .collect();
+            let mut by_columns = Triangle::new(p + 1);
+            let (first, second): (Vec<_>, Vec<_>) =
+                columns.iter().map(|column| column.split_at(n / 3)).unzip();
+            by_columns.push_columns(&first);
+            by_columns.push_columns(&second);
+            by_columns.finish();
+            assert_eq!((by_columns.rows(), &by_columns.r), (n, &by_rows.r));
+        }
+    }
+
+    #[test]
+    fn lengths_determinant_and_damping_by_hand() {
+        let mut triangle = Triangle::new(3);
+        triangle.push_columns(&[&[1.0, 2.0, 2.0], &[1e6, 0.0, 1e6], &[3.0, 0.0, 3.0]]);
+        triangle.finish();
+        assert!(triangle.determined() && triangle.is_finite());
+        assert_relative_eq!(
+            triangle.squared_length(&[1.0, 1e-6]),
+            17.0,
+            max_relative = 1e-14
+        );
+        // |J'J| = 9 2e12 - (3e6)^2.
+        assert_relative_eq!(triangle.log_det(), 9e12_f64.ln(), max_relative = 1e-14);
+        let damped = triangle.damped(&[2.0, 1e6], 0.5);
+        // |J'J| = 11 2.5e12 - (3e6)^2.
+        assert_relative_eq!(damped.log_det(), 18.5e12_f64.ln(), max_relative = 1e-14);
+        let at_once = triangle.solve(&[0, 1], &[2.0, 1e6], 0.5);
+        for (own, at_once) in damped.solve(&[0, 1], &[], 0.0).iter().zip(at_once) {
+            assert_relative_eq!(*own, at_once, max_relative = 1e-12);
+        }
+        triangle.push(&[f64::INFINITY, 0.0, 0.0]);
+        triangle.finish();
+        assert!(!triangle.is_finite());
+    }
+
+    #[test]
+    fn appended_rows_take_their_places() {
+        let rows = rows(40, 2);
+        let (mut all, mut expected) = (Triangle::new(4), Triangle::new(4));
+        for (part, places) in rows.chunks(20).zip([[0, 1, 3], [0, 2, 3]]) {
+            let mut own = Triangle::new(3);
+            for row in part {
+                own.push(row);
+                let mut whole = [0.0; 4];
+                places
+                    .iter()
+                    .zip(row)
+                    .for_each(|(&place, value)| whole[place] = *value);
+                expected.push(&whole);
+            }
+            own.finish();
+            all.append(&own, &places);
+        }
+        all.finish();
+        expected.finish();
+        assert_eq!(all.rows(), 40);
+        for i in 0..4 {
+            for j in i..4 {
+                assert_relative_eq!(all.at(i, j).abs(), expected.at(i, j).abs(), epsilon = 1e-13);
+            }
+        }
+    }
+
+    #[test]
     fn a_combination_of_columns_has_no_covariance() {
         let mut triangle = Triangle::new(4);
         for row in rows(50, 1) {
             triangle.push(&[row[0], row[1], row[0] + row[1], 1.0]);
         }
         triangle.finish();
-        assert!(triangle.covariance(&[0, 1, 2]).is_none());
+        assert!(triangle.covariance(&[0, 1, 2]).is_none() && !triangle.determined());
         assert!(triangle.covariance(&[0, 1]).is_some());
     }
 }

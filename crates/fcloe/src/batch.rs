@@ -17,9 +17,9 @@
 //!
 //! Cost: one pass over the records for each step tried.
 
+use estimation::{Residuals, Triangle};
 use serde::Serialize;
 
-use crate::normal_equations::NormalEquations;
 use crate::problem::Refused;
 use crate::{
     ClosedLoop, Coordinates, Damping, Error, Levels, Method, PlantModel, Problem, Settings,
@@ -116,16 +116,19 @@ impl Problem {
         ClosedLoop::new(start, self.controller())?.require_stable()?;
         let mut x = self.start(start);
         let scale = self.scale(start, settings.coordinates)?;
-        let mut at = self.evaluate(&x).map_err(|_| Error::NotFiniteSimulation)?;
+        let mut at = self
+            .evaluate(&x, f64::INFINITY, true)
+            .map_err(|_| Error::NotFiniteSimulation)?;
         let mut run = Run {
             mu: match settings.method {
                 Method::LevenbergMarquardt { mu, .. } => mu,
                 _ => 0.0,
             },
+            tolerance: settings.tolerance,
             evaluations: 1,
             refused: 0,
         };
-        let iterate = |x: &[f64], at: &NormalEquations| Iterate {
+        let iterate = |x: &[f64], at: &Triangle| Iterate {
             theta: x[..expected].to_vec(),
             cost: at.cost(),
         };
@@ -173,7 +176,7 @@ impl Problem {
         Ok(scale)
     }
 
-    fn is_small(&self, x: &[f64], step: &[f64], at: &NormalEquations, tolerance: f64) -> bool {
+    fn is_small(&self, x: &[f64], step: &[f64], at: &Triangle, tolerance: f64) -> bool {
         let parameters = self.orders().parameters();
         let changes = x.iter().zip(step).take(parameters);
         let relative = changes.clone().all(|(x, d)| d.abs() <= tolerance * x.abs())
@@ -188,25 +191,26 @@ impl Problem {
 
 /// Whether the lowest point of the linearised model is nearer than this share of the residual, root mean squares of y^.
 /// The step itself is no measure: damping makes it small far from any minimum too.
-fn at_minimum(at: &NormalEquations, tolerance: f64) -> bool {
-    at.factor(|_| 0.0).is_some_and(|factor| {
-        let step = factor.solve(|i| at.je(i));
-        at.length_squared(&step) <= tolerance * tolerance * at.cost()
-    })
+fn at_minimum(at: &Triangle, tolerance: f64) -> bool {
+    let last = at.columns() - 1;
+    // The residual's coordinates along the columns.
+    let nearer: f64 = (0..last).map(|i| at.at(i, last).powi(2)).sum();
+    at.determined() && nearer <= tolerance * tolerance * at.cost()
 }
 
-/// A step, and the sums where it ends.
-type Taken = (Vec<f64>, NormalEquations);
+/// A step, and the triangle where it ends.
+type Taken = (Vec<f64>, Triangle);
 
 struct Run {
     mu: f64,
+    tolerance: f64,
     evaluations: usize,
     refused: usize,
 }
 
 /// What became of a step that was tried.
 enum Tried {
-    Lower(NormalEquations),
+    Lower(Triangle),
     /// By no more than rounding can explain.
     Level,
     Higher,
@@ -220,7 +224,7 @@ impl Run {
         problem: &Problem,
         method: Method,
         x: &[f64],
-        at: &NormalEquations,
+        at: &Triangle,
         scale: &[f64],
     ) -> Result<Taken, Stop> {
         match method {
@@ -229,10 +233,14 @@ impl Run {
                 let along: Vec<f64> = scale
                     .iter()
                     .enumerate()
-                    .map(|(i, s)| s * s * at.je(i))
+                    .map(|(i, s)| s * s * at.descent(i))
                     .collect();
-                let slope: f64 = along.iter().enumerate().map(|(i, d)| d * at.je(i)).sum();
-                let curvature = at.length_squared(&along);
+                let slope: f64 = along
+                    .iter()
+                    .enumerate()
+                    .map(|(i, d)| d * at.descent(i))
+                    .sum();
+                let curvature = at.squared_length(&along);
                 if curvature.is_nan() || curvature <= 0.0 {
                     return Err(Stop::Rounding);
                 }
@@ -241,8 +249,10 @@ impl Run {
                 self.shortened(problem, x, at, step)
             }
             Method::GaussNewton => {
-                let factor = at.factor(|_| 0.0).ok_or(Stop::Singular)?;
-                self.shortened(problem, x, at, factor.solve(|i| at.je(i)))
+                if !at.determined() {
+                    return Err(Stop::Singular);
+                }
+                self.shortened(problem, x, at, at.solve(problem.free(), &[], 0.0))
             }
             Method::LevenbergMarquardt { damping, .. } => {
                 self.damped(problem, x, at, scale, damping)
@@ -255,7 +265,7 @@ impl Run {
         &mut self,
         problem: &Problem,
         x: &[f64],
-        at: &NormalEquations,
+        at: &Triangle,
         mut step: Vec<f64>,
     ) -> Result<Taken, Stop> {
         let mut unstable = false;
@@ -280,28 +290,26 @@ impl Run {
         &mut self,
         problem: &Problem,
         x: &[f64],
-        at: &NormalEquations,
+        at: &Triangle,
         scale: &[f64],
         damping: Damping,
     ) -> Result<Taken, Stop> {
+        // J'' = 2 R'R: halved, both.
+        let (scale, part): (Vec<f64>, f64) = match damping {
+            Damping::Identity => (scale.iter().map(|s| 1.0 / s).collect(), 0.5),
+            Damping::Diagonal => ((0..x.len()).map(|i| at.column_norm(i)).collect(), 1.0),
+        };
         let mut unstable = false;
         for _ in 0..40 {
-            // J'' = 2 J'J, J' = -2 J'e: halved, both.
-            let added = |i: usize| match damping {
-                Damping::Identity => 0.5 * self.mu / (scale[i] * scale[i]),
-                Damping::Diagonal => self.mu * at.jj(i, i),
-            };
-            if let Some(factor) = at.factor(added) {
-                let step = factor.solve(|i| at.je(i));
-                match self.try_step(problem, x, at, &step) {
-                    Tried::Lower(next) => {
-                        self.mu = (0.1 * self.mu).max(1e-20);
-                        return Ok((step, next));
-                    }
-                    Tried::Level => return Err(Stop::Rounding),
-                    Tried::Higher => unstable = false,
-                    Tried::Unstable => unstable = true,
+            let step = at.solve(problem.free(), &scale, part * self.mu);
+            match self.try_step(problem, x, at, &step) {
+                Tried::Lower(next) => {
+                    self.mu = (0.1 * self.mu).max(1e-20);
+                    return Ok((step, next));
                 }
+                Tried::Level => return Err(Stop::Rounding),
+                Tried::Higher => unstable = false,
+                Tried::Unstable => unstable = true,
             }
             self.mu *= 10.0;
         }
@@ -312,23 +320,24 @@ impl Run {
         })
     }
 
-    fn try_step(
-        &mut self,
-        problem: &Problem,
-        x: &[f64],
-        at: &NormalEquations,
-        step: &[f64],
-    ) -> Tried {
+    fn try_step(&mut self, problem: &Problem, x: &[f64], at: &Triangle, step: &[f64]) -> Tried {
         let to: Vec<f64> = x.iter().zip(step).map(|(x, d)| x + d).collect();
-        match problem.evaluate(&to) {
-            Ok(next) => {
+        // After the last step nobody asks for derivatives.
+        let last = problem.is_small(x, step, at, self.tolerance);
+        match problem.evaluate(&to, at.cost(), !last) {
+            Ok(next) if next.cost() < at.cost() => {
                 self.evaluations += 1;
-                if next.cost() < at.cost() {
-                    return Tried::Lower(next);
-                }
+                Tried::Lower(next)
+            }
+            Ok(_) | Err(Refused::Higher) => {
+                self.evaluations += 1;
                 // What the linearised model promises.
-                let slope: f64 = step.iter().enumerate().map(|(i, d)| d * at.je(i)).sum();
-                let promised = 2.0 * slope - at.length_squared(step);
+                let slope: f64 = step
+                    .iter()
+                    .enumerate()
+                    .map(|(i, d)| d * at.descent(i))
+                    .sum();
+                let promised = 2.0 * slope - at.squared_length(step);
                 if promised <= 1e-13 * at.cost() && at_minimum(at, AT_ROUNDING) {
                     Tried::Level
                 } else {

@@ -13,9 +13,9 @@
 
 use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
 use ct_signals::ArModel;
+use estimation::Triangle;
 use serde::Serialize;
 
-use crate::normal_equations::NormalEquations;
 use crate::{Controller, Error, LoopRecord, Offsets};
 
 /// Frequencies below this over the length of the record are left out.
@@ -113,22 +113,28 @@ pub fn controller_mismatch(
 /// The square of that part of what is missed which follows the ladder, and what noise of the same colour would show of
 /// it, by generalised least squares.
 fn following(free: &[Vec<f64>], ladder: &[Vec<f64>], missed: &[f64]) -> Result<(f64, f64), Error> {
-    let noise = ArModel::fit(&[&residual(ladder, missed)], 4)?;
+    let plain = Projection::new(ladder, missed);
+    let noise = ArModel::fit(&[&plain.left(ladder, missed)], 4)?;
     let whitened: Vec<Vec<f64>> = ladder.iter().chain(free).map(|c| noise.whiten(c)).collect();
-    let sums = sums(&whitened, &noise.whiten(missed));
-    let Some(factor) = sums.factor(|i| RIDGE * sums.jj(i, i)) else {
+    let whole = Projection::new(&whitened, &noise.whiten(missed));
+    let Some(covariance) = whole.damped.covariance(&whole.all) else {
         return Ok((0.0, 0.0));
     };
-    let mut x = factor.solve(|i| sums.je(i));
+    let mut x = whole.solution();
     x.truncate(ladder.len());
-    let covariance = factor.inverse();
-    let plain = self::sums(ladder, missed);
+    let plain = plain.triangle;
     let variance = noise.sigma() * noise.sigma();
-    let by_chance: f64 = (0..ladder.len())
-        .flat_map(|i| (0..ladder.len()).map(move |j| (i, j)))
-        .map(|(i, j)| variance * covariance[i][j] * plain.jj(i, j))
-        .sum();
-    Ok((plain.length_squared(&x), by_chance))
+    // The trace of the covariance times J'J = R'R, J the ladder.
+    let columns = 0..ladder.len();
+    let by_row = |k: usize| -> f64 {
+        let times = |i: usize| -> f64 {
+            let own = columns.clone().map(|j| covariance[i][j] * plain.at(k, j));
+            own.sum()
+        };
+        columns.clone().map(|i| plain.at(k, i) * times(i)).sum()
+    };
+    let by_chance: f64 = columns.clone().map(by_row).sum();
+    Ok((plain.squared_length(&x), variance * by_chance))
 }
 
 fn response(
@@ -176,24 +182,49 @@ fn ladder(r: &[f64], record: &LoopRecord) -> Result<Vec<Vec<f64>>, Error> {
     Ok(columns)
 }
 
-/// What is left of a signal beside its projection on the columns, dependent ones weighed down.
+/// What is left of a signal beside its projection on the columns.
 fn residual(columns: &[Vec<f64>], signal: &[f64]) -> Vec<f64> {
-    let sums = sums(columns, signal);
-    let mut left = signal.to_vec();
-    let Some(factor) = sums.factor(|i| RIDGE * sums.jj(i, i)) else {
-        return left;
-    };
-    for (x, column) in factor.solve(|i| sums.je(i)).iter().zip(columns) {
-        for (left, c) in left.iter_mut().zip(column) {
-            *left -= x * c;
-        }
-    }
-    left
+    Projection::new(columns, signal).left(columns, signal)
 }
 
-fn sums(columns: &[Vec<f64>], signal: &[f64]) -> NormalEquations {
-    let mut sums = NormalEquations::new(columns.len());
-    let columns: Vec<(usize, &[f64])> = columns.iter().map(Vec::as_slice).enumerate().collect();
-    sums.add(&columns, signal);
-    sums
+/// Least squares of a signal on columns, dependent ones weighed down.
+struct Projection {
+    /// Of the columns and the signal.
+    triangle: Triangle,
+    /// The same with the ridge.
+    damped: Triangle,
+    all: Vec<usize>,
+}
+
+impl Projection {
+    fn new(columns: &[Vec<f64>], signal: &[f64]) -> Self {
+        let mut triangle = Triangle::new(columns.len() + 1);
+        let mut with_signal: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        with_signal.push(signal);
+        triangle.push_columns(&with_signal);
+        triangle.finish();
+        let all: Vec<usize> = (0..columns.len()).collect();
+        let norms: Vec<f64> = all.iter().map(|&j| triangle.column_norm(j)).collect();
+        Self {
+            damped: triangle.damped(&norms, RIDGE),
+            triangle,
+            all,
+        }
+    }
+
+    /// The coefficient of each column.
+    fn solution(&self) -> Vec<f64> {
+        self.damped.solve(&self.all, &[], 0.0)
+    }
+
+    /// The signal without its projection.
+    fn left(&self, columns: &[Vec<f64>], signal: &[f64]) -> Vec<f64> {
+        let mut left = signal.to_vec();
+        for (x, column) in self.solution().iter().zip(columns) {
+            for (left, c) in left.iter_mut().zip(column) {
+                *left -= x * c;
+            }
+        }
+        left
+    }
 }

@@ -14,6 +14,7 @@
 //! | Will the recursion converge from here? | [`Condition`]: condition (14) exactly, and the frequency where it fails worst; [`locus`] for a picture, [`TableOfStarts`] for many starts |
 //! | Is this the controller that made the record? | [`controller_mismatch`]; [`Problem::new`] asks it too |
 //! | What does the loop do, and how does that change with a parameter? | [`LoopSimulator`], exact for a held reference |
+//! | I want many starts at once, or a fit in the metric of a noise | [`Problem`] implements [`estimation::Residuals`]: [`estimation::fit_from`], [`estimation::coloured`] |
 //! | I need data to try it on | [`continuous_loop`], [`sampled_loop`], [`noise_at_snr`], [`Quantiser`] |
 //!
 //! Time is in any one unit throughout. Signals are deviations from an operating point at which the loop rested before
@@ -79,7 +80,6 @@ mod convergence;
 mod error;
 mod experiment;
 mod noise_model;
-mod normal_equations;
 mod plant_model;
 mod problem;
 mod record;

@@ -20,13 +20,15 @@
 //!
 //! Cost: `q nu^2` products a sample, for q columns and nu states of H.
 //!
+//! [`estimation::robust`] knows autoregressions alone: F has zeros, and which path it is has to be compared by one criterion for both.
+//!
 //! Reference: P. J. Huber, Proc. 5th Berkeley Symposium 1 (1967) 221-233, for the form of the covariance.
 
 use ct_lti::{Hold, Sampled, StateSpace};
 use ct_signals::{ArModel, StationaryNoise};
+use estimation::Triangle;
 use serde::Serialize;
 
-use crate::normal_equations::NormalEquations;
 use crate::{ClosedLoop, Error};
 
 /// Where the noise enters.
@@ -138,8 +140,8 @@ struct Series {
 /// the penalty of Bayes' information criterion for its coefficients.
 fn autoregression(mut all: Vec<Series>, max_order: usize) -> Result<(f64, ArModel), Error> {
     for series in &mut all {
-        let (sums, x) = series.regression();
-        if sums.cost() > 0.0 {
+        let (triangle, x) = series.regression();
+        if triangle.cost() > 0.0 {
             for (x, beside) in x.iter().zip(&series.beside) {
                 for (v, b) in series.values.iter_mut().zip(beside) {
                     *v -= x * b;
@@ -157,11 +159,10 @@ fn autoregression(mut all: Vec<Series>, max_order: usize) -> Result<(f64, ArMode
             values: ar.whiten(&series.values),
             beside: series.beside.iter().map(|b| ar.whiten(b)).collect(),
         };
-        let (sums, x) = whitened.regression();
-        squares += sums.cost();
-        if let Some(factor) = sums.factor(|_| 0.0) {
-            squares -= sums.length_squared(&x);
-            volume += factor.log_det();
+        let (triangle, x) = whitened.regression();
+        squares += triangle.predicted(&x);
+        if triangle.determined() {
+            volume += triangle.log_det();
             left -= x.len() as f64;
         }
     }
@@ -172,15 +173,19 @@ fn autoregression(mut all: Vec<Series>, max_order: usize) -> Result<(f64, ArMode
 
 impl Series {
     /// Least squares of the values on what is beside the noise; 0 where that is not determined.
-    fn regression(&self) -> (NormalEquations, Vec<f64>) {
+    fn regression(&self) -> (Triangle, Vec<f64>) {
         let q = self.beside.len();
-        let mut sums = NormalEquations::new(q);
-        let columns: Vec<(usize, &[f64])> =
-            self.beside.iter().map(Vec::as_slice).enumerate().collect();
-        sums.add(&columns, &self.values);
-        let factor = sums.factor(|_| 0.0);
-        let x = factor.map_or(vec![0.0; q], |factor| factor.solve(|i| sums.je(i)));
-        (sums, x)
+        let mut columns: Vec<&[f64]> = self.beside.iter().map(Vec::as_slice).collect();
+        columns.push(&self.values);
+        let mut triangle = Triangle::new(q + 1);
+        triangle.push_columns(&columns);
+        triangle.finish();
+        let x = if triangle.determined() {
+            triangle.solve(&(0..q).collect::<Vec<_>>(), &[], 0.0)
+        } else {
+            vec![0.0; q]
+        };
+        (triangle, x)
     }
 }
 

@@ -5,12 +5,15 @@
 //! a record's offsets are estimated, `y^ = c_y + T(p) (r - c_r)` with `T = B R/P`, and its two levels join the
 //! parameters, with the sensitivities `1` and `-T 1`.
 //!
-//! Cost per sample with p parameters: the simulation, and `p (p + 3)/2` products for the sums.
+//! The sums are held as the triangle R of [`estimation::Triangle`]: `J'' = 2 R'R`, `J' = -2 R'z`, z its last column, so that the condition of
+//! the sensitivities is not squared; [`Problem`] is one of [`estimation::Residuals`].
+//!
+//! Cost per sample with p parameters: the simulation, and `2 (p + 1)^2` operations for the triangle.
 
 use ct_lti::Hold;
+use estimation::{Residuals, Sample, Triangle};
 
 use crate::control_check::{Mismatch, controller_mismatch};
-use crate::normal_equations::NormalEquations;
 use crate::simulation::BLOCK;
 use crate::{
     ClosedLoop, Controller, Error, LoopRecord, LoopSimulator, Offsets, Orders, PlantModel,
@@ -56,8 +59,11 @@ pub struct Problem {
     orders: Orders,
     records: Vec<Prepared>,
     mismatches: Vec<Option<Mismatch>>,
-    columns: usize,
-    samples: usize,
+    /// All columns: the parameters of the plant, then the estimated levels.
+    free: Vec<usize>,
+    bounds: Vec<(f64, f64)>,
+    /// Of the one output.
+    samples: [usize; 1],
 }
 
 /// Why parameters have no criterion.
@@ -67,7 +73,12 @@ pub(crate) enum Refused {
     Unstable,
     /// Numbers out of range.
     NotFinite,
+    /// J is above the limit.
+    Higher,
 }
+
+/// J may be above its limit by this part: sums in another order differ by less.
+const ROUNDING: f64 = 1e-9;
 
 impl Problem {
     /// Checks everything that can be checked before a fit.
@@ -148,8 +159,9 @@ impl Problem {
             orders,
             records: prepared,
             mismatches,
-            columns,
-            samples,
+            free: (0..columns).collect(),
+            bounds: vec![(f64::NEG_INFINITY, f64::INFINITY); columns],
+            samples: [samples],
         })
     }
 
@@ -165,7 +177,7 @@ impl Problem {
 
     /// Samples in all records.
     pub fn samples(&self) -> usize {
-        self.samples
+        self.samples[0]
     }
 
     /// How far the controller is from each record's u; none for a record without u, and in open loop.
@@ -181,13 +193,13 @@ impl Problem {
 
     /// Parameters of the plant and estimated levels.
     pub(crate) fn columns(&self) -> usize {
-        self.columns
+        self.free.len()
     }
 
     /// The vector of all unknowns at this plant: theta, and each estimated level's distance from its start, 0.
     pub(crate) fn start(&self, plant: &PlantModel) -> Vec<f64> {
         let mut x = plant.theta().to_vec();
-        x.resize(self.columns, 0.0);
+        x.resize(self.columns(), 0.0);
         x
     }
 
@@ -214,34 +226,74 @@ impl Problem {
         PlantModel::from_theta(self.orders, &x[..self.orders.parameters()])
     }
 
-    /// J and its derivatives at x.
-    pub(crate) fn evaluate(&self, x: &[f64]) -> Result<NormalEquations, Refused> {
+    /// J and its derivatives at x, or the residual's column alone, unless J is above a limit: that is known before the last sample as a rule.
+    pub(crate) fn evaluate(
+        &self,
+        x: &[f64],
+        limit: f64,
+        sensitivities: bool,
+    ) -> Result<Triangle, Refused> {
         let plant = self.plant(x).map_err(|_| Refused::NotFinite)?;
         let closed = ClosedLoop::new(&plant, &self.controller).map_err(|_| Refused::NotFinite)?;
         if !closed.is_stable() {
             return Err(Refused::Unstable);
         }
-        let mut equations = NormalEquations::new(self.columns);
-        self.visit(&closed, &plant, x, |_, columns, e| {
-            equations.add(columns, e)
-        })
-        .map_err(|_| Refused::NotFinite)?;
-        if equations.is_finite() {
-            Ok(equations)
+        // Each record's rows have few columns other than zero: they are folded by themselves.
+        let of_record = |index| {
+            let places = self.places(index, sensitivities);
+            (index, Triangle::new(places.len()), places)
+        };
+        let mut all = Triangle::new(if sensitivities { self.columns() + 1 } else { 1 });
+        let mut own = of_record(0);
+        let limit = limit * (1.0 + ROUNDING);
+        let seen = self.visit(&closed, &plant, x, sensitivities, |index, columns| {
+            if index != own.0 {
+                let (_, mut record, places) = std::mem::replace(&mut own, of_record(index));
+                record.finish();
+                all.append(&record, &places);
+            }
+            own.1.push_columns(columns);
+            // A cost that is no number is found out below.
+            let cost = all.cost() + own.1.cost();
+            !(cost > limit && cost.is_finite())
+        });
+        if !seen.map_err(|_| Refused::NotFinite)? {
+            return Err(Refused::Higher);
+        }
+        let (_, mut record, places) = own;
+        record.finish();
+        all.append(&record, &places);
+        all.finish();
+        if all.is_finite() {
+            Ok(all)
         } else {
             Err(Refused::NotFinite)
         }
     }
 
-    /// Simulates all records at x and shows the index of the record, the columns of its sensitivities and its
-    /// residual, up to [`BLOCK`] samples at a time.
-    pub(crate) fn visit(
+    /// Where the columns that a record shows have their places: those of theta, its levels, the residual; or the residual alone.
+    fn places(&self, index: usize, sensitivities: bool) -> Vec<usize> {
+        if !sensitivities {
+            return vec![0];
+        }
+        let mut places: Vec<usize> = (0..self.orders.parameters()).collect();
+        if let Some(column) = self.records[index].column {
+            places.extend([column, column + 1]);
+        }
+        places.push(self.columns());
+        places
+    }
+
+    /// Simulates all records at x and shows the index of the record and, if asked for, the columns of its sensitivities (theta, then its
+    /// levels), the residual's last, up to [`BLOCK`] samples at a time, until `see` has seen enough; whether it has seen all.
+    fn visit(
         &self,
         closed: &ClosedLoop,
         plant: &PlantModel,
         x: &[f64],
-        mut see: impl FnMut(usize, &[(usize, &[f64])], &[f64]),
-    ) -> Result<(), Error> {
+        sensitivities: bool,
+        mut see: impl FnMut(usize, &[&[f64]]) -> bool,
+    ) -> Result<bool, Error> {
         let mut last: Option<(f64, Hold, LoopSimulator)> = None;
         let parameters = self.orders.parameters();
         for (index, record) in self.records.iter().enumerate() {
@@ -258,7 +310,7 @@ impl Problem {
                     record.step,
                 )?,
             };
-            let mut steps = record.column.map(|_| {
+            let mut steps = record.column.filter(|_| sensitivities).map(|_| {
                 let mut steps = simulator.clone();
                 steps.reset();
                 steps
@@ -273,25 +325,99 @@ impl Problem {
                 for (drive, r) in drive.iter_mut().zip(r) {
                     *drive = r - level;
                 }
-                let block = simulator.sensitivities(&drive[..len]);
-                for ((e, y), model) in e.iter_mut().zip(y).zip(block.y()) {
-                    *e = y - model - y_level;
+                let mut error = |model: &[f64]| {
+                    for ((e, y), model) in e.iter_mut().zip(y).zip(model) {
+                        *e = y - model - y_level;
+                    }
+                };
+                if !sensitivities {
+                    error(&simulator.outputs(&drive[..len]));
+                    if !see(index, &[&e[..len]]) {
+                        return Ok(false);
+                    }
+                    continue;
                 }
-                let mut columns: Vec<(usize, &[f64])> =
-                    (0..parameters).map(|j| (j, block.sigma(j))).collect();
-                if let (Some(column), Some(steps)) = (record.column, &mut steps) {
+                let block = simulator.sensitivities(&drive[..len]);
+                error(block.y());
+                let mut columns: Vec<&[f64]> = (0..parameters).map(|j| block.sigma(j)).collect();
+                if let Some(steps) = &mut steps {
                     let response = steps.outputs(&ONES[..len]);
                     for (s, response) in step_response.iter_mut().zip(&response) {
                         *s = -response;
                     }
-                    columns.push((column, &step_response[..len]));
-                    columns.push((column + 1, &ONES[..len]));
+                    columns.extend([&step_response[..len], &ONES[..len]]);
                 }
-                see(index, &columns, &e[..len]);
+                columns.push(&e[..len]);
+                if !see(index, &columns) {
+                    return Ok(false);
+                }
             }
             last = Some((record.step, record.hold, simulator));
         }
-        Ok(())
+        Ok(true)
+    }
+
+    /// Shows the rows of all samples, or those of the residual alone.
+    fn each(
+        &self,
+        x: &[f64],
+        sensitivities: bool,
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        let plant = self.plant(x).ok()?;
+        let closed = ClosedLoop::new(&plant, &self.controller).ok()?;
+        if !closed.is_stable() {
+            return None;
+        }
+        let mut row = vec![0.0; if sensitivities { self.columns() + 1 } else { 1 }];
+        let mut places = Vec::new();
+        let mut present = None;
+        let seen = self.visit(&closed, &plant, x, sensitivities, |index, columns| {
+            let mut first = present != Some(index);
+            if first {
+                present = Some(index);
+                places = self.places(index, sensitivities);
+            }
+            let samples = columns.first().map_or(0, |column| column.len());
+            (0..samples).all(|k| {
+                // Whoever sees a row may change it.
+                row.fill(0.0);
+                for (&place, column) in places.iter().zip(columns) {
+                    row[place] = column[k];
+                }
+                let sample = Sample {
+                    output: 0,
+                    first: std::mem::take(&mut first),
+                    missing: false,
+                };
+                row.iter().all(|value| value.is_finite()) && each(sample, &mut row)
+            })
+        });
+        seen.ok()?.then_some(())
+    }
+}
+
+/// The residual `y - y^` of all records as one output, no sample missing; its entries are theta, and each estimated level's distance from where it started (drive, then y,
+/// record by record). It is not finite where the loop is not stable.
+impl Residuals for Problem {
+    fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
+    }
+
+    fn samples(&self) -> &[usize] {
+        &self.samples
+    }
+
+    fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        self.each(x, true, each)
+    }
+
+    fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        self.each(x, false, each)
     }
 }
 

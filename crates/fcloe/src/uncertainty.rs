@@ -11,6 +11,7 @@
 //! of a white residual hold it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`).
 
 use ct_signals::student_half_width;
+use estimation::{Residuals, residuals};
 use serde::Serialize;
 
 use crate::noise_model::{NoiseModel, NoisePath, Residual};
@@ -59,25 +60,27 @@ impl Problem {
     /// [`Error::NotDetermined`] where the data leave a combination of parameters open.
     pub fn uncertainty(&self, fit: &Fit, path: Option<NoisePath>) -> Result<Uncertainty, Error> {
         let closed = ClosedLoop::new(&fit.plant, self.controller())?;
-        let sums = self
-            .evaluate(&fit.x)
+        let triangle = self
+            .evaluate(&fit.x, f64::INFINITY, true)
             .map_err(|_| Error::NotFiniteSimulation)?;
         let q = self.columns();
         let parameters = self.orders().parameters();
-        let bread = sums.factor(|_| 0.0).ok_or(Error::NotDetermined {
-            parameters: q,
-            samples: self.samples(),
-        })?;
+        let bread = triangle
+            .covariance(self.free())
+            .ok_or(Error::NotDetermined {
+                parameters: q,
+                samples: self.samples(),
+            })?;
 
-        let residual = |(step, free_level)| Residual {
-            step,
-            free_level,
-            values: Vec::new(),
-        };
-        let mut residuals: Vec<Residual> = self.steps_and_free_levels().map(residual).collect();
-        self.visit(&closed, &fit.plant, &fit.x, |index, _, e| {
-            residuals[index].values.extend_from_slice(e);
-        })?;
+        let series = residuals(self, &fit.x).ok_or(Error::NotFiniteSimulation)?;
+        let records = self.steps_and_free_levels().zip(series);
+        let residuals: Vec<Residual> = records
+            .map(|((step, free_level), values)| Residual {
+                step,
+                free_level,
+                values,
+            })
+            .collect();
         let noise = NoiseModel::of_residuals(&residuals, &closed, path, MAX_ORDER)?;
 
         // Each record has its own filter, from rest; from the process of the noise at its sampling interval.
@@ -87,16 +90,13 @@ impl Problem {
             .map(|residual| noise.process(&closed, residual.step))
             .collect::<Result<Vec<_>, _>>()?;
         let mut filters: Vec<_> = processes.iter().map(|process| process.sum(q)).collect();
-        let mut row = vec![0.0; q];
-        self.visit(&closed, &fit.plant, &fit.x, |index, columns, e| {
-            for k in 0..e.len() {
-                row.fill(0.0);
-                for (column, values) in columns {
-                    row[*column] = values[k];
-                }
-                filters[index].push(&row);
-            }
-        })?;
+        let mut begun = 0;
+        self.each_row(&fit.x, |sample, row| {
+            begun += usize::from(sample.first);
+            filters[begun - 1].push(&row[..q]);
+            true
+        })
+        .ok_or(Error::NotFiniteSimulation)?;
         for filter in filters {
             meat.iter_mut()
                 .zip(filter.finish())
@@ -107,7 +107,6 @@ impl Problem {
         let freedom = (n - (q + noise.ar.order()) as f64).max(1.0);
         // The model's sigma^2 is over n less its order.
         let variance = noise.ar.sigma().powi(2) * (n - noise.ar.order() as f64) / freedom;
-        let bread = bread.inverse();
         let times = |i: usize, j: usize| -> f64 {
             (0..q)
                 .map(|k| bread[i][k] * (0..q).map(|l| meat[k * q + l] * bread[l][j]).sum::<f64>())
@@ -116,7 +115,7 @@ impl Problem {
         let covariance: Vec<Vec<f64>> = (0..q)
             .map(|i| (0..q).map(|j| variance * times(i, j)).collect())
             .collect();
-        let white = sums.cost() / (n - q as f64).max(1.0);
+        let white = triangle.cost() / (n - q as f64).max(1.0);
         Ok(Uncertainty {
             std_errors: (0..parameters)
                 .map(|i| covariance[i][i].max(0.0).sqrt())

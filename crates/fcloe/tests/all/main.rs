@@ -8,6 +8,7 @@ mod coverage;
 mod error_of_the_loop;
 mod experiment;
 mod freedom;
+mod least_squares;
 mod offsets;
 mod recovery;
 mod recursive;

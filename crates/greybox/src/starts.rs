@@ -172,8 +172,8 @@ fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     let h2 = head(all.max(0.0), x[pumps + 2]);
     let h3 = h2 + head(first, x[pumps + 1]);
     let mut levels = [h3 + head(first, x[pumps]), h3, h2];
-    // They stand about the first that is read as they would at rest.
-    let read = scales.outputs[0].vessel;
+    // They stand about the lowest that is read as they would at rest.
+    let read = scales.outputs[scales.lowest_output()].vessel;
     let shift = first_reading(setup, record, read).unwrap_or(0.0) - levels[read];
     for (vessel, level) in levels.iter_mut().enumerate() {
         let at_rest = (*level + shift).max(0.0);

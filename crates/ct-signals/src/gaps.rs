@@ -126,6 +126,14 @@ impl Record {
         steps(&self.time).map(|step| sampling.missing(step)).sum()
     }
 
+    /// The time of the row behind which the first row is missing \[s\].
+    #[must_use]
+    pub fn before_missing_row(&self) -> Option<f64> {
+        let sampling = Sampling::of(&self.time);
+        let at = steps(&self.time).position(|step| sampling.missing(step) > 0);
+        at.map(|at| self.time[at])
+    }
+
     /// Whether rows are missing, or samples of an input.
     #[must_use]
     pub fn has_gaps(&self) -> bool {

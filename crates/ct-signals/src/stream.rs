@@ -9,7 +9,7 @@ use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
 use crate::columns::{Found, Layout};
 use crate::csv::{check_width, delimiter, is_number};
-use crate::{Columns, Conversion, Error, quoted, unit};
+use crate::{Columns, Conversion, Error, escaped, quoted, unit};
 
 /// The names of the columns in use, where they have no header; all behind the last are outputs.
 const ROLES: [&str; 3] = ["time", "input", "output"];
@@ -152,7 +152,9 @@ impl Rows {
             rows.names
                 .extend((0..outputs).map(|output| named(&columns.outputs, output)));
             let units = rows.names[1..].iter();
-            rows.units = units.map(|name| unit::split(name).1.to_string()).collect();
+            rows.units = units
+                .map(|name| escaped(unit::split(name).1).into_owned())
+                .collect();
             for (i, name) in rows.names.iter_mut().enumerate() {
                 if name.is_empty() {
                     *name = ROLES[i.min(OUTPUTS)].to_string();
@@ -185,7 +187,7 @@ impl Rows {
         {
             rows.at.push(index);
             rows.names.push(header);
-            rows.units.push(unit);
+            rows.units.push(escaped(&unit).into_owned());
             rows.conversions.push(converted.map(|(_, by)| by));
         }
         rows.seconds = seconds;
@@ -213,7 +215,7 @@ impl Rows {
         self.names.get(OUTPUTS + output).map_or("", String::as_str)
     }
 
-    /// Units of input and outputs, in order; empty where nothing says.
+    /// Units of input and outputs, in order and in printable text; empty where nothing says.
     pub fn units(&self) -> impl Iterator<Item = &str> {
         self.units.iter().map(String::as_str)
     }

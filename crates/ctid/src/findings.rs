@@ -67,22 +67,29 @@ pub(crate) fn noise_floors(diagnosis: &Diagnosis) -> PerOutput {
     )
 }
 
-/// The error that a single effect leaves, and its unit: errors of several outputs are one number only where each is divided by its noise.
-pub(crate) fn score_error<'a>(diagnosis: &'a Diagnosis, score: &Score) -> (f64, &'a str) {
+/// Errors of several outputs are one number only where each is divided by its noise: of an only output the error itself, of several the
+/// weighted one, and the unit that goes with it.
+fn one_error<T>(diagnosis: &Diagnosis, only: T, weighted: T) -> (T, &str) {
     if several(diagnosis) {
-        (score.weighted_rmse, TIMES_THE_NOISE)
+        (weighted, TIMES_THE_NOISE)
     } else {
-        (score.rmse, &diagnosis.output_unit)
+        (only, &diagnosis.output_unit)
     }
 }
 
-/// The same of a step, on the fitted records.
+/// The error that a single effect leaves, and its unit.
+pub(crate) fn score_error<'a>(diagnosis: &'a Diagnosis, score: &Score) -> (f64, &'a str) {
+    one_error(diagnosis, score.rmse, score.weighted_rmse)
+}
+
+/// The error of a step on the fitted records, and its unit.
 pub(crate) fn step_error<'a>(diagnosis: &'a Diagnosis, step: &Step) -> (f64, &'a str) {
-    if several(diagnosis) {
-        (step.weighted_rmse, TIMES_THE_NOISE)
-    } else {
-        (step.rmse, &diagnosis.output_unit)
-    }
+    one_error(diagnosis, step.rmse, step.weighted_rmse)
+}
+
+/// The same on held-out records, where there are some.
+pub(crate) fn held_out_step_error(diagnosis: &Diagnosis, step: &Step) -> Option<f64> {
+    one_error(diagnosis, step.rmse_test, step.weighted_rmse_test).0
 }
 
 /// Where a step fails, output by output, behind the name of the output where there are several.

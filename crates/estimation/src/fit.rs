@@ -124,6 +124,13 @@ impl Fit {
         self.prior_weight
     }
 
+    /// Standard deviation of the innovations at each output, by [`Fit::variance`].
+    #[must_use]
+    pub fn scales(&self) -> Vec<f64> {
+        let sigma = self.variance().sqrt();
+        self.weights.iter().map(|weight| sigma / weight).collect()
+    }
+
     /// Standard error of every entry of the vector; `None` for one that is fixed, held at a bound, or not determined.
     #[must_use]
     pub fn std_errors(&self) -> Vec<Option<f64>> {

@@ -39,8 +39,8 @@ pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
 fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     let structure = &setup.structure;
     let scales = &structure.scales;
-    // The output that the others lead into.
-    let last = scales.outputs.len() - 1;
+    // The output that the others lead into, wherever it stands among them.
+    let last = scales.lowest_output();
     let read = scales.outputs[last].vessel;
     let (mut u, mut y, mut uu, mut uy, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for record in setup.records {
@@ -99,7 +99,7 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
         Plant::SingleTankLinear => vec![slope, tau[1], y - slope * u],
         Plant::CascadedTanksLinear => vec![slope, tau[0], tau[1], y - slope * u],
         Plant::FirstOrder => vec![if driven { y / u } else { slope }, tau[1]],
-        Plant::ThreeTank => joined_tanks(setup, mean, flow(scales.area[read]), heads),
+        Plant::ThreeTank => joined_tanks(setup, (read, mean), flow(scales.area[read]), heads),
     };
     let added = structure.parameters().split_off(x.len());
     x.extend(
@@ -111,9 +111,9 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     x
 }
 
-/// Pumps, valves and outlet of joined tanks that rest, the measured one at its mean level, with a throughput; `heads`: of the valves,
-/// as shares of that level.
-fn joined_tanks(setup: &Setup, mean: f64, flow: f64, heads: [f64; 2]) -> Vec<f64> {
+/// Pumps, valves and outlet of joined tanks that rest, a measured one at its mean level, with a throughput; `heads`: of the valves, as
+/// shares of that level.
+fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f64; 2]) -> Vec<f64> {
     let scales = &setup.structure.scales;
     let second = scales.input_2.is_some();
     let middle = |signal: fn(&Record) -> Option<&Channel>| {
@@ -130,7 +130,6 @@ fn joined_tanks(setup: &Setup, mean: f64, flow: f64, heads: [f64; 2]) -> Vec<f64
     let through = (gain * u).max(0.1 * flow);
     let [d13, d32] = heads.map(|share| share * mean);
     // Levels in the row, T1, T3, T2, from the measured one.
-    let read = scales.outputs.last().map_or(2, |output| output.vessel);
     let outlet = match read {
         0 => mean - d13 - d32,
         1 => mean - d32,
@@ -173,8 +172,8 @@ fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     let h2 = head(all.max(0.0), x[pumps + 2]);
     let h3 = h2 + head(first, x[pumps + 1]);
     let mut levels = [h3 + head(first, x[pumps]), h3, h2];
-    // They stand about the first that is read as they would at rest.
-    let read = scales.outputs[0].vessel;
+    // They stand about the lowest that is read as they would at rest.
+    let read = scales.outputs[scales.lowest_output()].vessel;
     let shift = first_reading(setup, record, read).unwrap_or(0.0) - levels[read];
     for (vessel, level) in levels.iter_mut().enumerate() {
         let at_rest = (*level + shift).max(0.0);

@@ -29,6 +29,7 @@ const TRIED: f64 = 0.8;
 /// Where the records, the plant or the fit do not allow it.
 pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
     let begun = Instant::now();
+    problem.check()?;
     let mut diagnosis = match Mended::of(problem, options)? {
         None => compare_whole(problem, options)?,
         Some(mended) => {

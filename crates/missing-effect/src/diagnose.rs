@@ -44,6 +44,7 @@ pub fn diagnose(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Diagnosis, Error> {
     let begun = Instant::now();
+    problem.check()?;
     let mut diagnosis = match Mended::of(problem, options)? {
         None => diagnose_whole(problem, options, progress)?,
         Some(mended) => {
@@ -181,8 +182,8 @@ fn diagnose_whole(
         && let Some(rounded) = rounded(course.last())?
     {
         rounding = Some(sentences::of_rounding(
-            &rounded,
-            &problem.records[0].outputs[rounded.output],
+            &rounded.outputs,
+            &problem.records[0].outputs,
         ));
         let longer = judge.longer(course.nodes.clone(), rounded.node)?;
         // What nothing explains stays unexplained where rounding leaves something that is not noise.

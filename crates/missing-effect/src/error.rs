@@ -27,6 +27,30 @@ pub enum Error {
     /// An experiment that cannot be proposed.
     #[error(transparent)]
     Design(#[from] crate::design::Refused),
+    /// A record has other outputs than the first one.
+    #[error(
+        "{record}: output {output} is {column}, but in {first} it is {needed}: give every record the same outputs in the same order"
+    )]
+    OtherOutput {
+        /// The record.
+        record: String,
+        /// Which of its outputs, counted from one.
+        output: usize,
+        /// The column there, or that it is missing.
+        column: String,
+        /// The first record.
+        first: String,
+        /// The column that the first record has there, or that it is missing.
+        needed: String,
+    },
+    /// The controller reads an output that there is not.
+    #[error("controller: it reads output {output}, but the model has {outputs}: name one of these")]
+    ControlledOutput {
+        /// Which output, counted from one.
+        output: usize,
+        /// How many there are.
+        outputs: usize,
+    },
     /// The controller and the fitted plant do not make a stable loop.
     #[error(
         "controller: the loop of {controller} and the fitted plant is unstable (its output grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",

@@ -4,6 +4,7 @@
 //! of effects that explain the failure, confirms each of them, groups what the data cannot tell apart, and returns
 //! the trail of the falling error. [`design()`](design::design) proposes the experiment that tells two of them apart.
 
+mod check;
 mod closed_loop;
 mod compare;
 mod confirm;
@@ -39,6 +40,7 @@ mod rounding;
 mod scores;
 mod search;
 mod sentences;
+mod series;
 #[cfg(test)]
 mod simulated;
 mod spectral_line;

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use crate::{
     hidden_step::{self, hidden_step},
     node::{Node, ROUGH, best_first, position_of, transfer},
+    series::{series, standardised},
     spectral_line::strongest_line,
 };
 
@@ -43,7 +44,8 @@ const BY_CLOCK: usize = 1;
 pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let mut begun = vec![transfer(from, child)];
     let less = with_less_throughput(&begun[0], child, placed);
-    let pair = child.structure.plant.interchangeable();
+    let structure = &child.structure;
+    let pair = structure.plant.interchangeable(&structure.known);
     if let Some(pair) = pair.filter(|_| placed.effect.place == Place::Vessel) {
         let free = |name| {
             let at = child.names().iter().position(|known| known == name)?;
@@ -263,23 +265,30 @@ fn keep_shown_periods(setup: &Setup, placed: Placed, starts: &mut Vec<Vec<f64>>,
     let Ok(residuals) = setup.disturbance(&without) else {
         return;
     };
-    let of_series = setup
-        .records
-        .iter()
-        .flat_map(|record| record.outputs.iter().map(move |_| record));
-    let whitened: Vec<(&Record, Vec<f64>)> = of_series.zip(noise.whiten(&residuals)).collect();
+    let shown = most_shown(periods, setup.records, noise.whiten(&residuals));
+    // The strongest line stands out of its neighbours, and may yet be lower than what wanders; its choice is paid for.
+    let strongest = setup.structure.scales.period;
+    starts.retain(|start| {
+        let of = |period: f64| period == start[at];
+        of(strongest) || shown.iter().any(|period| of(*period))
+    });
+}
+
+/// The periods that show most in whitened residuals, outputs by their noise.
+fn most_shown(periods: Vec<f64>, records: &[Record], whitened: Vec<Vec<f64>>) -> Vec<f64> {
+    let outputs = whitened.len() / records.len().max(1);
+    let whitened = standardised(whitened, outputs);
+    let whitened: Vec<(&Record, Vec<f64>)> = series(records)
+        .map(|(record, _)| record)
+        .zip(whitened)
+        .collect();
     let mut shown: Vec<(f64, f64)> = periods
         .into_par_iter()
         .map(|period| (power_at(TAU / period, &whitened), period))
         .collect();
     shown.sort_by(|a, b| b.0.total_cmp(&a.0));
     shown.truncate(PERIODS_SHOWN);
-    // The strongest line stands out of its neighbours, and may yet be lower than what wanders; its choice is paid for.
-    let strongest = setup.structure.scales.period;
-    starts.retain(|start| {
-        let of = |period: f64| period == start[at];
-        of(strongest) || shown.iter().any(|(_, period)| of(*period))
-    });
+    shown.into_iter().map(|(_, period)| period).collect()
 }
 
 /// The power of series at a frequency \[rad/s\].
@@ -305,14 +314,11 @@ pub(crate) fn period_of(setup: &Setup) -> Option<usize> {
 // A cell is filled by it: it must not wait for other threads, for the reason that is given at the hidden step.
 fn strongest_period(node: &Node) -> Option<f64> {
     let residuals = node.setup.disturbance(&node.fit.x).ok()?;
-    let of_series = node
-        .setup
-        .records
-        .iter()
-        .flat_map(|record| record.outputs.iter().map(move |_| record));
-    let lines = residuals.iter().zip(of_series);
+    let lines = residuals.iter().zip(series(node.setup.records));
     let strongest = lines
-        .filter_map(|(residual, record)| Some((strongest_line(residual).ok()??, record.duration())))
+        .filter_map(|(residual, (record, _))| {
+            Some((strongest_line(residual).ok()??, record.duration()))
+        })
         .min_by(|a, b| a.0.chance.total_cmp(&b.0.chance));
     Some(strongest.map_or(0.0, |(line, duration)| duration / line.cycles as f64))
 }
@@ -431,4 +437,32 @@ pub(crate) fn place<'a>(
     // First, since out of time one start is followed.
     proposal.starts.insert(0, start.into());
     realise(proposal, noise, stopping)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+    use crate::simulated;
+
+    #[test]
+    fn a_swing_of_a_quiet_output_shows_beside_a_noisy_one() {
+        let problem = simulated::two_levels(3);
+        let records = &problem.records;
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let count = records[0].len();
+        let noisy = ct_signals::noise::white(count, 5.0, &mut rng);
+        let mut quiet = ct_signals::noise::white(count, 0.05, &mut rng);
+        let swing = 60.0;
+        for (value, t) in quiet.iter_mut().zip(&records[0].time) {
+            *value += 0.05 * (TAU * t / swing).sin();
+        }
+        let periods: Vec<f64> = (0..60)
+            .map(|k| 10.0 * 1.05_f64.powi(k))
+            .chain([swing])
+            .collect();
+        let shown = most_shown(periods, records, vec![noisy, quiet]);
+        assert_eq!(shown[0], swing, "{shown:?}");
+    }
 }

@@ -24,11 +24,18 @@ const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
 
 /// A model with rounding, and what rounding makes of the error.
 pub(crate) struct Rounded<'a> {
-    /// The model with rounding.
+    /// The model with rounding at the first of the outputs.
     pub node: Node<'a>,
     /// What is named with it.
     pub group: Group,
-    /// The output whose readings are rounded.
+    /// The outputs whose readings are rounded, at least one: that first of whose error rounding makes most.
+    pub outputs: Vec<RoundedOutput>,
+}
+
+/// An output whose readings are rounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RoundedOutput {
+    /// The output.
     pub output: usize,
     /// The number that readings are multiples of \[output unit\].
     pub step: f64,
@@ -46,12 +53,8 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
     if structure.effects().iter().any(|on| on.effect.id == EFFECT) {
         return Ok(None);
     }
-    let rounds = |output: usize| {
-        let step = exact_reading_step(node.setup.records, output)?;
-        let share = step.powi(2) / 12.0 / node.fit.rmse[output].powi(2);
-        SHARE.contains(&share).then_some((output, step, share))
-    };
-    let Some((output, step, share)) = (0..node.setup.outputs()).find_map(rounds) else {
+    let outputs = rounded_outputs(node);
+    let Some(&RoundedOutput { output, step, .. }) = outputs.first() else {
         return Ok(None);
     };
     let placed = Placed {
@@ -83,8 +86,58 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
     Ok(Some(Rounded {
         node: Node { setup, fit, added },
         group,
-        output,
-        step,
-        share,
+        outputs,
     }))
+}
+
+/// The outputs whose readings are rounded, that first of whose error rounding makes most.
+fn rounded_outputs(node: &Node) -> Vec<RoundedOutput> {
+    let rounds = |output: usize| {
+        let step = exact_reading_step(node.setup.records, output)?;
+        let share = step.powi(2) / 12.0 / node.fit.rmse[output].powi(2);
+        SHARE.contains(&share).then_some(RoundedOutput {
+            output,
+            step,
+            share,
+        })
+    };
+    let mut outputs: Vec<RoundedOutput> = (0..node.setup.outputs()).filter_map(rounds).collect();
+    outputs.sort_by(|a, b| b.share.total_cmp(&a.share));
+    outputs
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::{Options, problem::base, sentences::of_rounding, simulated};
+
+    #[test]
+    fn every_output_that_is_rounded_is_said() {
+        let mut problem = simulated::two_levels(4);
+        for (output, step) in problem.records[0].outputs.iter_mut().zip([0.8, 0.3]) {
+            for y in &mut output.values {
+                *y = (*y / step).round() * step;
+            }
+        }
+        let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
+        let found = rounded(&node).unwrap().unwrap();
+        let steps: Vec<(usize, f64)> = found.outputs.iter().map(|o| (o.output, o.step)).collect();
+        // The quieter one first: more of its error is rounding.
+        assert!(
+            steps[0].0 == 1 && (steps[0].1 - 0.3).abs() < 1e-9,
+            "{steps:?}"
+        );
+        assert!(
+            steps[1].0 == 0 && (steps[1].1 - 0.8).abs() < 1e-9,
+            "{steps:?}"
+        );
+        assert_eq!(found.node.added.last().unwrap().vessel, 1);
+        let said = of_rounding(&found.outputs, &problem.records[0].outputs);
+        assert!(
+            said.contains("of lower are multiples of 0.300 cm")
+                && said.contains("of upper are multiples of 0.800 cm"),
+            "{said}"
+        );
+    }
 }

@@ -20,7 +20,7 @@ pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]
             let placed = *node.added.last()?;
             let (_, at) = node.size_of(placed)?;
             let parameters = step::parameters(&node.setup, &node.fit, &node.fit.std_errors());
-            let projected = signature(base, node, noise);
+            let projected = signature(base, node, noise, &node.fit.scales());
             Some(Score {
                 effect: placed.effect.id.to_string(),
                 place: step::place_name(node, placed),
@@ -33,7 +33,7 @@ pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]
                 size: parameters.get(at).cloned(),
                 smallest_visible: projected
                     .filter(|(p, j)| *p > ABSORBED * j)
-                    .map(|(p, _)| VISIBLE * node.fit.variance().sqrt() / p),
+                    .map(|(p, _)| VISIBLE / p),
             })
         })
         .collect()
@@ -46,15 +46,14 @@ pub(crate) fn price_of_colour(base: &Node, single: &[Node], noise: &Noise) -> Op
         return None;
     }
     let white = base.setup.white_noise();
-    // Innovations over the noise itself, in the mean of outputs.
-    let ratio = |model: &ArModel| (model.sigma() / model.stationary_std()).ln();
-    let colour = (noise.iter().map(ratio).sum::<f64>() / noise.outputs() as f64).exp();
+    let innovations: Vec<f64> = noise.iter().map(ArModel::sigma).collect();
+    let whole: Vec<f64> = noise.iter().map(ArModel::stationary_std).collect();
     let mut ratios: Vec<f64> = single
         .par_iter()
         .filter_map(|node| {
-            let (own, whole) = signature(base, node, noise)?;
-            let (in_white, _) = signature(base, node, &white)?;
-            (own > ABSORBED * whole).then(|| in_white / own * colour)
+            let (own, all) = signature(base, node, noise, &innovations)?;
+            let (in_white, _) = signature(base, node, &white, &whole)?;
+            (own > ABSORBED * all).then(|| in_white / own)
         })
         .collect();
     ratios.sort_by(f64::total_cmp);
@@ -62,8 +61,10 @@ pub(crate) fn price_of_colour(base: &Node, single: &[Node], noise: &Noise) -> Op
 }
 
 /// The length of the signature of an effect at its absent value, beside what the base's own parameters can imitate and as
-/// a whole; `None` where it has no derivative there.
-fn signature(base: &Node, node: &Node, noise: &Noise) -> Option<(f64, f64)> {
+/// a whole, in standard deviations of the innovations (`scales`, of each output); `None` where it has no derivative there.
+///
+/// The scales are those of the fit: at the absent value the residuals hold the effect, and would make an output that it acts on count less.
+fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<(f64, f64)> {
     let (leading, at) = node.size_of(*node.added.last()?)?;
     if !leading.absent.is_finite() {
         return None;
@@ -75,7 +76,9 @@ fn signature(base: &Node, node: &Node, noise: &Noise) -> Option<(f64, f64)> {
         }
     }
     x[at] = leading.absent;
-    let triangle = node.setup.linearise(&x, noise)?;
+    let mut setup = node.setup.clone();
+    setup.known_scales = Some(scales.to_vec());
+    let triangle = setup.linearise(&x, noise)?;
     let column = node.setup.free().iter().position(|&i| i == at)?;
     let mut order: Vec<usize> = (0..node.setup.free().len())
         .filter(|&j| {
@@ -89,5 +92,48 @@ fn signature(base: &Node, node: &Node, noise: &Noise) -> Option<(f64, f64)> {
     order.push(column);
     let chosen = triangle.select(&order);
     let last = order.len() - 1;
-    Some((chosen.at(last, last).abs(), chosen.column_norm(last)))
+    // Outputs count in units of the first one's noise.
+    let lengths = [chosen.at(last, last).abs(), chosen.column_norm(last)];
+    let [own, all] = lengths.map(|length| length / scales[0]);
+    Some((own, all))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use plants::{EffectInfo, Placed};
+
+    use super::*;
+    use crate::{
+        Options,
+        node::FINE,
+        problem::base,
+        proposal::place,
+        simulated::{self, INTERVAL},
+    };
+
+    #[test]
+    fn what_is_visible_hangs_on_the_noise_and_not_on_the_effect() {
+        // Both levels of two linear tanks; the lower sensor drifts by ten times the noise, which is in the residual where it is absent.
+        let mut problem = simulated::two_levels(5);
+        for (k, y) in problem.records[0].outputs[1].values.iter_mut().enumerate() {
+            *y += 0.0005 * INTERVAL * k as f64;
+        }
+        let (base, _) = base(&problem, &Options::default(), 1.0).unwrap();
+        let white = base.setup.white_noise();
+        let drift = Placed {
+            effect: EffectInfo::find("sensor_drift").unwrap(),
+            vessel: 1,
+        };
+        let node = place(&base, drift, &base, &white, FINE).unwrap();
+        let scored = scores(&base, std::slice::from_ref(&node), &white, &[1.0, 1.0]);
+        // The reading is linear in the drift, so its standard error is that of the signature.
+        let error = scored[0].size.as_ref().unwrap().std_error.unwrap();
+        let visible = scored[0].smallest_visible.unwrap();
+        assert!(
+            (visible / (VISIBLE * error) - 1.0).abs() < 0.15,
+            "{visible} beside {}",
+            VISIBLE * error
+        );
+    }
 }

@@ -1,15 +1,16 @@
 //! The findings in words.
 
-use ct_signals::{Channel, Clock, Gaps, duration};
+use ct_signals::{Channel, Gaps, duration};
 use plants::{Domain, EffectInfo, Placed};
 
 use crate::{
     Acceptance, Diagnosis, LONGEST_HOLD, MendedGaps, Parameter, PerOutput, Problem, Rankings, Step,
-    Unknown, Verdict,
+    Verdict,
     node::Node,
     numbers::{significant, value_and_error},
     remains::{Left, Remains},
-    rounding::Rounded,
+    rounding::RoundedOutput,
+    unknown::of_unknown,
 };
 
 /// A value with its standard error to two significant digits of the latter.
@@ -37,7 +38,7 @@ fn rms(per_output: &PerOutput, unit: &str) -> String {
     list(&all, "and")
 }
 
-fn list(names: &[String], last_word: &str) -> String {
+pub(crate) fn list(names: &[String], last_word: &str) -> String {
     match names {
         [] => String::new(),
         [one] => one.clone(),
@@ -162,20 +163,25 @@ pub(crate) fn of_a_part(last: &Node) -> String {
     )
 }
 
-/// What readings of an output say of a converter.
-pub(crate) fn of_rounding(rounded: &Rounded, output: &Channel) -> String {
-    let (step, share, unit) = (rounded.step, rounded.share, &output.unit);
-    let of = if rounded.node.setup.outputs() > 1 {
-        format!(" of {}", output.name)
-    } else {
-        String::new()
+/// What readings say of their converters, a sentence for each output whose readings are rounded.
+pub(crate) fn of_rounding(rounded: &[RoundedOutput], outputs: &[Channel]) -> String {
+    let of_output = |rounded: &RoundedOutput| {
+        let output = &outputs[rounded.output];
+        let (step, unit) = (rounded.step, &output.unit);
+        let of = if outputs.len() > 1 {
+            format!(" of {}", output.name)
+        } else {
+            String::new()
+        };
+        format!(
+            "Nearly all readings{of} are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error of the model without it.",
+            significant(step, 3),
+            significant(step / 12.0_f64.sqrt(), 2),
+            100.0 * rounded.share.min(1.0)
+        )
     };
-    format!(
-        "Nearly all readings{of} are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error of the model without it.",
-        significant(step, 3),
-        significant(step / 12.0_f64.sqrt(), 2),
-        100.0 * share.min(1.0)
-    )
+    let all: Vec<String> = rounded.iter().map(of_output).collect();
+    all.join(" ")
 }
 
 /// That the two weightings of the residual rank different effects first.
@@ -473,103 +479,6 @@ fn next_experiment(group: &[String], added: usize) -> String {
     )
 }
 
-/// Where what is missing acts, on what it depends, and what it looks like.
-fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> String {
-    let place = |name: &str| match name {
-        "actuator" => "at the actuator".to_string(),
-        "sensor" => "at the sensor".to_string(),
-        "vessel" if domain == Domain::General => "in the balance".to_string(),
-        "vessel" => "in the vessel's balance".to_string(),
-        which => {
-            if let Some(read) = which.strip_prefix("sensor ") {
-                return format!("at the {}", domain.sensor_words(read));
-            }
-            let (which, kind) = domain.vessel_words(which);
-            format!("in the balance of the {which} {kind}")
-        }
-    };
-    let mut said = format!("What is missing acts {}", place(&unknown.place));
-    let others: Vec<String> = unknown
-        .places
-        .iter()
-        .filter(|other| {
-            other.below_best < crate::unknown::SAME_PLACE && other.place != unknown.place
-        })
-        .map(|other| place(&other.place))
-        .collect();
-    if !others.is_empty() && unknown.variable == "time" {
-        said += &format!(
-            " (or {}: the likelihood does not tell)",
-            others.join(" or ")
-        );
-    }
-    if unknown.variable == "time" {
-        said += " and follows no variable of the plant, so that it is a function of time";
-        if let Some(window) = unknown.windows.first() {
-            said += &format!(
-                ": most {}, {} {} on average",
-                clock.span(window.from, window.to),
-                significant(window.mean, 2),
-                unknown.unit
-            );
-        }
-    } else {
-        let variable = match (unknown.variable, unknown.place.as_str()) {
-            ("input", _) => "the command",
-            ("rate", _) if domain == Domain::General => "the rate of change",
-            ("rate", _) => "the net inflow",
-            (_, place) if place.starts_with("sensor") => "the reading",
-            _ => &format!("the {}", domain.level_words("level")),
-        };
-        said += &format!(" and depends on {variable}");
-        if let Some(share) = unknown.shares.first() {
-            said += &format!(
-                ", which predicts {:.0} ± {:.0} % of it on data that were left out",
-                100.0 * share.share.min(1.0),
-                (100.0 * share.std_error).max(1.0)
-            );
-        }
-        let (low, high) = unknown
-            .ordinates
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-                (low.min(*v), high.max(*v))
-            });
-        said += &format!(
-            "; it ranges over {} {}",
-            significant(high - low, 2),
-            unknown.unit
-        );
-    }
-    match &unknown.primitive {
-        Some(nearest) => {
-            said += &format!("; the nearest simple shape is a {}", nearest.name);
-            if let Some(at) = nearest.at {
-                let (at, unit) = (significant(at, 2), &unknown.variable_unit);
-                said += &match nearest.name {
-                    "swing" => format!(" of a period of {at} {unit}"),
-                    "end of a range" => format!(" below {at} {unit}"),
-                    _ => format!(" at {at} {unit}"),
-                };
-            }
-            if !nearest.effects.is_empty() {
-                said += &format!(
-                    " ({} would leave one)",
-                    list(
-                        &nearest
-                            .effects
-                            .iter()
-                            .map(|e| (*e).to_string())
-                            .collect::<Vec<_>>(),
-                        "or"
-                    )
-                );
-            }
-        }
-        None => said += "; no simple shape comes near",
-    }
-    said + "."
-}
 /// A time of which two digits are known: in seconds below two hours.
 fn about(seconds: f64) -> String {
     if seconds.abs() < 7200.0 {

@@ -52,6 +52,40 @@ pub(crate) fn tank(
     problem(plant, Known::default(), vec![record])
 }
 
+/// Both levels of two linear tanks, the upper reading with four times the noise of the lower one.
+pub(crate) fn two_levels(seed: u64) -> Problem {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (plant, range, samples) = (Plant::CascadedTanksLinear, (3.0, 5.0), 600);
+    let known = Known {
+        measured: vec![0, 1],
+        ..Known::default()
+    };
+    let scales = Scales::from_ranges(range, (5.0, 20.0), INTERVAL, INTERVAL * samples as f64);
+    let structure = Structure::new(plant, known.clone(), scales);
+    let u = excitation::steps(samples, 20..=60, range.0, range.1, &mut rng).unwrap();
+    let mut levels = [4.0, 1.0].map(|times| noise::white(samples, times * NOISE, &mut rng));
+    let theta = [4.0, 40.0, 90.0, 0.0];
+    let mut simulator = Simulator::<f64>::new(&structure, &theta, &[16.0; 2], u[0]).unwrap();
+    for k in 0..samples {
+        for (output, readings) in levels.iter_mut().enumerate() {
+            readings[k] += simulator.read(output);
+        }
+        simulator.advance(Command::held(u[k]), INTERVAL);
+    }
+    let [upper, lower] = levels;
+    let record = Record {
+        name: "simulated".to_string(),
+        time: (0..samples).map(|k| k as f64 * INTERVAL).collect(),
+        inputs: vec![Channel::new("u", "V", u)],
+        outputs: vec![
+            Channel::new("upper", "cm", upper),
+            Channel::new("lower", "cm", lower),
+        ],
+        ..Record::default()
+    };
+    problem(plant, known, vec![record])
+}
+
 #[allow(clippy::too_many_arguments)]
 fn through(
     structure: &Structure,

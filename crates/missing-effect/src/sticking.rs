@@ -7,6 +7,7 @@
 //! **Reference**: M. Kano, H. Maruta, H. Kugemoto, K. Shimizu, Practical model and detection algorithm for valve stiction, Proc. IFAC
 //! DYCOPS 2004, 859-864.
 
+use crate::series::series;
 use ct_signals::Record;
 use statrs::statistics::{Data, OrderStatistics};
 
@@ -34,10 +35,7 @@ struct Shape {
 
 /// Whether some record has the shape of a valve that sticks.
 pub(crate) fn sticks(records: &[Record]) -> bool {
-    let outputs = records
-        .iter()
-        .flat_map(|record| record.outputs.iter().map(move |y| (record, y)));
-    outputs.into_iter().any(|(record, output)| {
+    series(records).any(|(record, output)| {
         let shape = shape(&record.inputs[0].values, &output.interpolated());
         shape.plateaus >= PLATEAUS
             && shape.plateaus as f64 >= OF_JUMPS * shape.jumps as f64

@@ -47,6 +47,7 @@ mod linear;
 mod moments;
 mod plant;
 mod scalar;
+mod scales;
 mod sensor;
 mod simulator;
 mod structure;
@@ -60,10 +61,8 @@ pub use error::Error;
 pub use law::{Balance, Law, Rim, Side};
 pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scalar::{Dual, Scalar};
+pub use scales::{Deciles, OutputScales, Picked, Scales, deciles};
 pub use simulator::{Command, Simulator};
-pub use structure::{
-    Deciles, Known, MAX_VESSELS, OutputScales, Picked, Placed, Scales, Site, Structure, WIDENED,
-    deciles,
-};
+pub use structure::{Known, MAX_VESSELS, Placed, Site, Structure, WIDENED};
 pub use term::{Fitted, MOST_KNOTS, Term, Variable};
 pub use unit::Unit;

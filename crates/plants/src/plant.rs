@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Unit, structure::Scales};
+use crate::{Known, Unit, scales::Scales};
 
 /// A plant of the model file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -161,10 +161,12 @@ impl Plant {
     }
 
     /// Two parameters that may be exchanged without any reading becoming another, once the first level of the vessel that nobody
-    /// measures is fitted anew; an effect in one of the vessels tells them apart.
+    /// measures is fitted anew; an effect in one of the vessels tells them apart. `None` too where both levels are measured, or a measured
+    /// disturbance flows into the lower vessel: these tell them apart already.
     #[must_use]
-    pub fn interchangeable(self) -> Option<[&'static str; 2]> {
-        (self == Self::CascadedTanksLinear).then_some(["tau1", "tau2"])
+    pub fn interchangeable(self, known: &Known) -> Option<[&'static str; 2]> {
+        let told_apart = known.outputs(self).len() > 1 || known.disturbed_vessel(self) == Some(1);
+        (self == Self::CascadedTanksLinear && !told_apart).then_some(["tau1", "tau2"])
     }
 
     /// Its own fitted parameters, in the order in which the simulator takes them. Of a record with a measured disturbance

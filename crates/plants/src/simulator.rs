@@ -207,7 +207,6 @@ impl<T: Scalar> Simulator<T> {
         let outputs = &structure.scales.outputs;
         let mut vessels = Vec::new();
         let mut sensors: Vec<Vec<_>> = outputs.iter().map(|_| Vec::new()).collect();
-        let last_output = sensors.len() - 1;
         // The laws of joined vessels once more without derivatives.
         let plain: Vec<f64> = theta.iter().map(|value| value.value()).collect();
         let mut values = Vec::new();
@@ -224,7 +223,7 @@ impl<T: Scalar> Simulator<T> {
                 match placed.effect.place {
                     Place::Actuator => actuators[placed.vessel.min(1)].push(law),
                     Place::Vessel => vessels.push((placed.vessel, law)),
-                    Place::Sensor => sensors[placed.vessel.min(last_output)].push(law),
+                    Place::Sensor => sensors[placed.vessel].push(law),
                 }
             }
             at += count;
@@ -237,7 +236,7 @@ impl<T: Scalar> Simulator<T> {
             match term.place {
                 Place::Actuator => actuators[term.vessel.min(1)].push(law),
                 Place::Vessel => vessels.push((term.vessel, law)),
-                Place::Sensor => sensors[term.vessel.min(last_output)].push(law),
+                Place::Sensor => sensors[term.vessel].push(law),
             }
             at += count;
         }
@@ -260,9 +259,7 @@ impl<T: Scalar> Simulator<T> {
                     Some(second) if lag.vessel > 0 => second.actuator.unsettle(before, sample),
                     _ => actuator.unsettle(before, sample),
                 },
-                _ => sensors[lag.vessel.min(last_output)]
-                    .1
-                    .unsettle(before, sample),
+                _ => sensors[lag.vessel].1.unsettle(before, sample),
             }
         }
         let watched = sensors[lagging.unwrap_or(0)].0;

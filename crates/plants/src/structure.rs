@@ -1,11 +1,10 @@
 //! A structure: a plant, what is known of it, and the effects that are on, in chain order.
 
-use serde::{Deserialize, Serialize};
-
 use crate::{
     Domain, Error, ParameterInfo, Plant, Term,
     effects::{self, EffectInfo, Place},
     plant::Outlet,
+    scales::{OutputScales, Picked, Scales, quantile},
 };
 
 /// The most vessels a plant has.
@@ -15,108 +14,6 @@ pub(crate) const SERIES: usize = 2;
 
 /// How many times wider the range of a size becomes that ended at its bound.
 pub const WIDENED: f64 = 4.0;
-
-/// The best of many values that were looked at: a start whose choice a claim has to pay for.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Picked {
-    /// The best.
-    pub value: f64,
-    /// How many were looked at.
-    pub of: f64,
-}
-
-/// What the data visit: it sets the plausible ranges, the starts and the operating levels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Scales {
-    /// Smallest and largest command \[input unit\].
-    pub input: (f64, f64),
-    /// Smallest and largest value of the second input: the command to the second pump or, where [`Known::disturbance`] says so, the measured
-    /// disturbance; `None`: there is none \[input unit\].
-    pub input_2: Option<(f64, f64)>,
-    /// Deciles of the commands, where they are known \[input unit\].
-    #[serde(default)]
-    pub input_deciles: [Option<Deciles>; 2],
-    /// Range over which the actuator works: the known one, or zero to the largest command \[input unit\].
-    pub input_range: f64,
-    /// How many vessels there are, as [`Structure::new`] knows it.
-    pub vessels: usize,
-    /// Smallest and largest level that each vessel visits, as far as it is known \[level unit\].
-    pub level: [(f64, f64); MAX_VESSELS],
-    /// Deciles of these levels, where they are known \[level unit\].
-    #[serde(default)]
-    pub level_deciles: [Option<Deciles>; MAX_VESSELS],
-    /// Height of the tanks, where it is known, as [`Structure::new`] knows it \[level unit\].
-    #[serde(default)]
-    pub tank_height: Option<f64>,
-    /// Mean level of each vessel \[level unit\].
-    pub operating_level: [f64; MAX_VESSELS],
-    /// Area of each vessel, one where it is not known.
-    pub area: [f64; MAX_VESSELS],
-    /// The outputs in order, at least one, as [`Structure::new`] knows them.
-    pub outputs: Vec<OutputScales>,
-    /// Flow through a valve of flow coefficient one at one unit of head, where it is known \[level^2.5/s\].
-    pub orifice: Option<f64>,
-    /// Period of the strongest line in the spectrum of what is not explained so far; zero where none is looked for \[s\].
-    pub period: f64,
-    /// Mean throughput \[area x level/s\].
-    pub flow: f64,
-    /// Median sampling interval \[s\].
-    pub sample_interval: f64,
-    /// Length of the longest record \[s\].
-    pub duration: f64,
-}
-
-/// An output: a sensor and what its readings show.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct OutputScales {
-    /// The vessel whose level it reads.
-    pub vessel: usize,
-    /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
-    pub reading_step: f64,
-    /// Step of a sensor that takes most out of what is not explained so far, where the readings show none; `None` where none is looked for
-    /// \[level unit\].
-    pub hidden_step: Option<Picked>,
-}
-
-/// The 10 %, 20 %, ... 90 % quantiles of what was visited.
-pub type Deciles = [f64; 9];
-
-/// The quantile of a share, between two ends and straight between the deciles; of an even spread where these are not known.
-fn quantile(share: f64, (low, high): (f64, f64), deciles: Option<&Deciles>) -> f64 {
-    let Some(deciles) = deciles else {
-        return low + share * (high - low);
-    };
-    let at = |i: usize| match i {
-        0 => low,
-        10 => high,
-        _ => deciles[i - 1],
-    };
-    let place = 10.0 * share.clamp(0.0, 1.0);
-    let below = (place as usize).min(9);
-    at(below) + (place - below as f64) * (at(below + 1) - at(below))
-}
-
-/// The deciles of values; `None` of nothing.
-#[must_use]
-pub fn deciles(mut values: Vec<f64>) -> Option<Deciles> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    Some(std::array::from_fn(|i| {
-        values[((i + 1) as f64 * last as f64 / 10.0).round() as usize]
-    }))
-}
-
-impl Scales {
-    /// The largest level in any vessel, by magnitude.
-    #[must_use]
-    pub fn largest_level(&self) -> f64 {
-        // What there is not has the range of the reading.
-        let levels = self.level.iter().take(self.vessels.max(SERIES));
-        levels.fold(0.0, |most: f64, (low, high)| {
-            most.max(low.abs()).max(high.abs())
-        })
-    }
-}
 
 /// Constants that are known and not fitted.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -213,8 +110,7 @@ impl Site<'_> {
     /// At the sensor: its output.
     #[must_use]
     pub fn output(&self) -> &OutputScales {
-        let last = self.scales.outputs.len() - 1;
-        &self.scales.outputs[self.vessel.min(last)]
+        &self.scales.outputs[self.vessel]
     }
     /// The vessel stands above another one, into which its outlet leads.
     #[must_use]
@@ -579,63 +475,9 @@ impl Structure {
     }
 }
 
-impl Scales {
-    /// Scales from the ranges of the command and of the reading, before any simulation has shown more.
-    #[must_use]
-    pub fn from_ranges(
-        input: (f64, f64),
-        output: (f64, f64),
-        sample_interval: f64,
-        duration: f64,
-    ) -> Self {
-        let middle = 0.5 * (output.0 + output.1);
-        Self {
-            input,
-            input_2: None,
-            input_deciles: [None; 2],
-            input_range: input.0.abs().max(input.1.abs()),
-            level: [output; MAX_VESSELS],
-            level_deciles: [None; MAX_VESSELS],
-            tank_height: None,
-            operating_level: [middle; MAX_VESSELS],
-            area: [1.0; MAX_VESSELS],
-            vessels: 1,
-            outputs: vec![OutputScales::default()],
-            orifice: None,
-            period: 0.0,
-            flow: middle.abs() / (0.1 * duration),
-            sample_interval,
-            duration,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn quantiles_lie_on_what_was_visited() {
-        // Nine tenths of the time near the lower end.
-        let values: Vec<f64> = (0..=1000)
-            .map(|k| f64::from(k) / 1000.0)
-            .map(|x| if x < 0.9 { x } else { 0.9 + 91.0 * (x - 0.9) })
-            .collect();
-        let known = deciles(values).unwrap();
-        let at = |share| quantile(share, (0.0, 10.0), Some(&known));
-        for (share, value) in [
-            (0.0, 0.0),
-            (0.25, 0.25),
-            (0.9, 0.9),
-            (0.95, 5.45),
-            (1.0, 10.0),
-        ] {
-            assert!((at(share) - value).abs() < 1e-9, "{share}: {}", at(share));
-        }
-        assert_eq!(quantile(0.25, (2.0, 10.0), None), 4.0);
-        assert_eq!(deciles(Vec::new()), None);
-        assert_eq!(deciles(vec![3.0]), Some([3.0; 9]));
-    }
 
     #[test]
     fn rims_and_holes_lie_within_the_tank() {

@@ -31,7 +31,8 @@ pub(crate) use self::{
 };
 use crate::columns::{Columns, Found, Heading, Layout};
 use crate::{
-    Calendar, Channel, Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, quoted, read_file, unit,
+    Calendar, Channel, Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, escaped, quoted, read_file,
+    unit,
 };
 
 /// How a record is read.
@@ -289,10 +290,12 @@ impl Table {
             calendar.start = calendar.start.after(first);
             self.time.iter_mut().for_each(|time| *time -= first);
         }
+        // Names and units go into sentences, tables and files; none of them may steer a terminal.
+        let printable = |text: &str| escaped(text).into_owned();
         let mut values = self.values.into_iter();
         let mut channels = |columns: &[Found]| -> Vec<Channel> {
             let channel = |(column, values): (&Found, Vec<f64>)| {
-                Channel::new(&*column.name, &*column.unit, values)
+                Channel::new(printable(&column.name), printable(&column.unit), values)
             };
             columns.iter().zip(values.by_ref()).map(channel).collect()
         };
@@ -309,7 +312,7 @@ impl Table {
         let missing = named
             .filter(|(_, words)| !words.is_empty())
             .map(|(column, words)| MissingSamples {
-                column: column.name.clone(),
+                column: printable(&column.name),
                 samples: words.iter().map(|(_, count)| count).sum(),
                 words: words
                     .iter()
@@ -320,9 +323,9 @@ impl Table {
         let converted = layout.channels().filter_map(|column| {
             let (from, _) = column.converted.as_ref()?;
             Some(Converted {
-                column: column.name.clone(),
-                from: from.clone(),
-                to: column.unit.clone(),
+                column: printable(&column.name),
+                from: printable(from),
+                to: printable(&column.unit),
             })
         });
         let summary = ReadSummary {

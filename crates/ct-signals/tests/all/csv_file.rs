@@ -153,6 +153,17 @@ fn quoted_headers_and_cells() {
 }
 
 #[test]
+fn names_and_units_are_printable_text() {
+    let header = "t [s],\u{1b}[31mu\u{202e} [V],\u{1b}[2Jy [\u{7}cm]";
+    let text = text(header, &rows());
+    let columns = named("t [s]", "\u{1b}[31mu\u{202e}", "\u{1b}[2Jy");
+    let record = read_bytes(text.as_bytes(), &columns).unwrap();
+    assert_eq!(record.inputs[0].name, "\\u{1b}[31mu\\u{202e}");
+    assert_eq!(record.outputs[0].name, "\\u{1b}[2Jy");
+    assert_eq!(record.outputs[0].unit, "\\u{7}cm");
+}
+
+#[test]
 fn units_as_suffixes() {
     let text = text("t_s,u_pump_V,y_level2_V", &rows());
     let guessed = read(&text).unwrap();

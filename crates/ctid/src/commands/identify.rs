@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use ct_signals::{Columns, Hold, ReadOptions, Reading, Record, quoted, read_csv};
+use ct_signals::{Channel, Clock, Columns, Hold, ReadOptions, Reading, Record, quoted, read_csv};
 use missing_effect::Progress;
 
 use super::{Results, finish};
@@ -103,6 +103,13 @@ enum InputHold {
     Zero,
     /// It runs on a line to the next sample: a measured input
     First,
+}
+
+/// The time of the first sample that a channel lacks \[s\].
+fn first_missing(record: &Record, channel: &Channel) -> f64 {
+    let mut samples = record.time.iter().zip(&channel.values);
+    let lacks = samples.find(|(_, value)| value.is_nan());
+    lacks.map_or(f64::NAN, |(time, _)| *time)
 }
 
 impl Identify {
@@ -262,17 +269,20 @@ impl Identify {
         let record = self.without_unnamed(record);
         let missing = record.channels().find(|channel| channel.missing() > 0);
         let rows = record.missing_rows();
+        let clock = Clock::of([&record]);
         let what = match missing {
             Some(channel) => format!(
-                "column \"{}\": {} of {} samples are missing",
+                "column \"{}\": {} of {} samples are missing, the first at {}",
                 quoted(&channel.header()),
                 channel.missing(),
-                record.len()
+                record.len(),
+                clock.at(first_missing(&record, channel))
             ),
             None if rows > 0 && !self.methods().iter().all(|method| method.is_refined()) => {
+                let behind = clock.at(record.before_missing_row().unwrap_or(f64::NAN));
                 match rows {
-                    1 => "1 row is missing".to_string(),
-                    rows => format!("{rows} rows are missing"),
+                    1 => format!("1 row is missing behind {behind}"),
+                    rows => format!("{rows} rows are missing, the first behind {behind}"),
                 }
             }
             None => return Ok(Reading { record, summary }),

@@ -339,23 +339,20 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
 
 /// ` at the upper vessel`, ` at the sensor of the lower tank`, where the plant has several; `assumed` when nobody said which.
 fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
-    match placed.place_name(model.plant, &model.known) {
-        Some(name) => {
-            let (kind, sensor) = match (placed.effect.place, model.plant.joined()) {
-                (Place::Vessel, false) => (" vessel", ""),
-                (Place::Sensor, _) => (" tank", "the sensor of "),
-                _ => ("", ""),
-            };
-            let other = if assumed {
-                "; `--where` says another"
-            } else {
-                ""
-            };
-            let the = if kind.is_empty() { "" } else { "the " };
-            format!(" at {sensor}{the}{name}{kind}{other}")
-        }
-        None => String::new(),
-    }
+    let Some(name) = placed.place_name(model.plant, &model.known) else {
+        return String::new();
+    };
+    let place = match (placed.effect.place, model.plant.joined()) {
+        (Place::Vessel, false) => format!("the {name} vessel"),
+        (Place::Sensor, _) => format!("the {}", model.domain().sensor_words(name)),
+        _ => name.to_string(),
+    };
+    let other = if assumed {
+        "; `--where` says another"
+    } else {
+        ""
+    };
+    format!(" at {place}{other}")
 }
 
 fn list(model: &ModelFile) -> String {

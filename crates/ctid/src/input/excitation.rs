@@ -43,10 +43,12 @@ pub enum ExcitationWarning {
         /// Unit of the command.
         unit: String,
     },
-    /// The output of a record shows no trace of its command.
+    /// An output of a record shows no trace of its command.
     NoAnswer {
         /// The record.
         record: String,
+        /// The output, where there are several.
+        output: Option<String>,
         /// Range of the output.
         range: f64,
         /// Median of the absolute first differences of the output.
@@ -76,13 +78,17 @@ impl fmt::Display for ExcitationWarning {
             ),
             Self::NoAnswer {
                 record,
+                output,
                 range,
                 difference,
                 unit,
             } => write!(
                 f,
-                "{record}: the output shows no trace of the command: its range of {} is that of noise (median change from row to row {}); \
+                "{record}: the output{} shows no trace of the command: its range of {} is that of noise (median change from row to row {}); \
                  check the columns, or record an experiment with larger steps",
+                output
+                    .as_ref()
+                    .map_or(String::new(), |name| format!(" \"{name}\"")),
                 with_unit(*range, unit),
                 with_unit(*difference, unit),
             ),
@@ -115,13 +121,19 @@ pub(crate) fn of_records<'a>(
                     record: record.name.clone(),
                 });
             }
-        } else if let Some((range, difference)) = no_answer(record) {
-            warnings.push(ExcitationWarning::NoAnswer {
-                record: record.name.clone(),
-                range,
-                difference,
-                unit: record.outputs[0].unit.clone(),
-            });
+            continue;
+        }
+        let several = record.outputs.len() > 1;
+        for output in &record.outputs {
+            if let Some((range, difference)) = no_answer(record, output) {
+                warnings.push(ExcitationWarning::NoAnswer {
+                    record: record.name.clone(),
+                    output: several.then(|| output.name.clone()),
+                    range,
+                    difference,
+                    unit: output.unit.clone(),
+                });
+            }
         }
     }
     warnings.extend(single_step(records));
@@ -174,10 +186,10 @@ fn moves(signal: &Channel, least: f64) -> Vec<(f64, f64)> {
     moves
 }
 
-/// Range of the output and median of its first differences, where it does not answer to the command.
-fn no_answer(record: &Record) -> Option<(f64, f64)> {
-    let (input, output) = (&record.inputs[0].interpolated(), &record.outputs[0].values);
-    let (low, high) = record.output_range();
+/// Range of an output and median of its first differences, where it does not answer to the command.
+fn no_answer(record: &Record, output: &Channel) -> Option<(f64, f64)> {
+    let (low, high) = output.range();
+    let (input, output) = (&record.inputs[0].interpolated(), &output.values);
     let differences = output.windows(2).map(|y| (y[1] - y[0]).abs());
     let mut differences: Vec<f64> = differences.filter(|d| !d.is_nan()).collect();
     let middle = differences.len() / 2;
@@ -296,6 +308,26 @@ mod tests {
         }
         // Each of the tests finds something by chance in one record of a hundred.
         assert!(raised >= 18, "{raised} of 20");
+    }
+
+    #[test]
+    fn each_of_several_outputs_is_looked_at() {
+        let command = steps(600, 40, 1);
+        let mut both = record("a.csv", 5.0, 20.0, 1, &command);
+        let silent = record("a.csv", 0.0, 20.0, 2, &command)
+            .outputs
+            .swap_remove(0);
+        both.outputs.push(Channel {
+            name: "lower".into(),
+            ..silent
+        });
+        let warnings = warnings(&[both]);
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        let said = warnings[0].to_string();
+        assert!(
+            said.starts_with("a.csv: the output \"lower\" shows no trace"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -6,7 +6,7 @@ pub mod excitation;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use ct_signals::{Hold, ReadOptions, ReadSummary, Reading, Record, read_csv};
+use ct_signals::{Hold, ReadOptions, ReadSummary, Reading, Record, escaped, read_csv};
 use missing_effect::Problem;
 
 use self::checks::{
@@ -159,8 +159,11 @@ impl Files {
 
     /// An error of the computation, with the file that is to blame where that is known.
     pub(crate) fn blame(&self, error: missing_effect::Error) -> Error {
-        use missing_effect::Error::{Design, Structure, UnstableLoop};
-        if matches!(error, UnstableLoop { .. } | Structure(_)) {
+        use missing_effect::Error::{ControlledOutput, Design, Structure, UnstableLoop};
+        if matches!(
+            error,
+            UnstableLoop { .. } | ControlledOutput { .. } | Structure(_)
+        ) {
             return Error::file(&self.model, error.to_string());
         }
         // Its message names the option.
@@ -168,10 +171,7 @@ impl Files {
             return error.into();
         }
         let what = error.to_string();
-        let named = |path: &PathBuf| {
-            path.file_name()
-                .is_some_and(|name| what.contains(&*name.to_string_lossy()))
-        };
+        let named = |path: &PathBuf| what.contains(&self.name_of(path));
         if self.data.iter().chain(&self.test).any(named) {
             return error.into();
         }
@@ -182,14 +182,15 @@ impl Files {
         }
     }
 
-    /// How a record is called: by its file, or by its path where another has the same file name.
+    /// How a record is called: by its file, or by its path where another has the same file name; in printable text.
     pub(crate) fn name_of(&self, path: &Path) -> String {
         let records = self.data.iter().chain(&self.test);
         let same = records.filter(|other| other.file_name() == path.file_name());
-        match path.file_name() {
+        let name = match path.file_name() {
             Some(name) if same.count() <= 1 => name.to_string_lossy().into_owned(),
             _ => path.display().to_string(),
-        }
+        };
+        escaped(&name).into_owned()
     }
 
     /// No record twice: a fitted one cannot be held out, and twice the same is not twice the data.

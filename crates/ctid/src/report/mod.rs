@@ -129,11 +129,7 @@ fn trail(diagnosis: &Diagnosis) -> String {
         .iter()
         .map(|step| {
             let (error, unit) = findings::step_error(diagnosis, step);
-            let test = if several {
-                step.weighted_rmse_test
-            } else {
-                step.rmse_test
-            };
+            let test = findings::held_out_step_error(diagnosis, step);
             let unit = text::unit(unit);
             let mut below = test.map_or(String::new(), |error| {
                 format!(

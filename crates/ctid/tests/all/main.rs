@@ -12,6 +12,7 @@ mod identify_refined;
 mod injected;
 mod model_file;
 mod monitor;
+mod outputs;
 mod own_term;
 mod prior;
 mod program;

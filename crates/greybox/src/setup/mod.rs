@@ -102,9 +102,11 @@ pub(crate) fn scales_of(records: &[Record], plant: Plant, known: &Known) -> Opti
         let outputs = records.iter().map(move |record| &record.outputs[o]);
         deciles(outputs.flat_map(Channel::present).collect())
     };
-    // A level that nobody reads is taken for one like the last that is read.
-    scales.level_deciles = [readings(ranges.len() - 1); MAX_VESSELS];
-    for (o, (vessel, (low, high))) in known.outputs(plant).into_iter().zip(ranges).enumerate() {
+    let vessels = known.outputs(plant);
+    // A level that nobody reads is taken for one like the lowest that is read.
+    let lowest = (0..vessels.len()).max_by_key(|&o| vessels[o])?;
+    scales.level_deciles = [readings(lowest); MAX_VESSELS];
+    for (o, (vessel, (low, high))) in vessels.into_iter().zip(ranges).enumerate() {
         scales.level[vessel] = (low, high);
         scales.operating_level[vessel] = 0.5 * (low + high);
         scales.level_deciles[vessel] = readings(o);
@@ -236,10 +238,11 @@ impl<'a> Setup<'a> {
                 .map(|output| output.values.len() - output.missing())
                 .sum()
         };
-        // A millionth of the range: of a sensor that rounds, of a level that stands still.
-        let floor = |o: usize| {
-            let range = output_range(records, o).filter(|_| outputs > 1);
-            range.map_or(0.0, |(low, high)| 1e-6 * (high - low))
+        // A millionth of the range or, of a level that stands still, of the largest level.
+        let floor = |o: usize| match output_range(records, o) {
+            Some((low, high)) if outputs > 1 && low < high => 1e-6 * (high - low),
+            Some(_) if outputs > 1 => 1e-6 * reach,
+            _ => 0.0,
         };
         Ok(Self {
             known_scales: None,

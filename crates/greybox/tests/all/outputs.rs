@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use crate::support::{PRECISE, Rig};
 use approx::assert_relative_eq;
 use ct_signals::{ArModel, Channel, Record, excitation, noise};
-use estimation::squares;
-use greybox::{FitOptions, Noise, Setup, fit, fit_from, robust};
+use estimation::{Residuals, squares};
+use greybox::{FitOptions, Noise, Setup, fit, fit_from, random_starts, robust};
 use nalgebra::{DMatrix, DVector};
 use plants::{Command, Known, Simulator, Structure};
 use rand::SeedableRng;
@@ -242,4 +242,69 @@ fn records_with_another_number_of_outputs_are_refused() {
         said.contains("it has 1 outputs, but the model has 2"),
         "{said}"
     );
+}
+
+#[test]
+fn starts_follow_the_vessels_and_not_the_order_of_the_columns() {
+    let records = [record(7, 200, 0.0)];
+    let mut swapped = records.clone();
+    swapped[0].outputs.swap(0, 1);
+    let plant = Rig::cascaded_tanks().plant;
+    let other = Known {
+        measured: vec![1, 0],
+        ..known()
+    };
+    let other = Setup::from_records(plant, other, &[], &swapped, BTreeMap::new()).unwrap();
+    let (own, other) = (setup(&records), other);
+    assert_eq!(random_starts(&own, 5, 1), random_starts(&other, 5, 1));
+}
+
+#[test]
+fn starts_of_three_tanks_follow_the_vessels_too() {
+    let of_levels = |measured: &[usize]| {
+        let readings = |vessel: usize| {
+            let mean = [30.0, 20.0, 10.0][vessel];
+            let values = (0..60).map(|k| mean + f64::from(k % 7)).collect();
+            Channel::new(format!("h{vessel}"), "cm", values)
+        };
+        Record {
+            name: "three".into(),
+            time: (0..60).map(f64::from).collect(),
+            inputs: vec![Channel::new(
+                "u",
+                "V",
+                (0..60).map(|k| f64::from(k / 10)).collect(),
+            )],
+            outputs: measured.iter().map(|&vessel| readings(vessel)).collect(),
+            ..Record::default()
+        }
+    };
+    let starts = |measured: &[usize]| {
+        let records = [of_levels(measured)];
+        let known = Known {
+            measured: measured.to_vec(),
+            ..Known::default()
+        };
+        let plant = plants::Plant::ThreeTank;
+        let setup = Setup::from_records(plant, known, &[], &records, BTreeMap::new()).unwrap();
+        (
+            random_starts(&setup, 5, 1),
+            setup.structure.scales.level_deciles,
+        )
+    };
+    assert_eq!(starts(&[0, 2]), starts(&[2, 0]));
+    assert_eq!(starts(&[0, 1]), starts(&[1, 0]));
+    assert_eq!(starts(&[0, 1, 2]), starts(&[1, 2, 0]));
+}
+
+#[test]
+fn a_level_that_stands_still_does_not_count_alone() {
+    let mut records = [record(8, 200, 0.0)];
+    records[0].outputs[0].values.fill(12.0);
+    let setup = setup(&records);
+    // The model meets nothing here, so the weights are those of the residuals; met exactly they are those of the floor.
+    for output in 0..2 {
+        assert!(setup.floor(output) > 0.0, "output {output}");
+    }
+    assert!(setup.floor(0) < 1e-4);
 }

@@ -88,6 +88,7 @@ pub fn design(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Design, Error> {
     let begun = Instant::now();
+    problem.check()?;
     let mended = Mended::of(problem, options)?;
     let problem = mended.as_ref().map_or(problem, |mended| &mended.problem);
     if between[0].is_that_of(between[1]) {
@@ -231,8 +232,7 @@ fn fitted<'a>(
     };
     let nodes = [refined(0)?, refined(1)?];
     let fit = &nodes[usize::from(nodes[1].fit.bic() < nodes[0].fit.bic())].fit;
-    let sigma = fit.variance().sqrt();
-    let scales = fit.weights.iter().map(|weight| sigma / weight).collect();
+    let scales = fit.scales();
     let base = refine(&base, &noise, &[])?;
     // What was fitted in part would seem to be a twin of the model without it.
     if base.setup.out_of_time() {

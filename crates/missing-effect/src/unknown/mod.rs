@@ -6,6 +6,7 @@
 //! 3. The simple shape that comes nearest (`primitive.rs`), and the effects that leave such a shape.
 
 mod primitive;
+mod sentence;
 mod shape;
 mod smooth;
 #[cfg(test)]
@@ -16,6 +17,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 pub use self::primitive::Primitive;
+pub(crate) use self::sentence::of_unknown;
 use self::{
     primitive::nearest,
     shape::{Shape, shape},

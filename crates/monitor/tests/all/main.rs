@@ -6,3 +6,4 @@ mod domain;
 mod monitor;
 mod outputs;
 mod play;
+mod support;

@@ -3,10 +3,12 @@
 use ct_signals::{Hold, excitation, noise};
 use monitor::{
     Alarm, Error, Model, Monitor, Notice, Progress, Refused, Row, ScatterAlarm, ScatterEvent,
-    Settings, Stage, State, Step, Units, Verdict,
+    Settings, Stage, State, Step, Verdict,
 };
 use plants::{EffectInfo, Known, Placed, Plant};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+
+use crate::support::{alarms, all, new, notices, units};
 
 /// A single tank under random steps of the command, read with noise.
 struct Tank {
@@ -70,37 +72,6 @@ fn model() -> Model {
     Model::new(Plant::SingleTank, known)
 }
 
-fn units() -> Units {
-    Units {
-        output: "cm".into(),
-        input: "V".into(),
-    }
-}
-
-fn new() -> Monitor {
-    Monitor::new(model(), Settings::default(), units()).unwrap()
-}
-
-fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
-    rows.iter()
-        .map(|row| monitor.update(row).unwrap())
-        .collect()
-}
-
-fn alarms(steps: &[Step]) -> Vec<&Alarm> {
-    steps
-        .iter()
-        .filter_map(|step| step.alarm.as_ref())
-        .collect()
-}
-
-fn notices(steps: &[Step]) -> Vec<&Notice> {
-    steps
-        .iter()
-        .flat_map(|step| step.notices.iter().flatten())
-        .collect()
-}
-
 /// The first and the last alarm of a leak that begins at 4000 s, which was seen, named and dated.
 fn first_and_last<'a>(alarms: &[&'a Alarm]) -> (&'a Alarm, &'a Alarm) {
     let first = alarms.first().unwrap();
@@ -121,7 +92,7 @@ fn a_leak_is_seen_named_and_dated() {
         leak: |t| if t < 4000.0 { 0.0 } else { 1.5 },
         ..Tank::default()
     };
-    let steps = all(&mut new(), &tank.run());
+    let steps = all(&mut new(model()), &tank.run());
     let alarms = alarms(&steps);
     let (first, last) = first_and_last(&alarms);
     assert_eq!(first.event, Stage::Alarm);
@@ -151,7 +122,7 @@ fn the_learned_model_stays_until_it_fits_again() {
         ..Tank::default()
     };
     let rows = tank.run();
-    let mut monitor = new();
+    let mut monitor = new(model());
     // The last look is 1200 s after the alarm; a long gap on the way back changes nothing.
     let mut steps = all(&mut monitor, &rows[..3500]);
     let learned = monitor.estimates()[1].learned;
@@ -200,7 +171,7 @@ fn a_scatter_that_grows_is_said_in_words_and_is_no_effect() {
         for (row, extra) in rows[2000..3500].iter_mut().zip(extra) {
             row.outputs[0] += extra;
         }
-        let steps = all(&mut new(), &rows);
+        let steps = all(&mut new(model()), &rows);
         let said: Vec<&ScatterAlarm> = steps.iter().filter_map(|s| s.scatter[0].as_ref()).collect();
         let [up, down] = said[..] else {
             panic!("{said:?}");
@@ -224,7 +195,7 @@ fn readings_that_alternate_are_no_fit() {
     for (k, row) in rows[2000..].iter_mut().enumerate() {
         row.outputs[0] += [0.25, -0.25][k % 2];
     }
-    let steps = all(&mut new(), &rows);
+    let steps = all(&mut new(model()), &rows);
     let first = steps
         .iter()
         .find_map(|step| step.scatter[0].as_ref())
@@ -242,7 +213,7 @@ fn a_leak_grows_no_scatter() {
         leak: |t| if t < 4000.0 { 0.0 } else { 12.0 },
         ..Tank::default()
     };
-    let steps = all(&mut new(), &tank.run());
+    let steps = all(&mut new(model()), &tank.run());
     assert!(!alarms(&steps).is_empty());
     assert!(steps.iter().all(|step| step.scatter[0].is_none()));
 }
@@ -256,7 +227,7 @@ fn nothing_is_seen_where_nothing_is() {
             seed,
             ..Tank::default()
         };
-        let mut monitor = new();
+        let mut monitor = new(model());
         let steps = all(&mut monitor, &tank.run());
         assert!(alarms(&steps).is_empty(), "{:?}", alarms(&steps));
         // The innovations are white and of the size that was learned.
@@ -286,7 +257,7 @@ fn the_estimates_follow_and_their_band_holds() {
             seed,
             ..Tank::default()
         };
-        let mut monitor = new();
+        let mut monitor = new(model());
         for row in tank.run() {
             monitor.update(&row).unwrap();
             if monitor.rows() > 3000 && monitor.rows().is_multiple_of(1500) {
@@ -307,7 +278,7 @@ fn the_estimates_follow_and_their_band_holds() {
         alpha: |t| if t < 4000.0 { 12.5 } else { 12.75 },
         ..Tank::default()
     };
-    let mut monitor = new();
+    let mut monitor = new(model());
     let rows = tank.run();
     let changed = rows.iter().position(|row| row.time >= 4000.0).unwrap();
     // Before it is learned anew: the alarm has let the tracker go.
@@ -335,14 +306,14 @@ fn a_restored_monitor_goes_on_as_if_nothing_had_happened() {
     rows.drain(3500..3560);
     let kept = rows.split_off(6200);
     rows.extend(kept.into_iter().step_by(2));
-    let mut straight = new();
+    let mut straight = new(model());
     let steps = all(&mut straight, &rows);
     assert!(!alarms(&steps).is_empty());
     for cuts in [
         vec![10, 700, 1500, 2601, 3505, 3600],
         vec![2048, 4400, 4437, 4460, 4700, 5100, 6221, 6400],
     ] {
-        let mut monitor = new();
+        let mut monitor = new(model());
         let mut from = 0;
         for cut in cuts.into_iter().chain([rows.len()]) {
             for (row, expected) in rows[from..cut].iter().zip(&steps[from..cut]) {
@@ -362,7 +333,7 @@ fn a_restored_monitor_goes_on_as_if_nothing_had_happened() {
 
 #[test]
 fn a_state_of_another_model_or_a_damaged_one_is_refused() {
-    let mut monitor = new();
+    let mut monitor = new(model());
     all(&mut monitor, &Tank::default().run()[..1800]);
     let state = monitor.state();
     let mut other = model();
@@ -402,9 +373,9 @@ fn a_state_of_another_model_or_a_damaged_one_is_refused() {
 #[test]
 fn bad_rows_change_nothing() {
     let rows = Tank::default().run();
-    let mut clean = new();
+    let mut clean = new(model());
     let steps = all(&mut clean, &rows[..1500]);
-    let mut monitor = new();
+    let mut monitor = new(model());
     for (k, row) in rows[..1500].iter().enumerate() {
         if k % 7 == 3 {
             let time = row.time;
@@ -463,12 +434,12 @@ fn the_command_of_a_row_counts_where_its_reading_is_lost() {
             ..Tank::default()
         };
         let rows = tank.run();
-        let steps = all(&mut new(), &without_steps(&rows, 2));
+        let steps = all(&mut new(model()), &without_steps(&rows, 2));
         assert_eq!(alarms(&steps), Vec::<&Alarm>::new());
         let lost = steps.iter().filter(|step| step.lost[0].is_some()).count();
         assert!(lost > 100, "{lost}");
         // What was learned and what is said of the readings that are left is what it was with all of them.
-        let whole = all(&mut new(), &rows);
+        let whole = all(&mut new(model()), &rows);
         for (step, whole) in steps.iter().zip(&whole).skip(2000) {
             let (Some(said), Some(of_all)) = (step.innovations[0], whole.innovations[0]) else {
                 assert!(step.lost[0].is_some());
@@ -483,10 +454,10 @@ fn the_command_of_a_row_counts_where_its_reading_is_lost() {
 fn a_reading_that_cannot_be_used_is_lost_and_said() {
     let row = Row::new(0.0, 5.0, &[16.0]);
     for output in [f64::NAN, f64::INFINITY, 1e200] {
-        let step = new().update(&Row::new(0.0, 5.0, &[output])).unwrap();
+        let step = new(model()).update(&Row::new(0.0, 5.0, &[output])).unwrap();
         assert_eq!(step.lost[0].as_ref().unwrap().column(), "output");
     }
-    assert_eq!(new().update(&row).unwrap().lost[0], None);
+    assert_eq!(new(model()).update(&row).unwrap().lost[0], None);
 }
 
 #[test]
@@ -495,7 +466,7 @@ fn what_begins_is_seen_and_named_where_readings_are_lost() {
         leak: |t| if t < 4000.0 { 0.0 } else { 1.5 },
         ..Tank::default()
     };
-    let steps = all(&mut new(), &without_steps(&tank.run(), 2));
+    let steps = all(&mut new(model()), &without_steps(&tank.run(), 2));
     let alarms = alarms(&steps);
     first_and_last(&alarms);
 }
@@ -514,7 +485,7 @@ fn lost_readings_are_no_alarm_in_means_of_rows() {
             row.outputs[0] = f64::NAN;
         }
     }
-    let steps = all(&mut new(), &rows);
+    let steps = all(&mut new(model()), &rows);
     let every = notices(&steps).into_iter().find_map(|notice| match notice {
         Notice::Learned { every, .. } => Some(*every),
         _ => None,
@@ -531,10 +502,10 @@ fn lost_readings_are_no_alarm_in_means_of_rows() {
 #[test]
 fn a_state_with_lost_readings_goes_on_where_it_was() {
     let rows = without_steps(&Tank::default().run(), 2);
-    let mut monitor = new();
+    let mut monitor = new(model());
     let steps = all(&mut monitor, &rows);
     for at in [700, 1900, 2500] {
-        let mut before = new();
+        let mut before = new(model());
         all(&mut before, &rows[..at]);
         let text = serde_json::to_string(&before.state()).unwrap();
         let state: State = serde_json::from_str(&text).unwrap();
@@ -553,7 +524,7 @@ fn too_few_readings_are_not_learned_from() {
             row.outputs[0] = f64::NAN;
         }
     }
-    let mut monitor = new();
+    let mut monitor = new(model());
     let steps = all(&mut monitor, &rows);
     assert!(matches!(monitor.progress(), Progress::Learning(_)));
     let why = notices(&steps).into_iter().find_map(|notice| match notice {
@@ -572,7 +543,7 @@ fn gaps_are_said_and_bridged_or_waited_out() {
     .run();
     rows.drain(6000..6400);
     rows.drain(3000..3003);
-    let mut monitor = new();
+    let mut monitor = new(model());
     let steps = all(&mut monitor, &rows);
     let gaps: Vec<_> = notices(&steps)
         .into_iter()
@@ -601,7 +572,7 @@ fn gaps_are_said_and_bridged_or_waited_out() {
 
 /// Why a first row of input and output is refused, beside one that is taken.
 fn refused(model: Model, row: [f64; 2], taken: [f64; 2]) -> Refused {
-    let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
+    let mut monitor = new(model);
     let row_of = |[input, output]: [f64; 2]| Row::new(0.0, input, &[output]);
     let refused = monitor.update(&row_of(row)).unwrap_err();
     assert_eq!(monitor.rows(), 0);
@@ -623,7 +594,7 @@ fn a_command_that_no_pump_gets_is_refused() {
 fn a_reading_that_no_tank_of_this_height_gives_is_lost() {
     let mut model = model();
     model.known.tank_height = Some(30.0);
-    let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
+    let mut monitor = new(model);
     let mut lost = |time, output| {
         let row = Row::new(time, 5.0, &[output]);
         monitor.update(&row).unwrap().lost[0].clone()
@@ -647,7 +618,7 @@ fn a_clock_that_goes_back_is_followed() {
         row.time -= 4002.0;
     }
     for rows in [ahead, anew] {
-        let mut monitor = new();
+        let mut monitor = new(model());
         all(&mut monitor, &rows[..2001]);
         for row in &rows[2001..2100] {
             let refused = monitor.update(row).unwrap_err();
@@ -680,7 +651,7 @@ fn another_sampling_interval_is_learned_anew() {
         .filter(|(k, _)| *k < 2000 || k % 3 == 0)
         .map(|(_, row)| *row)
         .collect();
-    let steps = all(&mut new(), &kept);
+    let steps = all(&mut new(model()), &kept);
     let changed = notices(&steps).into_iter().find_map(|notice| match notice {
         Notice::IntervalChanged { from, to, .. } => Some((*from, *to)),
         _ => None,
@@ -703,7 +674,7 @@ fn a_plant_that_is_sampled_much_faster_than_it_moves_is_watched_in_blocks() {
         leak: |t| if t < 4500.0 { 0.0 } else { 3.0 },
         ..Tank::default()
     };
-    let steps = all(&mut new(), &tank.run());
+    let steps = all(&mut new(model()), &tank.run());
     let every = notices(&steps).into_iter().find_map(|notice| match notice {
         Notice::Learned { every, .. } => Some(*every),
         _ => None,
@@ -770,7 +741,7 @@ fn a_command_that_stands_still_teaches_nothing() {
     }
     .run();
     let moved = rows.split_off(2500);
-    let mut monitor = new();
+    let mut monitor = new(model());
     for (k, row) in rows.iter().enumerate() {
         let output = 16.0 + 0.01 * ((k * 7919) % 13) as f64;
         let still = Row::new(row.time, 5.0, &[output]);

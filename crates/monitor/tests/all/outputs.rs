@@ -3,10 +3,12 @@
 use ct_signals::{excitation, noise};
 use monitor::{
     Alarm, Error, MAX_OUTPUTS, Model, Monitor, Notice, Progress, Row, ScatterAlarm, Settings,
-    Stage, State, Step, Units, Verdict,
+    Stage, State, Step, Verdict,
 };
 use plants::{Known, Plant};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+
+use crate::support::{alarms, all, new, units};
 
 const INTERVAL: f64 = 2.0;
 /// Standard deviations of the noise at the upper and at the lower sensor, and their correlations from row to row.
@@ -73,30 +75,6 @@ fn model() -> Model {
     Model::new(Plant::CascadedTanks, known)
 }
 
-fn units() -> Units {
-    Units {
-        output: "cm".into(),
-        input: "V".into(),
-    }
-}
-
-fn new() -> Monitor {
-    Monitor::new(model(), Settings::default(), units()).unwrap()
-}
-
-fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
-    rows.iter()
-        .map(|row| monitor.update(row).unwrap())
-        .collect()
-}
-
-fn alarms(steps: &[Step]) -> Vec<&Alarm> {
-    steps
-        .iter()
-        .filter_map(|step| step.alarm.as_ref())
-        .collect()
-}
-
 /// The alarms of tanks in which something begins at 4000 s: the first is raised soon after, the last look is given.
 fn last_look(steps: &[Step]) -> Alarm {
     let alarms = alarms(steps);
@@ -115,7 +93,7 @@ fn healthy_tanks_raise_no_alarm() {
             seed,
             ..Tanks::default()
         };
-        let mut monitor = new();
+        let mut monitor = new(model());
         let steps = all(&mut monitor, &tanks.run());
         assert_eq!(alarms(&steps), Vec::<&Alarm>::new());
         assert!(steps.iter().all(|s| s.scatter.iter().all(Option::is_none)));
@@ -154,7 +132,7 @@ fn a_leak_of_the_lower_tank_is_named_with_its_tank() {
         leak_lower: |t| if t < 4000.0 { 0.0 } else { 1.5 },
         ..Tanks::default()
     };
-    let last = last_look(&all(&mut new(), &tanks.run()));
+    let last = last_look(&all(&mut new(model()), &tanks.run()));
     assert!(last.effects.iter().any(|e| e == "const_leak"), "{last:?}");
     assert!((last.since.unwrap() - 4000.0).abs() < 60.0, "{last:?}");
     assert_eq!(last.output.as_deref(), Some("lower"));
@@ -168,7 +146,7 @@ fn a_valve_of_the_upper_tank_that_opens_is_named_with_its_tank() {
         alpha_upper: |t| if t < 4000.0 { 12.5 } else { 13.0 },
         ..Tanks::default()
     };
-    let last = last_look(&all(&mut new(), &tanks.run()));
+    let last = last_look(&all(&mut new(model()), &tanks.run()));
     assert!(last.effects.iter().any(|e| e == "valve_step"), "{last:?}");
     assert!((last.since.unwrap() - 4000.0).abs() < 60.0, "{last:?}");
     assert_eq!(last.size.unwrap().vessel.as_deref(), Some("upper"));
@@ -186,7 +164,7 @@ fn an_offset_of_one_sensor_is_named_with_its_sensor() {
             offset,
             ..Tanks::default()
         };
-        let steps = all(&mut new(), &tanks.run());
+        let steps = all(&mut new(model()), &tanks.run());
         let last = last_look(&steps);
         assert_eq!(last.effects[0], "sensor_offset", "{last:?}");
         assert!((last.since.unwrap() - 4000.0).abs() < 60.0, "{last:?}");
@@ -212,7 +190,7 @@ fn an_unexplained_alarm_says_at_which_output_it_shows_most() {
         },
         ..Tanks::default()
     };
-    let steps = all(&mut new(), &tanks.run());
+    let steps = all(&mut new(model()), &tanks.run());
     let alarms = alarms(&steps);
     let unexplained = alarms
         .iter()
@@ -233,7 +211,7 @@ fn a_scatter_that_grows_is_that_of_its_output() {
     for (row, extra) in rows[2000..].iter_mut().zip(extra) {
         row.outputs[1] += extra;
     }
-    let steps = all(&mut new(), &rows);
+    let steps = all(&mut new(model()), &rows);
     let said: Vec<&ScatterAlarm> = steps
         .iter()
         .flat_map(|s| s.scatter.iter().flatten())
@@ -274,7 +252,7 @@ fn outputs_lose_readings_for_themselves() {
         }
         .run(),
     );
-    let steps = all(&mut new(), &healthy);
+    let steps = all(&mut new(model()), &healthy);
     assert_eq!(alarms(&steps), Vec::<&Alarm>::new());
     for (row, step) in healthy.iter().zip(&steps).skip(4000) {
         for output in 0..2 {
@@ -288,7 +266,7 @@ fn outputs_lose_readings_for_themselves() {
         offset: |t| [if t < 4000.0 { 0.0 } else { 0.15 }, 0.0],
         ..Tanks::default()
     };
-    let last = last_look(&all(&mut new(), &with_lost_readings(tanks.run())));
+    let last = last_look(&all(&mut new(model()), &with_lost_readings(tanks.run())));
     assert_eq!(last.effects[0], "sensor_offset", "{last:?}");
     assert_eq!(last.size.unwrap().vessel.as_deref(), Some("upper"));
 }
@@ -305,7 +283,7 @@ fn an_output_without_any_reading_leaves_the_other_one_watched() {
     for row in &mut rows[1500..] {
         row.outputs[0] = f64::NAN;
     }
-    let mut monitor = new();
+    let mut monitor = new(model());
     let steps = all(&mut monitor, &rows);
     let alarms = alarms(&steps);
     let first = alarms.first().unwrap();
@@ -321,7 +299,7 @@ fn an_output_that_is_not_read_is_named_where_nothing_can_be_learned() {
     for row in &mut rows {
         row.outputs[1] = f64::NAN;
     }
-    let steps = all(&mut new(), &rows[..1100]);
+    let steps = all(&mut new(model()), &rows[..1100]);
     let why = steps
         .iter()
         .flat_map(|step| step.notices.iter().flatten())
@@ -340,9 +318,9 @@ fn a_restored_monitor_of_two_outputs_goes_on_where_it_was() {
         ..Tanks::default()
     };
     let rows = with_lost_readings(tanks.run());
-    let steps = all(&mut new(), &rows);
+    let steps = all(&mut new(model()), &rows);
     for at in [600, 1700, 2300] {
-        let mut before = new();
+        let mut before = new(model());
         all(&mut before, &rows[..at]);
         let text = serde_json::to_string(&before.state()).unwrap();
         let state: State = serde_json::from_str(&text).unwrap();
@@ -352,7 +330,7 @@ fn a_restored_monitor_of_two_outputs_goes_on_where_it_was() {
         assert_eq!(words(&all(&mut restored, &rows[at..])), words(&steps[at..]));
     }
     // Another choice of outputs is another model.
-    let mut monitor = new();
+    let mut monitor = new(model());
     all(&mut monitor, &rows[..50]);
     let mut other = model();
     other.known.measured = vec![1];
@@ -378,7 +356,7 @@ fn one_output_is_watched_as_ever() {
     let run = |measured: &[usize]| {
         let mut model = model();
         model.known.measured = measured.to_vec();
-        let mut monitor = Monitor::new(model, Settings::default(), units()).unwrap();
+        let mut monitor = new(model);
         assert_eq!(monitor.outputs(), 1);
         all(&mut monitor, &rows)
     };

@@ -4,7 +4,7 @@ use crate::support::{
     Case, DRIVES, Drive, base, begins_with_a_root, difference, effect, input, label, placements,
     random_sets, reference,
 };
-use plants::{Command, Placed, Plant};
+use plants::{Command, Known, Placed, Plant};
 
 /// Compares one structure with one step a sample and with three, by which an error of order four falls 81 times.
 fn compare(case: &Case, drive: Drive, seed: u64, most: f64) -> Vec<String> {
@@ -146,7 +146,7 @@ fn linear_plants_are_exact_whatever_the_sampling() {
 #[test]
 fn two_lags_in_series_may_be_exchanged() {
     for plant in Plant::ALL {
-        let Some(pair) = plant.interchangeable() else {
+        let Some(pair) = plant.interchangeable(&Known::default()) else {
             assert_ne!(plant, Plant::CascadedTanksLinear);
             continue;
         };
@@ -165,6 +165,23 @@ fn two_lags_in_series_may_be_exchanged() {
             assert!(difference(&y, &exchanged) < 1e-11);
         }
     }
+}
+
+#[test]
+fn a_second_sensor_or_a_disturbance_of_the_lower_lag_tells_two_lags_apart() {
+    let plant = Plant::CascadedTanksLinear;
+    let with = |measured: &[usize], disturbance| {
+        plant.interchangeable(&Known {
+            measured: measured.to_vec(),
+            disturbance,
+            ..Known::default()
+        })
+    };
+    assert_eq!(with(&[1], None), Some(["tau1", "tau2"]));
+    assert_eq!(with(&[1], Some(0)), Some(["tau1", "tau2"]));
+    assert_eq!(with(&[1], Some(1)), None);
+    assert_eq!(with(&[0, 1], None), None);
+    assert_eq!(with(&[1, 0], None), None);
 }
 
 #[test]

@@ -1,0 +1,39 @@
+//! What all tests of the monitor do: make one, give it rows, and look at what it says.
+
+use monitor::{Alarm, Model, Monitor, Notice, Row, Settings, Step, Units};
+
+/// Levels in cm, commands in V.
+pub fn units() -> Units {
+    Units {
+        output: "cm".into(),
+        input: "V".into(),
+    }
+}
+
+/// A monitor of a model with the usual settings.
+pub fn new(model: Model) -> Monitor {
+    Monitor::new(model, Settings::default(), units()).unwrap()
+}
+
+/// What the monitor says to each row.
+pub fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
+    rows.iter()
+        .map(|row| monitor.update(row).unwrap())
+        .collect()
+}
+
+/// The alarms among what was said.
+pub fn alarms(steps: &[Step]) -> Vec<&Alarm> {
+    steps
+        .iter()
+        .filter_map(|step| step.alarm.as_ref())
+        .collect()
+}
+
+/// The notices among what was said.
+pub fn notices(steps: &[Step]) -> Vec<&Notice> {
+    steps
+        .iter()
+        .flat_map(|step| step.notices.iter().flatten())
+        .collect()
+}

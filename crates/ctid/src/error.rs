@@ -18,6 +18,14 @@ pub enum Error {
         /// What is wrong and the mend.
         what: String,
     },
+    /// A model's text.
+    #[error("{file}:{source}")]
+    Text {
+        /// The path as it was given.
+        file: String,
+        /// Line, column, what is wrong and the mend.
+        source: ct_model::TextError,
+    },
     /// Something about a file as a whole.
     #[error("{file}: {what}")]
     File {

@@ -19,6 +19,7 @@
 
 mod atomic;
 pub mod catalogue;
+mod check;
 mod column_errors;
 mod commands;
 pub mod design;

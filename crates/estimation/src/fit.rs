@@ -7,7 +7,7 @@ use crate::{
     Error, Noise, Residuals, Squares, Stop, Stopping, Triangle, costs_more,
     levenberg_marquardt::{held, minimise, within},
     linearise_below, marginal,
-    prior::free_priors,
+    prior::{begin_near_priors, free_priors},
     residuals, rows,
 };
 
@@ -56,6 +56,8 @@ pub struct Fit {
     freedom: Vec<f64>,
     /// See [`Squares::prior_weight`].
     prior_weight: f64,
+    /// See [`Squares::of_samples`].
+    of_samples: f64,
 }
 impl Fit {
     /// Whether two fits of one model in one metric ended in the same minimum.
@@ -109,7 +111,7 @@ impl Fit {
     /// Variance of the innovations, with the degrees of freedom that are left.
     #[must_use]
     pub fn variance(&self) -> f64 {
-        self.cost / self.degrees_left()
+        self.of_samples / self.degrees_left()
     }
 
     /// Samples and priors, less the fitted entries.
@@ -248,9 +250,7 @@ pub fn fit_from(
                 return None;
             }
             let mut start = given.clone();
-            for (_, prior) in free_priors(model) {
-                start[prior.entry] = prior.near(start[prior.entry]);
-            }
+            begin_near_priors(model, &mut start);
             for (&i, bounds) in free.iter().zip(&bounds) {
                 start[i] = within(start[i], *bounds);
             }
@@ -315,6 +315,7 @@ pub fn fit_from(
         samples_per_output: model.samples().to_vec(),
         priors: free_priors(model).count(),
         prior_weight: end.prior_weight,
+        of_samples: end.of_samples,
         starts: count,
         agree,
         stop: minimum.stop,
@@ -324,6 +325,9 @@ pub fn fit_from(
         free: free.to_vec(),
     };
     fit.freedom = vec![fit.degrees_left(); fit.interior.len()];
+    // For what follows from the fit priors count by the variance with the degrees of freedom that are left.
+    let sigma = fit.variance().sqrt();
+    fit.triangle = fit.triangle.with_prior_weight(sigma);
     Ok(fit)
 }
 
@@ -332,6 +336,7 @@ struct End {
     rmse: Vec<f64>,
     weights: Vec<f64>,
     prior_weight: f64,
+    of_samples: f64,
     /// Logarithm of the determinant of the noise's covariance, of unit innovations.
     log_det: f64,
 }
@@ -366,6 +371,7 @@ impl End {
             rmse: sums.iter().zip(samples).map(of_output).collect(),
             weights: squares.weights(),
             prior_weight: squares.prior_weight(),
+            of_samples: squares.of_samples(),
             log_det,
         })
     }

@@ -71,7 +71,7 @@ pub use error::Error;
 pub use fit::{Fit, Start, coloured, fit_from, noise_of, prewhitened};
 pub use levenberg_marquardt::{Stop, Stopping, within};
 pub use noise::Noise;
-pub use prior::Prior;
+pub use prior::{Prior, begin_near_priors};
 pub use residuals::{
     Residuals, Sample, costs_more, linearise, linearise_below, residuals, rows, squares,
 };

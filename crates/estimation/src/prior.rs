@@ -26,10 +26,24 @@ impl Prior {
         (self.value - x[self.entry]) / self.std_error
     }
 
+    /// Whether values near the prior are within bounds.
+    #[must_use]
+    pub fn is_within(&self, bounds: (f64, f64)) -> bool {
+        let nearest = crate::within(self.value, bounds);
+        (nearest - self.value).abs() <= FARTHEST_START * self.std_error
+    }
+
     /// A start for the entry: `x` where it is near.
     pub(crate) fn near(&self, x: f64) -> f64 {
         let reach = FARTHEST_START * self.std_error;
         crate::within(x, (self.value - reach, self.value + reach))
+    }
+}
+
+/// Moves the fitted entries of a start that are far from their priors near these.
+pub fn begin_near_priors(model: &impl Residuals, x: &mut [f64]) {
+    for (_, prior) in free_priors(model) {
+        x[prior.entry] = prior.near(x[prior.entry]);
     }
 }
 

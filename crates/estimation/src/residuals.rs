@@ -143,7 +143,8 @@ pub fn linearise_below(
         triangle.finish();
     }
     let priors = prior_rows(model, x);
-    (filter.squares.cost() <= filter.limit)
+    let cost = filter.squares.cost();
+    (cost <= filter.limit && cost.is_finite())
         .then(|| Triangle::of_outputs(triangles, &priors, filter.squares))
 }
 

@@ -47,7 +47,8 @@ impl Robust {
 pub fn robust(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Robust, Error> {
     let rows = rows(model, &fit.x).ok_or(Error::NoFiniteStart { starts: 1 })?;
     let noise = marginal::noise(&rows, fit.interior(), order)?;
-    let bread = fit.triangle.covariance(fit.interior());
+    let own = fit.triangle.clone().with_prior_weight(fit.prior_weight());
+    let bread = own.covariance(fit.interior());
     let mut sandwich = Sandwich::new(&rows, fit.interior(), (&fit.noise, &fit.weights), bread);
     let weight = fit.prior_weight().powi(2);
     rows.each_prior(fit.interior(), weight, |row| {

@@ -214,9 +214,23 @@ impl Triangle {
             priors,
             squares,
         };
-        let mut all = outputs.weighted(&outputs.squares);
+        let squares = &outputs.squares;
+        let mut all = outputs.weighted(&squares.weights(), squares.prior_weight());
         all.outputs = Some(Box::new(outputs));
         all
+    }
+
+    /// The same rows, those of priors with another weight.
+    #[must_use]
+    pub(crate) fn with_prior_weight(self, weight: f64) -> Self {
+        match self.outputs {
+            Some(outputs) if outputs.priors.rows() > 0 => {
+                let mut all = outputs.weighted(&outputs.squares.weights(), weight);
+                all.outputs = Some(outputs);
+                all
+            }
+            _ => self,
+        }
     }
 
     /// Minimises `|J x - r|^2 + damping sum_j (scale_j x_j)^2` over the `free` parameters; the others stay zero.
@@ -242,7 +256,8 @@ impl Triangle {
                 break;
             }
             weights = next;
-            step = outputs.weighted(&left).solve_weighted(free, scale, damping);
+            let weighted = outputs.weighted(&weights, left.prior_weight());
+            step = weighted.solve_weighted(free, scale, damping);
         }
         step
     }
@@ -325,6 +340,7 @@ impl Triangle {
     #[must_use]
     pub fn damped(&self, scale: &[f64], damping: f64) -> Self {
         let mut damped = self.clone();
+        damped.outputs = None;
         damped.damp(scale.iter().copied(), damping);
         damped
     }
@@ -443,8 +459,8 @@ impl Outputs {
         squares
     }
 
-    /// The triangle of all rows, each times the weight that it has where so much is left.
-    fn weighted(&self, left: &Squares) -> Triangle {
+    /// The triangle of all rows, those of each output and those of the priors times their weight.
+    fn weighted(&self, weights: &[f64], of_priors: f64) -> Triangle {
         let columns = self.priors.columns();
         let mut all = Triangle::new(columns);
         let mut row = vec![0.0; columns];
@@ -456,12 +472,12 @@ impl Outputs {
                 all.push(&row);
             }
         };
-        for (triangle, weight) in self.triangles.iter().zip(left.weights()) {
-            add(triangle, weight);
+        for (triangle, weight) in self.triangles.iter().zip(weights) {
+            add(triangle, *weight);
         }
         let mut rows = self.triangles.iter().map(Triangle::rows).sum();
         if self.priors.rows() > 0 {
-            add(&self.priors, left.prior_weight());
+            add(&self.priors, of_priors);
             rows += self.priors.rows();
         }
         all.finish();

@@ -16,9 +16,11 @@
 //!
 //! **Priors** ([`crate::Prior`]) are readings of known variance, one each: with `Q` the sum of their squares, in standard errors,
 //! ```text
-//! N log(C/N) = sum_o N_o log(C_o/N_o) + Q,     C = exp(Q/N) N prod_o (C_o/N_o)^(N_o/N)
+//! N log(C/N) = sum_o N_o log(C_o/N_o) + Q,     C = G exp(Q/N),     G = N prod_o (C_o/N_o)^(N_o/N)
 //! ```
-//! so `dC = sum_o w_o^2 dC_o + (C/N) dQ`: a prior's row counts by the root of `C/N`, the noise's standard deviation.
+//! so `dC = exp(Q/N) (sum_o w_o^2 dC_o + (G/N) dQ)`: with the factor that all rows share left out, samples keep the weights that they have
+//! without priors, and a prior's row counts by the root of `G/N`, the standard deviation of the noise. A step that lowers the weighted sum
+//! of squares enough lowers `C`; the fit looks at `C`.
 //!
 //! **Reference**: G. A. F. Seber, C. J. Wild, Nonlinear Regression, 1989, ch. 11 (multiresponse models), for independent responses.
 
@@ -85,20 +87,33 @@ impl Squares {
     #[must_use]
     pub fn cost(&self) -> f64 {
         if let Some(scales) = &self.known {
+            return self.of_samples() + scales[0].powi(2) * self.prior;
+        }
+        let samples = self.of_samples();
+        if self.prior == 0.0 {
+            return samples;
+        }
+        samples * (self.prior / self.count()).exp()
+    }
+
+    /// `G`: the cost without priors. Where the noise is known, as the cost is there.
+    #[must_use]
+    pub fn of_samples(&self) -> f64 {
+        if let Some(scales) = &self.known {
             let outputs = self.sums.iter().zip(scales);
-            let squares = outputs.map(|(sum, scale)| (scales[0] / scale).powi(2) * sum);
-            return squares.sum::<f64>() + scales[0].powi(2) * self.prior;
+            return outputs
+                .map(|(sum, scale)| (relative(scales[0], *scale)).powi(2) * sum)
+                .sum();
+        }
+        if let [sum] = self.sums[..] {
+            return sum;
         }
         let n = self.count();
-        if let [sum] = self.sums[..] {
-            // Without priors the sum as it is.
-            return sum * (self.prior / n).exp();
-        }
         let outputs = 0..self.sums.len();
         let mean: f64 = outputs
             .map(|o| self.samples[o] as f64 / n * self.variance(o).ln())
             .sum();
-        n * (mean + self.prior / n).exp()
+        n * mean.exp()
     }
 
     /// What the rows of priors, in standard errors, count by: the noise's standard deviation in the metric of the cost.
@@ -106,7 +121,7 @@ impl Squares {
     pub fn prior_weight(&self) -> f64 {
         match &self.known {
             Some(scales) => scales[0],
-            None => (self.cost() / self.count()).sqrt(),
+            None => (self.of_samples() / self.count().max(1.0)).sqrt(),
         }
     }
 
@@ -114,16 +129,24 @@ impl Squares {
     #[must_use]
     pub fn weights(&self) -> Vec<f64> {
         if let Some(scales) = &self.known {
-            return scales.iter().map(|scale| scales[0] / scale).collect();
+            return scales
+                .iter()
+                .map(|scale| relative(scales[0], *scale))
+                .collect();
         }
         if self.sums.len() == 1 {
-            return vec![(self.prior / self.count() / 2.0).exp()];
+            return vec![1.0];
         }
-        let mean = self.cost() / self.count();
+        let mean = self.of_samples() / self.count();
         (0..self.sums.len())
             .map(|o| (mean / self.variance(o)).sqrt())
             .collect()
     }
+}
+
+/// A scale over another, none of them nothing.
+fn relative(first: f64, scale: f64) -> f64 {
+    first.max(f64::MIN_POSITIVE) / scale.max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]

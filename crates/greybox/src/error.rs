@@ -23,7 +23,7 @@ pub enum Error {
     },
     /// What is known of a parameter beside the records is no number with an error.
     #[error(
-        "the prior of {name} is {value} with a standard error of {std_error}: give a finite value and an error above zero"
+        "[prior] {name} = [{value}, {std_error}]: the parameter lies between {lower:.4e} and {upper:.4e}; give a value there and a standard error above zero, in its unit"
     )]
     Prior {
         /// The parameter.
@@ -32,6 +32,10 @@ pub enum Error {
         value: f64,
         /// Its standard error.
         std_error: f64,
+        /// The smallest value that a fit takes.
+        lower: f64,
+        /// The largest.
+        upper: f64,
     },
     /// A record has another number of outputs than the structure.
     #[error(

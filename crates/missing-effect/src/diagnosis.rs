@@ -41,7 +41,7 @@ pub struct Parameter {
     pub prior: Option<PriorValue>,
 }
 
-/// An estimate further from its prior than so many of the prior's standard errors disagrees with it.
+/// Records that are further from a prior than so many standard errors of the two together disagree with it.
 const DISAGREES: f64 = 3.0;
 
 impl Parameter {
@@ -50,7 +50,15 @@ impl Parameter {
     pub fn prior_words(&self) -> Option<String> {
         let prior = self.prior?;
         let (value, error) = value_and_error(prior.value, Some(prior.std_error));
-        let away = (self.value - prior.value).abs() / prior.std_error;
+        // The estimate has the prior in it: their difference is the less uncertain the better the prior is beside the records.
+        let own = self.std_error.map_or(0.0, |error| error * error);
+        let variance = prior.std_error * prior.std_error - own;
+        let scale = if variance > 0.0 {
+            variance.sqrt()
+        } else {
+            prior.std_error
+        };
+        let away = (self.value - prior.value).abs() / scale;
         let mut words = format!("prior {value} ± {}", error.unwrap_or_default());
         if away > DISAGREES {
             words += &format!("; the records disagree with it by {away:.1} standard errors");

@@ -182,7 +182,8 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
     let error = |node: &Node, fitted: usize| -> Result<Vec<f64>, Error> {
         let own = node
             .setup
-            .with_records(std::slice::from_ref(&halves[fitted]))?;
+            .with_records(std::slice::from_ref(&halves[fitted]))?
+            .with_priors(&node.setup.prior_values())?;
         let begun = fit_initial_levels(&own, &node.fit.x[..own.parameter_count()], ROUGH)?;
         let fit = fit_from(&own, &[begun], &white, FINE)?;
         let half = Node {

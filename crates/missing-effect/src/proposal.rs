@@ -224,7 +224,8 @@ pub(crate) fn promising(
     keep_best_simulated(setup, placed, &mut starts, noise);
     let mut ranked: Vec<(f64, Start)> = starts
         .into_par_iter()
-        .filter_map(|x| {
+        .filter_map(|mut x| {
+            setup.begin_near_priors(&mut x);
             let triangle = setup.linearise(&x, noise)?;
             let promise = promise(setup, &x, &triangle);
             let triangle = Some(triangle);

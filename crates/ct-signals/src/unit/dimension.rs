@@ -18,6 +18,11 @@ pub struct Dimension {
 }
 
 impl Dimension {
+    /// Of pure numbers.
+    pub const NONE: Self = Self::of([0; 6]);
+    /// Of times.
+    pub const TIME: Self = Self::of([0, 0, 1, 0, 0, 0]);
+
     /// From the powers of metre, kilogram, second, ampere, kelvin and mole.
     pub(super) const fn of(powers: [i8; 6]) -> Self {
         let [length, mass, time, current, temperature, amount] = powers;
@@ -43,7 +48,8 @@ impl Dimension {
     }
 
     /// The dimension of the product of this and a power of another; `None` where a power is too large.
-    pub(super) fn times(self, other: Self, power: i8) -> Option<Self> {
+    #[must_use]
+    pub fn times(self, other: Self, power: i8) -> Option<Self> {
         let mut powers = self.powers();
         for (own, factor) in powers.iter_mut().zip(other.powers()) {
             *own = own.checked_add(factor.checked_mul(power)?)?;
@@ -51,8 +57,17 @@ impl Dimension {
         Some(Self::of(powers))
     }
 
+    /// The dimension whose square this is; `None` where a power is odd.
+    #[must_use]
+    pub fn root(self) -> Option<Self> {
+        let powers = self.powers();
+        let even = powers.iter().all(|power| power % 2 == 0);
+        even.then(|| Self::of(powers.map(|power| power / 2)))
+    }
+
     /// The quantity in a word for people; `None` where it has no common name. Torque is called energy: their units are the same.
-    pub(super) fn kind(self) -> Option<&'static str> {
+    #[must_use]
+    pub fn kind(self) -> Option<&'static str> {
         Some(match self.powers() {
             [0, 0, 0, 0, 0, 0] => "ratio",
             [1, 0, 0, 0, 0, 0] => "length",

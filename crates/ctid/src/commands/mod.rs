@@ -16,7 +16,7 @@ use crate::look::Look;
 use crate::model_file;
 use crate::output::{self, Found, Kind, Output};
 use crate::progress::Bar;
-use crate::{Error, catalogue, design, edit, monitor, serve, tour};
+use crate::{Error, catalogue, check, design, edit, monitor, serve, tour};
 
 /// Says which physical effect a model of measured data is missing.
 #[derive(Debug, Parser)]
@@ -41,6 +41,8 @@ enum Command {
     Remove(Remove),
     /// List the catalogue of effects, or say all about one
     Effects(Effects),
+    /// Read a model in Modelica and say what it holds: states, inputs, outputs, parameters, units that do not fit
+    Check(Check),
     /// Propose the next experiment, which tells two effects apart
     Design(design::Arguments),
     /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
@@ -97,6 +99,13 @@ struct Effects {
     model: Option<PathBuf>,
 }
 
+#[derive(Debug, Args)]
+struct Check {
+    /// The model's text, in a flat subset of Modelica
+    #[arg(value_name = "MODEL.mo")]
+    model: PathBuf,
+}
+
 /// Does what the command line asks for; what a person reads goes to `out`.
 ///
 /// # Errors
@@ -129,6 +138,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
             model: Some(model), ..
         })) => say(out, &catalogue::list_for(&model_file::read(&model)?, look)),
         Some(Command::Effects(_)) => say(out, &catalogue::list(look)),
+        Some(Command::Check(Check { model })) => say(out, &check::run(&model, look)?),
         Some(Command::Design(arguments)) => {
             let (proposal, outputs, notes) = arguments.run(look)?;
             let text = notes + &design::text::design(&proposal.design, look);

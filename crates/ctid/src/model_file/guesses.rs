@@ -40,6 +40,12 @@ impl Source<'_> {
             let RawPrior::ValueAndError([value, std_error]) = *prior.as_ref();
             let value = Spanned::new(prior.span(), value);
             let std_error = Spanned::new(prior.span(), std_error);
+            if let Some(effect) = waits(&structure, name.as_ref()) {
+                self.finite(name.as_ref(), &value)?;
+                self.positive("the standard error", &std_error)?;
+                model.waiting.push(format!("prior.{effect}"));
+                continue;
+            }
             let value = self.parameter("prior", &structure, name, &value)?;
             let key = name.as_ref();
             let std_error = self.positive(&format!("the standard error of {key}"), &std_error)?;
@@ -84,4 +90,15 @@ impl Source<'_> {
             self.finite(key, number)
         }
     }
+}
+
+/// The effect of a name such as `overflow.rim` where it is not on.
+fn waits<'n>(structure: &Structure, name: &'n str) -> Option<&'n str> {
+    let (effect, _) = name.split_once('.')?;
+    let own = format!("{effect}.");
+    let on = structure
+        .parameter_names()
+        .iter()
+        .any(|n| n.starts_with(&own));
+    (!on && plants::EffectInfo::find(effect).is_some()).then_some(effect)
 }

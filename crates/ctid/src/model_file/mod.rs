@@ -230,10 +230,8 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
     let on = |name: &str| raw.effects.iter().any(|effect| effect.as_ref() == name);
     let effects = settings.keys().map(|name| ("effect", *name));
     let own = terms.keys().map(|name| ("term", name.as_str()));
-    model.waiting = effects
-        .chain(own)
-        .filter(|(_, name)| !on(name))
-        .map(|(kind, name)| format!("{kind}.{name}"))
-        .collect();
+    let tables = effects.chain(own).filter(|(_, name)| !on(name));
+    let tables = tables.map(|(kind, name)| format!("{kind}.{name}"));
+    model.waiting.extend(tables);
     Ok(model)
 }

@@ -25,7 +25,7 @@ impl Setup<'_> {
     /// so that what is known counts once.
     ///
     /// # Errors
-    /// Where the structure has no parameter of a name, or a standard error is not above zero.
+    /// Where the structure has no parameter of a name, a standard error is not above zero, or a value is far outside the bounds.
     pub fn with_priors(mut self, priors: &BTreeMap<String, PriorValue>) -> Result<Self, Error> {
         let parameters = &self.names[..self.parameters];
         self.priors = priors
@@ -37,21 +37,31 @@ impl Setup<'_> {
                 };
                 let entry = parameters.iter().position(|own| own == name);
                 let PriorValue { value, std_error } = *prior;
-                if !(value.is_finite() && std_error > 0.0 && std_error.is_finite()) {
+                let prior = Prior {
+                    entry: entry.ok_or_else(unknown)?,
+                    value,
+                    std_error,
+                };
+                let weighs = std_error > 0.0 && (1.0 / std_error).is_finite();
+                let (lower, upper) = self.bounds[prior.entry];
+                if !(value.is_finite() && weighs && prior.is_within((lower, upper))) {
                     return Err(Error::Prior {
                         name: name.clone(),
                         value,
                         std_error,
+                        lower,
+                        upper,
                     });
                 }
-                Ok(Prior {
-                    entry: entry.ok_or_else(unknown)?,
-                    value,
-                    std_error,
-                })
+                Ok(prior)
             })
             .collect::<Result<_, Error>>()?;
         Ok(self)
+    }
+
+    /// Moves the fitted entries of a start that are far from their priors near these.
+    pub fn begin_near_priors(&self, x: &mut [f64]) {
+        estimation::begin_near_priors(self, x);
     }
 
     /// What is known of parameters beside the records, by name.

@@ -1,0 +1,282 @@
+//! Expressions over the variables of a model.
+
+/// A variable of a model, by its position in [`crate::ModelSpec`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Variable {
+    /// A parameter.
+    Parameter(usize),
+    /// An input.
+    Input(usize),
+    /// A state.
+    State(usize),
+    /// A named flow, which another expression defines.
+    Flow(usize),
+}
+
+/// An operator between two numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Operator {
+    /// `a + b`.
+    Add,
+    /// `a - b`.
+    Subtract,
+    /// `a * b`.
+    Multiply,
+    /// `a / b`.
+    Divide,
+    /// `a ^ b`.
+    Power,
+}
+
+/// A function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "each is the function of its name")]
+pub enum Function {
+    Abs,
+    Sign,
+    Sqrt,
+    Exp,
+    Log,
+    Log10,
+    Sin,
+    Cos,
+    Tan,
+    Tanh,
+    Atan2,
+    Min,
+    Max,
+}
+
+impl Function {
+    /// All functions.
+    pub const ALL: [Self; 13] = [
+        Self::Abs,
+        Self::Sign,
+        Self::Sqrt,
+        Self::Exp,
+        Self::Log,
+        Self::Log10,
+        Self::Sin,
+        Self::Cos,
+        Self::Tan,
+        Self::Tanh,
+        Self::Atan2,
+        Self::Min,
+        Self::Max,
+    ];
+
+    /// Its name in a text.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Abs => "abs",
+            Self::Sign => "sign",
+            Self::Sqrt => "sqrt",
+            Self::Exp => "exp",
+            Self::Log => "log",
+            Self::Log10 => "log10",
+            Self::Sin => "sin",
+            Self::Cos => "cos",
+            Self::Tan => "tan",
+            Self::Tanh => "tanh",
+            Self::Atan2 => "atan2",
+            Self::Min => "min",
+            Self::Max => "max",
+        }
+    }
+
+    /// How many arguments it takes.
+    #[must_use]
+    pub fn arguments(self) -> usize {
+        match self {
+            Self::Atan2 | Self::Min | Self::Max => 2,
+            _ => 1,
+        }
+    }
+}
+
+/// How two numbers compare.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Comparison {
+    /// `a < b`.
+    Less,
+    /// `a <= b`.
+    LessOrEqual,
+    /// `a > b`.
+    Greater,
+    /// `a >= b`.
+    GreaterOrEqual,
+    /// `a == b`.
+    Equal,
+    /// `a <> b`.
+    NotEqual,
+}
+
+/// Something that is true or false.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Condition {
+    /// `true` or `false`.
+    Constant(bool),
+    /// Two numbers compared.
+    Compare(Comparison, Box<Expression>, Box<Expression>),
+    /// `not a`.
+    Not(Box<Condition>),
+    /// `a and b`.
+    And(Box<Condition>, Box<Condition>),
+    /// `a or b`.
+    Or(Box<Condition>, Box<Condition>),
+}
+
+/// A number that is computed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Expression {
+    /// A number that stands in the text, zero or above.
+    Number(f64),
+    /// The time since the record began, in the unit of its time.
+    Time,
+    /// A variable.
+    Variable(Variable),
+    /// `-a`.
+    Negative(Box<Expression>),
+    /// Two numbers joined.
+    Binary(Operator, Box<Expression>, Box<Expression>),
+    /// A function of its arguments.
+    Call(Function, Vec<Expression>),
+    /// `if c then a else b`.
+    If(Box<Condition>, Box<Expression>, Box<Expression>),
+    /// The expression so long ago \[time\]; before the record it was as at its beginning.
+    Delay(Box<Expression>, Box<Expression>),
+}
+
+impl Expression {
+    /// Shows every variable, each as often as it stands.
+    pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
+        match self {
+            Self::Number(_) | Self::Time => {}
+            Self::Variable(variable) => each(*variable),
+            Self::Negative(a) => a.each_variable(each),
+            Self::Binary(_, a, b) | Self::Delay(a, b) => {
+                a.each_variable(each);
+                b.each_variable(each);
+            }
+            Self::Call(_, arguments) => arguments.iter().for_each(|a| a.each_variable(each)),
+            Self::If(condition, a, b) => {
+                condition.each_variable(each);
+                a.each_variable(each);
+                b.each_variable(each);
+            }
+        }
+    }
+
+    /// Whether some part satisfies a test.
+    pub fn any(&self, test: &impl Fn(&Self) -> bool) -> bool {
+        test(self)
+            || match self {
+                Self::Number(_) | Self::Time | Self::Variable(_) => false,
+                Self::Negative(a) => a.any(test),
+                Self::Binary(_, a, b) | Self::Delay(a, b) => a.any(test) || b.any(test),
+                Self::Call(_, arguments) => arguments.iter().any(|a| a.any(test)),
+                Self::If(condition, a, b) => condition.any(test) || a.any(test) || b.any(test),
+            }
+    }
+
+    /// The value where variables have these values; a delay gives what it delays.
+    #[must_use]
+    pub fn value(&self, time: f64, of: &impl Fn(Variable) -> f64) -> f64 {
+        match self {
+            Self::Number(value) => *value,
+            Self::Time => time,
+            Self::Variable(variable) => of(*variable),
+            Self::Negative(a) => -a.value(time, of),
+            Self::Binary(operator, a, b) => {
+                let (a, b) = (a.value(time, of), b.value(time, of));
+                match operator {
+                    Operator::Add => a + b,
+                    Operator::Subtract => a - b,
+                    Operator::Multiply => a * b,
+                    Operator::Divide => a / b,
+                    Operator::Power => a.powf(b),
+                }
+            }
+            Self::Call(function, arguments) => {
+                let argument = |i: usize| arguments[i].value(time, of);
+                let a = argument(0);
+                match function {
+                    Function::Abs => a.abs(),
+                    // Of zero it is zero, as Modelica has it.
+                    Function::Sign if a == 0.0 => 0.0,
+                    Function::Sign => a.signum(),
+                    Function::Sqrt => a.sqrt(),
+                    Function::Exp => a.exp(),
+                    Function::Log => a.ln(),
+                    Function::Log10 => a.log10(),
+                    Function::Sin => a.sin(),
+                    Function::Cos => a.cos(),
+                    Function::Tan => a.tan(),
+                    Function::Tanh => a.tanh(),
+                    Function::Atan2 => a.atan2(argument(1)),
+                    Function::Min => a.min(argument(1)),
+                    Function::Max => a.max(argument(1)),
+                }
+            }
+            Self::If(condition, a, b) => {
+                if condition.holds(time, of) {
+                    a.value(time, of)
+                } else {
+                    b.value(time, of)
+                }
+            }
+            Self::Delay(a, _) => a.value(time, of),
+        }
+    }
+}
+
+impl Condition {
+    /// As [`Expression::each_variable`].
+    pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
+        match self {
+            Self::Constant(_) => {}
+            Self::Compare(_, a, b) => {
+                a.each_variable(each);
+                b.each_variable(each);
+            }
+            Self::Not(a) => a.each_variable(each),
+            Self::And(a, b) | Self::Or(a, b) => {
+                a.each_variable(each);
+                b.each_variable(each);
+            }
+        }
+    }
+
+    /// As [`Expression::any`].
+    pub fn any(&self, test: &impl Fn(&Expression) -> bool) -> bool {
+        match self {
+            Self::Constant(_) => false,
+            Self::Compare(_, a, b) => a.any(test) || b.any(test),
+            Self::Not(a) => a.any(test),
+            Self::And(a, b) | Self::Or(a, b) => a.any(test) || b.any(test),
+        }
+    }
+
+    /// Whether it holds where variables have these values.
+    #[must_use]
+    pub fn holds(&self, time: f64, of: &impl Fn(Variable) -> f64) -> bool {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Compare(comparison, a, b) => {
+                let (a, b) = (a.value(time, of), b.value(time, of));
+                match comparison {
+                    Comparison::Less => a < b,
+                    Comparison::LessOrEqual => a <= b,
+                    Comparison::Greater => a > b,
+                    Comparison::GreaterOrEqual => a >= b,
+                    Comparison::Equal => a == b,
+                    Comparison::NotEqual => a != b,
+                }
+            }
+            Self::Not(a) => !a.holds(time, of),
+            Self::And(a, b) => a.holds(time, of) && b.holds(time, of),
+            Self::Or(a, b) => a.holds(time, of) || b.holds(time, of),
+        }
+    }
+}

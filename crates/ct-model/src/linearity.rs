@@ -1,0 +1,91 @@
+//! Whether a model is linear in its states and inputs, found from its text.
+
+use crate::expression::{Expression, Operator, Variable};
+use crate::spec::ModelSpec;
+
+/// Whether a model is linear in states and inputs, whatever its parameters are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Linearity {
+    /// Every equation is a sum of constants times states and inputs, and a constant.
+    Linear,
+    /// Some are not.
+    Nonlinear {
+        /// The variables whose own equations are not, in the order of the equations: flows, then states.
+        equations: Vec<Variable>,
+    },
+}
+
+/// How something hangs on states, inputs and time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Degree {
+    /// On parameters alone.
+    Constant,
+    Linear,
+    Other,
+}
+
+impl ModelSpec {
+    /// Whether the model is linear, so that it can be simulated exactly. What changes with time by itself, other than by a delay, is not.
+    #[must_use]
+    pub fn linearity(&self) -> Linearity {
+        let mut flows = vec![Degree::Constant; self.flows.len()];
+        let mut equations = Vec::new();
+        for &i in &self.order {
+            flows[i] = degree(&self.flows[i].value, &flows);
+            if flows[i] == Degree::Other {
+                equations.push(Variable::Flow(i));
+                // What uses it is no less linear for it: only the first place is named.
+                flows[i] = Degree::Linear;
+            }
+        }
+        for (i, state) in self.states.iter().enumerate() {
+            let coefficient = state.coefficient.as_ref();
+            let varies = |c| degree(c, &flows) != Degree::Constant;
+            if coefficient.is_some_and(varies) || degree(&state.right, &flows) == Degree::Other {
+                equations.push(Variable::State(i));
+            }
+        }
+        if equations.is_empty() {
+            Linearity::Linear
+        } else {
+            Linearity::Nonlinear { equations }
+        }
+    }
+}
+
+fn degree(expression: &Expression, flows: &[Degree]) -> Degree {
+    use Degree::{Constant, Linear, Other};
+    let of = |part: &Expression| degree(part, flows);
+    // A function of constants is constant, and of anything else it is not linear.
+    let constant_or_other = |worst: Degree| if worst == Constant { Constant } else { Other };
+    match expression {
+        Expression::Number(_) => Constant,
+        Expression::Time => Other,
+        Expression::Variable(Variable::Parameter(_)) => Constant,
+        Expression::Variable(Variable::Input(_) | Variable::State(_)) => Linear,
+        Expression::Variable(Variable::Flow(i)) => flows[*i],
+        Expression::Negative(a) | Expression::Delay(a, _) => of(a),
+        Expression::Binary(operator, a, b) => {
+            let (a, b) = (of(a), of(b));
+            match operator {
+                Operator::Add | Operator::Subtract => a.max(b),
+                Operator::Multiply if a == Constant => b,
+                Operator::Multiply | Operator::Divide if b == Constant => a,
+                _ => constant_or_other(a.max(b)),
+            }
+        }
+        Expression::Call(_, arguments) => {
+            constant_or_other(arguments.iter().map(of).max().unwrap_or(Constant))
+        }
+        Expression::If(condition, a, b) => {
+            let mut fixed = true;
+            condition.each_variable(&mut |variable| match variable {
+                Variable::Parameter(_) => {}
+                Variable::Flow(i) => fixed &= flows[i] == Constant,
+                Variable::Input(_) | Variable::State(_) => fixed = false,
+            });
+            fixed &= !condition.any(&|part| matches!(part, Expression::Time));
+            if fixed { of(a).max(of(b)) } else { Other }
+        }
+    }
+}

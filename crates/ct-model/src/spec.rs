@@ -1,0 +1,155 @@
+//! What a model is: its variables, what defines them, and what is known of them.
+
+use crate::expression::{Expression, Variable};
+
+/// What every variable has.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct About {
+    /// Its name.
+    pub name: String,
+    /// Its unit as it is written, `W/K`; empty where the text gives none.
+    pub unit: String,
+    /// What it is, in a few words.
+    pub description: String,
+    /// Smallest value; minus infinity where the text gives none.
+    pub min: f64,
+    /// Largest value; infinity where the text gives none.
+    pub max: f64,
+}
+
+/// How a parameter is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Given {
+    /// It is fitted, and its value is where a fit starts.
+    Fitted,
+    /// It is measured (`final parameter`).
+    Measured,
+    /// It is a constant of nature, or of the construction (`constant`).
+    Constant,
+}
+
+/// A parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Name, unit, bounds.
+    pub about: About,
+    /// Its value \[`about.unit`\].
+    pub value: f64,
+    /// How the text computes the value from parameters above it; `None` where it is a number.
+    pub definition: Option<Expression>,
+    /// Whether it is fitted.
+    pub given: Given,
+}
+
+/// An input: a command, or a measured disturbance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    /// Name, unit, bounds.
+    pub about: About,
+}
+
+/// A state, `coefficient der(x) = right`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// Name, unit, bounds.
+    pub about: About,
+    /// What multiplies the derivative; `None` where it stands alone.
+    pub coefficient: Option<Expression>,
+    /// The other side of the equation.
+    pub right: Expression,
+    /// Where its initial value starts, of parameters alone.
+    pub start: Expression,
+    /// The initial value is known, and not fitted.
+    pub fixed: bool,
+}
+
+/// A named flow: a variable that an expression defines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flow {
+    /// Name, unit, bounds.
+    pub about: About,
+    /// What it is equal to.
+    pub value: Expression,
+    /// A parameter that others define (`final parameter b = 2*a`): it does not change with time.
+    pub of_parameters: bool,
+}
+
+/// An output: a state or a flow that is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Output {
+    /// The state or the flow.
+    pub variable: Variable,
+}
+
+/// A model.
+///
+/// Every expression holds variables by their position here.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelSpec {
+    /// Its name.
+    pub name: String,
+    /// What it is, in a few words.
+    pub description: String,
+    /// Parameters in the order of the text.
+    pub parameters: Vec<Parameter>,
+    /// Inputs in the order of the text.
+    pub inputs: Vec<Input>,
+    /// States in the order of the text.
+    pub states: Vec<State>,
+    /// Flows: those of parameters alone, then the others, each in the order of the text.
+    pub flows: Vec<Flow>,
+    /// Positions of the flows in an order in which each needs only those before it.
+    pub order: Vec<usize>,
+    /// Outputs in the order of the text.
+    pub outputs: Vec<Output>,
+}
+
+impl ModelSpec {
+    /// What is known of a variable.
+    ///
+    /// # Panics
+    /// For a variable of another model.
+    #[must_use]
+    pub fn about(&self, variable: Variable) -> &About {
+        match variable {
+            Variable::Parameter(i) => &self.parameters[i].about,
+            Variable::Input(i) => &self.inputs[i].about,
+            Variable::State(i) => &self.states[i].about,
+            Variable::Flow(i) => &self.flows[i].about,
+        }
+    }
+
+    /// All variables: parameters, inputs, states, flows.
+    pub fn variables(&self) -> impl Iterator<Item = Variable> + use<> {
+        let parameters = (0..self.parameters.len()).map(Variable::Parameter);
+        let inputs = (0..self.inputs.len()).map(Variable::Input);
+        let states = (0..self.states.len()).map(Variable::State);
+        let flows = (0..self.flows.len()).map(Variable::Flow);
+        parameters.chain(inputs).chain(states).chain(flows)
+    }
+
+    /// The variable of a name.
+    #[must_use]
+    pub fn find(&self, name: &str) -> Option<Variable> {
+        self.variables()
+            .find(|&variable| self.about(variable).name == name)
+    }
+
+    /// Whether a state or a flow is an output.
+    #[must_use]
+    pub fn is_output(&self, variable: Variable) -> bool {
+        self.outputs
+            .iter()
+            .any(|output| output.variable == variable)
+    }
+
+    /// Every expression that defines something as time goes on: flows, then coefficients and right-hand sides of the states.
+    pub fn expressions(&self) -> impl Iterator<Item = &Expression> {
+        let flows = self.flows.iter().map(|flow| &flow.value);
+        let states = self
+            .states
+            .iter()
+            .flat_map(|state| state.coefficient.iter().chain([&state.right]));
+        flows.chain(states)
+    }
+}

@@ -1,0 +1,612 @@
+//! The grammar: a model of declarations and equations, expressions with Modelica's precedence.
+//!
+//! ```text
+//! model       = "model" name [text] {declaration ";"} ["equation" {equation ";"}] "end" name ";"
+//! declaration = ["final"] ["constant" | "parameter" | "input" | "output"] "Real" variable {"," variable}
+//! variable    = name ["(" attribute {"," attribute} ")"] ["=" expression] [text]
+//! equation    = sum "=" expression [text]
+//! expression  = "if" expression "then" expression {"elseif" expression "then" expression} "else" expression | or
+//! or          = and {"or" and}          and = not {"and" not}         not = ["not"] relation
+//! relation    = sum [("<" | "<=" | ">" | ">=" | "==" | "<>") sum]
+//! sum         = ["+" | "-"] term {("+" | "-") term}
+//! term        = factor {("*" | "/") factor}
+//! factor      = primary ["^" primary]
+//! primary     = number | "true" | "false" | name | name "(" expression {"," expression} ")" | "(" expression ")"
+//! ```
+
+use super::{
+    error::{TextError, shown},
+    lexer::{Token, Word, words},
+    syntax::{Attribute, Declaration, Equation, Kept, Kind, Node, Syntax},
+};
+use crate::expression::{Comparison, Operator};
+
+/// Expressions that are deeper than so many operators and brackets are refused.
+const DEEPEST: usize = 200;
+/// The longest text \[bytes\], and the most words in it.
+const LONGEST: usize = 1024 * 1024;
+const MOST_WORDS: usize = 200_000;
+
+pub(crate) fn parse(text: &str) -> Result<Syntax, TextError> {
+    if text.len() > LONGEST {
+        let what = format!(
+            "a text of {} bytes, and {LONGEST} are the most: is this a model?",
+            text.len()
+        );
+        return Err(TextError::at(text, 0, what));
+    }
+    let tokens = words(text)?;
+    if let Some(token) = tokens.get(MOST_WORDS) {
+        let what = format!("more than {MOST_WORDS} words: is this a model?");
+        return Err(TextError::at(text, token.from, what));
+    }
+    Parser {
+        text,
+        tokens,
+        at: 0,
+        brackets: 0,
+    }
+    .model()
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    tokens: Vec<Token>,
+    at: usize,
+    /// Expressions within each other.
+    brackets: usize,
+}
+
+/// Words of Modelica that are no names.
+const KEYWORDS: [&str; 58] = [
+    "algorithm",
+    "and",
+    "annotation",
+    "block",
+    "break",
+    "class",
+    "connect",
+    "connector",
+    "constant",
+    "constrainedby",
+    "der",
+    "discrete",
+    "each",
+    "else",
+    "elseif",
+    "elsewhen",
+    "encapsulated",
+    "end",
+    "enumeration",
+    "equation",
+    "expandable",
+    "extends",
+    "external",
+    "false",
+    "final",
+    "flow",
+    "for",
+    "function",
+    "if",
+    "import",
+    "impure",
+    "in",
+    "initial",
+    "inner",
+    "input",
+    "loop",
+    "model",
+    "not",
+    "operator",
+    "or",
+    "outer",
+    "output",
+    "package",
+    "parameter",
+    "partial",
+    "protected",
+    "public",
+    "pure",
+    "record",
+    "redeclare",
+    "replaceable",
+    "return",
+    "stream",
+    "then",
+    "true",
+    "type",
+    "when",
+    "within",
+];
+
+/// What stands outside the subset, and the mend.
+fn outside(word: &str) -> Option<&'static str> {
+    Some(match word {
+        "connect" => "connections are outside the subset: write the equations that it stands for",
+        "when" | "elsewhen" => {
+            "`when` is outside the subset: write an expression with `if` or `time`"
+        }
+        "for" | "while" | "loop" => "loops are outside the subset: write every equation",
+        "algorithm" => "algorithms are outside the subset: write equations under `equation`",
+        "initial" => {
+            "initial equations are outside the subset: give the state a start, and fixed = true where it is known"
+        }
+        "extends" | "import" | "within" | "redeclare" | "replaceable" | "constrainedby" => {
+            "a model is one text: write in it what it takes from others"
+        }
+        "package" | "block" | "class" | "record" | "connector" | "function" | "type"
+        | "partial" | "encapsulated" | "expandable" | "operator" | "external" => {
+            "a text is one `model`: write its variables and equations there"
+        }
+        "Integer" | "Boolean" | "String" | "enumeration" | "discrete" => {
+            "every variable is a `Real`"
+        }
+        "annotation" => "annotations are outside the subset: delete it",
+        "protected" | "public" | "inner" | "outer" | "flow" | "stream" | "each" => {
+            "it means nothing in a single model: delete the word"
+        }
+        "assert" | "terminate" | "reinit" => {
+            "it does not compute a variable: delete it, or write bounds with min and max"
+        }
+        _ => return None,
+    })
+}
+
+impl Parser<'_> {
+    fn word(&self) -> &Word {
+        &self.tokens[self.at].word
+    }
+
+    fn from(&self) -> usize {
+        self.tokens[self.at].from
+    }
+
+    fn next(&mut self) -> Token {
+        let token = self.tokens[self.at].clone();
+        if self.at + 1 < self.tokens.len() {
+            self.at += 1;
+        }
+        token
+    }
+
+    fn is_sign(&self, sign: &str) -> bool {
+        matches!(self.word(), Word::Sign(own) if *own == sign)
+    }
+
+    fn is_name(&self, name: &str) -> bool {
+        matches!(self.word(), Word::Name(own) if own == name)
+    }
+
+    fn take_sign(&mut self, sign: &str) -> bool {
+        let is = self.is_sign(sign);
+        if is {
+            self.next();
+        }
+        is
+    }
+
+    fn take_name(&mut self, name: &str) -> bool {
+        let is = self.is_name(name);
+        if is {
+            self.next();
+        }
+        is
+    }
+
+    fn error<T>(&self, what: impl Into<String>) -> Result<T, TextError> {
+        Err(TextError::at(self.text, self.from(), what))
+    }
+
+    /// The word that stands here does not belong here.
+    fn unexpected<T>(&self, wanted: &str) -> Result<T, TextError> {
+        let found = match self.word() {
+            Word::End => "the end of the text".to_string(),
+            _ => shown(&self.text[self.from()..self.tokens[self.at].to]),
+        };
+        if let Word::Name(name) = self.word()
+            && let Some(mend) = outside(name)
+        {
+            return self.error(format!("{found}: {mend}"));
+        }
+        if self.is_sign("[") || self.is_sign("{") {
+            return self.error(format!(
+                "{found}: arrays are outside the subset; give each element a name of its own"
+            ));
+        }
+        if self.is_sign(":=") {
+            return self.error(format!("{found}: an equation is written with `=`"));
+        }
+        self.error(format!("{found} where {wanted} has to stand"))
+    }
+
+    fn expect_sign(&mut self, sign: &str, wanted: &str) -> Result<(), TextError> {
+        if self.take_sign(sign) {
+            return Ok(());
+        }
+        self.unexpected(wanted)
+    }
+
+    /// A name that may be a variable's or a model's.
+    fn name(&mut self, wanted: &str) -> Result<(String, usize), TextError> {
+        let from = self.from();
+        match self.word() {
+            Word::Name(name) if !KEYWORDS.contains(&name.as_str()) => {
+                let name = name.clone();
+                self.next();
+                Ok((name, from))
+            }
+            _ => self.unexpected(wanted),
+        }
+    }
+
+    fn description(&mut self) -> Result<String, TextError> {
+        let mut all = String::new();
+        while let Word::Text(text) = self.word() {
+            all += text;
+            self.next();
+            if self.is_sign("+") {
+                self.next();
+                if !matches!(self.word(), Word::Text(_)) {
+                    return self.unexpected("a description in quotes");
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    fn model(&mut self) -> Result<Syntax, TextError> {
+        if !self.take_name("model") {
+            return self.unexpected("`model`, with which a model begins,");
+        }
+        let (name, _) = self.name("the model's name")?;
+        let mut syntax = Syntax {
+            name,
+            description: self.description()?,
+            declarations: Vec::new(),
+            equations: Vec::new(),
+        };
+        while !self.is_name("equation") && !self.is_name("end") {
+            self.declarations(&mut syntax.declarations)?;
+        }
+        while self.take_name("equation") {
+            while !self.is_name("end") && !self.is_name("equation") {
+                let equation = self.equation()?;
+                syntax.equations.push(equation);
+            }
+        }
+        self.next();
+        let (end, from) = self.name("the model's name")?;
+        if end != syntax.name {
+            let what = format!(
+                "{} ends here, but {} began: write the same name",
+                shown(&end),
+                shown(&syntax.name)
+            );
+            return Err(TextError::at(self.text, from, what));
+        }
+        self.expect_sign(";", "`;`")?;
+        if *self.word() != Word::End {
+            return self.unexpected("the end of the text");
+        }
+        Ok(syntax)
+    }
+
+    fn declarations(&mut self, all: &mut Vec<Declaration>) -> Result<(), TextError> {
+        let is_final = self.take_name("final");
+        let kept = match self.word() {
+            Word::Name(word) => match word.as_str() {
+                "constant" => Kept::Constant,
+                "parameter" if is_final => Kept::FinalParameter,
+                "parameter" => Kept::Parameter,
+                "input" => Kept::Input,
+                "output" => Kept::Output,
+                _ => Kept::Plain,
+            },
+            _ => Kept::Plain,
+        };
+        if kept != Kept::Plain {
+            self.next();
+        }
+        if is_final && !matches!(kept, Kept::FinalParameter | Kept::Constant) {
+            return self.unexpected("`parameter`, behind `final`,");
+        }
+        if !self.take_name("Real") {
+            if let Word::Name(name) = self.word()
+                && outside(name).is_none()
+                && !KEYWORDS.contains(&name.as_str())
+            {
+                return self.error(format!(
+                    "{} is no type of the subset: write `Real`, with the unit in brackets",
+                    shown(name)
+                ));
+            }
+            return self.unexpected("a declaration (`Real ...;`), `equation` or `end`");
+        }
+        loop {
+            let declaration = self.variable(kept)?;
+            all.push(declaration);
+            if !self.take_sign(",") {
+                break;
+            }
+        }
+        self.expect_sign(";", "`;` or `,`")
+    }
+
+    fn variable(&mut self, kept: Kept) -> Result<Declaration, TextError> {
+        let (name, from) = self.name("a variable's name")?;
+        let mut attributes = Vec::new();
+        if self.take_sign("(") {
+            loop {
+                let (attribute, place) = self.name("an attribute, such as unit,")?;
+                self.expect_sign("=", "`=`")?;
+                let value = if matches!(self.word(), Word::Text(_)) {
+                    Attribute::Text(self.description()?)
+                } else {
+                    Attribute::Value(self.expression()?)
+                };
+                attributes.push((attribute, place, value));
+                if !self.take_sign(",") {
+                    break;
+                }
+            }
+            self.expect_sign(")", "`)` or `,`")?;
+        }
+        let binding = if self.take_sign("=") {
+            Some(self.expression()?)
+        } else {
+            None
+        };
+        Ok(Declaration {
+            kept,
+            name,
+            from,
+            attributes,
+            binding,
+            description: self.description()?,
+        })
+    }
+
+    fn equation(&mut self) -> Result<Equation, TextError> {
+        if self.is_name("if") {
+            return self.error(
+                "equations within `if` are outside the subset: write `x = if c then a else b;`",
+            );
+        }
+        if let Word::Name(name) = self.word()
+            && outside(name).is_some()
+        {
+            return self.unexpected("an equation");
+        }
+        let left = self.sum()?;
+        self.expect_sign("=", "`=`")?;
+        let right = self.expression()?;
+        self.description()?;
+        self.expect_sign(";", "`;`")?;
+        Ok(Equation { left, right })
+    }
+
+    /// What holds more than so many within each other would take a stack of any size.
+    fn bounded(&self, node: Node) -> Result<Node, TextError> {
+        if node.depth <= DEEPEST {
+            return Ok(node);
+        }
+        let what = format!(
+            "an expression of more than {DEEPEST} operators within each other: give a part of it a name of its own"
+        );
+        Err(TextError::at(self.text, node.from, what))
+    }
+
+    fn join(&self, kind: Kind, from: usize) -> Result<Node, TextError> {
+        self.bounded(Node::new(kind, from))
+    }
+
+    fn expression(&mut self) -> Result<Node, TextError> {
+        self.brackets += 1;
+        if self.brackets > DEEPEST {
+            return self.error(format!(
+                "more than {DEEPEST} brackets within each other: give a part of it a name of its own"
+            ));
+        }
+        let node = if self.is_name("if") {
+            self.choice()?
+        } else {
+            self.or()?
+        };
+        self.brackets -= 1;
+        Ok(node)
+    }
+
+    /// From `if` or `elseif` on.
+    fn choice(&mut self) -> Result<Node, TextError> {
+        let from = self.next().from;
+        let condition = self.expression()?;
+        if !self.take_name("then") {
+            return self.unexpected("`then`");
+        }
+        let first = self.expression()?;
+        let second = if self.is_name("elseif") {
+            self.brackets += 1;
+            if self.brackets > DEEPEST {
+                return self.error(format!("more than {DEEPEST} choices within each other"));
+            }
+            let node = self.choice()?;
+            self.brackets -= 1;
+            node
+        } else if self.take_name("else") {
+            self.expression()?
+        } else {
+            return self.unexpected("`else`");
+        };
+        self.join(
+            Kind::If(Box::new(condition), Box::new(first), Box::new(second)),
+            from,
+        )
+    }
+
+    fn or(&mut self) -> Result<Node, TextError> {
+        let mut left = self.and()?;
+        while self.take_name("or") {
+            let right = self.and()?;
+            let from = left.from;
+            left = self.join(Kind::Or(Box::new(left), Box::new(right)), from)?;
+        }
+        Ok(left)
+    }
+
+    fn and(&mut self) -> Result<Node, TextError> {
+        let mut left = self.not()?;
+        while self.take_name("and") {
+            let right = self.not()?;
+            let from = left.from;
+            left = self.join(Kind::And(Box::new(left), Box::new(right)), from)?;
+        }
+        Ok(left)
+    }
+
+    fn not(&mut self) -> Result<Node, TextError> {
+        let from = self.from();
+        if self.take_name("not") {
+            let inner = self.relation()?;
+            return self.join(Kind::Not(Box::new(inner)), from);
+        }
+        self.relation()
+    }
+
+    fn relation(&mut self) -> Result<Node, TextError> {
+        let left = self.sum()?;
+        let comparison = match self.word() {
+            Word::Sign("<") => Comparison::Less,
+            Word::Sign("<=") => Comparison::LessOrEqual,
+            Word::Sign(">") => Comparison::Greater,
+            Word::Sign(">=") => Comparison::GreaterOrEqual,
+            Word::Sign("==") => Comparison::Equal,
+            Word::Sign("<>") => Comparison::NotEqual,
+            _ => return Ok(left),
+        };
+        self.next();
+        let right = self.sum()?;
+        let from = left.from;
+        self.join(
+            Kind::Compare(comparison, Box::new(left), Box::new(right)),
+            from,
+        )
+    }
+
+    fn sum(&mut self) -> Result<Node, TextError> {
+        let from = self.from();
+        let negative = self.take_sign("-");
+        if !negative {
+            self.take_sign("+");
+        }
+        let mut left = self.term()?;
+        if negative {
+            left = self.join(Kind::Negative(Box::new(left)), from)?;
+        }
+        loop {
+            let operator = match self.word() {
+                Word::Sign("+") => Operator::Add,
+                Word::Sign("-") => Operator::Subtract,
+                _ => return Ok(left),
+            };
+            self.next();
+            let right = self.term()?;
+            left = self.join(
+                Kind::Binary(operator, Box::new(left), Box::new(right)),
+                from,
+            )?;
+        }
+    }
+
+    fn term(&mut self) -> Result<Node, TextError> {
+        let from = self.from();
+        let mut left = self.factor()?;
+        loop {
+            let operator = match self.word() {
+                Word::Sign("*") => Operator::Multiply,
+                Word::Sign("/") => Operator::Divide,
+                _ => return Ok(left),
+            };
+            self.next();
+            let right = self.factor()?;
+            left = self.join(
+                Kind::Binary(operator, Box::new(left), Box::new(right)),
+                from,
+            )?;
+        }
+    }
+
+    fn factor(&mut self) -> Result<Node, TextError> {
+        let from = self.from();
+        let base = self.primary()?;
+        if !self.take_sign("^") {
+            return Ok(base);
+        }
+        let exponent = self.primary()?;
+        if self.is_sign("^") {
+            return self.error("`^` behind `^` has two meanings: put brackets, `(a^b)^c`");
+        }
+        self.join(
+            Kind::Binary(Operator::Power, Box::new(base), Box::new(exponent)),
+            from,
+        )
+    }
+
+    fn primary(&mut self) -> Result<Node, TextError> {
+        let token = self.tokens[self.at].clone();
+        let from = token.from;
+        match token.word {
+            Word::Number(value) => {
+                self.next();
+                Ok(Node::new(Kind::Number(value), from))
+            }
+            Word::Sign("(") => {
+                self.next();
+                let inner = self.expression()?;
+                if self.is_sign(",") {
+                    return self
+                        .error("a list in brackets is outside the subset: write one expression");
+                }
+                self.expect_sign(")", "`)`")?;
+                Ok(inner)
+            }
+            Word::Sign(sign @ ("-" | "+")) => self.error(format!(
+                "`{sign}` behind an operator: put brackets, `({sign}x)`"
+            )),
+            Word::Name(name) => match name.as_str() {
+                "true" | "false" => {
+                    self.next();
+                    Ok(Node::new(Kind::Truth(name == "true"), from))
+                }
+                "if" => self.error("`if` within an expression: put brackets around the choice"),
+                "der" => {
+                    self.next();
+                    self.call(name, from)
+                }
+                _ => {
+                    let (name, from) = self.name("a number, a name or a bracket")?;
+                    if self.is_sign("(") {
+                        return self.call(name, from);
+                    }
+                    Ok(Node::new(Kind::Name(name), from))
+                }
+            },
+            _ => self.unexpected("a number, a name or a bracket"),
+        }
+    }
+
+    /// From the bracket on.
+    fn call(&mut self, name: String, from: usize) -> Result<Node, TextError> {
+        self.expect_sign("(", "`(`")?;
+        let mut arguments = Vec::new();
+        if !self.is_sign(")") {
+            loop {
+                arguments.push(self.expression()?);
+                if !self.take_sign(",") {
+                    break;
+                }
+            }
+        }
+        self.expect_sign(")", "`)` or `,`")?;
+        self.join(Kind::Call(name, arguments), from)
+    }
+}

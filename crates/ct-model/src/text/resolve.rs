@@ -1,0 +1,853 @@
+//! Names looked up, equations matched to their variables, and everything checked that can be.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{
+    error::{TextError, shown},
+    syntax::{Attribute, Declaration, Equation, Kept, Kind, Node, Syntax},
+};
+use crate::expression::{Condition, Expression, Function, Operator, Variable};
+use crate::spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
+
+/// Names that a variable cannot have.
+const RESERVED: [&str; 6] = ["time", "delay", "noEvent", "smooth", "Real", "der"];
+
+pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
+    let names = Names::of(text, &syntax)?;
+    let builder = Builder {
+        text,
+        names,
+        used: BTreeSet::new(),
+        spec: ModelSpec {
+            name: syntax.name,
+            description: syntax.description,
+            parameters: Vec::new(),
+            inputs: Vec::new(),
+            states: Vec::new(),
+            flows: Vec::new(),
+            order: Vec::new(),
+            outputs: Vec::new(),
+        },
+    };
+    builder.build(&syntax.declarations, syntax.equations)
+}
+
+/// What a name stands for. Flows are in the order of the text until they are sorted.
+struct Names {
+    all: BTreeMap<String, Variable>,
+    /// Declarations that are flows, and those that are states, by position.
+    flows: Vec<usize>,
+    states: Vec<usize>,
+    /// How many flows, the first ones, are of parameters alone.
+    tied: usize,
+}
+
+/// What a binding of a parameter hangs on.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Tied {
+    /// On numbers, constants and measured parameters: it has a value.
+    No,
+    /// On parameters that are fitted.
+    Yes,
+}
+
+fn each_name<'a>(node: &'a Node, each: &mut impl FnMut(&'a str)) {
+    match &node.kind {
+        Kind::Number(_) | Kind::Truth(_) => {}
+        Kind::Name(name) => each(name),
+        Kind::Negative(a) | Kind::Not(a) => each_name(a, each),
+        Kind::Binary(_, a, b) | Kind::Compare(_, a, b) | Kind::And(a, b) | Kind::Or(a, b) => {
+            each_name(a, each);
+            each_name(b, each);
+        }
+        Kind::Call(_, all) => all.iter().for_each(|a| each_name(a, each)),
+        Kind::If(c, a, b) => {
+            each_name(c, each);
+            each_name(a, each);
+            each_name(b, each);
+        }
+    }
+}
+
+/// The variable of `der(x)` where a node is that.
+fn derivative(node: &Node) -> Option<&str> {
+    match &node.kind {
+        Kind::Call(function, arguments) if function == "der" => match arguments.as_slice() {
+            [
+                Node {
+                    kind: Kind::Name(name),
+                    ..
+                },
+            ] => Some(name),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// The state of an equation `der(x) = e`, `c*der(x) = e`, and the coefficient.
+fn differentiated(left: &Node) -> Option<(&str, Option<&Node>)> {
+    if let Some(name) = derivative(left) {
+        return Some((name, None));
+    }
+    let Kind::Binary(Operator::Multiply, a, b) = &left.kind else {
+        return None;
+    };
+    match (derivative(a), derivative(b)) {
+        (None, Some(name)) => Some((name, Some(a))),
+        (Some(name), None) => Some((name, Some(b))),
+        _ => None,
+    }
+}
+
+impl Names {
+    fn of(text: &str, syntax: &Syntax) -> Result<Self, TextError> {
+        let is_differentiated: BTreeSet<&str> = syntax
+            .equations
+            .iter()
+            .filter_map(|equation| Some(differentiated(&equation.left)?.0))
+            .collect();
+        let mut names = Self {
+            all: BTreeMap::new(),
+            flows: Vec::new(),
+            states: Vec::new(),
+            tied: 0,
+        };
+        // Parameters that hang on fitted ones are computed like flows.
+        let mut tied: BTreeMap<&str, Tied> = BTreeMap::new();
+        let mut of_parameters = Vec::new();
+        let (mut parameters, mut inputs) = (0, 0);
+        let next = |count: &mut usize| {
+            *count += 1;
+            *count - 1
+        };
+        for (index, declaration) in syntax.declarations.iter().enumerate() {
+            let name = declaration.name.as_str();
+            let at = |what: String| TextError::at(text, declaration.from, what);
+            if RESERVED.contains(&name) || Function::ALL.iter().any(|f| f.name() == name) {
+                let what = format!(
+                    "{} has a meaning of its own: choose another name",
+                    shown(name)
+                );
+                return Err(at(what));
+            }
+            let of_fitted = || {
+                let mut any = false;
+                if let Some(binding) = &declaration.binding {
+                    each_name(binding, &mut |name| {
+                        any |= tied.get(name) == Some(&Tied::Yes)
+                    });
+                }
+                any
+            };
+            let variable = match declaration.kept {
+                Kept::FinalParameter if of_fitted() => {
+                    tied.insert(name, Tied::Yes);
+                    names.tied += 1;
+                    of_parameters.push(index);
+                    Variable::Flow(0)
+                }
+                Kept::Parameter => {
+                    tied.insert(name, Tied::Yes);
+                    Variable::Parameter(next(&mut parameters))
+                }
+                Kept::Constant | Kept::FinalParameter => {
+                    tied.insert(name, Tied::No);
+                    Variable::Parameter(next(&mut parameters))
+                }
+                Kept::Input => Variable::Input(next(&mut inputs)),
+                Kept::Output | Kept::Plain if is_differentiated.contains(name) => {
+                    names.states.push(index);
+                    Variable::State(names.states.len() - 1)
+                }
+                Kept::Output | Kept::Plain => {
+                    names.flows.push(index);
+                    Variable::Flow(0)
+                }
+            };
+            if names.all.insert(name.to_string(), variable).is_some() {
+                let what = format!(
+                    "{} is declared twice: give one of them another name",
+                    shown(name)
+                );
+                return Err(at(what));
+            }
+        }
+        of_parameters.append(&mut names.flows);
+        names.flows = of_parameters;
+        for (position, &index) in names.flows.iter().enumerate() {
+            let name = syntax.declarations[index].name.clone();
+            names.all.insert(name, Variable::Flow(position));
+        }
+        Ok(names)
+    }
+}
+
+struct Builder<'a> {
+    text: &'a str,
+    names: Names,
+    used: BTreeSet<Variable>,
+    spec: ModelSpec,
+}
+
+/// What an expression may hold.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Holds {
+    /// Numbers and parameters that stand before it; these are not used by it.
+    Numbers,
+    /// Numbers and parameters that stand before it.
+    Parameters,
+    Everything,
+}
+
+impl Builder<'_> {
+    fn error<T>(&self, from: usize, what: impl Into<String>) -> Result<T, TextError> {
+        Err(TextError::at(self.text, from, what))
+    }
+
+    fn build(
+        mut self,
+        declarations: &[Declaration],
+        equations: Vec<Equation>,
+    ) -> Result<ModelSpec, TextError> {
+        let (mut assigned, mut differential) = self.matched(declarations, &equations)?;
+        // Parameters first: what is declared above may stand in what is declared below.
+        for declaration in declarations {
+            match self.names.all[&declaration.name] {
+                Variable::Parameter(_) => self.parameter(declaration)?,
+                Variable::Input(_) => self.input(declaration)?,
+                Variable::State(_) | Variable::Flow(_) => {}
+            }
+        }
+        for index in self.names.states.clone() {
+            let declaration = &declarations[index];
+            // A state is what a derivative is taken of.
+            let Some((coefficient, right)) = differential.remove(&declaration.name) else {
+                continue;
+            };
+            let about = self.about(declaration, &["start", "fixed"])?;
+            let (start, fixed) = self.start(declaration)?;
+            let coefficient = coefficient
+                .map(|node| self.expression(node, Holds::Everything))
+                .transpose()?;
+            let right = self.expression(right, Holds::Everything)?;
+            self.spec.states.push(State {
+                about,
+                coefficient,
+                right,
+                start,
+                fixed,
+            });
+        }
+        let mut froms = Vec::new();
+        for index in self.names.flows.clone() {
+            let declaration = &declarations[index];
+            let Some(node) = assigned.remove(declaration.name.as_str()) else {
+                let name = shown(&declaration.name);
+                return self.error(
+                    declaration.from,
+                    format!("nothing defines {name}: write `{} = ...;` or an equation with its derivative, or make it an input", declaration.name),
+                );
+            };
+            let of_parameters = declaration.kept == Kept::FinalParameter;
+            let about = self.about(declaration, &[])?;
+            let holds = if of_parameters {
+                Holds::Parameters
+            } else {
+                Holds::Everything
+            };
+            let value = self.expression(node, holds)?;
+            froms.push(declaration.from);
+            self.spec.flows.push(Flow {
+                about,
+                value,
+                of_parameters,
+            });
+        }
+        for declaration in declarations {
+            if declaration.kept == Kept::Output {
+                let variable = self.names.all[&declaration.name];
+                self.spec.outputs.push(Output { variable });
+            }
+        }
+        if self.spec.outputs.is_empty() {
+            let what = "the model has no output: declare what is measured, `output Real y = ...;`";
+            return self.error(0, what);
+        }
+        self.unused(declarations)?;
+        self.sort(&froms)?;
+        Ok(self.spec)
+    }
+
+    /// The expression that defines each flow, and coefficient and right-hand side of each state, by name.
+    #[allow(clippy::type_complexity, reason = "two tables of nodes")]
+    fn matched<'n>(
+        &self,
+        declarations: &'n [Declaration],
+        equations: &'n [Equation],
+    ) -> Result<
+        (
+            BTreeMap<&'n str, &'n Node>,
+            BTreeMap<String, (Option<&'n Node>, &'n Node)>,
+        ),
+        TextError,
+    > {
+        let mut assigned: BTreeMap<&str, &Node> = BTreeMap::new();
+        let mut differential = BTreeMap::new();
+        for declaration in declarations {
+            let variable = self.names.all[&declaration.name];
+            match (&declaration.binding, variable) {
+                (Some(binding), Variable::Flow(_)) => {
+                    assigned.insert(&declaration.name, binding);
+                }
+                (Some(binding), Variable::State(_)) => {
+                    let what = format!(
+                        "{} has an equation with its derivative and a value of its own: keep one of them (its initial value is `start`)",
+                        shown(&declaration.name)
+                    );
+                    return self.error(binding.from, what);
+                }
+                (Some(binding), Variable::Input(_)) => {
+                    let what = format!(
+                        "{} is an input, which the records give: leave its value out",
+                        shown(&declaration.name)
+                    );
+                    return self.error(binding.from, what);
+                }
+                _ => {}
+            }
+        }
+        for Equation { left, right } in equations {
+            let twice = |name: &str| {
+                format!(
+                    "{} is defined twice: keep one of the equations",
+                    shown(name)
+                )
+            };
+            if let Some((name, coefficient)) = differentiated(left) {
+                match self.names.all.get(name) {
+                    None => return self.error(left.from, self.unknown(name)),
+                    Some(Variable::State(_)) => {}
+                    Some(_) => {
+                        let what = format!(
+                            "{} has a derivative, but is a parameter or an input: declare it as `Real {name};`",
+                            shown(name)
+                        );
+                        return self.error(left.from, what);
+                    }
+                }
+                if differential
+                    .insert(name.to_string(), (coefficient, right))
+                    .is_some()
+                {
+                    return self.error(left.from, twice(name));
+                }
+                continue;
+            }
+            let Kind::Name(name) = &left.kind else {
+                return self.error(
+                    left.from,
+                    "on the left stands one variable, or `der(x)`, or `c*der(x)`: solve the equation for it",
+                );
+            };
+            match self.names.all.get(name) {
+                None => return self.error(left.from, self.unknown(name)),
+                Some(Variable::Flow(_)) => {
+                    if assigned.insert(name, right).is_some() {
+                        return self.error(left.from, twice(name));
+                    }
+                }
+                Some(Variable::State(_)) => {
+                    let what = format!(
+                        "{} has an equation with its derivative already: keep one of the two",
+                        shown(name)
+                    );
+                    return self.error(left.from, what);
+                }
+                Some(Variable::Parameter(_)) => {
+                    let what = format!(
+                        "{} is a parameter: give its value where it is declared",
+                        shown(name)
+                    );
+                    return self.error(left.from, what);
+                }
+                Some(Variable::Input(_)) => {
+                    let what = format!(
+                        "{} is an input, which the records give: declare it as `Real {name};` if this defines it",
+                        shown(name)
+                    );
+                    return self.error(left.from, what);
+                }
+            }
+        }
+        Ok((assigned, differential))
+    }
+
+    fn unknown(&self, name: &str) -> String {
+        let near = self
+            .names
+            .all
+            .keys()
+            .filter(|own| is_near(own, name))
+            .min_by_key(|own| own.len().abs_diff(name.len()));
+        match near {
+            Some(near) => format!(
+                "{} is not declared: declare it, or did you mean {}?",
+                shown(name),
+                shown(near)
+            ),
+            None => format!(
+                "{} is not declared: declare it, `parameter Real {name} = ...;` or `input Real {name};`",
+                shown(name)
+            ),
+        }
+    }
+
+    fn about(&mut self, declaration: &Declaration, more: &[&str]) -> Result<About, TextError> {
+        let mut about = About {
+            name: declaration.name.clone(),
+            unit: String::new(),
+            description: declaration.description.clone(),
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+        };
+        let mut seen = BTreeSet::new();
+        for (name, from, attribute) in &declaration.attributes {
+            if !seen.insert(name.as_str()) {
+                return self.error(
+                    *from,
+                    format!("{} stands here twice: keep one", shown(name)),
+                );
+            }
+            match (name.as_str(), attribute) {
+                ("unit", Attribute::Text(unit)) => about.unit.clone_from(unit),
+                ("displayUnit" | "quantity", Attribute::Text(_)) => {}
+                ("unit" | "displayUnit" | "quantity", Attribute::Value(_)) => {
+                    let what = format!("{name} is a text: write {name}=\"...\"");
+                    return self.error(*from, what);
+                }
+                ("min", Attribute::Value(node)) => about.min = self.known_value(node)?,
+                ("max", Attribute::Value(node)) => about.max = self.known_value(node)?,
+                ("nominal", Attribute::Value(node)) => {
+                    self.known_value(node)?;
+                }
+                (name, Attribute::Value(_)) if more.contains(&name) => {}
+                (known @ ("min" | "max" | "nominal" | "start" | "fixed"), Attribute::Text(_)) => {
+                    let what = format!("{known} is a value: write it without quotes");
+                    return self.error(*from, what);
+                }
+                ("start" | "fixed", Attribute::Value(_)) => {
+                    let what = format!(
+                        "{name} is of states; {} is none: write its value behind `=`, or delete {name}",
+                        shown(&declaration.name)
+                    );
+                    return self.error(*from, what);
+                }
+                _ => {
+                    let what = format!(
+                        "{} is no attribute of the subset: unit, displayUnit, quantity, min, max, nominal, start and fixed are",
+                        shown(name)
+                    );
+                    return self.error(*from, what);
+                }
+            }
+        }
+        if about.min > about.max {
+            let what = format!(
+                "min = {} is above max = {}: exchange them",
+                about.min, about.max
+            );
+            return self.error(declaration.from, what);
+        }
+        Ok(about)
+    }
+
+    /// The value of an expression of numbers and parameters, which are not used by it.
+    fn known_value(&mut self, node: &Node) -> Result<f64, TextError> {
+        let expression = self.expression(node, Holds::Numbers)?;
+        self.value_of(&expression, node)
+    }
+
+    fn value_of(&self, expression: &Expression, node: &Node) -> Result<f64, TextError> {
+        if expression.any(&|part| matches!(part, Expression::Variable(Variable::Flow(_)))) {
+            let what = "it hangs on parameters that are fitted: write numbers, or parameters that are measured";
+            return self.error(node.from, what);
+        }
+        let value = expression.value(0.0, &|variable| self.parameter_value(variable));
+        if value.is_finite() {
+            return Ok(value);
+        }
+        self.error(
+            node.from,
+            format!("it has the value {value}: write an expression with a finite value"),
+        )
+    }
+
+    /// The declared value of a parameter.
+    fn parameter_value(&self, variable: Variable) -> f64 {
+        match variable {
+            Variable::Parameter(i) => self.spec.parameters[i].value,
+            _ => f64::NAN,
+        }
+    }
+
+    fn parameter(&mut self, declaration: &Declaration) -> Result<(), TextError> {
+        let about = self.about(declaration, &["start"])?;
+        let start =
+            declaration
+                .attributes
+                .iter()
+                .find_map(|(name, _, attribute)| match attribute {
+                    Attribute::Value(node) if name == "start" => Some(node),
+                    _ => None,
+                });
+        let Some(node) = declaration.binding.as_ref().or(start) else {
+            let what = format!(
+                "{} has no value: write `= ...`, where a fit starts",
+                shown(&declaration.name)
+            );
+            return self.error(declaration.from, what);
+        };
+        let given = match declaration.kept {
+            Kept::Constant => Given::Constant,
+            Kept::FinalParameter => Given::Measured,
+            _ => Given::Fitted,
+        };
+        // Of a fitted one it is where a fit starts, and no part of the model.
+        let holds = match given {
+            Given::Fitted => Holds::Numbers,
+            Given::Measured | Given::Constant => Holds::Parameters,
+        };
+        let definition = self.expression(node, holds)?;
+        let value = self.value_of(&definition, node)?;
+        if value < about.min || value > about.max {
+            let what = format!(
+                "{} = {value} is outside its bounds {} to {}: correct one of them",
+                declaration.name, about.min, about.max
+            );
+            return self.error(node.from, what);
+        }
+        let mut of_others = false;
+        definition.each_variable(&mut |_| of_others = true);
+        self.spec.parameters.push(Parameter {
+            about,
+            value,
+            definition: of_others.then_some(definition),
+            given,
+        });
+        Ok(())
+    }
+
+    fn input(&mut self, declaration: &Declaration) -> Result<(), TextError> {
+        let about = self.about(declaration, &[])?;
+        self.spec.inputs.push(Input { about });
+        Ok(())
+    }
+
+    /// The initial value of a state, and whether it is known.
+    fn start(&mut self, declaration: &Declaration) -> Result<(Expression, bool), TextError> {
+        let (mut start, mut fixed) = (Expression::Number(0.0), false);
+        for (name, from, attribute) in &declaration.attributes {
+            match (name.as_str(), attribute) {
+                ("start", Attribute::Value(node)) => {
+                    start = self.expression(node, Holds::Parameters)?;
+                }
+                ("fixed", Attribute::Value(node)) => match node.kind {
+                    Kind::Truth(value) => fixed = value,
+                    _ => return self.error(*from, "fixed is true or false"),
+                },
+                _ => {}
+            }
+        }
+        Ok((start, fixed))
+    }
+
+    fn expression(&mut self, node: &Node, holds: Holds) -> Result<Expression, TextError> {
+        let mut part = |node: &Node| self.expression(node, holds).map(Box::new);
+        Ok(match &node.kind {
+            Kind::Number(value) => Expression::Number(*value),
+            Kind::Negative(a) => Expression::Negative(part(a)?),
+            Kind::Binary(operator, a, b) => Expression::Binary(*operator, part(a)?, part(b)?),
+            Kind::If(condition, a, b) => {
+                let (a, b) = (part(a)?, part(b)?);
+                Expression::If(Box::new(self.condition(condition, holds)?), a, b)
+            }
+            Kind::Name(name) => return self.variable(name, node.from, holds),
+            Kind::Call(name, arguments) => return self.call(name, arguments, node.from, holds),
+            Kind::Truth(_) | Kind::Compare(..) | Kind::Not(_) | Kind::And(..) | Kind::Or(..) => {
+                return self.error(
+                    node.from,
+                    "true or false where a number has to stand: write `if ... then 1 else 0`",
+                );
+            }
+        })
+    }
+
+    fn condition(&mut self, node: &Node, holds: Holds) -> Result<Condition, TextError> {
+        Ok(match &node.kind {
+            Kind::Truth(value) => Condition::Constant(*value),
+            Kind::Compare(comparison, a, b) => Condition::Compare(
+                *comparison,
+                Box::new(self.expression(a, holds)?),
+                Box::new(self.expression(b, holds)?),
+            ),
+            Kind::Not(a) => Condition::Not(Box::new(self.condition(a, holds)?)),
+            Kind::And(a, b) => Condition::And(
+                Box::new(self.condition(a, holds)?),
+                Box::new(self.condition(b, holds)?),
+            ),
+            Kind::Or(a, b) => Condition::Or(
+                Box::new(self.condition(a, holds)?),
+                Box::new(self.condition(b, holds)?),
+            ),
+            Kind::Call(name, arguments) if name == "noEvent" && arguments.len() == 1 => {
+                self.condition(&arguments[0], holds)?
+            }
+            _ => {
+                return self.error(
+                    node.from,
+                    "a number where a condition has to stand: compare it, `x > 0`",
+                );
+            }
+        })
+    }
+
+    fn variable(&mut self, name: &str, from: usize, holds: Holds) -> Result<Expression, TextError> {
+        if name == "time" {
+            if holds != Holds::Everything {
+                return self.error(from, "`time` where only numbers and parameters may stand");
+            }
+            return Ok(Expression::Time);
+        }
+        let Some(&variable) = self.names.all.get(name) else {
+            return self.error(from, self.unknown(name));
+        };
+        if holds != Holds::Everything {
+            let declared = match variable {
+                Variable::Parameter(i) => i < self.spec.parameters.len(),
+                Variable::Flow(i) if i < self.names.tied => true,
+                _ => {
+                    let what = format!(
+                        "{} is no parameter: only numbers and parameters may stand here",
+                        shown(name)
+                    );
+                    return self.error(from, what);
+                }
+            };
+            if !declared {
+                let what = format!(
+                    "{} is declared below: declare it before it is used in another value",
+                    shown(name)
+                );
+                return self.error(from, what);
+            }
+        }
+        if holds != Holds::Numbers {
+            self.used.insert(variable);
+        }
+        Ok(Expression::Variable(variable))
+    }
+
+    fn call(
+        &mut self,
+        name: &str,
+        arguments: &[Node],
+        from: usize,
+        holds: Holds,
+    ) -> Result<Expression, TextError> {
+        let count = |wanted: usize, of: &str| {
+            if arguments.len() == wanted {
+                return Ok(());
+            }
+            let what = format!("{name} takes {of}, and {} stand here", arguments.len());
+            Err(TextError::at(self.text, from, what))
+        };
+        match name {
+            "der" => self.error(
+                from,
+                "a derivative stands alone on the left, `der(x) = ...` or `c*der(x) = ...`: name what it is equal to, and use that",
+            ),
+            "noEvent" => {
+                count(1, "one argument")?;
+                self.expression(&arguments[0], holds)
+            }
+            "smooth" => {
+                count(2, "an order and an expression")?;
+                self.known_value(&arguments[0])?;
+                self.expression(&arguments[1], holds)
+            }
+            "delay" => {
+                if holds != Holds::Everything {
+                    return self.error(from, "a delay where only numbers and parameters may stand");
+                }
+                count(2, "an expression and a time")?;
+                let delayed = self.expression(&arguments[0], holds)?;
+                let by = self.delay_time(&arguments[1])?;
+                Ok(Expression::Delay(Box::new(delayed), Box::new(by)))
+            }
+            _ => {
+                let Some(function) = Function::ALL.into_iter().find(|f| f.name() == name) else {
+                    let all: Vec<&str> = Function::ALL.iter().map(|f| f.name()).collect();
+                    let what = format!(
+                        "{} is no function of the subset: {}, delay, noEvent and smooth are",
+                        shown(name),
+                        all.join(", ")
+                    );
+                    return self.error(from, what);
+                };
+                count(
+                    function.arguments(),
+                    if function.arguments() == 1 {
+                        "one argument"
+                    } else {
+                        "two arguments"
+                    },
+                )?;
+                let arguments = arguments
+                    .iter()
+                    .map(|argument| self.expression(argument, holds))
+                    .collect::<Result<_, _>>()?;
+                Ok(Expression::Call(function, arguments))
+            }
+        }
+    }
+
+    /// A dead time: it does not change while the model runs.
+    fn delay_time(&mut self, node: &Node) -> Result<Expression, TextError> {
+        let by = self.expression(node, Holds::Everything)?;
+        let mut constant =
+            !by.any(&|part| matches!(part, Expression::Time | Expression::Delay(..)));
+        by.each_variable(&mut |variable| constant &= matches!(variable, Variable::Parameter(_)));
+        if constant {
+            return Ok(by);
+        }
+        self.error(
+            node.from,
+            "a dead time of numbers and parameters alone: one that changes is outside the subset",
+        )
+    }
+
+    /// What is declared and has no part in anything is a mistake more often than not.
+    fn unused(&self, declarations: &[Declaration]) -> Result<(), TextError> {
+        for declaration in declarations {
+            let variable = self.names.all[&declaration.name];
+            let kind = match (variable, declaration.kept) {
+                (Variable::Parameter(_), _) => "parameter",
+                (Variable::Input(_), _) => "input",
+                _ => continue,
+            };
+            if !self.used.contains(&variable) {
+                let what = format!(
+                    "the {kind} {} is used nowhere: delete it, or write it into an equation",
+                    shown(&declaration.name)
+                );
+                return self.error(declaration.from, what);
+            }
+        }
+        Ok(())
+    }
+
+    /// Finds an order of the flows in which each needs only those before it, else as in the text.
+    fn sort(&mut self, froms: &[usize]) -> Result<(), TextError> {
+        let needs: Vec<Vec<usize>> = self
+            .spec
+            .flows
+            .iter()
+            .map(|flow| {
+                let mut needed = Vec::new();
+                // A delayed flow is needed too: its present value goes into the line.
+                flow.value.each_variable(&mut |variable| {
+                    if let Variable::Flow(i) = variable {
+                        needed.push(i);
+                    }
+                });
+                needed.sort_unstable();
+                needed.dedup();
+                needed
+            })
+            .collect();
+        let order = match sorted(&needs) {
+            Ok(order) => order,
+            Err(circle) => {
+                let mut names: Vec<&str> = circle
+                    .iter()
+                    .map(|&i| self.spec.flows[i].about.name.as_str())
+                    .collect();
+                names.push(names[0]);
+                let what = format!(
+                    "{} hang on each other in a circle: make one of them a state, or solve the equations for it",
+                    names.join(" -> ")
+                );
+                return self.error(froms[circle[0]], what);
+            }
+        };
+        self.spec.order = order;
+        Ok(())
+    }
+}
+
+/// An order in which each comes after what it needs, the first of the text first; or a circle.
+fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Mark {
+        New,
+        Begun,
+        Done,
+    }
+    let mut marks = vec![Mark::New; needs.len()];
+    let mut order = Vec::with_capacity(needs.len());
+    // Each with how many of its needs have been looked at: a stack of our own, as a chain may be long.
+    let mut path: Vec<(usize, usize)> = Vec::new();
+    for first in 0..needs.len() {
+        if marks[first] == Mark::New {
+            marks[first] = Mark::Begun;
+            path.push((first, 0));
+        }
+        while let Some((at, seen)) = path.last_mut() {
+            let Some(&next) = needs[*at].get(*seen) else {
+                marks[*at] = Mark::Done;
+                order.push(*at);
+                path.pop();
+                continue;
+            };
+            *seen += 1;
+            match marks[next] {
+                Mark::Done => {}
+                Mark::New => {
+                    marks[next] = Mark::Begun;
+                    path.push((next, 0));
+                }
+                Mark::Begun => {
+                    let from = path.iter().position(|(i, _)| *i == next).unwrap_or(0);
+                    return Err(path[from..].iter().map(|(i, _)| *i).collect());
+                }
+            }
+        }
+    }
+    Ok(order)
+}
+
+/// Two names that may be one with a slip: a letter more, less or another, or another case.
+fn is_near(a: &str, b: &str) -> bool {
+    if a.eq_ignore_ascii_case(b) {
+        return true;
+    }
+    let (short, long) = if a.len() <= b.len() { (a, b) } else { (b, a) };
+    if long.len() - short.len() > 1 || short.is_empty() {
+        return false;
+    }
+    let same = short
+        .bytes()
+        .zip(long.bytes())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let rest = short.len() - same;
+    let tail = &long.as_bytes()[long.len() - rest..];
+    if short.as_bytes()[same..] == *tail {
+        return true;
+    }
+    short.len() == long.len()
+        && rest > 0
+        && short.len() > 1
+        && short.as_bytes()[same + 1..] == long.as_bytes()[same + 1..]
+}

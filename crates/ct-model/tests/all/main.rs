@@ -1,0 +1,8 @@
+//! One program for all tests.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod language;
+mod mutated;
+mod refused;
+mod round_trip;
+mod units;

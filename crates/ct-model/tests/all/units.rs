@@ -1,0 +1,93 @@
+//! Units that do not fit together.
+
+use std::path::Path;
+
+use ct_model::{ModelSpec, unit_warnings};
+
+/// What is said of a heated block with these words changed.
+fn said(from: &str, to: &str) -> Vec<String> {
+    let text = r#"model Block
+  parameter Real C(unit="J/K") = 50;
+  parameter Real k(unit="W/K") = 0.1;
+  parameter Real tau(unit="s") = 3;
+  input Real u(unit="W");
+  input Real Ta(unit="degC");
+  output Real T(unit="degC", start=20);
+  Real v(unit="m/s") = sqrt(2*g*h);
+  final parameter Real g(unit="m/s2") = 9.81;
+  Real h(unit="m") = 0.001*v0*delay(time, tau);
+  input Real v0(unit="m/s");
+equation
+  C*der(T) = u - k*(T - Ta) + min(u, 3)*exp(-time/tau) + 0*v*v/(v^2)*u;
+end Block;"#;
+    assert!(text.contains(from), "{from}");
+    let model = ModelSpec::parse(&text.replace(from, to)).unwrap();
+    let said = unit_warnings(&model);
+    said.into_iter()
+        .map(|warning| format!("{}: {}", warning.of, warning.what))
+        .collect()
+}
+
+#[test]
+fn units_that_fit_are_not_spoken_of() {
+    assert_eq!(said("C", "C"), Vec::<String>::new());
+    // What has no unit fits everything, and sizes may differ.
+    assert_eq!(said("k(unit=\"W/K\")", "k"), Vec::<String>::new());
+    assert_eq!(
+        said("k(unit=\"W/K\")", "k(unit=\"bananas\")"),
+        Vec::<String>::new()
+    );
+    assert_eq!(
+        said("C(unit=\"J/K\")", "C(unit=\"kW.h/K\")"),
+        Vec::<String>::new()
+    );
+}
+
+#[test]
+fn both_sides_are_named() {
+    assert_eq!(
+        said("C*der(T) = u - k*(T - Ta)", "C*der(T) = u - k*(T - Ta)*T"),
+        ["T: `u` is power (m^2 kg s^-3), but `k*(T - Ta)*T` is m^2 kg s^-3 K"]
+    );
+    assert_eq!(
+        said("unit=\"J/K\"", "unit=\"J\""),
+        [
+            "T: `C*der(T)` is m^2 kg s^-3 K, but `u - k*(T - Ta) + min(u, 3)*exp(-time/tau) + 0*v*v/v^2*u` is power (m^2 kg s^-3)"
+        ]
+    );
+    assert_eq!(
+        said("exp(-time/tau)", "exp(-time)"),
+        ["T: `-time` is time (s), and exp takes a pure number"]
+    );
+    assert_eq!(
+        said("min(u, 3)", "min(u, T)"),
+        ["T: `u` is power (m^2 kg s^-3), but `T` is temperature (K)"]
+    );
+    assert_eq!(
+        said("sqrt(2*g*h)", "2*g*h"),
+        ["v: `v` is velocity (m s^-1), but `2*g*h` is m^2 s^-2"]
+    );
+}
+
+/// The models beside the checkout are read, written, read again, and their units fit.
+#[test]
+fn models_of_the_domains() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/domains/public");
+    let Ok(cases) = std::fs::read_dir(&folder) else {
+        println!("skipped: there is no {}", folder.display());
+        return;
+    };
+    let mut count = 0;
+    for case in cases {
+        let path = case.unwrap().path().join("base.mo");
+        let Ok(text) = std::fs::read_to_string(&path) else {
+            continue;
+        };
+        let model = ModelSpec::parse(&text)
+            .unwrap_or_else(|error| panic!("{}:{error}\n{}", path.display(), error.excerpt()));
+        assert_eq!(ModelSpec::parse(&model.to_string()).as_ref(), Ok(&model));
+        assert_eq!(unit_warnings(&model), [], "{}", path.display());
+        count += 1;
+    }
+    println!("{count} models");
+}

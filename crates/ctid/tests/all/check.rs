@@ -1,0 +1,71 @@
+//! `ctid check` from the program's outside.
+
+use std::path::Path;
+
+use crate::common::Place;
+
+/// The model of the document.
+fn documented() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/model-text.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let (_, rest) = text.split_once("```modelica\n").unwrap();
+    let (model, _) = rest.split_once("```").unwrap();
+    model.to_string()
+}
+
+#[test]
+fn it_says_what_a_model_holds() {
+    let place = Place::empty();
+    place.write("block.mo", documented());
+    let text = place.succeeds("check block.mo");
+    let lines: Vec<String> = text
+        .lines()
+        .map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "))
+        .collect();
+    for line in [
+        "HeatedBlock: a block with a heater, in a room",
+        "1 state, 2 inputs, 1 output, 3 parameters; linear in states and inputs",
+        "T [degC] start 20 fitted block",
+        "y [degC] = T",
+        "C [J/K] = 50 fitted, at least 0 heat capacity",
+        "loss [W] = k*(T - Ta)",
+    ] {
+        assert!(lines.iter().any(|own| own == line), "{line}\n{text}");
+    }
+    assert!(!text.contains("warning"), "{text}");
+    place.write(
+        "block.mo",
+        documented().replace("g*u - loss", "g*u - loss*T"),
+    );
+    let text = place.succeeds("check block.mo");
+    let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(said.contains("not linear in the equation of T"), "{text}");
+    assert!(
+        said.contains("warning: units in the equation of T: `g*u` is power"),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_is_wrong_is_said_in_one_line() {
+    let place = Place::empty();
+    let refused = |from: &str, to: &str, begins: &str, mend: &str| {
+        assert!(documented().contains(from));
+        place.write("block.mo", documented().replace(from, to));
+        place.refuses("check block.mo", &[&format!("block.mo:{begins}"), mend]);
+    };
+    refused(
+        "k*(T - Ta)",
+        "kk*(T - Ta)",
+        "9:25: `kk` is not declared",
+        "did you mean `k`",
+    );
+    refused(
+        "k*(T - Ta)",
+        "2*(T - Ta)",
+        "3:18: the parameter `k` is used nowhere",
+        "delete it",
+    );
+    refused("C*der(T)", "connect(a, b)", "11:3: `connect`", "equations");
+    place.refuses("check missing.mo", &["missing.mo"]);
+}

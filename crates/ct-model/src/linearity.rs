@@ -15,10 +15,10 @@ pub enum Linearity {
     },
 }
 
-/// How something hangs on states, inputs and time.
+/// How something depends on states, inputs and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Degree {
-    /// On parameters alone.
+    /// Parameters alone.
     Constant,
     Linear,
     Other,

@@ -120,7 +120,7 @@ impl Fit {
         rows.saturating_sub(self.free.len()).max(1) as f64
     }
 
-    /// What the rows of priors count by in the metric of the fit ([`crate::Squares::prior_weight`]).
+    /// Weight of the rows of priors in the fit ([`crate::Squares::prior_weight`]).
     #[must_use]
     pub fn prior_weight(&self) -> f64 {
         self.prior_weight
@@ -325,7 +325,7 @@ pub fn fit_from(
         free: free.to_vec(),
     };
     fit.freedom = vec![fit.degrees_left(); fit.interior.len()];
-    // For what follows from the fit priors count by the variance with the degrees of freedom that are left.
+    // Covariances multiply by this variance: with its root as their weight, rows of priors keep the standard errors that were given.
     let sigma = fit.variance().sqrt();
     fit.triangle = fit.triangle.with_prior_weight(sigma);
     Ok(fit)

@@ -21,7 +21,7 @@ pub struct Triangle {
     /// For folding: the product of each column of the block with the pivot's.
     products: Vec<f64>,
     rows: usize,
-    /// Of several outputs, or with priors, the triangle of each, whose weights hang on what is left of its residual.
+    /// Of several outputs, or with priors, the triangle of each: their weights follow from the residuals.
     outputs: Option<Box<Outputs>>,
 }
 

@@ -96,7 +96,7 @@ impl Squares {
         samples * (self.prior / self.count()).exp()
     }
 
-    /// `G`: the cost without priors. Where the noise is known, as the cost is there.
+    /// `G`: the cost without priors.
     #[must_use]
     pub fn of_samples(&self) -> f64 {
         if let Some(scales) = &self.known {
@@ -116,7 +116,7 @@ impl Squares {
         n * mean.exp()
     }
 
-    /// What the rows of priors, in standard errors, count by: the noise's standard deviation in the metric of the cost.
+    /// Weight of the rows of priors, which are in standard errors: the standard deviation of the noise.
     #[must_use]
     pub fn prior_weight(&self) -> f64 {
         match &self.known {

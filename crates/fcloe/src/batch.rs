@@ -322,7 +322,7 @@ impl Run {
 
     fn try_step(&mut self, problem: &Problem, x: &[f64], at: &Triangle, step: &[f64]) -> Tried {
         let to: Vec<f64> = x.iter().zip(step).map(|(x, d)| x + d).collect();
-        // After the last step nobody asks for derivatives.
+        // After the last step no derivatives are needed.
         let last = problem.is_small(x, step, at, self.tolerance);
         match problem.evaluate(&to, at.cost(), !last) {
             Ok(next) if next.cost() < at.cost() => {

@@ -380,7 +380,7 @@ impl Problem {
             }
             let samples = columns.first().map_or(0, |column| column.len());
             (0..samples).all(|k| {
-                // Whoever sees a row may change it.
+                // The caller may change the row.
                 row.fill(0.0);
                 for (&place, column) in places.iter().zip(columns) {
                     row[place] = column[k];

@@ -2,8 +2,10 @@
 
 mod error;
 mod lexer;
+mod names;
 mod parser;
 mod resolve;
+mod sort;
 mod syntax;
 mod writer;
 

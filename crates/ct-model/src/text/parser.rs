@@ -49,6 +49,9 @@ pub(crate) fn parse(text: &str) -> Result<Syntax, TextError> {
     .model()
 }
 
+/// What an operator makes of the parts beside it.
+type Joins = fn(Box<Node>, Box<Node>) -> Kind;
+
 struct Parser<'a> {
     text: &'a str,
     tokens: Vec<Token>,
@@ -444,21 +447,29 @@ impl Parser<'_> {
     }
 
     fn or(&mut self) -> Result<Node, TextError> {
-        let mut left = self.and()?;
-        while self.take_name("or") {
-            let right = self.and()?;
-            let from = left.from;
-            left = self.join(Kind::Or(Box::new(left), Box::new(right)), from)?;
-        }
-        Ok(left)
+        let or = |word: &Word| (*word == Word::Name("or".into())).then_some(Kind::Or as Joins);
+        let left = self.and()?;
+        self.chain(left, or, Self::and)
     }
 
     fn and(&mut self) -> Result<Node, TextError> {
-        let mut left = self.not()?;
-        while self.take_name("and") {
-            let right = self.not()?;
-            let from = left.from;
-            left = self.join(Kind::And(Box::new(left), Box::new(right)), from)?;
+        let and = |word: &Word| (*word == Word::Name("and".into())).then_some(Kind::And as Joins);
+        let left = self.not()?;
+        self.chain(left, and, Self::not)
+    }
+
+    /// Parts joined from left to right, as long as an operator follows.
+    fn chain(
+        &mut self,
+        mut left: Node,
+        operator: fn(&Word) -> Option<Joins>,
+        part: fn(&mut Self) -> Result<Node, TextError>,
+    ) -> Result<Node, TextError> {
+        let from = left.from;
+        while let Some(joins) = operator(self.word()) {
+            self.next();
+            let right = part(self)?;
+            left = self.join(joins(Box::new(left), Box::new(right)), from)?;
         }
         Ok(left)
     }
@@ -502,37 +513,28 @@ impl Parser<'_> {
         if negative {
             left = self.join(Kind::Negative(Box::new(left)), from)?;
         }
-        loop {
-            let operator = match self.word() {
-                Word::Sign("+") => Operator::Add,
-                Word::Sign("-") => Operator::Subtract,
-                _ => return Ok(left),
-            };
-            self.next();
-            let right = self.term()?;
-            left = self.join(
-                Kind::Binary(operator, Box::new(left), Box::new(right)),
-                from,
-            )?;
-        }
+        self.chain(
+            left,
+            |word| match word {
+                Word::Sign("+") => Some(|a, b| Kind::Binary(Operator::Add, a, b)),
+                Word::Sign("-") => Some(|a, b| Kind::Binary(Operator::Subtract, a, b)),
+                _ => None,
+            },
+            Self::term,
+        )
     }
 
     fn term(&mut self) -> Result<Node, TextError> {
-        let from = self.from();
-        let mut left = self.factor()?;
-        loop {
-            let operator = match self.word() {
-                Word::Sign("*") => Operator::Multiply,
-                Word::Sign("/") => Operator::Divide,
-                _ => return Ok(left),
-            };
-            self.next();
-            let right = self.factor()?;
-            left = self.join(
-                Kind::Binary(operator, Box::new(left), Box::new(right)),
-                from,
-            )?;
-        }
+        let left = self.factor()?;
+        self.chain(
+            left,
+            |word| match word {
+                Word::Sign("*") => Some(|a, b| Kind::Binary(Operator::Multiply, a, b)),
+                Word::Sign("/") => Some(|a, b| Kind::Binary(Operator::Divide, a, b)),
+                _ => None,
+            },
+            Self::factor,
+        )
     }
 
     fn factor(&mut self) -> Result<Node, TextError> {

@@ -4,13 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     error::{TextError, shown},
+    names::{Names, differentiated, is_near},
+    sort::sorted,
     syntax::{Attribute, Declaration, Equation, Kept, Kind, Node, Syntax},
 };
-use crate::expression::{Condition, Expression, Function, Operator, Variable};
+use crate::expression::{Condition, Expression, Function, Variable};
 use crate::spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
-
-/// Names that a variable cannot have.
-const RESERVED: [&str; 6] = ["time", "delay", "noEvent", "smooth", "Real", "der"];
 
 pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
     let names = Names::of(text, &syntax)?;
@@ -30,157 +29,6 @@ pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError
         },
     };
     builder.build(&syntax.declarations, syntax.equations)
-}
-
-/// What a name stands for. Flows are in the order of the text until they are sorted.
-struct Names {
-    all: BTreeMap<String, Variable>,
-    /// Declarations that are flows, and those that are states, by position.
-    flows: Vec<usize>,
-    states: Vec<usize>,
-    /// How many flows, the first ones, are of parameters alone.
-    tied: usize,
-}
-
-/// What a binding of a parameter hangs on.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Tied {
-    /// On numbers, constants and measured parameters: it has a value.
-    No,
-    /// On parameters that are fitted.
-    Yes,
-}
-
-fn each_name<'a>(node: &'a Node, each: &mut impl FnMut(&'a str)) {
-    match &node.kind {
-        Kind::Number(_) | Kind::Truth(_) => {}
-        Kind::Name(name) => each(name),
-        Kind::Negative(a) | Kind::Not(a) => each_name(a, each),
-        Kind::Binary(_, a, b) | Kind::Compare(_, a, b) | Kind::And(a, b) | Kind::Or(a, b) => {
-            each_name(a, each);
-            each_name(b, each);
-        }
-        Kind::Call(_, all) => all.iter().for_each(|a| each_name(a, each)),
-        Kind::If(c, a, b) => {
-            each_name(c, each);
-            each_name(a, each);
-            each_name(b, each);
-        }
-    }
-}
-
-/// The variable of `der(x)` where a node is that.
-fn derivative(node: &Node) -> Option<&str> {
-    match &node.kind {
-        Kind::Call(function, arguments) if function == "der" => match arguments.as_slice() {
-            [
-                Node {
-                    kind: Kind::Name(name),
-                    ..
-                },
-            ] => Some(name),
-            _ => None,
-        },
-        _ => None,
-    }
-}
-
-/// The state of an equation `der(x) = e`, `c*der(x) = e`, and the coefficient.
-fn differentiated(left: &Node) -> Option<(&str, Option<&Node>)> {
-    if let Some(name) = derivative(left) {
-        return Some((name, None));
-    }
-    let Kind::Binary(Operator::Multiply, a, b) = &left.kind else {
-        return None;
-    };
-    match (derivative(a), derivative(b)) {
-        (None, Some(name)) => Some((name, Some(a))),
-        (Some(name), None) => Some((name, Some(b))),
-        _ => None,
-    }
-}
-
-impl Names {
-    fn of(text: &str, syntax: &Syntax) -> Result<Self, TextError> {
-        let is_differentiated: BTreeSet<&str> = syntax
-            .equations
-            .iter()
-            .filter_map(|equation| Some(differentiated(&equation.left)?.0))
-            .collect();
-        let mut names = Self {
-            all: BTreeMap::new(),
-            flows: Vec::new(),
-            states: Vec::new(),
-            tied: 0,
-        };
-        // Parameters that hang on fitted ones are computed like flows.
-        let mut tied: BTreeMap<&str, Tied> = BTreeMap::new();
-        let mut of_parameters = Vec::new();
-        let (mut parameters, mut inputs) = (0, 0);
-        let next = |count: &mut usize| {
-            *count += 1;
-            *count - 1
-        };
-        for (index, declaration) in syntax.declarations.iter().enumerate() {
-            let name = declaration.name.as_str();
-            let at = |what: String| TextError::at(text, declaration.from, what);
-            if RESERVED.contains(&name) || Function::ALL.iter().any(|f| f.name() == name) {
-                let what = format!(
-                    "{} has a meaning of its own: choose another name",
-                    shown(name)
-                );
-                return Err(at(what));
-            }
-            let of_fitted = || {
-                let mut any = false;
-                if let Some(binding) = &declaration.binding {
-                    each_name(binding, &mut |name| {
-                        any |= tied.get(name) == Some(&Tied::Yes)
-                    });
-                }
-                any
-            };
-            let variable = match declaration.kept {
-                Kept::FinalParameter if of_fitted() => {
-                    tied.insert(name, Tied::Yes);
-                    names.tied += 1;
-                    of_parameters.push(index);
-                    Variable::Flow(0)
-                }
-                Kept::Parameter => {
-                    tied.insert(name, Tied::Yes);
-                    Variable::Parameter(next(&mut parameters))
-                }
-                Kept::Constant | Kept::FinalParameter => {
-                    tied.insert(name, Tied::No);
-                    Variable::Parameter(next(&mut parameters))
-                }
-                Kept::Input => Variable::Input(next(&mut inputs)),
-                Kept::Output | Kept::Plain if is_differentiated.contains(name) => {
-                    names.states.push(index);
-                    Variable::State(names.states.len() - 1)
-                }
-                Kept::Output | Kept::Plain => {
-                    names.flows.push(index);
-                    Variable::Flow(0)
-                }
-            };
-            if names.all.insert(name.to_string(), variable).is_some() {
-                let what = format!(
-                    "{} is declared twice: give one of them another name",
-                    shown(name)
-                );
-                return Err(at(what));
-            }
-        }
-        of_parameters.append(&mut names.flows);
-        names.flows = of_parameters;
-        for (position, &index) in names.flows.iter().enumerate() {
-            let name = syntax.declarations[index].name.clone();
-            names.all.insert(name, Variable::Flow(position));
-        }
-        Ok(names)
-    }
 }
 
 struct Builder<'a> {
@@ -470,7 +318,7 @@ impl Builder<'_> {
 
     fn value_of(&self, expression: &Expression, node: &Node) -> Result<f64, TextError> {
         if expression.any(&|part| matches!(part, Expression::Variable(Variable::Flow(_)))) {
-            let what = "it hangs on parameters that are fitted: write numbers, or parameters that are measured";
+            let what = "it depends on parameters that are fitted: write numbers, or parameters that are measured";
             return self.error(node.from, what);
         }
         let value = expression.value(0.0, &|variable| self.parameter_value(variable));
@@ -775,7 +623,7 @@ impl Builder<'_> {
                     .collect();
                 names.push(names[0]);
                 let what = format!(
-                    "{} hang on each other in a circle: make one of them a state, or solve the equations for it",
+                    "{} depend on each other in a circle: make one of them a state, or solve the equations for it",
                     names.join(" -> ")
                 );
                 return self.error(froms[circle[0]], what);
@@ -784,70 +632,4 @@ impl Builder<'_> {
         self.spec.order = order;
         Ok(())
     }
-}
-
-/// An order in which each comes after what it needs, the first of the text first; or a circle.
-fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
-    #[derive(Clone, Copy, PartialEq)]
-    enum Mark {
-        New,
-        Begun,
-        Done,
-    }
-    let mut marks = vec![Mark::New; needs.len()];
-    let mut order = Vec::with_capacity(needs.len());
-    // Each with how many of its needs have been looked at: a stack of our own, as a chain may be long.
-    let mut path: Vec<(usize, usize)> = Vec::new();
-    for first in 0..needs.len() {
-        if marks[first] == Mark::New {
-            marks[first] = Mark::Begun;
-            path.push((first, 0));
-        }
-        while let Some((at, seen)) = path.last_mut() {
-            let Some(&next) = needs[*at].get(*seen) else {
-                marks[*at] = Mark::Done;
-                order.push(*at);
-                path.pop();
-                continue;
-            };
-            *seen += 1;
-            match marks[next] {
-                Mark::Done => {}
-                Mark::New => {
-                    marks[next] = Mark::Begun;
-                    path.push((next, 0));
-                }
-                Mark::Begun => {
-                    let from = path.iter().position(|(i, _)| *i == next).unwrap_or(0);
-                    return Err(path[from..].iter().map(|(i, _)| *i).collect());
-                }
-            }
-        }
-    }
-    Ok(order)
-}
-
-/// Two names that may be one with a slip: a letter more, less or another, or another case.
-fn is_near(a: &str, b: &str) -> bool {
-    if a.eq_ignore_ascii_case(b) {
-        return true;
-    }
-    let (short, long) = if a.len() <= b.len() { (a, b) } else { (b, a) };
-    if long.len() - short.len() > 1 || short.is_empty() {
-        return false;
-    }
-    let same = short
-        .bytes()
-        .zip(long.bytes())
-        .take_while(|(a, b)| a == b)
-        .count();
-    let rest = short.len() - same;
-    let tail = &long.as_bytes()[long.len() - rest..];
-    if short.as_bytes()[same..] == *tail {
-        return true;
-    }
-    short.len() == long.len()
-        && rest > 0
-        && short.len() > 1
-        && short.as_bytes()[same + 1..] == long.as_bytes()[same + 1..]
 }

@@ -156,7 +156,7 @@ fn model() -> impl Strategy<Value = ModelSpec> {
                             about,
                             value,
                             definition: None,
-                            // What flows of parameters hang on is fitted.
+                            // What flows of parameters depend on is fitted.
                             given: if i == 0 { Given::Fitted } else { given },
                         }
                     },
@@ -195,7 +195,7 @@ fn model() -> impl Strategy<Value = ModelSpec> {
                 (about(format!("q{i}")), value).prop_map(move |(about, value)| Flow {
                     about,
                     value: if of_parameters {
-                        // It hangs on a fitted one whatever else it holds.
+                        // It depends on a fitted one whatever else it holds.
                         let own = Expression::Variable(Variable::Parameter(0));
                         Expression::Binary(Operator::Add, own.into(), value.into())
                     } else {

@@ -1,0 +1,42 @@
+//! An order in which assignments can be computed.
+
+/// An order in which each comes after what it needs, the first of the text first; or a circle.
+pub(super) fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Mark {
+        New,
+        Begun,
+        Done,
+    }
+    let mut marks = vec![Mark::New; needs.len()];
+    let mut order = Vec::with_capacity(needs.len());
+    // Each with how many of its needs have been looked at: a stack of our own, as a chain may be long.
+    let mut path: Vec<(usize, usize)> = Vec::new();
+    for first in 0..needs.len() {
+        if marks[first] == Mark::New {
+            marks[first] = Mark::Begun;
+            path.push((first, 0));
+        }
+        while let Some((at, seen)) = path.last_mut() {
+            let Some(&next) = needs[*at].get(*seen) else {
+                marks[*at] = Mark::Done;
+                order.push(*at);
+                path.pop();
+                continue;
+            };
+            *seen += 1;
+            match marks[next] {
+                Mark::Done => {}
+                Mark::New => {
+                    marks[next] = Mark::Begun;
+                    path.push((next, 0));
+                }
+                Mark::Begun => {
+                    let from = path.iter().position(|(i, _)| *i == next).unwrap_or(0);
+                    return Err(path[from..].iter().map(|(i, _)| *i).collect());
+                }
+            }
+        }
+    }
+    Ok(order)
+}

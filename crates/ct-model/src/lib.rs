@@ -46,12 +46,17 @@
 
 mod expression;
 mod linearity;
+mod scalar;
+mod simulation;
 mod spec;
+mod tape;
 mod text;
 mod units;
 
 pub use expression::{Comparison, Condition, Expression, Function, Operator, Variable};
 pub use linearity::Linearity;
+pub use scalar::{Dual, Scalar};
+pub use simulation::{Method, Model, NoSolution, Simulation};
 pub use spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
 pub use text::{Position, TextError};
 pub use units::{UnitWarning, unit_warnings};

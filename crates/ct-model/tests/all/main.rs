@@ -5,4 +5,5 @@ mod language;
 mod mutated;
 mod refused;
 mod round_trip;
+mod simulated;
 mod units;

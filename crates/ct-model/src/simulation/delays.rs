@@ -1,0 +1,146 @@
+//! What was a time ago: the past of every delayed expression, in pieces between its jumps.
+//!
+//! A jump of an input comes out of the delay at a time that depends on the delay: steps end there, at a time that carries the derivative.
+
+use std::collections::VecDeque;
+
+use crate::scalar::Scalar;
+
+/// Points of a piece at which its values are kept, at equal distances.
+pub(super) const POINTS: usize = 5;
+
+#[derive(Debug, Clone)]
+pub(super) struct Piece<T> {
+    pub begin: T,
+    pub length: T,
+    pub values: [T; POINTS],
+    /// How many jumps lie before it.
+    jumps: usize,
+}
+
+impl<T: Scalar> Piece<T> {
+    /// The polynomial of degree four through its points.
+    fn at(&self, time: T) -> T {
+        let share = (time - self.begin) / self.length;
+        let z = share.value() * (POINTS - 1) as f64;
+        let mut of = [(share, 0.0); POINTS + 1];
+        let (mut value, mut rise) = (0.0, 0.0);
+        for (i, own) in self.values.iter().enumerate() {
+            let (mut weight, mut slope) = (1.0, 0.0);
+            for j in (0..POINTS).filter(|&j| j != i) {
+                let distance = i as f64 - j as f64;
+                slope = (slope * (z - j as f64) + weight) / distance;
+                weight *= (z - j as f64) / distance;
+            }
+            value += weight * own.value();
+            rise += slope * (POINTS - 1) as f64 * own.value();
+            of[i] = (*own, weight);
+        }
+        of[POINTS].1 = rise;
+        T::with_slopes(value, of)
+    }
+}
+
+/// One delayed expression.
+#[derive(Debug, Clone)]
+pub(super) struct Delay<T> {
+    /// By how much.
+    pub by: T,
+    /// It is made of inputs and the time alone: its values in an interval are known when the interval begins.
+    pub known_ahead: bool,
+    /// Before the record.
+    before: T,
+    pieces: VecDeque<Piece<T>>,
+    /// Jumps that have not come out yet: when they went in.
+    jumps: VecDeque<T>,
+    /// How many have gone in.
+    gone_in: usize,
+    /// How many have come out.
+    out: usize,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Delays<T> {
+    pub all: Vec<Delay<T>>,
+}
+
+impl<T: Scalar> Delay<T> {
+    pub fn new(by: T, known_ahead: bool) -> Self {
+        Self {
+            by,
+            known_ahead,
+            before: T::constant(0.0),
+            pieces: VecDeque::new(),
+            jumps: VecDeque::new(),
+            gone_in: 0,
+            out: 0,
+        }
+    }
+
+    /// The record begins, with this value.
+    pub fn begin(&mut self, time: T, value: T) {
+        self.before = value;
+        self.jump(time);
+    }
+
+    /// It jumps, or bends.
+    pub fn jump(&mut self, time: T) {
+        self.jumps.push_back(time);
+        self.gone_in += 1;
+    }
+
+    /// Its values over an interval.
+    pub fn push(&mut self, begin: T, length: T, values: [T; POINTS]) {
+        self.pieces.push_back(Piece {
+            begin,
+            length,
+            values,
+            jumps: self.gone_in,
+        });
+    }
+
+    /// When the next jump comes out.
+    pub fn next_out(&self) -> Option<T> {
+        Some(*self.jumps.front()? + self.by)
+    }
+
+    /// The next jump is out.
+    pub fn let_out(&mut self) {
+        if self.jumps.pop_front().is_some() {
+            self.out += 1;
+        }
+    }
+
+    /// Drops what is not needed any more from a time on.
+    pub fn forget(&mut self, time: f64) {
+        let oldest = time - self.by.value();
+        let passed = |piece: &Piece<T>| piece.jumps <= self.out && piece.begin.value() < oldest;
+        while self.pieces.len() > 2 && passed(&self.pieces[1]) {
+            self.pieces.pop_front();
+        }
+    }
+
+    fn at(&self, time: T) -> T {
+        let time = time - self.by;
+        if self.out == 0 {
+            return self.before;
+        }
+        let first = self.pieces.partition_point(|piece| piece.jumps < self.out);
+        let begun = |piece: &Piece<T>| {
+            let since_jump = piece.jumps == self.out && piece.begin.value() <= time.value();
+            piece.jumps < self.out || since_jump
+        };
+        let later = self.pieces.partition_point(begun).saturating_sub(1);
+        // Before the first piece since the jump, or where none is there yet, the nearest one is carried on.
+        let at = later.max(first).min(self.pieces.len().saturating_sub(1));
+        self.pieces
+            .get(at)
+            .map_or(self.before, |piece| piece.at(time))
+    }
+}
+
+impl<T: Scalar> Delays<T> {
+    pub fn at(&self, i: usize, time: T) -> T {
+        self.all[i].at(time)
+    }
+}

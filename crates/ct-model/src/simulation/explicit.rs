@@ -1,0 +1,114 @@
+//! One step of the explicit Runge-Kutta method of order five by Dormand and Prince, with its error estimate of order four.
+//!
+//! **Reference**: J. R. Dormand, P. J. Prince, J. Computational and Applied Mathematics 6 (1980) 19-26; E. Hairer, S. P. Nørsett,
+//! G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, table II.5.2 and, for the interpolation, section II.6.
+
+use super::step::{Drive, Step};
+use crate::scalar::Scalar;
+use crate::tape::Tape;
+
+pub(super) const STAGES: usize = 7;
+const NODES: [f64; STAGES] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
+const A: [&[f64]; STAGES] = [
+    &[],
+    &[1.0 / 5.0],
+    &[3.0 / 40.0, 9.0 / 40.0],
+    &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
+    &[
+        19372.0 / 6561.0,
+        -25360.0 / 2187.0,
+        64448.0 / 6561.0,
+        -212.0 / 729.0,
+    ],
+    &[
+        9017.0 / 3168.0,
+        -355.0 / 33.0,
+        46732.0 / 5247.0,
+        49.0 / 176.0,
+        -5103.0 / 18656.0,
+    ],
+    &[
+        35.0 / 384.0,
+        0.0,
+        500.0 / 1113.0,
+        125.0 / 192.0,
+        -2187.0 / 6784.0,
+        11.0 / 84.0,
+    ],
+];
+/// The result less that of order four.
+const ERROR: [f64; STAGES] = [
+    71.0 / 57600.0,
+    0.0,
+    -71.0 / 16695.0,
+    71.0 / 1920.0,
+    -17253.0 / 339_200.0,
+    22.0 / 525.0,
+    -1.0 / 40.0,
+];
+/// What makes the interpolation one of order four.
+const BEND: [f64; STAGES] = [
+    -12_715_105_075.0 / 11_282_082_432.0,
+    0.0,
+    87_487_479_700.0 / 32_700_410_799.0,
+    -10_690_763_975.0 / 1_880_347_072.0,
+    701_980_252_875.0 / 199_316_789_632.0,
+    -1_453_857_185.0 / 822_651_844.0,
+    69_997_945.0 / 29_380_423.0,
+];
+
+/// Steps from `x` at `time` by `h`, to `work.next`.
+pub(super) fn step<T: Scalar>(
+    tape: &Tape,
+    work: &mut Step<T>,
+    drive: &Drive<'_, T>,
+    (time, x, h): (T, &[T], T),
+) {
+    let n = x.len();
+    for (stage, row) in A.iter().enumerate() {
+        for i in 0..n {
+            let mut sum = T::constant(0.0);
+            for (k, a) in work.slopes.chunks_exact(n.max(1)).zip(*row) {
+                sum = sum + k[i] * *a;
+            }
+            work.next[i] = x[i] + h * sum;
+        }
+        let at = time + h * NODES[stage];
+        let next = std::mem::take(&mut work.next);
+        drive.load(tape, work, at, &next);
+        work.next = next;
+        tape.evaluate(&mut work.registers);
+        work.keep_slope(tape, stage);
+    }
+}
+
+/// The error of the step against the tolerance: at most one where it is good.
+pub(super) fn error<T: Scalar>(work: &Step<T>, h: f64, scale: &[f64]) -> f64 {
+    let n = scale.len();
+    let of = |i: usize| {
+        let slopes = work.slopes.chunks_exact(n).zip(ERROR);
+        let sum: f64 = slopes.map(|(k, e)| k[i].value() * e).sum();
+        (h * sum).abs() / scale[i]
+    };
+    // A maximum that keeps what is no number.
+    (0..n)
+        .map(of)
+        .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
+}
+
+/// The states within the last step, at a share of it.
+pub(super) fn within<T: Scalar>(work: &Step<T>, x: &[T], h: T, share: f64, into: &mut [T]) {
+    let n = x.len();
+    for i in 0..n {
+        let slope = |stage: usize| work.slopes[stage * n + i];
+        let rise = work.next[i] - x[i];
+        let first = h * slope(0) - rise;
+        let second = rise - h * slope(STAGES - 1) - first;
+        let mut bend = T::constant(0.0);
+        for (stage, d) in BEND.into_iter().enumerate() {
+            bend = bend + slope(stage) * d;
+        }
+        let inner = second + h * bend * (1.0 - share);
+        into[i] = x[i] + (rise + (first + inner * share) * (1.0 - share)) * share;
+    }
+}

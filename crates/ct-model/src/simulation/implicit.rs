@@ -1,0 +1,165 @@
+//! One step of a diagonally implicit Runge-Kutta method of order four, L-stable, with an error estimate of order three: for stiff models.
+//!
+//! Each stage is solved by simplified Newton steps, with the Jacobian of the right-hand side at the beginning of the step. They run on
+//! numbers with derivatives like everything else: what they converge to has the derivatives of the solution.
+//!
+//! **Reference**: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition, section IV.6, table 6.5.
+
+use nalgebra::DMatrix;
+
+use super::step::{Drive, Step};
+use crate::scalar::{Dual, Scalar};
+use crate::tape::{Registers, Tape};
+
+const STAGES: usize = 5;
+const GAMMA: f64 = 0.25;
+const NODES: [f64; STAGES] = [0.25, 0.75, 11.0 / 20.0, 0.5, 1.0];
+const A: [&[f64]; STAGES] = [
+    &[],
+    &[0.5],
+    &[17.0 / 50.0, -1.0 / 25.0],
+    &[371.0 / 1360.0, -137.0 / 2720.0, 15.0 / 544.0],
+    &[25.0 / 24.0, -49.0 / 48.0, 125.0 / 16.0, -85.0 / 12.0],
+];
+/// The result less that of order three.
+const ERROR: [f64; STAGES] = [
+    25.0 / 24.0 - 59.0 / 48.0,
+    -49.0 / 48.0 + 17.0 / 96.0,
+    125.0 / 16.0 - 225.0 / 32.0,
+    0.0,
+    0.25,
+];
+/// Newton steps after which a stage counts as not to be solved.
+const NEWTON_STEPS: usize = 15;
+/// Values have converged below this share of the tolerance; derivatives follow in one step more.
+const CONVERGED: f64 = 1e-3;
+
+/// Lanes in which columns of the Jacobian are computed.
+const LANES: usize = 4;
+
+/// The Jacobian of the right-hand side by the states.
+#[derive(Debug, Clone)]
+pub(super) struct Jacobian {
+    registers: Registers<Dual<LANES>>,
+    pub matrix: DMatrix<f64>,
+}
+
+impl Jacobian {
+    pub fn new(tape: &Tape, parameters: &[f64]) -> Self {
+        let parameters: Vec<_> = parameters.iter().map(|p| Dual::constant(*p)).collect();
+        Self {
+            registers: tape.registers(&parameters),
+            matrix: DMatrix::zeros(tape.states, tape.states),
+        }
+    }
+
+    /// Computes it where these registers are.
+    pub fn compute<T: Scalar>(&mut self, tape: &Tape, at: &Registers<T>) {
+        let n = tape.states;
+        let up_to = tape.delayed(tape.delays.len());
+        for begin in (0..n).step_by(LANES) {
+            for (own, value) in self.registers.values[..up_to].iter_mut().zip(&at.values) {
+                *own = Dual::constant(value.value());
+            }
+            for lane in 0..LANES.min(n - begin) {
+                let state = &mut self.registers.values[tape.state(begin + lane)];
+                *state = Dual::variable(state.re, lane);
+            }
+            tape.copy_answers(at, &mut self.registers);
+            tape.evaluate(&mut self.registers);
+            for (i, &register) in tape.derivatives.iter().enumerate() {
+                for lane in 0..LANES.min(n - begin) {
+                    self.matrix[(i, begin + lane)] = self.registers.values[register].eps[lane];
+                }
+            }
+        }
+    }
+
+    /// The largest sum of a row's absolute values.
+    pub fn norm(&self) -> f64 {
+        let rows = self.matrix.row_iter();
+        rows.map(|row| row.iter().map(|v| v.abs()).sum())
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Steps from `x` at `time` by `h`, to `work.next`; the step's error against the tolerance, `None` where a stage cannot be solved.
+pub(super) fn step<T: Scalar>(
+    tape: &Tape,
+    work: &mut Step<T>,
+    jacobian: &mut Jacobian,
+    drive: &Drive<'_, T>,
+    (time, x, h): (T, &[T], T),
+    scale: &[f64],
+) -> Option<f64> {
+    let n = x.len();
+    drive.load(tape, work, time, x);
+    tape.evaluate(&mut work.registers);
+    work.keep_slope(tape, 0);
+    jacobian.compute(tape, &work.registers);
+    let newton = DMatrix::identity(n, n) - &jacobian.matrix * (GAMMA * h.value());
+    let inverse = newton.try_inverse()?;
+    let mut slope = vec![T::constant(0.0); n];
+    let mut left = slope.clone();
+    for (stage, row) in A.iter().enumerate() {
+        let before = if stage == 0 { 0 } else { stage - 1 };
+        slope.copy_from_slice(&work.slopes[before * n..][..n]);
+        let mut converged = false;
+        for _ in 0..NEWTON_STEPS {
+            for i in 0..n {
+                let mut sum = slope[i] * GAMMA;
+                for (k, a) in work.slopes.chunks_exact(n).zip(*row) {
+                    sum = sum + k[i] * *a;
+                }
+                work.next[i] = x[i] + h * sum;
+            }
+            let next = std::mem::take(&mut work.next);
+            drive.load(tape, work, time + h * NODES[stage], &next);
+            work.next = next;
+            tape.evaluate(&mut work.registers);
+            for (i, &register) in tape.derivatives.iter().enumerate() {
+                left[i] = work.registers.values[register] - slope[i];
+            }
+            let mut largest: f64 = 0.0;
+            for i in 0..n {
+                let mut change = T::constant(0.0);
+                for (j, left) in left.iter().enumerate() {
+                    change = change + *left * inverse[(i, j)];
+                }
+                slope[i] = slope[i] + change;
+                let moved = (h.value() * change.value()).abs() / scale[i];
+                largest = if moved.is_nan() {
+                    f64::INFINITY
+                } else {
+                    largest.max(moved)
+                };
+            }
+            if converged {
+                break;
+            }
+            converged = largest < CONVERGED;
+            if !largest.is_finite() {
+                return None;
+            }
+        }
+        if !converged {
+            return None;
+        }
+        work.slopes[stage * n..][..n].copy_from_slice(&slope);
+    }
+    for i in 0..n {
+        let mut sum = work.slopes[(STAGES - 1) * n + i] * GAMMA;
+        for (k, a) in work.slopes.chunks_exact(n).zip(A[STAGES - 1]) {
+            sum = sum + k[i] * *a;
+        }
+        work.next[i] = x[i] + h * sum;
+    }
+    // Filtered by the Newton matrix: what decays within the step is no error.
+    let errors = nalgebra::DVector::from_fn(n, |i, _| {
+        let slopes = work.slopes.chunks_exact(n).zip(ERROR);
+        h.value() * slopes.map(|(k, e)| k[i].value() * e).sum::<f64>()
+    });
+    let errors = inverse * errors;
+    let shares = errors.iter().zip(scale).map(|(e, s)| e.abs() / s);
+    Some(shares.fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a }))
+}

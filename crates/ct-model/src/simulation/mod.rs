@@ -1,0 +1,721 @@
+//! Simulates a model, with exact derivatives by parameters and initial states.
+//!
+//! - Linear models ([`crate::Linearity`]) without delays go from row to row exactly.
+//! - All others by an explicit method of order five whose steps follow its error, until its steps are far shorter than the error asks for:
+//!   then the model is stiff there, and an implicit method of order four goes on ([`Method`]).
+//! - Steps end where an input jumps, where a delay lets a jump through, and where a branch changes (`if`, `min`, `max`, `abs`, `sign`).
+//!   Such a time depends on the parameters, and the length of the step carries its derivative: what comes after has the derivatives of the
+//!   true solution.
+//!
+//! **Reference** for the derivatives through events: S. Galan, W. F. Feehery, P. I. Barton, Applied Numerical Mathematics 31 (1999) 17-47.
+
+mod delays;
+mod exact;
+mod explicit;
+mod implicit;
+mod step;
+
+use self::delays::{Delay, Delays, POINTS};
+use self::exact::Exact;
+use self::implicit::Jacobian;
+use self::step::{Drive, Step};
+use crate::linearity::Linearity;
+use crate::scalar::Scalar;
+use crate::spec::ModelSpec;
+use crate::tape::Tape;
+
+/// Error of a step, as a share of the largest absolute value that a state has had.
+const TOLERANCE: f64 = 1e-10;
+/// The shortest step, as a share of an interval between rows.
+const SHORTEST: f64 = 1e-9;
+/// Two events of one guard that lie nearer to each other than this share of an interval slide: from there a step of this length is taken.
+const SLIDE: f64 = 1e-3;
+/// Steps in an interval beyond which the simulation has failed.
+const MOST_STEPS: usize = 50_000;
+/// Steps in an interval from which on the model may be stiff.
+const MANY_STEPS: usize = 40;
+/// It is where the length of such steps times the norm of the Jacobian is above this: the stability of the method, and not its error, limits
+/// them.
+const STABILITY: f64 = 1.5;
+/// An event's time is found to this share of the step.
+const EVENT: f64 = 1e-13;
+/// Distance of the differences from which the speed of a guard is computed, as a share of the step.
+const SPEED: f64 = 1e-4;
+
+/// How a model is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Linear: exactly.
+    Exact,
+    /// Explicit Runge-Kutta steps of order five (Dormand and Prince).
+    Explicit,
+    /// Stiff: implicit Runge-Kutta steps of order four.
+    Implicit,
+}
+
+/// The simulation cannot go on: states that grow beyond all bounds, or an equation that has no value there.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "the simulation cannot go on beyond time {time}: a state grows without bound, or an equation has no value there"
+)]
+pub struct NoSolution {
+    /// When \[unit of the record's time\].
+    pub time: f64,
+}
+
+/// A model that is ready to be simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    spec: ModelSpec,
+    tape: Tape,
+    exact: bool,
+}
+
+impl Model {
+    /// Compiles a model.
+    #[must_use]
+    pub fn new(spec: ModelSpec) -> Self {
+        let tape = Tape::compile(&spec);
+        let exact = spec.linearity() == Linearity::Linear
+            && tape.delays.is_empty()
+            && !spec.states.is_empty();
+        Self { spec, tape, exact }
+    }
+
+    /// What it was compiled from.
+    #[must_use]
+    pub fn spec(&self) -> &ModelSpec {
+        &self.spec
+    }
+
+    /// The values of its parameters as the text has them, in the order of [`ModelSpec::parameters`].
+    #[must_use]
+    pub fn parameters(&self) -> Vec<f64> {
+        let parameters = self.spec.parameters.iter();
+        parameters.map(|parameter| parameter.value).collect()
+    }
+
+    /// The initial values of the states as the text has them, of these parameters.
+    #[must_use]
+    pub fn starts<T: Scalar>(&self, parameters: &[T]) -> Vec<T> {
+        let mut registers = self.tape.registers(parameters);
+        self.tape.evaluate_with_guards(&mut registers);
+        let starts = self.tape.starts.iter();
+        starts.map(|&register| registers.values[register]).collect()
+    }
+}
+
+/// A simulation in progress.
+///
+/// Nothing is allocated from row to row, but for the past of what is delayed.
+pub struct Simulation<'a, T> {
+    model: &'a Model,
+    method: Method,
+    time: T,
+    state: Vec<T>,
+    work: Step<T>,
+    exact: Option<Exact<T>>,
+    jacobian: Option<Jacobian>,
+    delays: Option<Delays<T>>,
+    /// When each guard changed its answer last.
+    changed: Vec<f64>,
+    /// The largest absolute value that each state has had, times the tolerance.
+    scale: Vec<f64>,
+    largest: Vec<f64>,
+    /// Length of the last step that the error allowed.
+    length: f64,
+    rise: Vec<f64>,
+    /// The inputs at the end of the last interval.
+    last: Vec<f64>,
+    scratch: Vec<T>,
+    begun: bool,
+}
+
+impl<'a, T: Scalar> Simulation<'a, T> {
+    /// Begins at `start` on the clock that `time` follows, with parameters in the order of [`ModelSpec::parameters`] and a value for
+    /// each state.
+    ///
+    /// # Panics
+    /// Where the numbers of parameters or states are not the model's.
+    #[must_use]
+    pub fn new(model: &'a Model, parameters: &[T], initial: &[T], start: f64) -> Self {
+        let tape = &model.tape;
+        assert_eq!(parameters.len(), tape.parameters, "parameters");
+        assert_eq!(initial.len(), tape.states, "initial states");
+        let mut work = Step::new(tape, parameters);
+        let exact = model.exact.then(|| Exact::new(tape, &mut work));
+        let zero = T::constant(0.0);
+        let delays = tape.delays.iter().zip(tape.known_ahead());
+        let delays = delays.map(|(&(_, by), ahead)| {
+            let by = work.registers.values[by];
+            // Nothing comes out before it went in.
+            Delay::new(if by.value() < 0.0 { zero } else { by }, ahead)
+        });
+        let plain: Vec<f64> = parameters.iter().map(|value| value.value()).collect();
+        Self {
+            method: if model.exact {
+                Method::Exact
+            } else {
+                Method::Explicit
+            },
+            time: T::constant(start),
+            state: initial.to_vec(),
+            exact,
+            jacobian: (!model.exact).then(|| Jacobian::new(tape, &plain)),
+            delays: Some(Delays {
+                all: delays.collect(),
+            }),
+            changed: vec![f64::NEG_INFINITY; tape.guards.len()],
+            scale: vec![0.0; tape.states],
+            largest: initial.iter().map(|x| x.value().abs()).collect(),
+            length: f64::INFINITY,
+            rise: vec![0.0; tape.inputs],
+            last: vec![0.0; tape.inputs],
+            scratch: vec![zero; tape.states],
+            begun: false,
+            work,
+            model,
+        }
+    }
+
+    /// How it is simulated by now.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The present states.
+    #[must_use]
+    pub fn state(&self) -> &[T] {
+        &self.state
+    }
+
+    /// The outputs now, with the inputs of this row.
+    pub fn read(&mut self, inputs: &[f64], outputs: &mut [T]) {
+        let Some(delays) = self.delays.take() else {
+            return;
+        };
+        self.rise.fill(0.0);
+        let drive = Drive {
+            begin: 0.0,
+            from: inputs,
+            rise: &self.rise,
+            delays: &delays,
+        };
+        let tape = &self.model.tape;
+        drive.load(tape, &mut self.work, self.time, &self.state);
+        if self.begun {
+            tape.evaluate_with_guards(&mut self.work.registers);
+        } else {
+            self.before_the_record();
+        }
+        self.delays = Some(delays);
+        for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {
+            *output = self.work.registers.values[register];
+        }
+    }
+
+    /// Before the record everything was as at its beginning: what a delay lets through too.
+    fn before_the_record(&mut self) {
+        let tape = &self.model.tape;
+        // A delay may delay what another one lets through.
+        for _ in 0..=tape.delays.len() {
+            tape.evaluate_with_guards(&mut self.work.registers);
+            for (i, &(what, _)) in tape.delays.iter().enumerate() {
+                self.work.registers.values[tape.delayed(i)] = self.work.registers.values[what];
+            }
+        }
+    }
+
+    /// Goes on to `until`, the inputs in straight lines from one value to the other (the same where they are held).
+    ///
+    /// # Errors
+    /// Where the simulation cannot go on.
+    pub fn advance(&mut self, from: &[f64], to: &[f64], until: f64) -> Result<(), NoSolution> {
+        let Some(mut delays) = self.delays.take() else {
+            return Err(NoSolution { time: until });
+        };
+        let done = self.go_on(from, to, until, &mut delays);
+        self.delays = Some(delays);
+        self.last.copy_from_slice(to);
+        done
+    }
+
+    fn go_on(
+        &mut self,
+        from: &[f64],
+        to: &[f64],
+        until: f64,
+        delays: &mut Delays<T>,
+    ) -> Result<(), NoSolution> {
+        let model = self.model;
+        let tape = &model.tape;
+        let begin = self.time.value();
+        let interval = until - begin;
+        for ((rise, from), to) in self.rise.iter_mut().zip(from).zip(to) {
+            *rise = (to - from) / interval;
+        }
+        let rise = std::mem::take(&mut self.rise);
+        let result = if self.exact.is_some() {
+            self.step_exactly(from, &rise, interval)
+        } else {
+            self.begin_interval(from, &rise, until, delays);
+            self.steps(tape, (from, &rise), (begin, until), delays)
+        };
+        self.rise = rise;
+        self.time = T::constant(until);
+        let finite = |x: &T| x.value().abs() < 1e150;
+        if result.is_ok() && self.state.iter().all(finite) {
+            Ok(())
+        } else {
+            Err(NoSolution { time: begin })
+        }
+    }
+
+    fn step_exactly(&mut self, from: &[f64], rise: &[f64], h: f64) -> Result<(), NoSolution> {
+        let tape = &self.model.tape;
+        let n = tape.states;
+        let delays = Delays { all: Vec::new() };
+        let mut drive = Drive {
+            begin: 0.0,
+            from,
+            rise: &[],
+            delays: &delays,
+        };
+        // `time` plays no part in what is linear; held inputs first, then what their rise adds.
+        let held = vec![0.0; from.len()];
+        drive.rise = &held;
+        drive.load(tape, &mut self.work, self.time, &self.state);
+        tape.evaluate(&mut self.work.registers);
+        self.work.keep_slope(tape, 0);
+        let mut added = vec![T::constant(0.0); n];
+        if rise.iter().any(|rise| *rise != 0.0) {
+            let ends: Vec<f64> = from.iter().zip(rise).map(|(u, r)| u + r * h).collect();
+            drive.from = &ends;
+            drive.load(tape, &mut self.work, self.time, &self.state);
+            tape.evaluate(&mut self.work.registers);
+            self.work.keep_slope(tape, 1);
+            for (i, added) in added.iter_mut().enumerate() {
+                *added = (self.work.slopes[n + i] - self.work.slopes[i]) * (1.0 / h);
+            }
+        }
+        if let Some(exact) = &mut self.exact {
+            exact.step(&mut self.state, &self.work.slopes[..n], &added, h);
+        }
+        Ok(())
+    }
+
+    /// The guards' answers where an interval begins, and what delays know of it.
+    fn begin_interval(&mut self, from: &[f64], rise: &[f64], until: f64, delays: &mut Delays<T>) {
+        let tape = &self.model.tape;
+        let begin = self.time.value();
+        let first = !self.begun;
+        let jumps = first || from != self.last;
+        let bends = rise.iter().any(|rise| *rise != 0.0);
+        if !delays.all.is_empty() {
+            if first {
+                let drive = Drive {
+                    begin,
+                    from,
+                    rise,
+                    delays,
+                };
+                drive.load(tape, &mut self.work, self.time, &self.state);
+                self.before_the_record();
+                for (delay, &(what, _)) in delays.all.iter_mut().zip(&tape.delays) {
+                    delay.begin(self.time, self.work.registers.values[what]);
+                }
+            } else if jumps || bends {
+                for delay in &mut delays.all {
+                    delay.jump(self.time);
+                }
+            }
+            let length = T::constant(until) - self.time;
+            self.keep_past(from, rise, (begin, length), delays, true);
+            for delay in &mut delays.all {
+                delay.forget(begin);
+            }
+        }
+        self.begun = true;
+        let drive = Drive {
+            begin,
+            from,
+            rise,
+            delays,
+        };
+        drive.load(tape, &mut self.work, self.time, &self.state);
+        tape.evaluate_with_guards(&mut self.work.registers);
+    }
+
+    /// Keeps what is delayed over the next or the last step: what is known ahead for a whole interval, everything else after each step.
+    fn keep_past(
+        &mut self,
+        from: &[f64],
+        rise: &[f64],
+        (begin, length): (f64, T),
+        delays: &mut Delays<T>,
+        ahead: bool,
+    ) {
+        let tape = &self.model.tape;
+        if length.value() <= 0.0 || delays.all.iter().all(|delay| delay.known_ahead != ahead) {
+            return;
+        }
+        let count = delays.all.len();
+        let mut values = vec![[T::constant(0.0); POINTS]; count];
+        for point in 0..POINTS {
+            let share = point as f64 / (POINTS - 1) as f64;
+            let mut state = std::mem::take(&mut self.scratch);
+            state.copy_from_slice(&self.state);
+            if !ahead {
+                match self.method {
+                    Method::Implicit => {
+                        for (i, x) in state.iter_mut().enumerate() {
+                            *x = *x + (self.work.next[i] - *x) * share;
+                        }
+                    }
+                    _ => explicit::within(&self.work, &self.state, length, share, &mut state),
+                }
+            }
+            let drive = Drive {
+                begin,
+                from,
+                rise,
+                delays,
+            };
+            drive.load(tape, &mut self.work, self.time + length * share, &state);
+            if ahead {
+                tape.evaluate_with_guards(&mut self.work.registers);
+            } else {
+                tape.evaluate(&mut self.work.registers);
+            }
+            self.scratch = state;
+            for (values, &(what, _)) in values.iter_mut().zip(&tape.delays) {
+                values[point] = self.work.registers.values[what];
+            }
+        }
+        for (delay, values) in delays.all.iter_mut().zip(values) {
+            if delay.known_ahead == ahead {
+                delay.push(self.time, length, values);
+            }
+        }
+    }
+
+    fn steps(
+        &mut self,
+        tape: &Tape,
+        (from, rise): (&[f64], &[f64]),
+        (begin, until): (f64, f64),
+        delays: &mut Delays<T>,
+    ) -> Result<(), NoSolution> {
+        let interval = until - begin;
+        let shortest = SHORTEST * interval;
+        let mut taken = 0;
+        loop {
+            let now = self.time.value();
+            let left = T::constant(until) - self.time;
+            // The end of what is smooth: the row, or a jump that comes out of a delay.
+            let mut limit = left;
+            let mut out = None;
+            for (i, delay) in delays.all.iter().enumerate() {
+                if let Some(next) = delay.next_out() {
+                    let distance = next - self.time;
+                    if distance.value() < limit.value() {
+                        limit = distance;
+                        out = Some(i);
+                    }
+                }
+            }
+            if out.is_none() && left.value() <= 1e-14 * interval {
+                // What is left of the interval has a derivative, where its last step ended at an event.
+                self.finish(tape, (from, rise), begin, left, delays);
+                return Ok(());
+            }
+            taken += 1;
+            if taken > MOST_STEPS {
+                return Err(NoSolution { time: now });
+            }
+            let mut longest = self.length;
+            for delay in delays.all.iter().filter(|delay| !delay.known_ahead) {
+                longest = longest.min(delay.by.value().max(interval / 50.0));
+            }
+            let whole = limit.value() <= longest * (1.0 + 1e-9);
+            let mut h = if whole { limit } else { T::constant(longest) };
+            let error = self.attempt(tape, (from, rise), begin, h, delays);
+            if (error > 1.0 || error.is_nan()) && h.value() > shortest {
+                // What is no number asks for a much shorter step.
+                let factor = if error.is_finite() {
+                    (0.9 * error.powf(-0.2)).clamp(0.1, 0.9)
+                } else {
+                    0.1
+                };
+                self.length = (h.value() * factor).max(shortest);
+                continue;
+            }
+            if !error.is_finite() {
+                return Err(NoSolution { time: now });
+            }
+            let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
+            let event = self.first_event(tape, (from, rise), (begin, interval), h, delays);
+            if event.is_none() && (!whole || grown > self.length || error > 0.5) {
+                self.length = grown.max(shortest);
+            }
+            if let Some(Event { after, .. }) = &event {
+                h = *after;
+                self.attempt(tape, (from, rise), begin, h, delays);
+            }
+            self.keep_past(from, rise, (begin, h), delays, false);
+            self.state.copy_from_slice(&self.work.next);
+            self.time = self.time + h;
+            self.note_largest();
+            if event.is_none() && whole && out.is_none() {
+                return Ok(());
+            }
+            if let Some(Event { guards, .. }) = event {
+                let drive = Drive {
+                    begin,
+                    from,
+                    rise,
+                    delays,
+                };
+                drive.load(tape, &mut self.work, self.time, &self.state);
+                for guard in guards {
+                    let answer = &mut self.work.registers.answers[guard];
+                    *answer = !*answer;
+                    self.changed[guard] = self.time.value();
+                }
+                tape.answers_changed(&mut self.work.registers);
+                for delay in delays.all.iter_mut().filter(|delay| !delay.known_ahead) {
+                    delay.jump(self.time);
+                }
+            } else if let Some(out) = out.filter(|_| whole) {
+                delays.all[out].let_out();
+                // A branch may stand on what jumps.
+                let drive = Drive {
+                    begin,
+                    from,
+                    rise,
+                    delays,
+                };
+                drive.load(tape, &mut self.work, self.time, &self.state);
+                tape.evaluate_with_guards(&mut self.work.registers);
+                for (i, delay) in delays.all.iter_mut().enumerate() {
+                    if i != out && !delay.known_ahead {
+                        delay.jump(self.time);
+                    }
+                }
+            }
+            if taken == MANY_STEPS && self.method == Method::Explicit {
+                self.look_for_stiffness(tape, h.value());
+            }
+        }
+    }
+
+    /// Carries the derivative of what is left of an interval whose last step ended at its very end.
+    fn finish(
+        &mut self,
+        tape: &Tape,
+        (from, rise): (&[f64], &[f64]),
+        begin: f64,
+        left: T,
+        delays: &Delays<T>,
+    ) {
+        let drive = Drive {
+            begin,
+            from,
+            rise,
+            delays,
+        };
+        drive.load(tape, &mut self.work, self.time, &self.state);
+        tape.evaluate(&mut self.work.registers);
+        for (x, &register) in self.state.iter_mut().zip(&tape.derivatives) {
+            *x = *x + left * self.work.registers.values[register];
+        }
+    }
+
+    fn note_largest(&mut self) {
+        for (largest, x) in self.largest.iter_mut().zip(&self.state) {
+            *largest = largest.max(x.value().abs());
+        }
+    }
+
+    fn look_for_stiffness(&mut self, tape: &Tape, h: f64) {
+        if let Some(jacobian) = &mut self.jacobian {
+            jacobian.compute(tape, &self.work.registers);
+            if self.length.min(h) * jacobian.norm() > STABILITY {
+                self.method = Method::Implicit;
+            }
+        }
+    }
+
+    /// Computes a step, with the answers of the guards as they are, and its error against the tolerance.
+    fn attempt(
+        &mut self,
+        tape: &Tape,
+        (from, rise): (&[f64], &[f64]),
+        begin: f64,
+        h: T,
+        delays: &Delays<T>,
+    ) -> f64 {
+        let drive = Drive {
+            begin,
+            from,
+            rise,
+            delays,
+        };
+        for (i, scale) in self.scale.iter_mut().enumerate() {
+            let slope = self.work.slopes.get(i).map_or(0.0, |k| k.value().abs());
+            let moved = if slope.is_finite() {
+                slope * h.value()
+            } else {
+                0.0
+            };
+            *scale = TOLERANCE * self.largest[i].max(moved).max(1e-30);
+        }
+        let at = (self.time, &self.state[..], h);
+        match (&mut self.jacobian, self.method) {
+            (Some(jacobian), Method::Implicit) => {
+                implicit::step(tape, &mut self.work, jacobian, &drive, at, &self.scale)
+                    .unwrap_or(f64::NAN)
+            }
+            _ => {
+                explicit::step(tape, &mut self.work, &drive, at);
+                explicit::error(&self.work, h.value(), &self.scale)
+            }
+        }
+    }
+
+    /// The guards' differences at the end of the step that has been computed: its last stage stands there.
+    fn differences(&self) -> impl Iterator<Item = T> {
+        let guards = self.model.tape.guards.iter();
+        guards.map(|guard| self.work.registers.values[guard.difference])
+    }
+
+    /// The first change of a branch within the step that has been computed.
+    fn first_event(
+        &mut self,
+        tape: &Tape,
+        inputs: (&[f64], &[f64]),
+        (begin, interval): (f64, f64),
+        h: T,
+        delays: &Delays<T>,
+    ) -> Option<Event<T>> {
+        if tape.guards.is_empty() || h.value() <= 0.0 {
+            return None;
+        }
+        let mut crossed = Vec::new();
+        for (i, (guard, difference)) in tape.guards.iter().zip(self.differences()).enumerate() {
+            if guard.is_crossed(self.work.registers.answers[i], difference.value()) {
+                crossed.push((i, difference.value()));
+            }
+        }
+        let answers = self.work.registers.answers.clone();
+        let is_crossed = |i: usize, value: f64| tape.guards[i].is_crossed(answers[i], value);
+        let at = |own: &mut Self, guard: usize, share: f64| {
+            let part = T::constant(h.value() * share);
+            own.attempt(tape, inputs, begin, part, delays);
+            own.work.registers.values[tape.guards[guard].difference]
+        };
+        let mut first: Option<(f64, usize)> = None;
+        for (guard, mut ends_with) in crossed {
+            let mut end = 1.0;
+            if let Some((share, _)) = first {
+                end = share;
+                ends_with = at(self, guard, share).value();
+            }
+            if !is_crossed(guard, ends_with) {
+                continue;
+            }
+            let begins_with = at(self, guard, 0.0).value();
+            // It may have been on the other side when the step began.
+            let share = if is_crossed(guard, begins_with) || begins_with == 0.0 {
+                0.0
+            } else {
+                let difference = |share: f64| at(self, guard, share).value();
+                change_of_sign(difference, (0.0, begins_with), (end, ends_with))
+            };
+            first = Some((share, guard));
+        }
+        let (share, guard) = first?;
+        let slide = SLIDE * interval;
+        let since = self.time.value() - self.changed[guard];
+        if since < slide && share * h.value() < 1e-3 * slide {
+            // It changes back at once: the states slide along the guard, to either side of it in turn.
+            let after = T::constant(slide.min(h.value()));
+            self.attempt(tape, inputs, begin, after, delays);
+            let there = self.work.registers.values[tape.guards[guard].difference];
+            let together = if is_crossed(guard, there.value()) {
+                self.guards_of(guard)
+            } else {
+                Vec::new()
+            };
+            return Some(Event {
+                after,
+                guards: together,
+            });
+        }
+        let mut after = T::constant(h.value() * share);
+        let speed = (at(self, guard, share + SPEED).value()
+            - at(self, guard, share - SPEED).value())
+            / (2.0 * SPEED * h.value());
+        if speed != 0.0 && speed.is_finite() {
+            let here = at(self, guard, share);
+            after = T::with_slopes(after.value(), [(here, -1.0 / speed)]);
+        }
+        Some(Event {
+            after,
+            guards: self.guards_of(guard),
+        })
+    }
+
+    /// The guards that stand on the same difference: they change together.
+    fn guards_of(&self, guard: usize) -> Vec<usize> {
+        let guards = &self.model.tape.guards;
+        let same = |&i: &usize| guards[i].difference == guards[guard].difference;
+        (0..guards.len()).filter(same).collect()
+    }
+}
+
+/// Where a function changes its sign between two points, by regula falsi with halved ordinates (Illinois); the point on the far side.
+fn change_of_sign(
+    mut f: impl FnMut(f64) -> f64,
+    (mut a, mut fa): (f64, f64),
+    (mut b, mut fb): (f64, f64),
+) -> f64 {
+    let far = fb.is_sign_positive();
+    let mut last = None;
+    for _ in 0..100 {
+        if b - a <= EVENT {
+            break;
+        }
+        let mut c = (a * fb - b * fa) / (fb - fa);
+        if !(c > a && c < b) {
+            c = 0.5 * (a + b);
+        }
+        let fc = f(c);
+        if fc == 0.0 {
+            return c;
+        }
+        let is_far = fc.is_sign_positive() == far;
+        if is_far {
+            (b, fb) = (c, fc);
+        } else {
+            (a, fa) = (c, fc);
+        }
+        if last == Some(is_far) {
+            if is_far {
+                fa *= 0.5;
+            } else {
+                fb *= 0.5;
+            }
+        }
+        last = Some(is_far);
+    }
+    b
+}
+
+/// A change of branches within a step.
+struct Event<T> {
+    /// How long after its beginning.
+    after: T,
+    guards: Vec<usize>,
+}

@@ -1,0 +1,65 @@
+//! What a step works with: registers, slopes at the stages, and what drives the model.
+
+use super::delays::Delays;
+use super::explicit;
+use crate::scalar::Scalar;
+use crate::tape::{Registers, Tape};
+
+/// Storage of one step.
+#[derive(Debug, Clone)]
+pub(super) struct Step<T> {
+    pub registers: Registers<T>,
+    /// The derivative of the states at each stage, one stage after the other.
+    pub slopes: Vec<T>,
+    /// The states at the end.
+    pub next: Vec<T>,
+}
+
+impl<T: Scalar> Step<T> {
+    pub fn new(tape: &Tape, parameters: &[T]) -> Self {
+        let zero = T::constant(0.0);
+        Self {
+            registers: tape.registers(parameters),
+            slopes: vec![zero; explicit::STAGES * tape.states],
+            next: vec![zero; tape.states],
+        }
+    }
+
+    /// Keeps the derivative that the registers hold as that of a stage.
+    pub fn keep_slope(&mut self, tape: &Tape, stage: usize) {
+        let slopes = &mut self.slopes[stage * tape.states..];
+        for (slope, &register) in slopes.iter_mut().zip(&tape.derivatives) {
+            *slope = self.registers.values[register];
+        }
+    }
+}
+
+/// What drives the model over an interval: inputs, each in a straight line, and what is delayed.
+#[derive(Clone, Copy)]
+pub(super) struct Drive<'a, T> {
+    pub begin: f64,
+    pub from: &'a [f64],
+    /// Rise of each input per unit of time.
+    pub rise: &'a [f64],
+    pub delays: &'a Delays<T>,
+}
+
+impl<T: Scalar> Drive<'_, T> {
+    /// Writes time, inputs, states and delayed values into the registers.
+    pub fn load(&self, tape: &Tape, work: &mut Step<T>, time: T, x: &[T]) {
+        let values = &mut work.registers.values;
+        values[0] = time;
+        for (i, (&from, &rise)) in self.from.iter().zip(self.rise).enumerate() {
+            values[tape.input(i)] = if rise == 0.0 {
+                T::constant(from)
+            } else {
+                (time - self.begin) * rise + from
+            };
+        }
+        let first = tape.state(0);
+        values[first..first + x.len()].copy_from_slice(x);
+        for i in 0..tape.delays.len() {
+            values[tape.delayed(i)] = self.delays.at(i, time);
+        }
+    }
+}

@@ -1,0 +1,493 @@
+//! Simulations against closed forms, against an adaptive solver that no one here wrote, and derivatives against central differences.
+
+use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation};
+use ode_solvers::{DVector, Dopri5, System, dop_shared::OutputType};
+
+/// A model and what drives it: rows of inputs, held or in straight lines.
+struct Case {
+    model: Model,
+    time: Vec<f64>,
+    inputs: Vec<Vec<f64>>,
+    lines: bool,
+}
+
+fn model(text: &str) -> Model {
+    Model::new(ModelSpec::parse(text).unwrap_or_else(|error| panic!("{error}")))
+}
+
+impl Case {
+    fn new(text: &str, rows: usize, step: f64, input: impl Fn(usize) -> Vec<f64>) -> Self {
+        Self {
+            model: model(text),
+            time: (0..rows).map(|k| step * k as f64).collect(),
+            inputs: (0..rows).map(input).collect(),
+            lines: false,
+        }
+    }
+
+    /// The outputs of all rows, and the method at the end.
+    fn run<T: Scalar>(&self, parameters: &[T], initial: &[T]) -> (Vec<Vec<T>>, Method) {
+        let mut simulation = Simulation::new(&self.model, parameters, initial, 0.0);
+        let mut rows = Vec::new();
+        for k in 0..self.time.len() {
+            let mut y = vec![T::constant(0.0); self.model.spec().outputs.len()];
+            simulation.read(&self.inputs[k], &mut y);
+            rows.push(y);
+            if k + 1 < self.time.len() {
+                let to = &self.inputs[if self.lines { k + 1 } else { k }];
+                simulation
+                    .advance(&self.inputs[k], to, self.time[k + 1])
+                    .unwrap_or_else(|error| panic!("{error}"));
+            }
+        }
+        (rows, simulation.method())
+    }
+
+    fn plain(&self) -> (Vec<Vec<f64>>, Method) {
+        let parameters = self.model.parameters();
+        let initial = self.model.starts(&parameters);
+        self.run(&parameters, &initial)
+    }
+
+    fn range(rows: &[Vec<f64>], output: usize) -> f64 {
+        let of = |pick: fn(f64, f64) -> f64, from| rows.iter().map(|y| y[output]).fold(from, pick);
+        of(f64::max, f64::NEG_INFINITY) - of(f64::min, f64::INFINITY)
+    }
+
+    /// Derivatives of all outputs by all parameters and initial states against central differences.
+    fn check_derivatives(&self, tolerance: f64) {
+        const LANES: usize = 12;
+        let parameters = self.model.parameters();
+        let initial = self.model.starts(&parameters);
+        let all: Vec<f64> = parameters.iter().chain(&initial).copied().collect();
+        assert!(all.len() <= LANES);
+        let duals: Vec<_> = (0..all.len())
+            .map(|i| Dual::<LANES>::variable(all[i], i))
+            .collect();
+        let (exact, _) = self.run(&duals[..parameters.len()], &duals[parameters.len()..]);
+        for i in 0..all.len() {
+            let step = 1e-5 * all[i].abs().max(1e-2);
+            let moved = |by: f64| {
+                let mut all = all.clone();
+                all[i] += by;
+                self.run(&all[..parameters.len()], &all[parameters.len()..])
+                    .0
+            };
+            // Fourth order, so that the difference itself is good to 1e-7 of the slopes.
+            let (p, m, p2, m2) = (
+                moved(step),
+                moved(-step),
+                moved(2.0 * step),
+                moved(-2.0 * step),
+            );
+            for output in 0..exact[0].len() {
+                let difference = |k: usize| {
+                    (8.0 * (p[k][output] - m[k][output]) - (p2[k][output] - m2[k][output]))
+                        / (12.0 * step)
+                };
+                // What hardly acts shows the rounding of the outputs alone.
+                let visited = exact.iter().map(|y| y[output].re.abs()).fold(1.0, f64::max);
+                let largest = (0..exact.len())
+                    .map(|k| difference(k).abs())
+                    .fold(1e-3 * visited, f64::max);
+                for (k, row) in exact.iter().enumerate() {
+                    let (found, expected) = (row[output].eps[i], difference(k));
+                    assert!(
+                        (found - expected).abs() <= tolerance * largest,
+                        "entry {i}, output {output}, row {k}: {found} instead of {expected} (largest {largest})"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// The model by its expressions, for a solver from outside.
+struct Outside<'a> {
+    model: &'a Model,
+    inputs: &'a [f64],
+    rise: Vec<f64>,
+    begin: f64,
+}
+
+impl Outside<'_> {
+    fn values(&self, t: f64, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        use ct_model::Variable;
+        let spec = self.model.spec();
+        let parameters = self.model.parameters();
+        let mut flows = vec![0.0; spec.flows.len()];
+        let of = |flows: &[f64], variable: Variable| match variable {
+            Variable::Parameter(i) => parameters[i],
+            Variable::Input(i) => self.inputs[i] + self.rise[i] * (t - self.begin),
+            Variable::State(i) => x[i],
+            Variable::Flow(i) => flows[i],
+        };
+        for &flow in &spec.order {
+            flows[flow] = spec.flows[flow].value.value(t, &|v| of(&flows, v));
+        }
+        let slopes = spec.states.iter().map(|state| {
+            let by = state
+                .coefficient
+                .as_ref()
+                .map_or(1.0, |c| c.value(t, &|v| of(&flows, v)));
+            state.right.value(t, &|v| of(&flows, v)) / by
+        });
+        let outputs = spec
+            .outputs
+            .iter()
+            .map(|output| of(&flows, output.variable));
+        (slopes.collect(), outputs.collect())
+    }
+}
+
+impl System<f64, DVector<f64>> for Outside<'_> {
+    fn system(&self, t: f64, x: &DVector<f64>, dx: &mut DVector<f64>) {
+        dx.copy_from_slice(&self.values(t, x.as_slice()).0);
+    }
+}
+
+/// Every row by the adaptive solver of another crate, restarted where inputs jump.
+fn outside(case: &Case) -> Vec<Vec<f64>> {
+    let parameters = case.model.parameters();
+    let mut x = DVector::from_vec(case.model.starts(&parameters));
+    let mut rows = Vec::new();
+    for k in 0..case.time.len() {
+        let begin = case.time[k];
+        let system = |rise| Outside {
+            model: &case.model,
+            inputs: &case.inputs[k],
+            rise,
+            begin,
+        };
+        let held = vec![0.0; case.inputs[k].len()];
+        rows.push(system(held.clone()).values(begin, x.as_slice()).1);
+        let Some(&end) = case.time.get(k + 1) else {
+            break;
+        };
+        let rise = if case.lines {
+            let pairs = case.inputs[k].iter().zip(&case.inputs[k + 1]);
+            pairs.map(|(a, b)| (b - a) / (end - begin)).collect()
+        } else {
+            held
+        };
+        // Its test for stiffness takes corners for it: it is switched off.
+        let (h, most) = ((end - begin) / 20.0, u32::MAX);
+        let mut solver = Dopri5::from_param(
+            system(rise),
+            begin,
+            end,
+            h,
+            x.clone(),
+            1e-12,
+            1e-12,
+            0.9,
+            0.04,
+            0.2,
+            10.0,
+            h,
+            0.0,
+            most,
+            most,
+            OutputType::Sparse,
+        );
+        solver.integrate().unwrap_or_else(|error| panic!("{error}"));
+        if let Some(last) = solver.y_out().last() {
+            x = last.clone();
+        }
+    }
+    rows
+}
+
+fn check_outside(case: &Case, tolerance: f64) {
+    let (own, _) = case.plain();
+    let outside = outside(case);
+    for output in 0..own[0].len() {
+        let range = Case::range(&outside, output);
+        for (k, (own, outside)) in own.iter().zip(&outside).enumerate() {
+            let off = (own[output] - outside[output]).abs() / range;
+            assert!(
+                off <= tolerance,
+                "output {output}, row {k}: off by {off:e} of the range"
+            );
+        }
+    }
+}
+
+const BLOCK: &str = r#"
+model Block
+  parameter Real C(min=0) = 50;
+  parameter Real k(min=0) = 0.7;
+  parameter Real g(min=0) = 2;
+  input Real u;
+  input Real Ta;
+  output Real y = T;
+  output Real loss = k*(T - Ta);
+  Real T(start=20);
+equation
+  C*der(T) = g*u - loss;
+end Block;"#;
+
+const TANKS: &str = r#"
+model Tanks "two tanks in series, the lower one with a rim"
+  parameter Real k(min=0) = 3;
+  parameter Real a1(min=0) = 6;
+  parameter Real a2(min=0) = 5;
+  parameter Real rim = 11;
+  final parameter Real A = 30;
+  input Real u;
+  output Real y1 = h1;
+  output Real y2 = h2;
+  Real h1(start=4);
+  Real h2(start=6);
+  Real q = a1*sqrt(max(h1, 0));
+equation
+  A*der(h1) = k*u - q;
+  A*der(h2) = q - a2*sqrt(max(h2, 0)) - (if h2 > rim then 20*(h2 - rim) else 0);
+end Tanks;"#;
+
+const CUT_OUT: &str = r#"
+model CutOut "a heater that a limit switches off, with a bend in the loss"
+  parameter Real g = 1.5;
+  parameter Real k = 0.05;
+  parameter Real limit = 30;
+  parameter Real d = 4;
+  input Real u;
+  input Real Ta;
+  output Real y = T;
+  Real T(start=20);
+  Real box(start=21);
+equation
+  der(T) = (if T < limit then g*u else 0.3*g*u) - k*(T - box) - 0.02*abs(T - Ta - d);
+  der(box) = 0.1*(T - box) - 0.04*min(box - Ta, 15);
+end CutOut;"#;
+
+const LATE: &str = r#"
+model Late
+  parameter Real K = 2;
+  parameter Real tau = 7;
+  parameter Real d(min=0) = 3.3;
+  parameter Real e(min=0) = 2.1;
+  input Real u;
+  output Real y = x2;
+  Real x(start=1);
+  Real x2(start=1);
+equation
+  tau*der(x) = K*delay(u, d) - x;
+  4*der(x2) = delay(x, e) - x2 - 0.1*x2^2;
+end Late;"#;
+
+const STIFF: &str = r#"
+model Stiff "van der Pol's slow side, with a fast store"
+  parameter Real fast = 1e3;
+  parameter Real slow = 1e-3;
+  parameter Real b = 0.3;
+  input Real u;
+  output Real y = x;
+  output Real z = w;
+  Real x(start=1);
+  Real w(start=0.2);
+equation
+  der(x) = -fast*(x - w - b*w^3 - u);
+  der(w) = -slow*(w*w*w + x - 2*u);
+end Stiff;"#;
+
+const PENDULUM: &str = r#"
+model Pendulum
+  parameter Real w2 = 1;
+  parameter Real c = 0.05;
+  parameter Real b = 0.6;
+  input Real u;
+  output Real y = phi;
+  Real phi(start=0.5);
+  Real v(start=0);
+equation
+  der(phi) = v;
+  der(v) = -w2*sin(phi) - c*v - 0.02*v*abs(v) + b*u;
+end Pendulum;"#;
+
+fn steps(k: usize) -> f64 {
+    // A sequence of levels that looks random and is the same for all.
+    let level = (k / 10 * 7919) % 13;
+    level as f64
+}
+
+fn block(lines: bool) -> Case {
+    let mut case = Case::new(BLOCK, 200, 2.0, |k| {
+        vec![steps(k), 15.0 + (0.05 * k as f64).sin()]
+    });
+    case.lines = lines;
+    case
+}
+
+fn tanks() -> Case {
+    Case::new(TANKS, 300, 1.5, |k| vec![steps(k)])
+}
+
+fn cut_out() -> Case {
+    Case::new(CUT_OUT, 400, 1.0, |k| {
+        vec![0.4 * steps(k), 12.0 + 4.0 * (0.03 * k as f64).sin()]
+    })
+}
+
+fn late() -> Case {
+    Case::new(LATE, 300, 1.0, |k| vec![steps(k)])
+}
+
+fn stiff() -> Case {
+    Case::new(STIFF, 200, 20.0, |k| vec![0.1 * steps(k)])
+}
+
+fn pendulum() -> Case {
+    // A tenth of the Nyquist frequency: twenty samples in a period.
+    Case::new(PENDULUM, 400, std::f64::consts::PI / 10.0, |k| {
+        vec![0.05 * (steps(k) - 6.0)]
+    })
+}
+
+#[test]
+fn a_linear_model_is_simulated_exactly() {
+    let case = block(false);
+    let (rows, method) = case.plain();
+    assert_eq!(method, Method::Exact);
+    let (capacity, k, g) = (50.0, 0.7, 2.0);
+    let mut t = 20.0;
+    for (row, u) in rows.iter().zip(&case.inputs) {
+        assert!((row[0] - t).abs() < 1e-11 && (row[1] - k * (t - u[1])).abs() < 1e-11);
+        let rest = u[1] + g * u[0] / k;
+        t = rest + (t - rest) * f64::exp(-k / capacity * 2.0);
+    }
+    check_outside(&block(true), 1e-9);
+}
+
+#[test]
+fn intervals_that_differ_by_rounding_are_exact_too() {
+    let mut case = block(true);
+    for (k, time) in case.time.iter_mut().enumerate() {
+        // Written with few digits, and once with a gap.
+        *time = (*time / 3.0 * 1e6).round() / 1e6 + if k > 50 { 7.0 } else { 0.0 };
+    }
+    check_outside(&case, 1e-9);
+    case.check_derivatives(1e-6);
+}
+
+#[test]
+fn models_of_all_kinds_agree_with_an_adaptive_solver() {
+    for (case, tolerance) in [
+        (tanks(), 1e-7),
+        (cut_out(), 1e-7),
+        (stiff(), 1e-7),
+        (pendulum(), 1e-7),
+    ] {
+        check_outside(&case, tolerance);
+    }
+}
+
+#[test]
+fn derivatives_agree_with_central_differences() {
+    for case in [
+        block(false),
+        block(true),
+        tanks(),
+        cut_out(),
+        late(),
+        stiff(),
+        pendulum(),
+    ] {
+        case.check_derivatives(1e-5);
+    }
+}
+
+#[test]
+fn the_method_follows_from_the_model() {
+    for (case, method) in [
+        (tanks(), Method::Explicit),
+        (pendulum(), Method::Explicit),
+        (stiff(), Method::Implicit),
+        (block(false), Method::Exact),
+    ] {
+        assert_eq!(case.plain().1, method, "{}", case.model.spec().name);
+    }
+}
+
+#[test]
+fn a_delay_lets_jumps_through_when_they_are_due() {
+    let text = "model Late parameter Real d = 2.5; input Real u; output Real y = x; Real x(start=0); equation der(x) = delay(u, d); end Late;";
+    let case = Case::new(text, 40, 1.0, |k| vec![if k >= 10 { 1.0 } else { 0.0 }]);
+    let (rows, _) = case.plain();
+    for (k, row) in rows.iter().enumerate() {
+        let expected = (k as f64 - 12.5).max(0.0);
+        assert!((row[0] - expected).abs() < 1e-12, "row {k}: {}", row[0]);
+    }
+    // Later by d is less by d.
+    let (rows, _) = case.run(&[Dual::<1>::variable(2.5, 0)], &[Dual::constant(0.0)]);
+    for (k, row) in rows.iter().enumerate() {
+        let expected = if k > 12 { -1.0 } else { 0.0 };
+        assert!((row[0].eps[0] - expected).abs() < 1e-12, "row {k}");
+    }
+    // No delay at all has the same derivative.
+    let (rows, _) = case.run(&[Dual::<1>::variable(0.0, 0)], &[Dual::constant(0.0)]);
+    assert!((rows[20][0].re - 10.0).abs() < 1e-12 && (rows[20][0].eps[0] + 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_limit_that_is_met_fifty_times() {
+    let text = r#"
+model Saw
+  parameter Real limit = 0.8;
+  parameter Real w = 1;
+  input Real u;
+  output Real y = x;
+  Real x(start=0);
+  Real s(start=0);
+  Real c(start=1);
+equation
+  der(s) = w*c;
+  der(c) = -w*s;
+  der(x) = max(s - limit, 0) - 0.1*x + 0*u*x;
+end Saw;"#;
+    // Twenty-five periods of three samples each: both edges of the limit in each.
+    let case = Case::new(text, 80, 2.0, |_| vec![0.0]);
+    check_outside(&case, 1e-7);
+    case.check_derivatives(1e-5);
+}
+
+#[test]
+fn states_that_slide_along_a_switch_end() {
+    let text = "model Relay parameter Real q = 2; input Real u; output Real y = x; Real x(start=0); equation der(x) = (if x > 1 then -q else q) + 0*u*x; end Relay;";
+    let case = Case::new(text, 10, 1.0, |_| vec![0.0]);
+    let (rows, _) = case.plain();
+    for row in &rows[1..] {
+        assert!((row[0] - 1.0).abs() < 3e-3, "{}", row[0]);
+    }
+}
+
+#[test]
+fn a_state_without_bound_ends_the_trial() {
+    let text = "model Away parameter Real q = 2; input Real u; output Real y = x; Real x(start=1); equation der(x) = q*x^2 + u; end Away;";
+    let model = model(text);
+    let mut simulation = Simulation::new(&model, &[2.0], &[1.0], 0.0);
+    let error = simulation.advance(&[0.0], &[0.0], 1.0).unwrap_err();
+    assert!(error.time >= 0.0 && error.time < 1.0);
+    let negative = model_of_root();
+    let mut simulation = Simulation::new(&negative, &[], &[0.5], 0.0);
+    assert!(simulation.advance(&[0.0], &[0.0], 10.0).is_err());
+}
+
+fn model_of_root() -> Model {
+    model(
+        "model Root input Real u; output Real y = x; Real x(start=1); equation der(x) = -1 - sqrt(x) + u; end Root;",
+    )
+}
+
+#[test]
+fn exact_and_small_steps_agree() {
+    let mut bent = block(true);
+    bent.model = model(&BLOCK.replace("g*u - loss", "g*u - loss + 0*T*T"));
+    let (exact, small) = (block(true).plain(), bent.plain());
+    assert_eq!((exact.1, small.1), (Method::Exact, Method::Explicit));
+    let range = Case::range(&exact.0, 0);
+    for (k, (exact, small)) in exact.0.iter().zip(&small.0).enumerate() {
+        let off = (exact[0] - small[0]).abs() / range;
+        assert!(off < 1e-10, "row {k}: {off:e}");
+    }
+}

@@ -6,19 +6,14 @@ use ct_model::{About, Given, Linearity, ModelSpec, Variable, unit_warnings};
 use ct_signals::{escaped, shown};
 
 use crate::look::{Look, Side, table};
-use crate::{Error, model_file};
+use crate::{Error, own_model};
 
 /// Reads a model and says what it holds.
 ///
 /// # Errors
 /// One line that names the file, line and column, what is wrong and the mend.
 pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
-    let text = model_file::read_text(path)?;
-    let model = ModelSpec::parse(&text).map_err(|source| Error::Text {
-        file: path.display().to_string(),
-        source,
-    })?;
-    Ok(said(&model, look))
+    Ok(said(&own_model::read_model(path)?, look))
 }
 
 fn said(model: &ModelSpec, look: Look) -> String {

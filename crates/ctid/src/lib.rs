@@ -35,6 +35,7 @@ pub mod model_file;
 pub mod monitor;
 mod names;
 pub mod output;
+mod own_model;
 mod plot;
 mod program;
 pub mod progress;

@@ -49,6 +49,18 @@ pub enum Error {
         /// How many the structure has.
         needed: usize,
     },
+    /// A record has another number of inputs than the model.
+    #[error(
+        "{record}: it has {given} inputs, but the model has {needed}: name a column for each of them"
+    )]
+    Inputs {
+        /// The record.
+        record: String,
+        /// How many it has.
+        given: usize,
+        /// How many the model has.
+        needed: usize,
+    },
     /// The least squares have no answer.
     #[error(transparent)]
     Estimation(#[from] estimation::Error),

@@ -6,6 +6,7 @@ mod error;
 mod feedback;
 mod fit;
 mod many_starts;
+mod model_setup;
 mod reading_grid;
 mod reading_step;
 mod setup;
@@ -21,6 +22,7 @@ pub use fit::{
     robust,
 };
 pub use many_starts::{keep_best_simulated, with_other_speeds};
+pub use model_setup::ModelSetup;
 pub use reading_grid::{ReadingGrid, reading_grid};
 pub use reading_step::exact_reading_step;
 pub use setup::{LoopRun, PriorValue, Setup, Simulated, at_rest, commands, weighted_rms};

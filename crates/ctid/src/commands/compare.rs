@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use greybox::FitOptions;
 use missing_effect::Options;
 
 use super::{Results, finish};
@@ -12,6 +13,7 @@ use crate::input::excitation::{self, ExcitationWarning};
 use crate::input::{self, Files, Input, ReadArguments};
 use crate::interrupt;
 use crate::look::Look;
+use crate::own_model::{self, OwnModelFile};
 use crate::progress::Bar;
 use crate::{Error, terminal};
 
@@ -110,6 +112,9 @@ impl Compare {
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
+        if own_model::is_own(&self.model) {
+            return self.run_own(&files, out, look);
+        }
         let (waiting, input) = read(&files)?;
         let outputs = self.results.plan(&files.all(), None)?;
         let options = self.options();
@@ -128,9 +133,41 @@ impl Compare {
     }
 }
 
+impl Compare {
+    /// A model of the user's own.
+    fn run_own(&self, files: &Files, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        if self.results.report.is_some() {
+            return Err(Error::Usage(
+                "--report: a page of a model of your own cannot be written yet; leave it out, or write --json".to_string(),
+            ));
+        }
+        files.check_repetition()?;
+        let model = OwnModelFile::read(&self.model)?;
+        let records = model.records(files)?;
+        let outputs = self.results.plan(&files.all(), None)?;
+        let bar = Bar::new();
+        bar.phase("fitting the model");
+        let comparison = own_model::compare(&model, &records, &FitOptions::default());
+        bar.clear();
+        let unused = model.unused.iter().map(|table| {
+            look.paragraph("", &format!("note: [{table}] has no part in a comparison"))
+        });
+        let notes = input::notes(&records.summaries, look) + &unused.collect::<String>();
+        let comparison = comparison?;
+        let text = notes + &own_model::said(&comparison, look);
+        finish(&comparison, &text, &outputs, out, look)
+    }
+}
+
 impl Diagnose {
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
+        if own_model::is_own(&self.compare.model) {
+            return Err(Error::file(
+                &self.compare.model,
+                "diagnose knows the six plants alone: `ctid compare` fits a model of your own",
+            ));
+        }
         let (waiting, input) = read(&files)?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;

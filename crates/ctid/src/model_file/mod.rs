@@ -42,7 +42,7 @@ use crate::Error;
 pub use controller::{ControllerLaw, ControllerSettings};
 pub(crate) use effects::{any_structure, vessel};
 use raw::Raw;
-use source::Source;
+pub(crate) use source::Source;
 
 /// The largest model file, and the largest file of a term \[bytes\].
 pub(crate) const LARGEST: usize = 1024 * 1024;

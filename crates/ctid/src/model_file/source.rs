@@ -8,14 +8,14 @@ use super::raw::{Number, RawKnown, Words};
 use crate::{Error, names};
 
 /// The file being read: it knows its lines.
-pub(super) struct Source<'a> {
-    pub(super) file: &'a str,
-    pub(super) text: &'a str,
+pub(crate) struct Source<'a> {
+    pub(crate) file: &'a str,
+    pub(crate) text: &'a str,
 }
 
 impl Source<'_> {
     /// An error at a byte of the text.
-    pub(super) fn at(&self, byte: usize, what: impl Into<String>) -> Error {
+    pub(crate) fn at(&self, byte: usize, what: impl Into<String>) -> Error {
         Error::AtLine {
             file: self.file.to_string(),
             line: 1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count(),
@@ -24,7 +24,7 @@ impl Source<'_> {
     }
 
     /// What the parser refuses, in one line, with the key that was probably meant.
-    pub(super) fn syntax(&self, error: &toml::de::Error) -> Error {
+    pub(crate) fn syntax(&self, error: &toml::de::Error) -> Error {
         // Words of the file stand between backquotes.
         let parts = error.message().trim().split('`').enumerate();
         let parts = parts.map(|(i, part)| {

@@ -16,6 +16,7 @@ use plants::{
 };
 
 pub use self::priors::PriorValue;
+pub(crate) use self::priors::priors_of;
 pub use self::simulation::{LoopRun, Simulated, weighted_rms};
 use crate::{
     Error, LinearPlant, Replay, TimeLimit,

@@ -28,34 +28,7 @@ impl Setup<'_> {
     /// Where the structure has no parameter of a name, a standard error is not above zero, or a value is far outside the bounds.
     pub fn with_priors(mut self, priors: &BTreeMap<String, PriorValue>) -> Result<Self, Error> {
         let parameters = &self.names[..self.parameters];
-        self.priors = priors
-            .iter()
-            .map(|(name, prior)| {
-                let unknown = || Error::UnknownParameter {
-                    name: name.clone(),
-                    known: parameters.join(", "),
-                };
-                let entry = parameters.iter().position(|own| own == name);
-                let PriorValue { value, std_error } = *prior;
-                let prior = Prior {
-                    entry: entry.ok_or_else(unknown)?,
-                    value,
-                    std_error,
-                };
-                let weighs = std_error > 0.0 && (1.0 / std_error).is_finite();
-                let (lower, upper) = self.bounds[prior.entry];
-                if !(value.is_finite() && weighs && prior.is_within((lower, upper))) {
-                    return Err(Error::Prior {
-                        name: name.clone(),
-                        value,
-                        std_error,
-                        lower,
-                        upper,
-                    });
-                }
-                Ok(prior)
-            })
-            .collect::<Result<_, Error>>()?;
+        self.priors = priors_of(priors, parameters, &self.bounds)?;
         Ok(self)
     }
 
@@ -80,4 +53,41 @@ impl Setup<'_> {
             )
             .collect()
     }
+}
+
+/// Priors by the position of their parameter.
+///
+/// # Errors
+/// As [`Setup::with_priors`].
+pub(crate) fn priors_of(
+    priors: &BTreeMap<String, PriorValue>,
+    parameters: &[String],
+    bounds: &[(f64, f64)],
+) -> Result<Vec<Prior>, Error> {
+    let of = |(name, prior): (&String, &PriorValue)| {
+        let unknown = || Error::UnknownParameter {
+            name: name.clone(),
+            known: parameters.join(", "),
+        };
+        let entry = parameters.iter().position(|own| own == name);
+        let PriorValue { value, std_error } = *prior;
+        let prior = Prior {
+            entry: entry.ok_or_else(unknown)?,
+            value,
+            std_error,
+        };
+        let weighs = std_error > 0.0 && (1.0 / std_error).is_finite();
+        let (lower, upper) = bounds[prior.entry];
+        if !(value.is_finite() && weighs && prior.is_within((lower, upper))) {
+            return Err(Error::Prior {
+                name: name.clone(),
+                value,
+                std_error,
+                lower,
+                upper,
+            });
+        }
+        Ok(prior)
+    };
+    priors.iter().map(of).collect()
 }

@@ -1,0 +1,9 @@
+//! Models of their user's own: `model = "block.mo"` in the model file instead of a plant.
+
+mod compare;
+mod file;
+mod text;
+
+pub(crate) use self::compare::compare;
+pub(crate) use self::file::{OwnModelFile, is_own, read_model};
+pub(crate) use self::text::said;

@@ -1,0 +1,128 @@
+//! What a person reads of a comparison.
+
+use super::compare::{Comparison, Curves};
+use crate::look::{Look, Side, table};
+use crate::numbers;
+use crate::plot::{self, Curve, plot};
+
+/// The whole comparison, the first record drawn.
+pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
+    let [step] = &comparison.steps;
+    let mut text = format!("{}\n\n", look.heading(&comparison.model));
+    let first = comparison.curves.first().map(|curves| &curves.record);
+    for curves in comparison
+        .curves
+        .iter()
+        .filter(|curves| Some(&curves.record) == first)
+    {
+        text += &drawn(curves, look);
+    }
+    let held_out = step.rmse_test_per_output.as_ref();
+    let mut rows = vec![vec![String::new(), "fitted data".to_string()]];
+    if held_out.is_some() {
+        rows[0].push("held-out data".to_string());
+    }
+    for (name, rmse) in &step.rmse_per_output {
+        let unit = comparison
+            .curves
+            .iter()
+            .find(|c| c.output == *name)
+            .map_or("", |c| c.unit.as_str());
+        let number = |value: f64| format!("{} {unit}", numbers::significant(value, 3));
+        let mut row = vec![name.clone(), number(*rmse)];
+        row.extend(
+            held_out
+                .and_then(|test| test.get(name))
+                .map(|value| number(*value)),
+        );
+        rows.push(row);
+    }
+    text += &format!("{}\n", look.heading("Simulation error, root mean square"));
+    for line in table(&[Side::Left, Side::Right, Side::Right], &rows) {
+        text += &format!("  {}\n", line.trim_end());
+    }
+    if step.rmse_per_output.len() > 1 {
+        text += &format!(
+            "  together {} times the noise's innovations\n",
+            numbers::significant(step.weighted_rmse, 3)
+        );
+    }
+    text += &format!(
+        "\n{}\n",
+        look.heading("Parameters and initial states, with standard errors")
+    );
+    let rows = step.parameters.iter().map(|parameter| {
+        let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
+        let error = match error {
+            Some(error) => format!("± {error}"),
+            None if parameter.known => "(known)".to_string(),
+            None => "(at a bound, or not determined)".to_string(),
+        };
+        vec![parameter.name.clone(), value, error, parameter.unit.clone()]
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
+        text += &format!("  {}\n", line.trim_end());
+    }
+    let agree = format!(
+        "{} of {} starts ended in this minimum",
+        step.starts_agree, step.starts
+    );
+    text += &format!("  {}\n", look.faint(agree));
+    for together in &comparison.not_determined {
+        let what = match together.as_slice() {
+            [one] => format!(
+                "{one} leaves no trace in these records: fix it under [known], or measure more"
+            ),
+            [a, b] => format!(
+                "these records tell {a} and {b} together only: fix one of them under [known], give a [prior], or excite the plant more"
+            ),
+            all => format!(
+                "these records do not determine {}: fix some of them under [known], or give a [prior]",
+                all.join(", ")
+            ),
+        };
+        text += &look.warning(look.paragraph("", &format!("warning: {what}")).trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+fn drawn(curves: &Curves, look: Look) -> String {
+    let Curves {
+        record,
+        output,
+        unit,
+        length,
+        measured,
+        model,
+    } = curves;
+    let in_unit = if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" [{unit}]")
+    };
+    let residual: Vec<f64> = measured.iter().zip(model).map(|(y, m)| y - m).collect();
+    let both = [
+        Curve {
+            values: measured,
+            colour: plot::MEASURED,
+        },
+        Curve {
+            values: model,
+            colour: plot::MODEL,
+        },
+    ];
+    let one = [Curve {
+        values: &residual,
+        colour: plot::RESIDUAL,
+    }];
+    let limits = plot::limits([measured.as_slice(), model]);
+    let own = plot::limits([residual.as_slice()]);
+    let title = look.heading(&format!("{record}, {output}:"));
+    format!(
+        "{title} measured and model{in_unit}\n{}\nMeasured minus model{in_unit}\n{}\n",
+        plot(&both, (0.0, *length), limits, 9, look),
+        plot(&one, (0.0, *length), own, 5, look)
+    )
+}

@@ -1,0 +1,479 @@
+//! A model of its user's text against records: the vector that is fitted, its bounds, its starts.
+//!
+//! The fitted vector holds the parameters in the order of the text, then for every record the initial values of the states. Time is that
+//! of the records, in units of the model's time: `der()` is per such a unit. Inputs are held from row to row, or run in straight lines, as
+//! their channels say; an output of a row is read with the inputs of that row.
+
+use std::collections::BTreeMap;
+
+use ct_model::{About, Dual, Given, Model, Simulation, Variable};
+use ct_signals::{Hold, Record};
+use estimation::{Fit, Noise, Prior, Residuals, Sample, Start, within};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::{Error, FitOptions, PriorValue, clock::Clock};
+
+/// Spread of the starts of positive parameters, of their logarithm: a guess is off by a factor of two as often as not.
+const SPREAD: f64 = 0.7;
+
+/// A model, the records, and which parameters are free.
+#[derive(Debug, Clone)]
+pub struct ModelSetup<'a> {
+    model: &'a Model,
+    records: &'a [Record],
+    /// Seconds in one unit of the model's time.
+    time_unit: f64,
+    clock: Clock,
+    names: Vec<String>,
+    /// Where fits begin; fixed entries stay there.
+    start: Vec<f64>,
+    bounds: Vec<(f64, f64)>,
+    free: Vec<usize>,
+    samples: Vec<usize>,
+    floors: Vec<f64>,
+    priors: Vec<Prior>,
+    known_scales: Option<Vec<f64>>,
+}
+
+/// Where the text sets no bound a parameter stays within this factor of its value there, ...
+const REACH: f64 = 30.0;
+/// ... and an initial state within this one.
+const STATE_REACH: f64 = 10.0;
+/// Rounds in which outputs are weighted anew by their noise.
+const WEIGHTINGS: usize = 3;
+/// Scales of the noise have settled when none changes by more than this share.
+const SETTLED: f64 = 0.02;
+
+/// Bounds of the text, and where it has none a factor of the value there: a fit that runs away says nothing. Nothing bounds a value of zero.
+fn bounds_of(about: &About, value: f64, factor: f64) -> (f64, f64) {
+    let reach = if value == 0.0 {
+        f64::INFINITY
+    } else {
+        factor * value.abs()
+    };
+    let low = if about.min.is_finite() {
+        about.min
+    } else {
+        -reach
+    };
+    let high = if about.max.is_finite() {
+        about.max
+    } else {
+        reach
+    };
+    (low, high)
+}
+
+impl<'a> ModelSetup<'a> {
+    /// A model against records whose channels are those of the model, in its order; the parameters of `known` have these values and are not
+    /// fitted. `time_unit`: seconds in one unit of the model's time.
+    ///
+    /// # Errors
+    /// Where there is no record, a record is not sound, lacks samples of an input or has another number of channels, or `known` names a
+    /// parameter that there is not.
+    pub fn new(
+        model: &'a Model,
+        records: &'a [Record],
+        known: &BTreeMap<String, f64>,
+        time_unit: f64,
+    ) -> Result<Self, Error> {
+        let spec = model.spec();
+        if records.is_empty() {
+            return Err(Error::NoRecord);
+        }
+        for record in records {
+            record.validate()?;
+            record.require_whole_inputs()?;
+            if record.outputs.len() != spec.outputs.len() {
+                return Err(Error::Outputs {
+                    record: record.name.clone(),
+                    given: record.outputs.len(),
+                    needed: spec.outputs.len(),
+                });
+            }
+            if record.inputs.len() != spec.inputs.len() {
+                return Err(Error::Inputs {
+                    record: record.name.clone(),
+                    given: record.inputs.len(),
+                    needed: spec.inputs.len(),
+                });
+            }
+        }
+        let mut names: Vec<String> = Vec::new();
+        let mut start = model.parameters();
+        let mut bounds = Vec::new();
+        let mut free = Vec::new();
+        for (i, parameter) in spec.parameters.iter().enumerate() {
+            let given = known.get(&parameter.about.name);
+            if let Some(value) = given {
+                start[i] = *value;
+            }
+            if parameter.given == Given::Fitted && given.is_none() {
+                free.push(i);
+            }
+            names.push(parameter.about.name.clone());
+            bounds.push(bounds_of(&parameter.about, parameter.value, REACH));
+        }
+        if let Some(name) = known.keys().find(|name| !names.contains(name)) {
+            return Err(Error::UnknownParameter {
+                name: name.clone(),
+                known: names.join(", "),
+            });
+        }
+        let starts = model.starts(&start);
+        for (r, record) in records.iter().enumerate() {
+            for (i, state) in spec.states.iter().enumerate() {
+                let about = &state.about;
+                if !state.fixed {
+                    free.push(names.len());
+                }
+                names.push(if records.len() > 1 {
+                    format!("{}(0), record {}", about.name, r + 1)
+                } else {
+                    format!("{}(0)", about.name)
+                });
+                // Where an output reads the state, the record knows better.
+                let read = spec
+                    .outputs
+                    .iter()
+                    .position(|o| o.variable == Variable::State(i));
+                let first = read.and_then(|o| record.outputs[o].present().next());
+                let guess = first.filter(|_| !state.fixed).unwrap_or(starts[i]);
+                let largest = guess.abs().max(starts[i].abs());
+                bounds.push(bounds_of(about, largest, STATE_REACH));
+                start.push(within(guess, bounds[bounds.len() - 1]));
+            }
+        }
+        let outputs = 0..spec.outputs.len();
+        let all = |o: usize| records.iter().map(move |record| &record.outputs[o]);
+        let count = |o| all(o).map(|y| y.values.len() - y.missing()).sum();
+        let floor = |o| {
+            let ranges = all(o).map(ct_signals::Channel::range);
+            let range = ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+            let width = range.map_or(0.0, |(low, high)| high - low);
+            if spec.outputs.len() > 1 {
+                1e-6 * width
+            } else {
+                0.0
+            }
+        };
+        Ok(Self {
+            samples: outputs.clone().map(count).collect(),
+            floors: outputs.map(floor).collect(),
+            clock: Clock::of(records),
+            model,
+            records,
+            time_unit,
+            names,
+            start,
+            bounds,
+            free,
+            priors: Vec::new(),
+            known_scales: None,
+        })
+    }
+
+    /// The same with what is known of parameters beside the records.
+    ///
+    /// # Errors
+    /// Where the model has no parameter of a name, or a value or its standard error cannot be.
+    pub fn with_priors(mut self, priors: &BTreeMap<String, PriorValue>) -> Result<Self, Error> {
+        let parameters = &self.names[..self.parameter_count()];
+        self.priors = super::setup::priors_of(priors, parameters, &self.bounds)?;
+        Ok(self)
+    }
+
+    /// The same model and clock against other records, every parameter fixed at its value in a fitted vector: initial states are fitted.
+    ///
+    /// # Errors
+    /// As [`ModelSetup::new`].
+    pub fn held_out<'b>(&self, records: &'b [Record], x: &[f64]) -> Result<ModelSetup<'b>, Error>
+    where
+        'a: 'b,
+    {
+        let count = self.parameter_count();
+        let known = self.names[..count].iter().cloned();
+        let known: BTreeMap<String, f64> = known.zip(x.iter().copied()).collect();
+        let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
+        setup.clock = self.clock.with_records(records);
+        Ok(setup)
+    }
+
+    /// Positions of the entries that are fitted.
+    #[must_use]
+    pub fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    /// Names of the vector's entries.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// How many entries are parameters.
+    #[must_use]
+    pub fn parameter_count(&self) -> usize {
+        self.model.spec().parameters.len()
+    }
+
+    /// Where fits begin.
+    #[must_use]
+    pub fn start(&self) -> &[f64] {
+        &self.start
+    }
+
+    /// The model.
+    #[must_use]
+    pub fn model(&self) -> &'a Model {
+        self.model
+    }
+
+    /// Starts: that of the text and of the records, and others around it, each free parameter moved by its own factor.
+    #[must_use]
+    pub fn starts(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut starts = vec![self.start.clone()];
+        while starts.len() < n.max(1) {
+            let mut start = self.start.clone();
+            for &i in self.free.iter().filter(|&&i| i < self.parameter_count()) {
+                let draw: f64 = StandardNormal.sample(&mut rng);
+                let (value, (low, high)) = (self.start[i], self.bounds[i]);
+                let moved = if value == 0.0 {
+                    let reach = if high.is_finite() && low.is_finite() {
+                        0.2 * (high - low)
+                    } else {
+                        1.0
+                    };
+                    draw * reach
+                } else {
+                    value * (SPREAD * draw).exp()
+                };
+                start[i] = within(moved, (low, high));
+            }
+            starts.push(start);
+        }
+        starts
+    }
+
+    /// Fits from many starts. Of several outputs each counts by its noise, which is what the past of its residual does not explain: where the
+    /// model fails at one output, that does not make the others' readings worth more.
+    ///
+    /// # Errors
+    /// Where no start gives a finite simulation.
+    pub fn fit(&self, options: &FitOptions) -> Result<Fit, Error> {
+        let white = Noise::white(self.samples.len());
+        let starts = |own: &Self| {
+            own.starts(options.starts, options.seed)
+                .into_iter()
+                .map(Start::from)
+        };
+        let mut fit = estimation::fit_from(self, starts(self).collect(), &white, options.stopping)?;
+        let mut weighted = self.clone();
+        for round in 0..WEIGHTINGS {
+            let noise = estimation::noise_of(&weighted, &fit, options.noise_order)?;
+            let scales: Vec<f64> = noise.iter().map(ct_signals::ArModel::sigma).collect();
+            let settled = weighted.known_scales.as_ref().is_some_and(|known| {
+                known
+                    .iter()
+                    .zip(&scales)
+                    .all(|(a, b)| (a / b - 1.0).abs() < SETTLED)
+            });
+            if settled || scales.len() < 2 {
+                break;
+            }
+            weighted.known_scales = Some(scales);
+            let mut from: Vec<Start> = vec![fit.x.clone().into()];
+            if round == 0 {
+                from.extend(starts(self));
+            }
+            fit = estimation::fit_from(&weighted, from, &white, options.stopping)?;
+        }
+        Ok(fit)
+    }
+
+    /// The initial states that fit best with all else fixed, in white noise.
+    ///
+    /// # Errors
+    /// Where the simulation is not finite.
+    pub fn fit_states(&self, options: &FitOptions) -> Result<Vec<f64>, Error> {
+        if self.free.is_empty() {
+            return Ok(self.start.clone());
+        }
+        let noise = Noise::white(self.samples.len());
+        let fit = estimation::fit_from(
+            self,
+            vec![self.start.clone().into()],
+            &noise,
+            options.stopping,
+        )?;
+        Ok(fit.x)
+    }
+
+    /// The outputs that the model gives, a series for each record and output; `None` where the simulation cannot go on.
+    #[must_use]
+    pub fn simulate(&self, x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let residuals = estimation::residuals(self, x)?;
+        let measured = self.records.iter().flat_map(|record| &record.outputs);
+        let simulated = measured.zip(residuals);
+        // Where nothing was measured the residual says nothing: those are simulated on their own.
+        if simulated
+            .clone()
+            .all(|(measured, _)| measured.missing() == 0)
+        {
+            let model =
+                simulated.map(|(y, r)| y.values.iter().zip(r).map(|(y, r)| y - r).collect());
+            return Some(model.collect());
+        }
+        let mut all = vec![Vec::new(); self.records.len() * self.samples.len()];
+        self.each_instant::<0>(x, &[], |r, _, outputs| {
+            for (o, y) in outputs.iter().enumerate() {
+                all[r * self.samples.len() + o].push(y.re);
+            }
+            Some(())
+        })?;
+        Some(all)
+    }
+
+    /// Simulates all records with derivatives by some entries, at most `L` of them at once, and shows the outputs row by row with the
+    /// entries of the lanes.
+    fn each_instant<const L: usize>(
+        &self,
+        x: &[f64],
+        by: &[usize],
+        mut each: impl FnMut(usize, usize, &[Dual<L>]) -> Option<()>,
+    ) -> Option<()> {
+        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
+        let outputs = self.samples.len();
+        let mut inputs = vec![0.0; self.model.spec().inputs.len()];
+        let mut to = inputs.clone();
+        for (r, record) in self.records.iter().enumerate() {
+            let own = count + r * states..count + (r + 1) * states;
+            let lanes: Vec<usize> = by
+                .iter()
+                .copied()
+                .filter(|i| *i < count || own.contains(i))
+                .collect();
+            let mut chunks: Vec<&[usize]> = lanes.chunks(L.max(1)).collect();
+            if chunks.is_empty() {
+                chunks.push(&[]);
+            }
+            let begin = self.clock.begins[r] / self.time_unit;
+            let mut simulations: Vec<Simulation<'_, Dual<L>>> = chunks
+                .iter()
+                .map(|chunk| {
+                    let dual = |i: usize| {
+                        let lane = chunk.iter().position(|own| *own == i).unwrap_or(L);
+                        Dual::<L>::variable(x[i], lane)
+                    };
+                    let parameters: Vec<_> = (0..count).map(dual).collect();
+                    let initial: Vec<_> = own.clone().map(dual).collect();
+                    Simulation::new(self.model, &parameters, &initial, begin)
+                })
+                .collect();
+            let mut read = vec![Dual::<L>::variable(0.0, L); outputs * chunks.len()];
+            for k in 0..record.len() {
+                for (i, input) in record.inputs.iter().enumerate() {
+                    inputs[i] = input.values[k];
+                    to[i] = match input.hold {
+                        Hold::First if k + 1 < record.len() => input.values[k + 1],
+                        _ => input.values[k],
+                    };
+                }
+                for (simulation, read) in simulations.iter_mut().zip(read.chunks_exact_mut(outputs))
+                {
+                    simulation.read(&inputs, read);
+                }
+                each(r, k, &read)?;
+                if k + 1 < record.len() {
+                    let until = begin + (record.time[k + 1] - record.time[0]) / self.time_unit;
+                    for simulation in &mut simulations {
+                        simulation.advance(&inputs, &to, until).ok()?;
+                    }
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn each_row_in_lanes<const L: usize>(
+        &self,
+        x: &[f64],
+        by: &[usize],
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
+        let columns = by.len() + 1;
+        let outputs = self.samples.len();
+        let mut row = vec![0.0; columns];
+        self.each_instant::<L>(x, by, |r, k, read| {
+            let own = count + r * states..count + (r + 1) * states;
+            for output in 0..outputs {
+                row.fill(0.0);
+                let mine = (0..by.len()).filter(|&c| by[c] < count || own.contains(&by[c]));
+                for (lane, column) in mine.enumerate() {
+                    row[column] = read[lane / L.max(1) * outputs + output].eps[lane % L.max(1)];
+                }
+                let model = read[output].re;
+                let measured = self.records[r].outputs[output].values[k];
+                row[columns - 1] = measured - model;
+                let sample = Sample {
+                    output,
+                    first: k == 0,
+                    missing: measured.is_nan(),
+                };
+                let finite = row[..columns - 1].iter().all(|v| v.is_finite()) && model.is_finite();
+                if !(finite && each(sample, &mut row)) {
+                    return None;
+                }
+            }
+            Some(())
+        })
+    }
+}
+
+impl Residuals for ModelSetup<'_> {
+    fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
+    }
+
+    fn samples(&self) -> &[usize] {
+        &self.samples
+    }
+
+    fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        let states = self.model.spec().states.len();
+        let parameters = self
+            .free
+            .iter()
+            .filter(|&&i| i < self.parameter_count())
+            .count();
+        match parameters + states {
+            0..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
+            5..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
+            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
+            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
+        }
+    }
+
+    fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        self.each_row_in_lanes::<0>(x, &[], each)
+    }
+
+    fn floor(&self, output: usize) -> f64 {
+        self.floors[output]
+    }
+
+    fn known_scales(&self) -> Option<&[f64]> {
+        self.known_scales.as_deref()
+    }
+
+    fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+}

@@ -13,15 +13,9 @@ use crate::input::excitation::{self, ExcitationWarning};
 use crate::input::{self, Files, Input, ReadArguments};
 use crate::interrupt;
 use crate::look::Look;
-use crate::own_model::{self, OwnModelFile};
+use crate::own_model::{self, AnyModelFile, OwnModelFile};
 use crate::progress::Bar;
 use crate::{Error, terminal};
-
-/// What waits in the model file, and all that was read.
-fn read(files: &Files) -> Result<(Vec<String>, Input), Error> {
-    let model = files.read_model()?;
-    Ok((model.waiting.clone(), files.read_with(model)?))
-}
 
 #[derive(Debug, Args)]
 pub(super) struct Compare {
@@ -112,10 +106,13 @@ impl Compare {
 
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.files();
-        if own_model::is_own(&self.model) {
-            return self.run_own(&files, out, look);
-        }
-        let (waiting, input) = read(&files)?;
+        files.check_repetition()?;
+        let model = match AnyModelFile::read(&self.model)? {
+            AnyModelFile::Plant(model) => *model,
+            AnyModelFile::Own(model) => return self.run_own(&model, &files, out, look),
+        };
+        let waiting = model.waiting.clone();
+        let input = files.read_with(model)?;
         let outputs = self.results.plan(&files.all(), None)?;
         let options = self.options();
         let bar = Bar::with_limit(options.time_limit);
@@ -135,19 +132,23 @@ impl Compare {
 
 impl Compare {
     /// A model of the user's own.
-    fn run_own(&self, files: &Files, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+    fn run_own(
+        &self,
+        model: &OwnModelFile,
+        files: &Files,
+        out: &mut dyn Write,
+        look: Look,
+    ) -> Result<(), Error> {
         if self.results.report.is_some() {
             return Err(Error::Usage(
                 "--report: a page of a model of your own cannot be written yet; leave it out, or write --json".to_string(),
             ));
         }
-        files.check_repetition()?;
-        let model = OwnModelFile::read(&self.model)?;
         let records = model.records(files)?;
         let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
-        let comparison = own_model::compare(&model, &records, &FitOptions::default());
+        let comparison = own_model::compare(model, &records, &FitOptions::default());
         bar.clear();
         let unused = model.unused.iter().map(|table| {
             look.paragraph("", &format!("note: [{table}] has no part in a comparison"))
@@ -162,13 +163,18 @@ impl Compare {
 impl Diagnose {
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = self.compare.files();
-        if own_model::is_own(&self.compare.model) {
-            return Err(Error::file(
-                &self.compare.model,
-                "diagnose knows the six plants alone: `ctid compare` fits a model of your own",
-            ));
-        }
-        let (waiting, input) = read(&files)?;
+        files.check_repetition()?;
+        let model = match AnyModelFile::read(&self.compare.model)? {
+            AnyModelFile::Plant(model) => *model,
+            AnyModelFile::Own(_) => {
+                return Err(Error::file(
+                    &self.compare.model,
+                    "diagnose knows the six plants alone: `ctid compare` fits a model of your own",
+                ));
+            }
+        };
+        let waiting = model.waiting.clone();
+        let input = files.read_with(model)?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
         let mut options = self.compare.options();

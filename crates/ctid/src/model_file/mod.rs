@@ -115,7 +115,12 @@ impl ModelFile {
 /// # Errors
 /// One line that names the file, the line, what is wrong and the mend.
 pub fn read(path: &Path) -> Result<ModelFile, Error> {
-    let read = parse(&path.display().to_string(), &read_text(path)?);
+    of_text(path, &read_text(path)?)
+}
+
+/// Reads the text of the model file at a path.
+pub(crate) fn of_text(path: &Path, text: &str) -> Result<ModelFile, Error> {
+    let read = parse(&path.display().to_string(), text);
     let named_as_record = path
         .extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));

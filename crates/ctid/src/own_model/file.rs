@@ -10,7 +10,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::input::Files;
-use crate::model_file::{self, Source};
+use crate::model_file::{self, ModelFile, Source};
 use crate::{Error, names};
 
 /// The keys of `[columns]` that are no signals of the model.
@@ -73,26 +73,39 @@ pub(crate) struct Records {
     pub summaries: Vec<ct_signals::ReadSummary>,
 }
 
-/// Whether a model file names a text instead of a plant.
-pub(crate) fn is_own(path: &Path) -> bool {
-    let text = model_file::read_text(path).ok();
-    let table = text.and_then(|text| text.parse::<toml::Table>().ok());
-    table.is_some_and(|table| table.contains_key("model"))
+/// A model file, of a plant or of its user's own.
+pub(crate) enum AnyModelFile {
+    /// It names one of the plants.
+    Plant(Box<ModelFile>),
+    /// It names a text.
+    Own(Box<OwnModelFile>),
+}
+
+impl AnyModelFile {
+    /// Reads the model file once: it may be a pipe.
+    ///
+    /// # Errors
+    /// As [`model_file::read`] and [`OwnModelFile::parse`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = model_file::read_text(path)?;
+        let table = text.parse::<toml::Table>().ok();
+        Ok(if table.is_some_and(|table| table.contains_key("model")) {
+            Self::Own(Box::new(OwnModelFile::parse(path, &text)?))
+        } else {
+            Self::Plant(Box::new(model_file::of_text(path, &text)?))
+        })
+    }
 }
 
 impl OwnModelFile {
-    /// Reads the model file and the text that it names, which is looked for beside it.
+    /// Reads the text of a model file, and the model that it names, which is looked for beside the file.
     ///
     /// # Errors
     /// One line that names the file, the line, what is wrong and the mend.
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = model_file::read_text(path)?;
+    fn parse(path: &Path, text: &str) -> Result<Self, Error> {
         let file = path.display().to_string();
-        let source = Source {
-            file: &file,
-            text: &text,
-        };
-        let raw: Raw = toml::from_str(&text).map_err(|error| source.syntax(&error))?;
+        let source = Source { file: &file, text };
+        let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
         let beside = path
             .parent()
             .unwrap_or(Path::new(""))

@@ -5,5 +5,5 @@ mod file;
 mod text;
 
 pub(crate) use self::compare::compare;
-pub(crate) use self::file::{OwnModelFile, is_own, read_model};
+pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
 pub(crate) use self::text::said;

@@ -7,6 +7,8 @@ mod feedback;
 mod fit;
 mod many_starts;
 mod model_setup;
+mod model_starts;
+mod output_noise;
 mod reading_grid;
 mod reading_step;
 mod setup;

@@ -305,6 +305,21 @@ equation
   der(v) = -w2*sin(phi) - c*v - 0.02*v*abs(v) + b*u;
 end Pendulum;"#;
 
+/// Linear, and the derivative of one state is another one alone.
+const SPRING: &str = r#"model Spring
+  parameter Real g = 0.8;
+  parameter Real c = 0.4;
+  parameter Real k = 48;
+  final parameter Real m = 1.1;
+  input Real u;
+  output Real y = s;
+  Real s(start=0.1);
+  Real v(start=-0.5);
+equation
+  der(s) = v;
+  m*der(v) = g*u - c*v - k*s;
+end Spring;"#;
+
 fn steps(k: usize) -> f64 {
     // A sequence of levels that looks random and is the same for all.
     let level = (k / 10 * 7919) % 13;
@@ -344,6 +359,12 @@ fn pendulum() -> Case {
     })
 }
 
+fn spring(lines: bool) -> Case {
+    let mut case = Case::new(SPRING, 400, 0.04, |k| vec![steps(k) - 6.0]);
+    case.lines = lines;
+    case
+}
+
 #[test]
 fn a_linear_model_is_simulated_exactly() {
     let case = block(false);
@@ -377,6 +398,8 @@ fn models_of_all_kinds_agree_with_an_adaptive_solver() {
         (cut_out(), 1e-7),
         (stiff(), 1e-7),
         (pendulum(), 1e-7),
+        (spring(false), 1e-8),
+        (spring(true), 1e-8),
     ] {
         check_outside(&case, tolerance);
     }
@@ -392,6 +415,7 @@ fn derivatives_agree_with_central_differences() {
         late(),
         stiff(),
         pendulum(),
+        spring(false),
     ] {
         case.check_derivatives(1e-5);
     }
@@ -404,6 +428,7 @@ fn the_method_follows_from_the_model() {
         (pendulum(), Method::Explicit),
         (stiff(), Method::Implicit),
         (block(false), Method::Exact),
+        (spring(false), Method::Exact),
     ] {
         assert_eq!(case.plain().1, method, "{}", case.model.spec().name);
     }

@@ -44,6 +44,7 @@
 //! **Reference**: Modelica Association, Modelica - A Unified Object-Oriented Language for Systems Modeling, Language Specification 3.6, 2023:
 //! appendix A for the grammar of expressions.
 
+pub mod effects;
 mod expression;
 mod linearity;
 mod scalar;

@@ -1,6 +1,6 @@
 //! Whether a model is linear in its states and inputs, found from its text.
 
-use crate::expression::{Expression, Operator, Variable};
+use crate::expression::{Expression, Function, Operator, Variable};
 use crate::spec::ModelSpec;
 
 /// Whether a model is linear in states and inputs, whatever its parameters are.
@@ -74,6 +74,8 @@ fn degree(expression: &Expression, flows: &[Degree]) -> Degree {
                 _ => constant_or_other(a.max(b)),
             }
         }
+        // It remembers, whatever goes into it.
+        Expression::Call(Function::Play, _) => Other,
         Expression::Call(_, arguments) => {
             constant_or_other(arguments.iter().map(of).max().unwrap_or(Constant))
         }

@@ -13,6 +13,7 @@ mod delays;
 mod exact;
 mod explicit;
 mod implicit;
+mod memory;
 mod step;
 
 use self::delays::{Delay, Delays, POINTS};
@@ -129,6 +130,8 @@ pub struct Simulation<'a, T> {
     last: Vec<f64>,
     scratch: Vec<T>,
     begun: bool,
+    /// Settled states have their initial values.
+    settled: bool,
 }
 
 impl<'a, T: Scalar> Simulation<'a, T> {
@@ -173,6 +176,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             last: vec![0.0; tape.inputs],
             scratch: vec![zero; tape.states],
             begun: false,
+            settled: false,
             work,
             model,
         }
@@ -209,21 +213,10 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         } else {
             self.before_the_record();
         }
+        self.remember();
         self.delays = Some(delays);
         for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {
             *output = self.work.registers.values[register];
-        }
-    }
-
-    /// Before the record everything was as at its beginning: what a delay lets through too.
-    fn before_the_record(&mut self) {
-        let tape = &self.model.tape;
-        // A delay may delay what another one lets through.
-        for _ in 0..=tape.delays.len() {
-            tape.evaluate_with_guards(&mut self.work.registers);
-            for (i, &(what, _)) in tape.delays.iter().enumerate() {
-                self.work.registers.values[tape.delayed(i)] = self.work.registers.values[what];
-            }
         }
     }
 
@@ -252,6 +245,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let tape = &model.tape;
         let begin = self.time.value();
         let interval = until - begin;
+        self.settle(from, delays);
         for ((rise, from), to) in self.rise.iter_mut().zip(from).zip(to) {
             *rise = (to - from) / interval;
         }
@@ -345,6 +339,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         };
         drive.load(tape, &mut self.work, self.time, &self.state);
         tape.evaluate_with_guards(&mut self.work.registers);
+        self.remember();
     }
 
     /// Keeps what is delayed over the next or the last step: what is known ahead for a whole interval, everything else after each step.

@@ -1,6 +1,7 @@
 //! One program for all tests.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod effects;
 mod language;
 mod mutated;
 mod refused;

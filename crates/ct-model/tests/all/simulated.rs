@@ -366,6 +366,24 @@ fn spring(lines: bool) -> Case {
 }
 
 #[test]
+fn a_position_whose_derivative_is_the_speed_itself_is_simulated_exactly() {
+    let text = "model Free
+      parameter Real f = 0.3;
+      output Real s(start=0.1);
+      Real v(start=0.2);
+    equation
+      der(s) = v;
+      der(v) = f;
+    end Free;";
+    let case = Case::new(text, 20, 0.5, |_| Vec::new());
+    let (rows, method) = case.plain();
+    assert_eq!(method, Method::Exact);
+    for (row, t) in rows.iter().zip(&case.time) {
+        assert!((row[0] - (0.1 + 0.2 * t + 0.15 * t * t)).abs() < 1e-12, "{row:?}");
+    }
+}
+
+#[test]
 fn a_linear_model_is_simulated_exactly() {
     let case = block(false);
     let (rows, method) = case.plain();

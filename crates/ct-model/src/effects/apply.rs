@@ -7,7 +7,7 @@ use super::candidate::Candidate;
 use super::fragment::{Action, Counts, Target, sum};
 use super::port::Port;
 use crate::expression::{Expression, Variable};
-use crate::spec::{About, Flow, ModelSpec, State};
+use crate::spec::{About, Flow, ModelSpec, Output, State};
 
 /// Why effects cannot be added to a model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -71,6 +71,7 @@ pub fn apply(spec: &ModelSpec, candidates: &[&Candidate]) -> Result<ModelSpec, A
     }
     mended.name_readings(spec);
     let mut spec = mended.spec;
+    outputs_in_order(&mut spec);
     if let Err(circle) = spec.sort_flows() {
         let of = |i: &usize| spec.flows[*i].about.name.clone();
         let ids: Vec<&str> = candidates.iter().map(|c| c.id.as_str()).collect();
@@ -296,6 +297,46 @@ fn unbounded() -> About {
         min: f64::NEG_INFINITY,
         max: f64::INFINITY,
         ..About::default()
+    }
+}
+
+/// Exchanges the places of flows that are outputs, so that they stand in the order of the outputs: a text has one order.
+fn outputs_in_order(spec: &mut ModelSpec) {
+    let flow = |output: &Output| match output.variable {
+        Variable::Flow(i) => Some(i),
+        _ => None,
+    };
+    let wanted: Vec<usize> = spec.outputs.iter().filter_map(flow).collect();
+    let mut places = wanted.clone();
+    places.sort_unstable();
+    places.dedup();
+    if places.len() != wanted.len() {
+        return;
+    }
+    let mut moved: Vec<usize> = (0..spec.flows.len()).collect();
+    for (from, to) in wanted.iter().zip(&places) {
+        moved[*from] = *to;
+    }
+    let variable = |variable: Variable| match variable {
+        Variable::Flow(i) => Variable::Flow(moved[i]),
+        other => other,
+    };
+    let of = |old: Variable| Expression::Variable(variable(old));
+    let mut flows = spec.flows.clone();
+    for (old, flow) in spec.flows.iter().enumerate() {
+        flows[moved[old]] = Flow {
+            value: flow.value.with(&of),
+            ..flow.clone()
+        };
+    }
+    spec.flows = flows;
+    for state in &mut spec.states {
+        state.coefficient = state.coefficient.as_ref().map(|c| c.with(&of));
+        state.right = state.right.with(&of);
+        state.start = state.start.with(&of);
+    }
+    for output in &mut spec.outputs {
+        output.variable = variable(output.variable);
     }
 }
 

@@ -9,7 +9,7 @@ use super::scale::{Scales, balance_unit, divided};
 use super::visited::{Span, Visited};
 use super::{all_effects, domain};
 use crate::expression::Variable;
-use crate::spec::ModelSpec;
+use crate::spec::{Given, ModelSpec};
 use crate::text::is_reserved;
 
 /// A parameter of an effect at a port.
@@ -97,8 +97,11 @@ impl Candidate {
             name => free(format!("{stem}_{name}")),
         };
         let fragment = &mut self.fragment;
-        for (own, parameter) in self.parameters.iter_mut().zip(&mut fragment.parameters) {
-            parameter.about.name = named(&own.short);
+        for parameter in &mut fragment.parameters {
+            parameter.about.name = named(&parameter.about.name);
+        }
+        // Constants of the effect stand behind its parameters.
+        for (own, parameter) in self.parameters.iter_mut().zip(&fragment.parameters) {
             own.name.clone_from(&parameter.about.name);
         }
         let states = fragment.states.iter_mut().map(|state| &mut state.about);
@@ -266,7 +269,7 @@ fn candidate(
         _ => String::new(),
     };
     let unit = |symbol: &str| match symbol {
-        "port" => port_unit.clone(),
+        "port" | "signal" => port_unit.clone(),
         "time" => visited.time_unit.clone(),
         "balance" => balance_unit.clone(),
         "balance/port" => divided(&balance_unit, &port_unit),
@@ -278,7 +281,9 @@ fn candidate(
     for about in states.chain(flows).chain(parameters.map(|p| &mut p.about)) {
         about.unit = unit(&about.unit);
     }
-    let parameters = fragment.parameters.iter().map(|parameter| {
+    let parameters = fragment.parameters.iter();
+    let parameters = parameters.filter(|parameter| parameter.given != Given::Constant);
+    let parameters = parameters.map(|parameter| {
         let about = &parameter.about;
         let known = effect
             .parameters
@@ -288,6 +293,9 @@ fn candidate(
             .map_or((Role::Size, Starts::Values(&[])), |(_, role, starts)| {
                 (*role, *starts)
             });
+        // A reading of a row is later by a row with the slightest delay of what it shows at once.
+        let jumps = effect.id == "delay" && spec.is_read_directly(signal);
+        let role = if jumps { Role::Threshold } else { role };
         EffectParameter {
             name: String::new(),
             short: about.name.clone(),

@@ -72,15 +72,23 @@ pub(super) fn instance(
         flows: Vec::new(),
         action: Action::Add(Vec::new()),
     };
-    let mut own = Vec::new();
-    for parameter in &small.parameters {
-        if parameter.given == Given::Constant {
-            own.push(signed(parameter.value));
-            continue;
+    // Parameters first, then the constants that equations use; a pure number stands where it is used.
+    let mut own: Vec<Expression> = small.parameters.iter().map(|p| signed(p.value)).collect();
+    for constants in [false, true] {
+        for (i, parameter) in small.parameters.iter().enumerate() {
+            let is_constant = parameter.given == Given::Constant;
+            let kept = !is_constant
+                || !parameter.about.unit.is_empty()
+                    && small.occurrences(Variable::Parameter(i)) > 0;
+            if kept && is_constant == constants {
+                let at = counts.parameters + fragment.parameters.len();
+                own[i] = Expression::Variable(Variable::Parameter(at));
+                fragment.parameters.push(Parameter {
+                    definition: None,
+                    ..parameter.clone()
+                });
+            }
         }
-        let at = counts.parameters + fragment.parameters.len();
-        own.push(Expression::Variable(Variable::Parameter(at)));
-        fragment.parameters.push(parameter.clone());
     }
     // The right-hand side is a flow of its own, behind those of the effect.
     let rate = Variable::Flow(counts.flows + small.flows.len());

@@ -138,6 +138,16 @@ impl ModelSpec {
         self.holds(&self.states[state].right, on, &mut seen)
     }
 
+    /// Whether an output holds a variable, without a state between.
+    pub(super) fn is_read_directly(&self, variable: Variable) -> bool {
+        let mut seen = vec![false; self.flows.len()];
+        let mut outputs = self.outputs.iter();
+        outputs.any(|output| {
+            let reading = Expression::Variable(output.variable);
+            self.holds(&reading, variable, &mut seen)
+        })
+    }
+
     fn holds(&self, expression: &Expression, on: Variable, seen: &mut [bool]) -> bool {
         let mut found = false;
         let mut flows = Vec::new();

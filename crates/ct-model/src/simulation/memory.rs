@@ -4,7 +4,7 @@
 //! gave at the row: exact where what goes in is held or runs in one direction, as every input does. It comes to rest in the middle before the record.
 
 use super::Simulation;
-use super::delays::Delays;
+use super::delays::{Delay, Delays};
 use super::step::Drive;
 use crate::scalar::Scalar;
 
@@ -52,6 +52,22 @@ impl<T: Scalar> Simulation<'_, T> {
         };
         drive.load(tape, &mut self.work, self.time, &self.state);
         self.before_the_record();
+    }
+
+    /// Evaluates a reading: what is delayed by nothing is there at once.
+    pub(super) fn let_through(&mut self, delays: &Delays<T>) {
+        let tape = &self.model.tape;
+        tape.evaluate_with_guards(&mut self.work.registers);
+        let at_once = |delay: &Delay<T>| delay.by.value() == 0.0;
+        for _ in 0..delays.all.iter().filter(|delay| at_once(delay)).count() {
+            let values = &mut self.work.registers.values;
+            for (i, &(what, _)) in tape.delays.iter().enumerate() {
+                if at_once(&delays.all[i]) {
+                    values[tape.delayed(i)] = values[what];
+                }
+            }
+            tape.evaluate_with_guards(&mut self.work.registers);
+        }
     }
 
     /// Plays start anew from what they give at this row.

@@ -209,7 +209,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let tape = &self.model.tape;
         drive.load(tape, &mut self.work, self.time, &self.state);
         if self.begun {
-            tape.evaluate_with_guards(&mut self.work.registers);
+            self.let_through(&delays);
         } else {
             self.before_the_record();
         }

@@ -1,8 +1,10 @@
 //! Effects at the ports of models: every one at every port is added, gives the outputs of the model without it where it is absent, and has
 //! the derivatives that differences have.
 
-use ct_model::effects::{Candidate, Role, Visited, all_effects, apply, candidates};
-use ct_model::{Dual, Linearity, Model, ModelSpec, Scalar, Simulation, unit_warnings};
+use ct_model::effects::{
+    Candidate, EffectParameter, Role, Visited, all_effects, apply, candidates,
+};
+use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation, unit_warnings};
 
 const BLOCK: &str = r#"
 model Block "a heated block"
@@ -108,10 +110,15 @@ impl Driven {
             rows.push(y);
             if k + 1 < self.time.len() {
                 let done = simulation.advance(inputs, inputs, self.time[k + 1]);
-                done.unwrap_or_else(|error| panic!("{error}"));
+                done.unwrap_or_else(|error| panic!("{error}\n{}", model.spec()));
             }
         }
         rows
+    }
+
+    fn method(&self, model: &Model) -> Method {
+        let parameters = model.parameters();
+        Simulation::new(model, &parameters, &model.starts(&parameters), 0.0).method()
     }
 
     fn visited(&self) -> Visited {
@@ -142,7 +149,19 @@ fn range(rows: &[Vec<f64>]) -> f64 {
 
 /// Where a fit of the candidate would start: some of its starts, with a size that shows.
 fn active(candidate: &Candidate) -> Vec<f64> {
-    let of = |p: &ct_model::effects::EffectParameter| p.starts[p.starts.len() / 2];
+    // Quantiles are levels at which an input stays: a limit that moves over one has no derivative.
+    let of = |p: &EffectParameter| {
+        let start = match p.role {
+            Role::Size => p.starts[0],
+            _ => p.starts[p.starts.len() / 2],
+        };
+        let aside = if p.role == Role::Threshold {
+            0.013
+        } else {
+            0.0
+        };
+        start + aside * (p.bounds.1 - p.bounds.0)
+    };
     candidate.parameters.iter().map(of).collect()
 }
 
@@ -217,10 +236,9 @@ fn an_absent_effect_changes_nothing() {
         for candidate in driven.candidates() {
             let mended = Model::new(apply(&driven.spec, &[&candidate]).unwrap());
             let with = driven.run(&mended, &mended.parameters());
-            // One of the two may be simulated exactly, the other one in steps of an error of 1e-10.
-            let both_exact = *&base.spec().linearity() == Linearity::Linear
-                && mended.spec().linearity() == Linearity::Linear;
-            let allowed = if both_exact { 1e-12 } else { 1e-8 };
+            // Steps follow their error, to which new states and branches contribute.
+            let exact = [&base, &mended].map(|model| driven.method(model) == Method::Exact);
+            let allowed = if exact == [true, true] { 1e-12 } else { 1e-9 };
             let difference = largest_difference(&with, &without) / range(&without);
             assert!(difference <= allowed, "{}: {difference:e}", candidate.id);
         }
@@ -297,23 +315,31 @@ fn check_derivatives(driven: &Driven, candidate: &Candidate, at: &[f64], toleran
             .collect();
         let exact = driven.run(&model, &duals);
         let typical = own.starts.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        let step = 1e-4 * typical.max(at[i].abs());
+        // Of a limit a row may be near: a short step.
+        let share = if own.role == Role::Threshold {
+            1e-5
+        } else {
+            1e-4
+        };
+        let step = share * typical.max(at[i].abs());
         let moved = |by: f64| {
             let mut parameters = parameters.clone();
             parameters[first + i] += by;
             driven.run(&model, &parameters)
         };
         let one_sided = at[i] - 2.0 * step < own.bounds.0;
-        let (a, b) = (
-            moved(step),
-            moved(if one_sided { 2.0 * step } else { -step }),
-        );
+        let near = [moved(step), moved(2.0 * step)];
+        let far = (!one_sided).then(|| [moved(-step), moved(-2.0 * step)]);
         for (k, row) in exact.iter().enumerate() {
             for (y, own_value) in row.iter().enumerate() {
-                let difference = if one_sided {
-                    (4.0 * a[k][y] - b[k][y] - 3.0 * plain[k][y]) / (2.0 * step)
-                } else {
-                    (a[k][y] - b[k][y]) / (2.0 * step)
+                let of = |rows: &Vec<Vec<f64>>| rows[k][y];
+                let difference = match &far {
+                    None => (4.0 * of(&near[0]) - of(&near[1]) - 3.0 * of(&plain)) / (2.0 * step),
+                    Some(far) => {
+                        let one = of(&near[0]) - of(&far[0]);
+                        let two = of(&near[1]) - of(&far[1]);
+                        (8.0 * one - two) / (12.0 * step)
+                    }
                 };
                 let error = (own_value.eps[0] - difference).abs() * typical;
                 assert!(

@@ -379,7 +379,10 @@ fn a_position_whose_derivative_is_the_speed_itself_is_simulated_exactly() {
     let (rows, method) = case.plain();
     assert_eq!(method, Method::Exact);
     for (row, t) in rows.iter().zip(&case.time) {
-        assert!((row[0] - (0.1 + 0.2 * t + 0.15 * t * t)).abs() < 1e-12, "{row:?}");
+        assert!(
+            (row[0] - (0.1 + 0.2 * t + 0.15 * t * t)).abs() < 1e-12,
+            "{row:?}"
+        );
     }
 }
 

@@ -7,12 +7,12 @@ pub(super) const EFFECT: Effect = Effect {
     place: Place::Balance,
     text: r#"
 model constant_flow
-  constant Real balance = 1;
-  parameter Real flow(unit="balance", min=-10*balance, max=10*balance) = 0 "what flows in all the time";
-  output Real v = flow;
+  constant Real balance(unit="balance") = 1;
+  parameter Real amount(unit="balance", min=-10*balance, max=10*balance) = 0 "what flows in all the time";
+  output Real v = amount;
 end constant_flow;
 "#,
-    parameters: &[("flow", Role::Size, Starts::Balances(&[0.05, -0.05]))],
+    parameters: &[("amount", Role::Size, Starts::Balances(&[0.05, -0.05]))],
     physics: "Something flows in or out all the time that the model does not have: a leak, a load, a source.",
     confused_with: &["offset(y)", "dead_zone(u)", "loss(x)"],
     confirm: "Switch all inputs off and watch whether the state still changes.",

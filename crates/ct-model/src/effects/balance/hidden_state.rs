@@ -8,11 +8,11 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model hidden_state
   input Real x;
-  constant Real first = 0;
-  constant Real balance = 1;
-  constant Real width = 1;
-  constant Real interval = 1;
-  constant Real duration = 1;
+  constant Real first(unit="signal") = 0;
+  constant Real balance(unit="balance") = 1;
+  constant Real width(unit="signal") = 1;
+  constant Real interval(unit="time") = 1;
+  constant Real duration(unit="time") = 1;
   parameter Real exchange(unit="balance/port", min=0, max=100*balance/width) = 0 "exchange per unit of difference";
   parameter Real tau(unit="time", min=0.1*interval, max=20*duration) = 0.1*duration "time constant of the store";
   Real z(unit="port", start=first) "the store";

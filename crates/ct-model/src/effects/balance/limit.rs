@@ -9,10 +9,10 @@ pub(super) const EFFECT: Effect = Effect {
 model limit
   input Real x;
   input Real rate;
-  constant Real low = 0;
-  constant Real high = 1;
-  constant Real width = 1;
-  final parameter Real side = 1 "1: not above the bound, -1: not below it";
+  constant Real low(unit="signal") = 0;
+  constant Real high(unit="signal") = 1;
+  constant Real width(unit="signal") = 1;
+  final parameter Real side(min=-1, max=1) = 1 "1: not above the bound, -1: not below it";
   parameter Real bound(unit="port", min=low - width, max=high + width) = high + width "where it stops";
   output Real v = if side*(x - bound) >= 0 and side*rate > 0 then 0 else rate;
 end limit;

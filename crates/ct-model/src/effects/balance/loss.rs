@@ -8,8 +8,8 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model loss
   input Real x;
-  constant Real balance = 1;
-  constant Real width = 1;
+  constant Real balance(unit="balance") = 1;
+  constant Real width(unit="signal") = 1;
   parameter Real coefficient(unit="balance/port", min=-10*balance/width, max=10*balance/width) = 0 "loss per unit of the state";
   output Real v = -coefficient*x;
 end loss;

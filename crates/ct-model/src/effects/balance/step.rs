@@ -7,16 +7,16 @@ pub(super) const EFFECT: Effect = Effect {
     place: Place::Balance,
     text: r#"
 model step
-  constant Real balance = 1;
-  constant Real begin = 0;
-  constant Real duration = 1;
-  parameter Real flow(unit="balance", min=-10*balance, max=10*balance) = 0 "what flows in from then on";
+  constant Real balance(unit="balance") = 1;
+  constant Real begin(unit="time") = 0;
+  constant Real duration(unit="time") = 1;
+  parameter Real amount(unit="balance", min=-10*balance, max=10*balance) = 0 "what flows in from then on";
   parameter Real since(unit="time", min=begin, max=begin + duration) = begin + 0.5*duration "when it begins";
-  output Real v = if time >= since then flow else 0;
+  output Real v = if time >= since then amount else 0;
 end step;
 "#,
     parameters: &[
-        ("flow", Role::Size, Starts::Balances(&[0.05, -0.05])),
+        ("amount", Role::Size, Starts::Balances(&[0.05, -0.05])),
         (
             "since",
             Role::Shape,

@@ -9,8 +9,8 @@ pub(super) const EFFECT: Effect = Effect {
 model coupling
   input Real x1;
   input Real x2;
-  constant Real balance = 1;
-  constant Real width = 1;
+  constant Real balance(unit="balance") = 1;
+  constant Real width(unit="signal") = 1;
   parameter Real conductance(unit="balance/port", min=-10*balance/width, max=10*balance/width) = 0 "flow per unit of difference";
   output Real v = conductance*(x1 - x2);
 end coupling;

@@ -8,8 +8,8 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model input_to
   input Real u;
-  constant Real balance = 1;
-  constant Real width = 1;
+  constant Real balance(unit="balance") = 1;
+  constant Real width(unit="signal") = 1;
   parameter Real gain(unit="balance/port", min=-10*balance/width, max=10*balance/width) = 0 "what the input adds, per unit";
   output Real v = gain*u;
 end input_to;

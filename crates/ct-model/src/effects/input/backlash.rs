@@ -8,7 +8,7 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model backlash
   input Real u;
-  constant Real width = 1;
+  constant Real width(unit="signal") = 1;
   parameter Real half_width(unit="port", min=0, max=0.5*width) = 0 "half of the play";
   output Real v = play(u, half_width);
 end backlash;

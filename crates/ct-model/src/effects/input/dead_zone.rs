@@ -8,8 +8,8 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model dead_zone
   input Real u;
-  constant Real high = 1;
-  constant Real low = 0;
+  constant Real high(unit="signal") = 1;
+  constant Real low(unit="signal") = 0;
   parameter Real threshold(unit="port", min=0, max=max(abs(low), abs(high))) = 0 "size of the input below which nothing happens";
   output Real v = u - min(max(u, -threshold), threshold);
 end dead_zone;

@@ -8,7 +8,7 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model delay_effect
   input Real u;
-  constant Real duration = 1;
+  constant Real duration(unit="time") = 1;
   parameter Real dead_time(unit="time", min=0, max=0.5*duration) = 0 "time until the input acts";
   output Real v = delay(u, dead_time);
 end delay_effect;
@@ -16,7 +16,7 @@ end delay_effect;
     parameters: &[(
         "dead_time",
         Role::Size,
-        Starts::Intervals(&[0.5, 1.5, 4.0, 10.0, 25.0]),
+        Starts::Intervals(&[0.5, 1.5, 4.5, 10.5, 25.5]),
     )],
     physics: "The command acts a dead time later: transport through a pipe or on a belt, a computer, a network.",
     confused_with: &["lag(u)", "lag(y)"],

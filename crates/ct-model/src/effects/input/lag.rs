@@ -11,9 +11,9 @@ pub(in crate::effects) const EFFECT: Effect = Effect {
     text: r#"
 model lag
   input Real u;
-  constant Real interval = 1;
-  constant Real duration = 1;
-  constant Real shortest = 0.5*interval;
+  constant Real interval(unit="time") = 1;
+  constant Real duration(unit="time") = 1;
+  constant Real shortest(unit="time") = 0.5*interval;
   parameter Real tau(unit="time", min=0, max=duration) = 0 "time constant";
   Real x(unit="port");
   output Real v = u + min(tau/shortest, 1)*(x - u);

@@ -8,9 +8,9 @@ pub(in crate::effects) const EFFECT: Effect = Effect {
     text: r#"
 model nonlinearity
   input Real u;
-  constant Real low = 0;
-  constant Real high = 1;
-  constant Real width = 1;
+  constant Real low(unit="signal") = 0;
+  constant Real high(unit="signal") = 1;
+  constant Real width(unit="signal") = 1;
   parameter Real bend(unit="1", min=-2, max=2) = 0 "largest deviation from the straight line, as a share of the range";
   output Real v = u + bend*4*(u - low)*(high - u)/width;
 end nonlinearity;

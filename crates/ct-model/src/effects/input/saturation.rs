@@ -8,10 +8,10 @@ pub(in crate::effects) const EFFECT: Effect = Effect {
     text: r#"
 model saturation
   input Real u;
-  constant Real low = 0;
-  constant Real high = 1;
-  constant Real width = 1;
-  final parameter Real side = 1 "1: not above the limit, -1: not below it";
+  constant Real low(unit="signal") = 0;
+  constant Real high(unit="signal") = 1;
+  constant Real width(unit="signal") = 1;
+  final parameter Real side(min=-1, max=1) = 1 "1: not above the limit, -1: not below it";
   parameter Real limit(unit="port", min=low - width, max=high + width) = high "limit of what takes effect";
   output Real v = if side*(u - limit) > 0 then limit else u;
 end saturation;

@@ -8,9 +8,9 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model drift
   input Real y;
-  constant Real begin = 0;
-  constant Real duration = 1;
-  constant Real width = 1;
+  constant Real begin(unit="time") = 0;
+  constant Real duration(unit="time") = 1;
+  constant Real width(unit="signal") = 1;
   parameter Real change(unit="port", min=-5*width, max=5*width) = 0 "change of the zero over the record";
   output Real v = y + change*(time - begin)/duration;
 end drift;

@@ -8,7 +8,7 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model offset
   input Real y;
-  constant Real width = 1;
+  constant Real width(unit="signal") = 1;
   parameter Real error(unit="port", min=-5*width, max=5*width) = 0 "error of the zero";
   output Real v = y + error;
 end offset;

@@ -8,7 +8,7 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model quantisation
   input Real y;
-  constant Real width = 1;
+  constant Real width(unit="signal") = 1;
   parameter Real step(unit="port", min=0, max=width) = 0 "distance of two readings";
   output Real v = quantise(y, step);
 end quantisation;

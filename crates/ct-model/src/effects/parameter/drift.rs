@@ -8,8 +8,8 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model drift
   input Real p;
-  constant Real begin = 0;
-  constant Real duration = 1;
+  constant Real begin(unit="time") = 0;
+  constant Real duration(unit="time") = 1;
   parameter Real rate(unit="1", min=-0.95, max=5) = 0 "relative change over the record";
   output Real v = p*(1 + rate*(time - begin)/duration);
 end drift;

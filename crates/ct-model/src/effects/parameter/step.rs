@@ -8,8 +8,8 @@ pub(super) const EFFECT: Effect = Effect {
     text: r#"
 model step
   input Real p;
-  constant Real begin = 0;
-  constant Real duration = 1;
+  constant Real begin(unit="time") = 0;
+  constant Real duration(unit="time") = 1;
   parameter Real change(unit="1", min=-1, max=5) = 0 "relative change";
   parameter Real since(unit="time", min=begin, max=begin + duration) = begin + 0.5*duration "when it changes";
   output Real v = p*(1 + (if time >= since then change else 0));

@@ -9,8 +9,8 @@ pub(super) const EFFECT: Effect = Effect {
 model varies_with
   input Real p;
   input Real x;
-  constant Real middle = 0;
-  constant Real width = 1;
+  constant Real middle(unit="signal") = 0;
+  constant Real width(unit="signal") = 1;
   parameter Real change(unit="1", min=-3, max=3) = 0 "relative change over the visited range";
   output Real v = p*(1 + change*(x - middle)/width);
 end varies_with;

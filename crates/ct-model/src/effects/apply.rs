@@ -46,7 +46,7 @@ pub enum ApplyError {
 /// Where an effect is given twice, belongs to another model, or closes a circle.
 pub fn apply(spec: &ModelSpec, candidates: &[&Candidate]) -> Result<ModelSpec, ApplyError> {
     let mut ordered = candidates.to_vec();
-    ordered.sort_by_key(|candidate| rank(candidate));
+    ordered.sort_by_key(|candidate| (rank(candidate), candidate.port, &candidate.id));
     let mut seen = BTreeSet::new();
     for candidate in &ordered {
         if !seen.insert(candidate.id.as_str()) {

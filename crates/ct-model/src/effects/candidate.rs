@@ -268,8 +268,13 @@ fn candidate(
         (None, Port::OutputAnd(y, _)) => spec.about(spec.outputs[y].variable).unit.clone(),
         _ => String::new(),
     };
+    let value_unit = match port {
+        Port::Value(p) | Port::Dependence(p, _) => spec.about(p).unit.clone(),
+        _ => String::new(),
+    };
     let unit = |symbol: &str| match symbol {
         "port" | "signal" => port_unit.clone(),
+        "value" => value_unit.clone(),
         "time" => visited.time_unit.clone(),
         "balance" => balance_unit.clone(),
         "balance/port" => divided(&balance_unit, &port_unit),

@@ -372,3 +372,71 @@ fn derivatives_where_the_effect_is_absent_are_those_of_differences() {
         }
     }
 }
+
+/// Some of all pairs: those of the first candidates of every place with all others.
+#[test]
+fn effects_compose_in_any_order() {
+    for driven in Driven::all() {
+        let base = Model::new(driven.spec.clone());
+        let without = driven.run(&base, &base.parameters());
+        let all = driven.candidates();
+        for (i, one) in all.iter().enumerate() {
+            for other in all.iter().skip(i + 1).step_by(3) {
+                let spec = apply(&driven.spec, &[one, other]).unwrap();
+                assert_eq!(spec, apply(&driven.spec, &[other, one]).unwrap());
+                let text = spec.to_string();
+                let read = ModelSpec::parse(&text);
+                let read = read.unwrap_or_else(|error| panic!("{error}\n{text}"));
+                assert_eq!(read.to_string(), text);
+                let mended = Model::new(spec);
+                let with = driven.run(&mended, &mended.parameters());
+                let difference = largest_difference(&with, &without) / range(&without);
+                assert!(
+                    difference <= 1e-8,
+                    "{} {}: {difference:e}\n{text}",
+                    one.id,
+                    other.id
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_chain_is_in_its_order_and_readings_keep_their_name() {
+    let block = &Driven::all()[0];
+    let all = block.candidates();
+    let of = |id: &str| all.iter().find(|candidate| candidate.id == id).unwrap();
+    let ids = [
+        "quantisation(y)",
+        "lag(u)",
+        "offset(y)",
+        "dead_zone(u)",
+        "lag(y)",
+        "drift(g)",
+    ];
+    let chosen: Vec<&Candidate> = ids.iter().map(|id| of(id)).collect();
+    let text = apply(&block.spec, &chosen).unwrap().to_string();
+    for line in [
+        "output Real y(unit=\"degC\");",
+        "y = quantise(offset_y, quantisation_y_step);",
+        "offset_y = lag_y + offset_y_error;",
+        "lag_y = y_true + min(lag_y_tau/lag_y_shortest, 1)*(lag_y_x - y_true);",
+        "y_true = T;",
+        "C*der(T) = drift_g*lag_u - loss;",
+        "lag_u = dead_zone_u + min(lag_u_tau/lag_u_shortest, 1)*(lag_u_x - dead_zone_u);",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    let twice = apply(&block.spec, &[of("lag(u)"), of("lag(u)")]);
+    assert!(
+        twice
+            .unwrap_err()
+            .to_string()
+            .contains("lag(u) is given twice")
+    );
+    let other = Driven::all()[2].candidates();
+    let other = other.iter().find(|c| c.id == "coupling(h1,h2)").unwrap();
+    let error = apply(&block.spec, &[other]).unwrap_err().to_string();
+    assert!(error.contains("of another model"), "{error}");
+}

@@ -3,7 +3,9 @@
 
 mod effects;
 mod language;
+mod memory;
 mod mutated;
+mod own_candidates;
 mod refused;
 mod round_trip;
 mod simulated;

@@ -9,7 +9,7 @@ pub(super) const EFFECT: Effect = Effect {
 model constant_flow
   constant Real balance(unit="balance") = 1;
   parameter Real amount(unit="balance", min=-10*balance, max=10*balance) = 0 "what flows in all the time";
-  output Real v = amount;
+  output Real v(unit="balance") = amount;
 end constant_flow;
 "#,
     parameters: &[("amount", Role::Size, Starts::Balances(&[0.05, -0.05]))],

@@ -16,7 +16,7 @@ model hidden_state
   parameter Real exchange(unit="balance/port", min=0, max=100*balance/width) = 0 "exchange per unit of difference";
   parameter Real tau(unit="time", min=0.1*interval, max=20*duration) = 0.1*duration "time constant of the store";
   Real z(unit="port", start=first) "the store";
-  output Real v = exchange*(z - x);
+  output Real v(unit="balance") = exchange*(z - x);
 equation
   tau*der(z) = x - z;
 end hidden_state;

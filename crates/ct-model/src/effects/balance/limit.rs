@@ -14,7 +14,7 @@ model limit
   constant Real width(unit="signal") = 1;
   final parameter Real side(min=-1, max=1) = 1 "1: not above the bound, -1: not below it";
   parameter Real bound(unit="port", min=low - width, max=high + width) = high + width "where it stops";
-  output Real v = if side*(x - bound) >= 0 and side*rate > 0 then 0 else rate;
+  output Real v(unit="balance") = if side*(x - bound) >= 0 and side*rate > 0 then 0 else rate;
 end limit;
 "#,
     parameters: &[

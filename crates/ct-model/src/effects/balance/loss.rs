@@ -11,7 +11,7 @@ model loss
   constant Real balance(unit="balance") = 1;
   constant Real width(unit="signal") = 1;
   parameter Real coefficient(unit="balance/port", min=-10*balance/width, max=10*balance/width) = 0 "loss per unit of the state";
-  output Real v = -coefficient*x;
+  output Real v(unit="balance") = -coefficient*x;
 end loss;
 "#,
     parameters: &[(

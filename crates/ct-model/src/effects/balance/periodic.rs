@@ -16,7 +16,7 @@ model periodic
   parameter Real cosine(unit="balance", min=-10*balance, max=10*balance) = 0 "amplitude of the cosine";
   parameter Real period(unit="time", min=2*interval, max=2*duration) = 0.1*duration "period";
   Real angle = turn*(time - begin)/period;
-  output Real v = sine*sin(angle) + cosine*cos(angle);
+  output Real v(unit="balance") = sine*sin(angle) + cosine*cos(angle);
 end periodic;
 "#,
     parameters: &[

@@ -12,7 +12,7 @@ model step
   constant Real duration(unit="time") = 1;
   parameter Real amount(unit="balance", min=-10*balance, max=10*balance) = 0 "what flows in from then on";
   parameter Real since(unit="time", min=begin, max=begin + duration) = begin + 0.5*duration "when it begins";
-  output Real v = if time >= since then amount else 0;
+  output Real v(unit="balance") = if time >= since then amount else 0;
 end step;
 "#,
     parameters: &[

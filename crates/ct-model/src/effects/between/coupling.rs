@@ -12,7 +12,7 @@ model coupling
   constant Real balance(unit="balance") = 1;
   constant Real width(unit="signal") = 1;
   parameter Real conductance(unit="balance/port", min=-10*balance/width, max=10*balance/width) = 0 "flow per unit of difference";
-  output Real v = conductance*(x1 - x2);
+  output Real v(unit="balance") = conductance*(x1 - x2);
 end coupling;
 "#,
     parameters: &[(

@@ -11,7 +11,7 @@ model input_to
   constant Real balance(unit="balance") = 1;
   constant Real width(unit="signal") = 1;
   parameter Real gain(unit="balance/port", min=-10*balance/width, max=10*balance/width) = 0 "what the input adds, per unit";
-  output Real v = gain*u;
+  output Real v(unit="balance") = gain*u;
 end input_to;
 "#,
     parameters: &[("gain", Role::Size, Starts::BalancesPerWidth(&[0.1, -0.1]))],

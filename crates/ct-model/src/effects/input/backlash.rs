@@ -10,7 +10,7 @@ model backlash
   input Real u;
   constant Real width(unit="signal") = 1;
   parameter Real half_width(unit="port", min=0, max=0.5*width) = 0 "half of the play";
-  output Real v = play(u, half_width);
+  output Real v(unit="port") = play(u, half_width);
 end backlash;
 "#,
     parameters: &[(

@@ -11,7 +11,7 @@ model dead_zone
   constant Real high(unit="signal") = 1;
   constant Real low(unit="signal") = 0;
   parameter Real threshold(unit="port", min=0, max=max(abs(low), abs(high))) = 0 "size of the input below which nothing happens";
-  output Real v = u - min(max(u, -threshold), threshold);
+  output Real v(unit="port") = u - min(max(u, -threshold), threshold);
 end dead_zone;
 "#,
     parameters: &[(

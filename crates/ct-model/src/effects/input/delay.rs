@@ -10,7 +10,7 @@ model delay_effect
   input Real u;
   constant Real duration(unit="time") = 1;
   parameter Real dead_time(unit="time", min=0, max=0.5*duration) = 0 "time until the input acts";
-  output Real v = delay(u, dead_time);
+  output Real v(unit="port") = delay(u, dead_time);
 end delay_effect;
 "#,
     parameters: &[(

@@ -11,7 +11,7 @@ model gain_drift
   constant Real begin(unit="time") = 0;
   constant Real duration(unit="time") = 1;
   parameter Real rate(unit="1", min=-0.95, max=5) = 0 "relative change over the record";
-  output Real v = u*(1 + rate*(time - begin)/duration);
+  output Real v(unit="port") = u*(1 + rate*(time - begin)/duration);
 end gain_drift;
 "#,
     parameters: &[("rate", Role::Size, Starts::Values(&[0.1, -0.1]))],

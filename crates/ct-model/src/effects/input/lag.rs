@@ -16,7 +16,7 @@ model lag
   constant Real shortest(unit="time") = 0.5*interval;
   parameter Real tau(unit="time", min=0, max=duration) = 0 "time constant";
   Real x(unit="port");
-  output Real v = u + min(tau/shortest, 1)*(x - u);
+  output Real v(unit="port") = u + min(tau/shortest, 1)*(x - u);
 initial equation
   x = u;
 equation

@@ -12,7 +12,7 @@ model nonlinearity
   constant Real high(unit="signal") = 1;
   constant Real width(unit="signal") = 1;
   parameter Real bend(unit="1", min=-2, max=2) = 0 "largest deviation from the straight line, as a share of the range";
-  output Real v = u + bend*4*(u - low)*(high - u)/width;
+  output Real v(unit="port") = u + bend*4*(u - low)*(high - u)/width;
 end nonlinearity;
 "#,
     parameters: &[(

@@ -12,7 +12,7 @@ model drift
   constant Real duration(unit="time") = 1;
   constant Real width(unit="signal") = 1;
   parameter Real change(unit="port", min=-5*width, max=5*width) = 0 "change of the zero over the record";
-  output Real v = y + change*(time - begin)/duration;
+  output Real v(unit="port") = y + change*(time - begin)/duration;
 end drift;
 "#,
     parameters: &[("change", Role::Size, Starts::Widths(&[0.05, -0.05]))],

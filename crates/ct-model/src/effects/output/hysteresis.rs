@@ -10,7 +10,7 @@ model hysteresis
   input Real y;
   constant Real width(unit="signal") = 1;
   parameter Real half_width(unit="port", min=0, max=0.5*width) = 0 "half of the play";
-  output Real v = play(y, half_width);
+  output Real v(unit="port") = play(y, half_width);
 end hysteresis;
 "#,
     parameters: &[(

@@ -10,7 +10,7 @@ model offset
   input Real y;
   constant Real width(unit="signal") = 1;
   parameter Real error(unit="port", min=-5*width, max=5*width) = 0 "error of the zero";
-  output Real v = y + error;
+  output Real v(unit="port") = y + error;
 end offset;
 "#,
     parameters: &[("error", Role::Size, Starts::Widths(&[0.05, -0.05]))],

@@ -10,7 +10,7 @@ model quantisation
   input Real y;
   constant Real width(unit="signal") = 1;
   parameter Real step(unit="port", min=0, max=width) = 0 "distance of two readings";
-  output Real v = quantise(y, step);
+  output Real v(unit="port") = quantise(y, step);
 end quantisation;
 "#,
     parameters: &[("step", Role::Threshold, Starts::Widths(&[0.01, 0.03, 0.1]))],

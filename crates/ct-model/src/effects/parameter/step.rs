@@ -12,7 +12,7 @@ model step
   constant Real duration(unit="time") = 1;
   parameter Real change(unit="1", min=-1, max=5) = 0 "relative change";
   parameter Real since(unit="time", min=begin, max=begin + duration) = begin + 0.5*duration "when it changes";
-  output Real v = p*(1 + (if time >= since then change else 0));
+  output Real v(unit="value") = p*(1 + (if time >= since then change else 0));
 end step;
 "#,
     parameters: &[

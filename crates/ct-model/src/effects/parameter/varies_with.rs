@@ -12,7 +12,7 @@ model varies_with
   constant Real middle(unit="signal") = 0;
   constant Real width(unit="signal") = 1;
   parameter Real change(unit="1", min=-3, max=3) = 0 "relative change over the visited range";
-  output Real v = p*(1 + change*(x - middle)/width);
+  output Real v(unit="value") = p*(1 + change*(x - middle)/width);
 end varies_with;
 "#,
     parameters: &[(

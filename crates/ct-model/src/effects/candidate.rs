@@ -203,6 +203,10 @@ fn ports_of(
     }
 }
 
+/// The variables of an effect's inputs, by their names there, the signal first; states to whose equations it is added, and whether it is
+/// subtracted there.
+type Wiring = (Vec<(&'static str, Variable)>, Vec<(usize, bool)>);
+
 /// An effect at a port; `None` where its text cannot be read, which a test excludes.
 fn candidate(
     spec: &ModelSpec,
@@ -211,7 +215,7 @@ fn candidate(
     port: Port,
 ) -> Option<Candidate> {
     let state = Variable::State;
-    let (inputs, targets): (Vec<(&str, Variable)>, Vec<(usize, bool)>) = match port {
+    let (inputs, targets): Wiring = match port {
         Port::Input(u) => (vec![("u", Variable::Input(u))], Vec::new()),
         Port::Output(y) => (
             vec![

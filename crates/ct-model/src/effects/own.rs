@@ -340,7 +340,7 @@ fn sizes(
                 // Numbers with nothing in common, of either sign.
                 let turn = 1.7 + f64::from(trial) * 2.39 + f64::from(kind) * 1.13 + i as f64 * 0.71;
                 let size = 1.5 + turn.sin();
-                if kind > 0 && trial % 2 == 0 {
+                if kind > 0 && trial.is_multiple_of(2) {
                     -7.0 * size
                 } else {
                     11.0 * size

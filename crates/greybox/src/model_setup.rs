@@ -233,6 +233,16 @@ impl<'a> ModelSetup<'a> {
         self.model
     }
 
+    /// Instants of a record's rows on the clock of the model \[unit of the model's time\].
+    #[must_use]
+    pub fn model_time(&self, record: usize) -> Vec<f64> {
+        let time = &self.records[record].time;
+        let begin = self.clock.begins[record] / self.time_unit;
+        time.iter()
+            .map(|t| begin + (t - time[0]) / self.time_unit)
+            .collect()
+    }
+
     /// How many outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {

@@ -43,7 +43,6 @@ mod sentences;
 mod series;
 #[cfg(test)]
 mod simulated;
-mod spectral_line;
 mod step;
 mod sticking;
 mod trail;

@@ -69,6 +69,7 @@ fn said(model: &ModelSpec, look: Look) -> String {
         row(model.about(flow), &value, "")
     });
     part("Named flows", flows.collect());
+    text += &own_model::ports::summary(model, look);
     let warnings = unit_warnings(model);
     if !warnings.is_empty() {
         text.push('\n');

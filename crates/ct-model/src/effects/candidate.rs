@@ -254,6 +254,12 @@ fn candidate(
     } else {
         scales.reading(port)
     };
+    // Of a temperature: its zero above absolute zero.
+    let zero = if spec.about(signal).unit == "K" {
+        0.0
+    } else {
+        273.15
+    };
     let constants = BTreeMap::from([
         ("low", span.low),
         ("high", span.high),
@@ -261,6 +267,7 @@ fn candidate(
         ("width", span.width()),
         ("first", span.first),
         ("begin", visited.begin),
+        ("zero", zero),
         ("duration", visited.duration),
         ("interval", visited.interval),
         ("balance", balance),

@@ -19,9 +19,9 @@ pub enum Place {
     InputAndBalance,
     /// The equation of a state `x`, to which a surrounding of the same quantity `a` (a state or an input) belongs.
     BalanceAndSurrounding,
-    /// The equation of a speed `v`, whose position is `s`.
+    /// The equation of a speed `x`.
     Motion,
-    /// A reading `y` that a current `i` flows through.
+    /// A voltage that is read, `y`, with a current that is an input, `a`.
     Terminal,
 }
 
@@ -64,7 +64,7 @@ pub enum Starts {
 ///
 /// Its text is a model: the inputs are the port (their names say which part of it: [`Place`]), the output `v` is what the effect gives, the
 /// value of a parameter is the absent one, and a `final parameter` is a [`Role::Choice`]. Constants of these names take the values that the
-/// data visit: `low`, `high`, `middle`, `width`, `first` (of the signal), `begin`, `duration`, `interval` (of the record), `balance` (the
+/// data visit: `low`, `high`, `middle`, `width`, `first` (of the signal), `begin`, `duration`, `interval` (of the record), `zero` (of a temperature's unit above absolute zero), `balance` (the
 /// largest term of the equation). In units `port` (or `signal`), `value`, `time` and `balance`
 /// stand for those of the signal, of the parameter or flow, of the time and of the equation.
 #[derive(Debug, Clone, Copy, PartialEq)]

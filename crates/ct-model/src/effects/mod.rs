@@ -32,13 +32,16 @@ mod between;
 mod candidate;
 mod domain;
 mod effect;
+mod electrical;
 mod fragment;
 mod input;
+mod mechanical;
 mod output;
 mod own;
 mod parameter;
 mod port;
 mod scale;
+mod thermal;
 mod visited;
 
 pub use apply::{ApplyError, apply};
@@ -50,9 +53,12 @@ pub use visited::{Span, Visited};
 
 /// All effects, by place; those of a chain in its order.
 pub fn all_effects() -> impl Iterator<Item = &'static Effect> {
-    const GROUPS: [&[Effect]; 5] = [
+    const GROUPS: [&[Effect]; 8] = [
         &input::EFFECTS,
+        &electrical::EFFECTS,
         &output::EFFECTS,
+        &thermal::EFFECTS,
+        &mechanical::EFFECTS,
         &balance::EFFECTS,
         &parameter::EFFECTS,
         &between::EFFECTS,

@@ -1,7 +1,7 @@
 //! Where effects can act in a model.
 
 use crate::expression::{Expression, Operator, Variable};
-use crate::spec::{Given, ModelSpec};
+use crate::spec::{Given, ModelSpec, Output};
 
 /// A port of a model; positions are those of [`ModelSpec`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -118,7 +118,11 @@ impl ModelSpec {
         if flow.of_parameters || self.is_output(variable) || self.occurrences(variable) == 0 {
             return false;
         }
-        if matches!(flow.value, Expression::Variable(_)) {
+        let is_read = |output: &Output| match output.variable {
+            Variable::Flow(o) => self.flows[o].value == Expression::Variable(variable),
+            _ => false,
+        };
+        if matches!(flow.value, Expression::Variable(_)) || self.outputs.iter().any(is_read) {
             return false;
         }
         let mut factors = Vec::new();

@@ -224,6 +224,10 @@ fn all_candidates_are_listed_with_their_ports() {
     assert!(tanks.iter().any(|c| c.id == "input_to(u,h2)"));
     // A position has no balance, but an end stop.
     let spring = Driven::all()[1].candidates();
+    let has = |all: &[Candidate], id: &str| all.iter().any(|c| c.id == id);
+    assert!(has(&spring, "coulomb(v)") && !has(&spring, "coulomb(s)"));
+    assert!(has(&all, "radiation(T,Ta)") && !has(&tanks, "coulomb(h1)"));
+    assert!(has(&Driven::all()[3].candidates(), "second_rc(v,i)"));
     assert!(!spring.iter().any(|c| c.id == "constant(s)"));
     assert!(spring.iter().any(|c| c.id == "limit(s)"));
 }

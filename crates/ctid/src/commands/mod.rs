@@ -13,8 +13,8 @@ use self::compare::{Compare, Diagnose};
 use self::identify::Identify;
 use self::tables::Tables;
 use crate::look::Look;
-use crate::model_file;
 use crate::output::{self, Found, Kind, Output};
+use crate::own_model::{self, AnyModelFile};
 use crate::progress::Bar;
 use crate::{Error, catalogue, check, design, edit, monitor, serve, tour};
 
@@ -136,7 +136,13 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         })) => say(out, &catalogue::describe(&effect, look)?),
         Some(Command::Effects(Effects {
             model: Some(model), ..
-        })) => say(out, &catalogue::list_for(&model_file::read(&model)?, look)),
+        })) => {
+            let text = match AnyModelFile::read(&model)? {
+                AnyModelFile::Plant(model) => catalogue::list_for(&model, look),
+                AnyModelFile::Own(model) => own_model::ports::listed(&model, look)?,
+            };
+            say(out, &text)
+        }
         Some(Command::Effects(_)) => say(out, &catalogue::list(look)),
         Some(Command::Check(Check { model })) => say(out, &check::run(&model, look)?),
         Some(Command::Design(arguments)) => {

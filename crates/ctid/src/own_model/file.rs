@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use ct_model::effects::OwnCandidate;
 use ct_model::{Model, ModelSpec, Variable};
 use ct_signals::{Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv, read_file};
 use greybox::PriorValue;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::candidates::{self, RawCandidates};
 use crate::input::Files;
 use crate::model_file::{self, ModelFile, Source};
 use crate::{Error, names};
@@ -29,7 +31,7 @@ struct Raw {
     #[serde(default)]
     prior: BTreeMap<Spanned<String>, [f64; 2]>,
     #[serde(default)]
-    candidates: BTreeMap<String, toml::Table>,
+    candidates: RawCandidates,
     #[serde(default)]
     controller: BTreeMap<String, toml::Table>,
     #[serde(default)]
@@ -57,6 +59,8 @@ pub(crate) struct OwnModelFile {
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
     hold: Hold,
+    /// Effects of the user's own.
+    pub candidates: BTreeMap<String, OwnCandidate>,
     /// What stands in the file and is not used yet.
     pub unused: Vec<String>,
 }
@@ -145,11 +149,12 @@ impl OwnModelFile {
             is_parameter(name)?;
         }
         let columns = columns(&spec, &raw, &source)?;
+        let own_candidates = candidates::read(&spec, &raw.candidates, &source)?;
         let own = |name: Spanned<String>| name.into_inner();
         let candidates = raw
             .candidates
             .keys()
-            .map(|name| format!("candidates.{name}"));
+            .map(|name| format!("candidates.{}", name.as_ref()));
         let controllers = raw
             .controller
             .keys()
@@ -169,6 +174,7 @@ impl OwnModelFile {
                 .map(|(name, [value, std_error])| (own(name), PriorValue { value, std_error }))
                 .collect(),
             hold: raw.hold,
+            candidates: own_candidates,
             unused,
         })
     }

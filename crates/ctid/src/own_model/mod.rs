@@ -1,7 +1,9 @@
 //! Models of their user's own: `model = "block.mo"` in the model file instead of a plant.
 
+mod candidates;
 mod compare;
 mod file;
+pub(crate) mod ports;
 mod text;
 
 pub(crate) use self::compare::compare;

@@ -12,7 +12,7 @@ model saturation
   constant Real high(unit="signal") = 1;
   constant Real width(unit="signal") = 1;
   final parameter Real side(min=-1, max=1) = 1 "1: not above the limit, -1: not below it";
-  parameter Real limit(unit="port", min=low - width, max=high + width) = high "limit of what takes effect";
+  parameter Real limit(unit="port", min=low - width, max=high + width) = high + width "limit of what takes effect";
   output Real v(unit="port") = if side*(u - limit) > 0 then limit else u;
 end saturation;
 "#,

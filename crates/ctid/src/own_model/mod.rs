@@ -2,8 +2,10 @@
 
 mod compare;
 mod file;
+mod simulate;
 mod text;
 
 pub(crate) use self::compare::compare;
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
+pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;

@@ -45,6 +45,7 @@
 //! appendix A for the grammar of expressions.
 
 mod expression;
+mod linear_form;
 mod linearity;
 mod scalar;
 mod simulation;
@@ -54,6 +55,7 @@ mod text;
 mod units;
 
 pub use expression::{Comparison, Condition, Expression, Function, Operator, Variable};
+pub use linear_form::{LinearForm, TransferFunction};
 pub use linearity::Linearity;
 pub use scalar::{Dual, Scalar};
 pub use simulation::{Method, Model, NoSolution, Simulation};

@@ -1,11 +1,13 @@
 //! Models of their user's own: `model = "block.mo"` in the model file instead of a plant.
 
 mod compare;
+mod export;
 mod file;
 mod simulate;
 mod text;
 
 pub(crate) use self::compare::compare;
+pub(crate) use self::export::{Exported, export};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
 pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod language;
+mod linear_form;
 mod mutated;
 mod refused;
 mod round_trip;

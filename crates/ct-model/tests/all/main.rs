@@ -3,6 +3,7 @@
 
 mod effects;
 mod language;
+mod linear_form;
 mod memory;
 mod mutated;
 mod own_candidates;

@@ -4,8 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use ct_model::effects::OwnCandidate;
-use ct_model::{Model, ModelSpec, Variable};
-use ct_signals::{Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv, read_file};
+use ct_model::{About, Model, ModelSpec, Variable};
+use ct_signals::{
+    Channel, ColumnFault, Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv,
+    read_file,
+};
 use greybox::PriorValue;
 use serde::Deserialize;
 use toml::Spanned;
@@ -52,13 +55,15 @@ enum Column {
 pub(crate) struct OwnModelFile {
     /// The model.
     pub model: Model,
+    /// Where its text is.
+    pub text: PathBuf,
     /// Which column is which input and output, in the order of the model.
-    columns: Columns,
+    pub columns: Columns,
     /// Parameters that are not fitted.
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
-    hold: Hold,
+    pub hold: Hold,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
     /// What stands in the file and is not used yet.
@@ -162,6 +167,7 @@ impl OwnModelFile {
         let unused = candidates.chain(controllers).collect();
         Ok(Self {
             model: Model::new(spec),
+            text: beside,
             columns,
             known: raw
                 .known
@@ -189,7 +195,7 @@ impl OwnModelFile {
             ..files.options.clone()
         };
         let read = |path: &PathBuf| -> Result<Reading, Error> {
-            let mut reading = read_csv(path, &self.columns, &options)?;
+            let mut reading = read_csv(path, &self.columns, &options).map_err(|e| self.named(e))?;
             reading.record.name = files.name_of(path);
             reading.summary.file.clone_from(&reading.record.name);
             self.convert(&mut reading.record)?;
@@ -218,8 +224,34 @@ impl OwnModelFile {
         })
     }
 
+    /// An error of the columns with the mend for this model, whose signals have names of their own under `[columns]`.
+    pub fn named(&self, error: ct_signals::Error) -> Error {
+        let ct_signals::Error::Column { file, row, fault } = &error else {
+            return error.into();
+        };
+        let ColumnFault::Missing { wanted, .. } = &**fault else {
+            return error.into();
+        };
+        let spec = self.model.spec();
+        let inputs = spec.inputs.iter().map(|input| &input.about);
+        let outputs = spec.outputs.iter().map(|o| spec.about(o.variable));
+        let columns = self.columns.inputs.iter().chain(&self.columns.outputs);
+        let mut signals = columns.zip(inputs.chain(outputs));
+        let own = signals.find(|(column, _)| *wanted == format!("\"{}\"", quoted(column)));
+        match own {
+            None => error.into(),
+            Some((_, about)) => {
+                let mend = format!("set {} = \"...\" under [columns]", about.name);
+                Error::Columns(format!(
+                    "{file}, row {row}{}",
+                    fault.said("[columns]", &mend)
+                ))
+            }
+        }
+    }
+
     /// Puts the channels into the units of the model, where the model file reads them in others.
-    fn convert(&self, record: &mut Record) -> Result<(), Error> {
+    pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
         let spec = self.model.spec();
         let inputs = spec.inputs.iter().map(|input| &input.about);
         let outputs = spec
@@ -228,32 +260,13 @@ impl OwnModelFile {
             .map(|output| spec.about(output.variable));
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
         for (channel, about) in channels.zip(inputs.chain(outputs)) {
-            if about.unit.is_empty() || channel.unit.is_empty() || channel.unit == about.unit {
-                channel.unit.clone_from(&about.unit);
-                continue;
-            }
-            let units = Unit::parse(&channel.unit).zip(Unit::parse(&about.unit));
-            let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
-            let Some(conversion) = conversion else {
-                return Err(Error::File {
-                    file: record.name.clone(),
-                    what: format!(
-                        "column \"{}\" is in {}, but {} of the model is in {}: correct the unit in the header, or in the model",
-                        channel.name, channel.unit, about.name, about.unit
-                    ),
-                });
-            };
-            channel
-                .values
-                .iter_mut()
-                .for_each(|value| *value = conversion.apply(*value));
-            channel.unit.clone_from(&about.unit);
+            convert(&record.name, channel, about)?;
         }
         Ok(())
     }
 
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.
-    fn time_unit(&self, first: &Path) -> Result<f64, Error> {
+    pub fn time_unit(&self, first: &Path) -> Result<f64, Error> {
         if self.columns.time.is_some() {
             return Ok(self.columns.time_header().1);
         }
@@ -267,6 +280,32 @@ impl OwnModelFile {
         .time_header()
         .1)
     }
+}
+
+/// Puts a channel of a record into the unit of the model's signal.
+///
+/// # Errors
+/// Where its unit is of another dimension.
+pub(super) fn convert(record: &str, channel: &mut Channel, about: &About) -> Result<(), Error> {
+    if about.unit.is_empty() || channel.unit.is_empty() || channel.unit == about.unit {
+        channel.unit.clone_from(&about.unit);
+        return Ok(());
+    }
+    let units = Unit::parse(&channel.unit).zip(Unit::parse(&about.unit));
+    let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
+    let Some(conversion) = conversion else {
+        return Err(Error::File {
+            file: record.to_string(),
+            what: format!(
+                "column \"{}\" is in {}, but {} of the model is in {}: correct the unit in the header, or in the model",
+                channel.name, channel.unit, about.name, about.unit
+            ),
+        });
+    };
+    let values = channel.values.iter_mut();
+    values.for_each(|value| *value = conversion.apply(*value));
+    channel.unit.clone_from(&about.unit);
+    Ok(())
 }
 
 /// Reads the text of a model.

@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use ct_model::effects::OwnCandidate;
-use ct_model::{Model, ModelSpec, Variable};
-use ct_signals::{Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv, read_file};
+use ct_model::{About, Model, ModelSpec, Variable};
+use ct_signals::{
+    Columns, Conversion, Hold, Reading, Record, Unit, csv_header, quoted, read_csv, read_file,
+};
 use greybox::PriorValue;
 use serde::Deserialize;
 use toml::Spanned;
@@ -53,12 +55,13 @@ pub(crate) struct OwnModelFile {
     /// The model.
     pub model: Model,
     /// Which column is which input and output, in the order of the model.
-    columns: Columns,
+    pub columns: Columns,
     /// Parameters that are not fitted.
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
-    hold: Hold,
+    /// What the inputs do between rows.
+    pub hold: Hold,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
     /// What stands in the file and is not used yet.
@@ -220,36 +223,33 @@ impl OwnModelFile {
 
     /// Puts the channels into the units of the model, where the model file reads them in others.
     fn convert(&self, record: &mut Record) -> Result<(), Error> {
-        let spec = self.model.spec();
-        let inputs = spec.inputs.iter().map(|input| &input.about);
-        let outputs = spec
-            .outputs
-            .iter()
-            .map(|output| spec.about(output.variable));
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
-        for (channel, about) in channels.zip(inputs.chain(outputs)) {
-            if about.unit.is_empty() || channel.unit.is_empty() || channel.unit == about.unit {
-                channel.unit.clone_from(&about.unit);
-                continue;
-            }
-            let units = Unit::parse(&channel.unit).zip(Unit::parse(&about.unit));
-            let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
-            let Some(conversion) = conversion else {
-                return Err(Error::File {
-                    file: record.name.clone(),
-                    what: format!(
-                        "column \"{}\" is in {}, but {} of the model is in {}: correct the unit in the header, or in the model",
-                        channel.name, channel.unit, about.name, about.unit
-                    ),
-                });
+        for (channel, about) in channels.zip(self.signals()) {
+            let blame = |what| Error::File {
+                file: record.name.clone(),
+                what,
             };
-            channel
-                .values
-                .iter_mut()
-                .for_each(|value| *value = conversion.apply(*value));
+            let conversion = conversion(about, &channel.name, &channel.unit).map_err(blame)?;
+            if let Some(conversion) = conversion {
+                channel
+                    .values
+                    .iter_mut()
+                    .for_each(|value| *value = conversion.apply(*value));
+            }
             channel.unit.clone_from(&about.unit);
         }
         Ok(())
+    }
+
+    /// Inputs and outputs in the order of the model.
+    pub fn signals(&self) -> impl Iterator<Item = &About> {
+        let spec = self.model.spec();
+        let inputs = spec.inputs.iter().map(|input| &input.about);
+        inputs.chain(
+            spec.outputs
+                .iter()
+                .map(|output| spec.about(output.variable)),
+        )
     }
 
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.
@@ -267,6 +267,28 @@ impl OwnModelFile {
         .time_header()
         .1)
     }
+}
+
+/// How values of a column in this unit are put into that of a signal; `None` where they are in it, or one of them says nothing.
+///
+/// # Errors
+/// In words where the units do not go together.
+pub(crate) fn conversion(
+    about: &About,
+    column: &str,
+    unit: &str,
+) -> Result<Option<Conversion>, String> {
+    if about.unit.is_empty() || unit.is_empty() || unit == about.unit {
+        return Ok(None);
+    }
+    let units = Unit::parse(unit).zip(Unit::parse(&about.unit));
+    let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
+    conversion.map(Some).ok_or_else(|| {
+        format!(
+            "column \"{column}\" is in {unit}, but {} of the model is in {}: correct the unit in the header, or in the model",
+            about.name, about.unit
+        )
+    })
 }
 
 /// Reads the text of a model.

@@ -7,5 +7,5 @@ pub(crate) mod ports;
 mod text;
 
 pub(crate) use self::compare::compare;
-pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
+pub(crate) use self::file::{AnyModelFile, OwnModelFile, conversion, read_model};
 pub(crate) use self::text::said;

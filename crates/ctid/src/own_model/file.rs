@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use ct_model::effects::OwnCandidate;
 use ct_model::{About, Model, ModelSpec, Variable};
 use ct_signals::{
-    Columns, Conversion, Hold, Reading, Record, Unit, csv_header, quoted, read_csv, read_file,
+    Columns, Conversion, Heading, Hold, Reading, Record, Unit, csv_header, quoted, read_csv,
+    read_file,
 };
 use greybox::PriorValue;
 use serde::Deserialize;
@@ -110,21 +111,31 @@ impl OwnModelFile {
     /// # Errors
     /// One line that names the file, the line, what is wrong and the mend.
     fn parse(path: &Path, text: &str) -> Result<Self, Error> {
+        Self::parse_with(path, text, |named| {
+            read_model(&path.parent().unwrap_or(Path::new("")).join(named))
+        })
+    }
+
+    /// The same, the model from wherever `read` has it; it is given the name that stands in the file.
+    ///
+    /// # Errors
+    /// As [`OwnModelFile::parse`].
+    pub fn parse_with(
+        path: &Path,
+        text: &str,
+        read: impl FnOnce(&Path) -> Result<ModelSpec, Error>,
+    ) -> Result<Self, Error> {
         let file = path.display().to_string();
         let source = Source { file: &file, text };
         let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
-        let beside = path
-            .parent()
-            .unwrap_or(Path::new(""))
-            .join(raw.model.as_ref());
-        let spec = read_model(&beside)?;
+        let spec = read(Path::new(raw.model.as_ref()))?;
         if let Some(effect) = raw.effects.first() {
             return Err(source.at(
                 effect.span().start,
                 format!(
                     "{} cannot be added to a model of your own yet: write its equation into {}, and leave effects = []",
                     quoted(effect.as_ref()),
-                    beside.display()
+                    raw.model.as_ref()
                 ),
             ));
         }
@@ -195,17 +206,32 @@ impl OwnModelFile {
             let mut reading = read_csv(path, &self.columns, &options)?;
             reading.record.name = files.name_of(path);
             reading.summary.file.clone_from(&reading.record.name);
-            self.convert(&mut reading.record)?;
             Ok(reading)
         };
         let all = files.data.iter().chain(&files.test).map(read);
+        let all = all.collect::<Result<Vec<Reading>, Error>>()?;
+        self.gathered(all, files.data.len(), self.time_unit(&files.data[0])?)
+    }
+
+    /// Readings of records, of which so many come first that are fitted, as the model takes them; `time_unit`: seconds in one of the model's.
+    ///
+    /// # Errors
+    /// Where a column's unit is none of its signal.
+    pub fn gathered(
+        &self,
+        mut all: Vec<Reading>,
+        fitted: usize,
+        time_unit: f64,
+    ) -> Result<Records, Error> {
+        for reading in &mut all {
+            self.convert(&mut reading.record)?;
+        }
         let (mut all, summaries): (Vec<Record>, Vec<_>) = all
-            .collect::<Result<Vec<Reading>, Error>>()?
             .into_iter()
             .map(|reading| (reading.record, reading.summary))
             .unzip();
         crate::input::on_one_clock(&mut all);
-        let test = all.split_off(files.data.len());
+        let test = all.split_off(fitted);
         // An input that is missing is held for a row; a longer gap parts the record.
         let whole = |records: Vec<Record>| -> Vec<Record> {
             let parts = records
@@ -216,7 +242,7 @@ impl OwnModelFile {
         Ok(Records {
             records: whole(all),
             test: whole(test),
-            time_unit: self.time_unit(&files.data[0])?,
+            time_unit,
             summaries,
         })
     }
@@ -259,13 +285,18 @@ impl OwnModelFile {
         }
         let content = read_file(first, ct_signals::LARGEST_RECORD)?;
         let headings = csv_header(&first.display().to_string(), &content)?;
-        let time = Columns::guessed(&headings).time;
-        Ok(Columns {
+        Ok(self.time_unit_of(&headings))
+    }
+
+    /// The same, where the header of the first record is known.
+    pub fn time_unit_of(&self, headings: &[Heading]) -> f64 {
+        let guessed = || Columns::guessed(headings).time;
+        let time = self.columns.time.clone().or_else(guessed);
+        let columns = Columns {
             time,
             ..Columns::default()
-        }
-        .time_header()
-        .1)
+        };
+        columns.time_header().1
     }
 }
 

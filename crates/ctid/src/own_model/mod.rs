@@ -6,6 +6,6 @@ mod file;
 pub(crate) mod ports;
 mod text;
 
-pub(crate) use self::compare::compare;
-pub(crate) use self::file::{AnyModelFile, OwnModelFile, conversion, read_model};
+pub(crate) use self::compare::{Comparison, compare};
+pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
 pub(crate) use self::text::said;

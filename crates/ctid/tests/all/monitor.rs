@@ -619,7 +619,7 @@ equation
 end Block;
 "#;
 
-/// Rows time \[min\], heater, room, block \[degC\], power \[W\], every 5 min; from row `change` on more is lost to the room.
+/// Rows time \[min\], heater, room, block \[degC\], power \[W\], every 30 min; from row `change` on more is lost to the room.
 fn block_rows(count: usize, change: usize) -> String {
     let mut random = Random(11);
     let (mut block, mut u, mut until) = (40.0_f64, 50.0_f64, 20);
@@ -627,9 +627,9 @@ fn block_rows(count: usize, change: usize) -> String {
     for j in 0..count {
         if j == until {
             u = (100.0 * random.uniform()).round();
-            until += 15 + random.below(60);
+            until += 3 + random.below(40);
         }
-        let room = 20.0 + 3.0 * (j as f64 / 90.0).sin();
+        let room = 20.0 + 3.0 * (j as f64 / 15.0).sin();
         // Every sixth power is lost.
         let power = if j % 6 == 2 {
             String::new()
@@ -637,10 +637,10 @@ fn block_rows(count: usize, change: usize) -> String {
             format!("{:.3}", 0.6 * u + 0.5 * random.normal())
         };
         let reading = block + 0.2 * random.normal();
-        text += &format!("{},{u},{room:.6},{reading:.4},{power}\n", 5 * j);
+        text += &format!("{},{u},{room:.6},{reading:.4},{power}\n", 30 * j);
         let k = if j < change { 0.4 } else { 0.55 };
         let to = room + 0.6 * u / k;
-        block = to + (block - to) * f64::exp(-k / 15.0 * 5.0 / 60.0);
+        block = to + (block - to) * f64::exp(-k / 15.0 * 0.5);
     }
     text
 }
@@ -657,7 +657,7 @@ fn own_place() -> Place {
 #[test]
 fn a_model_of_ones_own_is_watched() {
     let place = own_place();
-    let outcome = fed(&place, "--estimates", block_rows(16_000, 12_000));
+    let outcome = fed(&place, "--estimates", block_rows(3400, 2600));
     assert_eq!(outcome.code, Some(0), "{}", outcome.err);
     assert_says(&outcome, "\"heater [%]\", \"room [degC]\" the inputs");
     assert_says(
@@ -676,8 +676,8 @@ fn a_model_of_ones_own_is_watched() {
         assert!((value / truth - 1.0).abs() < 0.02, "{estimate}");
         assert!(estimate["half_width"].is_number() && estimate["unit"] == unit);
     }
-    // 12000 rows of 5 min; the time constant is 15/0.4 h.
-    let onset = 12_000.0 * 300.0;
+    // 2600 rows of 30 min; the time constant is 15/0.4 h.
+    let onset = 2600.0 * 1800.0;
     let alarm = events.iter().find(|e| e["event"] == "alarm").unwrap();
     let time = alarm["time"].as_f64().unwrap();
     assert!((onset..onset + 40.0 * 3600.0).contains(&time), "{alarm}");
@@ -695,12 +695,12 @@ fn a_model_of_ones_own_is_watched() {
 #[test]
 fn a_state_of_a_model_of_ones_own_goes_on() {
     let place = own_place();
-    let all = block_rows(12_500, 11_000);
+    let all = block_rows(2600, 2000);
     let whole = fed(&place, "", &all);
     let lines: Vec<&str> = all.split_inclusive('\n').collect();
-    let first = fed(&place, "--state s.json", lines[..9000].concat());
+    let first = fed(&place, "--state s.json", lines[..1800].concat());
     assert_eq!(first.code, Some(0), "{}", first.err);
-    let rest = lines[0].to_string() + &lines[9000..].concat();
+    let rest = lines[0].to_string() + &lines[1800..].concat();
     let second = fed(&place, "--state s.json", rest);
     assert!(!whole.out.is_empty());
     assert_eq!(first.out + &second.out, whole.out);

@@ -207,7 +207,7 @@ impl<'a> Believed<'a> for OwnModel<'a> {
             None => String::new(),
         };
         let mut alarm = Alarm::unexplained(raised, name);
-        alarm.since = onset::onset(self, learned, hold, rows, growth);
+        alarm.since = onset::onset(self, learned, hold, rows, growth, raised.since);
         let since = match alarm.since {
             Some(since) => format!("since about t = {} s", instant(since)),
             None => format!("since t = {} s or before", instant(raised.since)),

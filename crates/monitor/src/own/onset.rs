@@ -7,8 +7,8 @@
 //! g(j) = max_i (sum_{k >= j} s_i(k) e(k))^2 / sum_{k >= j} s_i(k)^2
 //! ```
 //! is by how much the sum of squares falls with the best of them: the generalised likelihood ratio of a change of unknown onset, which is
-//! where it is largest (A. S. Willsky, H. L. Jones, IEEE Trans. Automatic Control 21 (1976) 108-112). It is linear in the change: of a large
-//! one the onset is right all the same, its size would not be.
+//! where it is largest (A. S. Willsky, H. L. Jones, IEEE Trans. Automatic Control 21 (1976) 108-112). It is linear in the change, whose
+//! beginning a large one shows right; what it does later it does not. So rows count until [`BEHIND`] time constants behind the alarm.
 //!
 //! **Cost**: some 25 simulations with derivatives of at most the rows that are kept, for each look at an alarm.
 
@@ -21,20 +21,28 @@ use crate::{Each, isolate::Kept, learn::Learned};
 const ONSETS: [f64; 14] = [
     0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0,
 ];
+/// Rows count until so many slowest time constants behind the alarm.
+const BEHIND: f64 = 1.0;
 /// An onset has at least so many rows behind it.
 const FEWEST: usize = 2;
 
-/// When the change began \[s\]; `None` where the rows say nothing of any.
+/// When the change began \[s\] of which an alarm was raised at `raised` \[s\]; `None` where the rows say nothing of any.
 pub(super) fn onset(
     own: &OwnModel,
     learned: &Learned,
     hold: Hold,
     rows: &[Kept],
     growth: &Each<f64>,
+    raised: f64,
 ) -> Option<f64> {
+    let end = raised + BEHIND * learned.time_constant;
+    let rows = &rows[..rows.partition_point(|kept| kept.sample.time <= end)];
     let unit = learned.rows_per_time_constant();
     let lengths = ONSETS.map(|share| ((share * unit).round() as usize).max(FEWEST));
     let mut lengths: Vec<usize> = lengths.into_iter().filter(|n| *n < rows.len()).collect();
+    if rows.len() < FEWEST {
+        return None;
+    }
     lengths.push(rows.len());
     lengths.dedup();
     let gain = |length: usize| -> f64 {

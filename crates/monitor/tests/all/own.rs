@@ -211,7 +211,7 @@ fn a_change_is_seen_soon_and_its_onset_is_found() {
             assert!(alarm.effects.is_empty() && alarm.evidence.is_none());
         }
         let since = last.since.unwrap();
-        assert!((since - onset).abs() < 0.5 * time_constant, "{since}");
+        assert!((since - onset).abs() < 0.25 * time_constant, "{since}");
         assert!(
             last.sentence
                 .starts_with("The model does not fit since about t = ")

@@ -16,7 +16,8 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     Ok(said(&own_model::read_model(path)?, look))
 }
 
-fn said(model: &ModelSpec, look: Look) -> String {
+/// What a model holds, in words.
+pub(crate) fn said(model: &ModelSpec, look: Look) -> String {
     let mut text = String::new();
     let title = match model.description.as_str() {
         "" => model.name.clone(),

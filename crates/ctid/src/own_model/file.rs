@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use ct_model::effects::OwnCandidate;
 use ct_model::{About, Model, ModelSpec, Variable};
 use ct_signals::{
-    Channel, ColumnFault, Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv,
-    read_file,
+    Channel, ColumnFault, Columns, Conversion, Heading, Hold, Reading, Record, Unit, csv_header,
+    quoted, read_csv, read_file,
 };
 use greybox::PriorValue;
 use serde::Deserialize;
@@ -63,6 +63,7 @@ pub(crate) struct OwnModelFile {
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
+    /// What the inputs do between rows.
     pub hold: Hold,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
@@ -112,21 +113,31 @@ impl OwnModelFile {
     /// # Errors
     /// One line that names the file, the line, what is wrong and the mend.
     fn parse(path: &Path, text: &str) -> Result<Self, Error> {
+        Self::parse_with(path, text, |named| {
+            read_model(&path.parent().unwrap_or(Path::new("")).join(named))
+        })
+    }
+
+    /// The same, the model from wherever `read` has it; it is given the name that stands in the file.
+    ///
+    /// # Errors
+    /// As [`OwnModelFile::parse`].
+    pub fn parse_with(
+        path: &Path,
+        text: &str,
+        read: impl FnOnce(&Path) -> Result<ModelSpec, Error>,
+    ) -> Result<Self, Error> {
         let file = path.display().to_string();
         let source = Source { file: &file, text };
         let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
-        let beside = path
-            .parent()
-            .unwrap_or(Path::new(""))
-            .join(raw.model.as_ref());
-        let spec = read_model(&beside)?;
+        let spec = read(Path::new(raw.model.as_ref()))?;
         if let Some(effect) = raw.effects.first() {
             return Err(source.at(
                 effect.span().start,
                 format!(
                     "{} cannot be added to a model of your own yet: write its equation into {}, and leave effects = []",
                     quoted(effect.as_ref()),
-                    beside.display()
+                    raw.model.as_ref()
                 ),
             ));
         }
@@ -167,7 +178,10 @@ impl OwnModelFile {
         let unused = candidates.chain(controllers).collect();
         Ok(Self {
             model: Model::new(spec),
-            text: beside,
+            text: path
+                .parent()
+                .unwrap_or(Path::new(""))
+                .join(raw.model.as_ref()),
             columns,
             known: raw
                 .known
@@ -198,17 +212,32 @@ impl OwnModelFile {
             let mut reading = read_csv(path, &self.columns, &options).map_err(|e| self.named(e))?;
             reading.record.name = files.name_of(path);
             reading.summary.file.clone_from(&reading.record.name);
-            self.convert(&mut reading.record)?;
             Ok(reading)
         };
         let all = files.data.iter().chain(&files.test).map(read);
+        let all = all.collect::<Result<Vec<Reading>, Error>>()?;
+        self.gathered(all, files.data.len(), self.time_unit(&files.data[0])?)
+    }
+
+    /// Readings of records, of which so many come first that are fitted, as the model takes them; `time_unit`: seconds in one of the model's.
+    ///
+    /// # Errors
+    /// Where a column's unit is none of its signal.
+    pub fn gathered(
+        &self,
+        mut all: Vec<Reading>,
+        fitted: usize,
+        time_unit: f64,
+    ) -> Result<Records, Error> {
+        for reading in &mut all {
+            self.convert(&mut reading.record)?;
+        }
         let (mut all, summaries): (Vec<Record>, Vec<_>) = all
-            .collect::<Result<Vec<Reading>, Error>>()?
             .into_iter()
             .map(|reading| (reading.record, reading.summary))
             .unzip();
         crate::input::on_one_clock(&mut all);
-        let test = all.split_off(files.data.len());
+        let test = all.split_off(fitted);
         // An input that is missing is held for a row; a longer gap parts the record.
         let whole = |records: Vec<Record>| -> Vec<Record> {
             let parts = records
@@ -219,7 +248,7 @@ impl OwnModelFile {
         Ok(Records {
             records: whole(all),
             test: whole(test),
-            time_unit: self.time_unit(&files.data[0])?,
+            time_unit,
             summaries,
         })
     }
@@ -252,17 +281,22 @@ impl OwnModelFile {
 
     /// Puts the channels into the units of the model, where the model file reads them in others.
     pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
-        let spec = self.model.spec();
-        let inputs = spec.inputs.iter().map(|input| &input.about);
-        let outputs = spec
-            .outputs
-            .iter()
-            .map(|output| spec.about(output.variable));
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
-        for (channel, about) in channels.zip(inputs.chain(outputs)) {
+        for (channel, about) in channels.zip(self.signals()) {
             convert(&record.name, channel, about)?;
         }
         Ok(())
+    }
+
+    /// Inputs and outputs in the order of the model.
+    pub fn signals(&self) -> impl Iterator<Item = &About> {
+        let spec = self.model.spec();
+        let inputs = spec.inputs.iter().map(|input| &input.about);
+        inputs.chain(
+            spec.outputs
+                .iter()
+                .map(|output| spec.about(output.variable)),
+        )
     }
 
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.
@@ -272,13 +306,18 @@ impl OwnModelFile {
         }
         let content = read_file(first, ct_signals::LARGEST_RECORD)?;
         let headings = csv_header(&first.display().to_string(), &content)?;
-        let time = Columns::guessed(&headings).time;
-        Ok(Columns {
+        Ok(self.time_unit_of(&headings))
+    }
+
+    /// The same, where the header of the first record is known.
+    pub fn time_unit_of(&self, headings: &[Heading]) -> f64 {
+        let guessed = || Columns::guessed(headings).time;
+        let time = self.columns.time.clone().or_else(guessed);
+        let columns = Columns {
             time,
             ..Columns::default()
-        }
-        .time_header()
-        .1)
+        };
+        columns.time_header().1
     }
 }
 
@@ -287,25 +326,38 @@ impl OwnModelFile {
 /// # Errors
 /// Where its unit is of another dimension.
 pub(super) fn convert(record: &str, channel: &mut Channel, about: &About) -> Result<(), Error> {
-    if about.unit.is_empty() || channel.unit.is_empty() || channel.unit == about.unit {
-        channel.unit.clone_from(&about.unit);
-        return Ok(());
-    }
-    let units = Unit::parse(&channel.unit).zip(Unit::parse(&about.unit));
-    let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
-    let Some(conversion) = conversion else {
-        return Err(Error::File {
-            file: record.to_string(),
-            what: format!(
-                "column \"{}\" is in {}, but {} of the model is in {}: correct the unit in the header, or in the model",
-                channel.name, channel.unit, about.name, about.unit
-            ),
-        });
+    let blame = |what| Error::File {
+        file: record.to_string(),
+        what,
     };
-    let values = channel.values.iter_mut();
-    values.for_each(|value| *value = conversion.apply(*value));
+    if let Some(conversion) = conversion(about, &channel.name, &channel.unit).map_err(blame)? {
+        let values = channel.values.iter_mut();
+        values.for_each(|value| *value = conversion.apply(*value));
+    }
     channel.unit.clone_from(&about.unit);
     Ok(())
+}
+
+/// How values of a column in this unit are put into that of a signal; `None` where they are in it, or one of them says nothing.
+///
+/// # Errors
+/// In words where the units do not go together.
+pub(crate) fn conversion(
+    about: &About,
+    column: &str,
+    unit: &str,
+) -> Result<Option<Conversion>, String> {
+    if about.unit.is_empty() || unit.is_empty() || unit == about.unit {
+        return Ok(None);
+    }
+    let units = Unit::parse(unit).zip(Unit::parse(&about.unit));
+    let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
+    conversion.map(Some).ok_or_else(|| {
+        format!(
+            "column \"{column}\" is in {unit}, but {} of the model is in {}: correct the unit in the header, or in the model",
+            about.name, about.unit
+        )
+    })
 }
 
 /// Reads the text of a model.

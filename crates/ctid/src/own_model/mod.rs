@@ -9,9 +9,9 @@ pub(crate) mod ports;
 mod simulate;
 mod text;
 
-pub(crate) use self::compare::compare;
+pub(crate) use self::compare::{Comparison, compare};
 pub(crate) use self::export::{Exported, export};
-pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
+pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
 pub(crate) use self::identify::{Beside, OneByOne};
 pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;

@@ -2,6 +2,7 @@
 
 mod candidates;
 mod compare;
+mod diagnose;
 mod export;
 mod file;
 mod identify;
@@ -10,6 +11,7 @@ mod simulate;
 mod text;
 
 pub(crate) use self::compare::{Comparison, compare};
+pub(crate) use self::diagnose::{diagnose, said as diagnosis_said};
 pub(crate) use self::export::{Exported, export};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
 pub(crate) use self::identify::{Beside, OneByOne};

@@ -53,20 +53,20 @@ impl ModelSpec {
     }
 }
 
-/// How the state equations depend on states, where inputs are held between rows.
+/// Whether the states can be computed exactly from row to row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Held {
+pub(crate) enum ExactSteps {
     /// Not linear, or they change with time.
     No,
     /// A constant matrix, and any function of the inputs: linear where these are held.
-    WhereHeld,
+    HeldInputs,
     /// Linear in the inputs too.
-    Always,
+    AllInputs,
 }
 
 impl ModelSpec {
-    /// Whether the states can be computed exactly from row to row; how outputs depend on them does not matter.
-    pub(crate) fn held_linearity(&self) -> Held {
+    /// Whether and when that is so; how outputs depend on them does not matter.
+    pub(crate) fn exact_steps(&self) -> ExactSteps {
         let mut flows = vec![Part::Parameters; self.flows.len()];
         for &i in &self.order {
             flows[i] = part(&self.flows[i].value, &flows);
@@ -75,21 +75,22 @@ impl ModelSpec {
         for state in &self.states {
             let coefficient = state.coefficient.as_ref();
             if coefficient.is_some_and(|c| part(c, &flows) != Part::Parameters) {
-                return Held::No;
+                return ExactSteps::No;
             }
             worst = worst.max(part(&state.right, &flows));
         }
         if worst == Part::Other {
-            return Held::No;
+            return ExactSteps::No;
         }
-        match self.linearity_of_states() {
-            true => Held::Always,
-            false => Held::WhereHeld,
+        if self.is_linear_in_states_and_inputs() {
+            ExactSteps::AllInputs
+        } else {
+            ExactSteps::HeldInputs
         }
     }
 
     /// Whether every state equation is linear in states and inputs.
-    fn linearity_of_states(&self) -> bool {
+    fn is_linear_in_states_and_inputs(&self) -> bool {
         let mut flows = vec![Degree::Constant; self.flows.len()];
         for &i in &self.order {
             flows[i] = degree(&self.flows[i].value, &flows);

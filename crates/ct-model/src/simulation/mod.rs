@@ -21,7 +21,7 @@ use self::delays::{Delay, Delays, POINTS};
 use self::exact::Exact;
 use self::implicit::Jacobian;
 use self::step::{Drive, Step};
-use crate::linearity::Held;
+use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
 use crate::spec::ModelSpec;
 use crate::tape::Tape;
@@ -70,7 +70,7 @@ pub struct NoSolution {
 pub struct Model {
     spec: ModelSpec,
     tape: Tape,
-    exact: Held,
+    exact: ExactSteps,
 }
 
 impl Model {
@@ -79,9 +79,9 @@ impl Model {
     pub fn new(spec: ModelSpec) -> Self {
         let tape = Tape::compile(&spec);
         let exact = if tape.delays.is_empty() && !spec.states.is_empty() {
-            spec.held_linearity()
+            spec.exact_steps()
         } else {
-            Held::No
+            ExactSteps::No
         };
         Self { spec, tape, exact }
     }
@@ -154,7 +154,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         assert_eq!(parameters.len(), tape.parameters, "parameters");
         assert_eq!(initial.len(), tape.states, "initial states");
         let mut work = Step::new(tape, parameters);
-        let exact = (model.exact != Held::No).then(|| Exact::new(tape, &mut work));
+        let exact = (model.exact != ExactSteps::No).then(|| Exact::new(tape, &mut work));
         // A function of inputs may have no value at zero, where the matrix is read.
         let exact = exact.filter(Exact::is_finite);
         let zero = T::constant(0.0);
@@ -260,7 +260,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             *rise = (to - from) / interval;
         }
         let rise = std::mem::take(&mut self.rise);
-        if self.model.exact == Held::WhereHeld && rise.iter().any(|rise| *rise != 0.0) {
+        if self.model.exact == ExactSteps::HeldInputs && rise.iter().any(|rise| *rise != 0.0) {
             self.go_on_in_steps();
         }
         let result = if self.exact.is_some() {

@@ -386,7 +386,8 @@ fn a_root_or_a_power_above_a_limit_that_is_crossed_goes_on() {
         let (rows, _) = case.plain();
         let low = rows.iter().map(|y| y[0]).fold(f64::INFINITY, f64::min);
         assert!(low < 0.8 && low > 0.0, "{term}: {low}");
-        case.check_derivatives(1e-5);
+        // Steps follow the error of the values; the slope of a root is infinite where it ends.
+        case.check_derivatives(if term.contains("1.5") { 1e-6 } else { 1e-3 });
     }
 }
 

@@ -148,6 +148,8 @@ pub(crate) struct Registers<T> {
     /// The answers of the guards.
     pub answers: Vec<bool>,
     taken: Vec<bool>,
+    /// Roots, powers and logarithms that have no value are zero: beyond a branch that a step has to end at.
+    pub extended: bool,
 }
 
 struct Compiler<'a> {
@@ -310,11 +312,12 @@ impl Tape {
         {
             *value = T::constant(*constant);
         }
-        self.run(0..self.once, &mut values, &[]);
+        self.run(0..self.once, &mut values, &[], false);
         Registers {
             values,
             answers: vec![false; self.guards.len()],
             taken: vec![false; self.branches.len()],
+            extended: false,
         }
     }
 
@@ -350,7 +353,8 @@ impl Tape {
     /// Computes everything from the time, inputs, states and delayed values, with the answers of the guards that the registers hold.
     pub fn evaluate<T: Scalar>(&self, registers: &mut Registers<T>) {
         let all = self.once..self.operations.len();
-        self.run(all, &mut registers.values, &registers.taken);
+        let extended = registers.extended;
+        self.run(all, &mut registers.values, &registers.taken, extended);
     }
 
     /// The same, where every guard answers by its difference.
@@ -384,7 +388,14 @@ impl Tape {
         to.taken.copy_from_slice(&from.taken);
     }
 
-    fn run<T: Scalar>(&self, which: std::ops::Range<usize>, values: &mut [T], taken: &[bool]) {
+    fn run<T: Scalar>(
+        &self,
+        which: std::ops::Range<usize>,
+        values: &mut [T],
+        taken: &[bool],
+        extended: bool,
+    ) {
+        let no_value = |x: f64| extended && x < 0.0;
         let begin = self.first_operation + which.start;
         for (i, operation) in self.operations[which].iter().enumerate() {
             values[begin + i] = match *operation {
@@ -393,6 +404,11 @@ impl Tape {
                 Operation::Subtract(a, b) => values[a] - values[b],
                 Operation::Multiply(a, b) => values[a] * values[b],
                 Operation::Divide(a, b) => values[a] / values[b],
+                Operation::Power(a, _) | Operation::Sqrt(a) | Operation::Log(a)
+                    if no_value(values[a].value()) =>
+                {
+                    T::constant(0.0)
+                }
                 Operation::Power(a, b) => power(values[a], values[b]),
                 Operation::WholePower(a, n) => whole_power(values[a], n),
                 Operation::Sqrt(a) => {

@@ -66,6 +66,11 @@ impl<T: Scalar> Exact<T> {
         }
     }
 
+    /// Whether the matrix has a value.
+    pub fn is_finite(&self) -> bool {
+        self.a.iter().all(|value| value.value().is_finite())
+    }
+
     /// The states after an interval, from their slope at its beginning and what the inputs add to it per unit of time.
     pub fn step(&mut self, x: &mut [T], slope: &[T], rise: &[T], h: f64) {
         let n = x.len();

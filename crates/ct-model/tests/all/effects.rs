@@ -444,3 +444,31 @@ fn a_chain_is_in_its_order_and_readings_keep_their_name() {
     let error = apply(&block.spec, &[other]).unwrap_err().to_string();
     assert!(error.contains("of another model"), "{error}");
 }
+
+/// Every model of the project, and every effect that can act in it.
+#[test]
+fn effects_of_the_projects_models_are_written_out_and_fit_in_their_units() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut models = 0;
+    for folder in ["examples/models", "crates/plants/models"] {
+        for entry in std::fs::read_dir(root.join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_none_or(|ending| ending != "mo") {
+                continue;
+            }
+            models += 1;
+            let spec = ModelSpec::parse(&std::fs::read_to_string(&path).unwrap()).unwrap();
+            let before = unit_warnings(&spec).len();
+            for candidate in candidates(&spec, &Visited::nominal(&spec)) {
+                let mended = apply(&spec, &[&candidate]).unwrap();
+                let text = mended.to_string();
+                let read = ModelSpec::parse(&text);
+                let read = read.unwrap_or_else(|error| panic!("{path:?} {error}\n{text}"));
+                assert_eq!(read.to_string(), text);
+                let warnings = unit_warnings(&mended);
+                assert!(warnings.len() <= before, "{path:?} {warnings:?}\n{text}");
+            }
+        }
+    }
+    assert!(models > 10, "{models}");
+}

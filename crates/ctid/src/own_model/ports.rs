@@ -52,7 +52,7 @@ pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
             let same = |c: &&&Candidate| c.effect == first.effect && c.effect.is_some();
             let count = rest.iter().take_while(same).count().max(1);
             let ids: Vec<&str> = rest[..count].iter().map(|c| c.id.as_str()).collect();
-            text += &look.paragraph("  ", &look.strong(&ids.join(", ")));
+            text += &look.paragraph("  ", &look.strong(ids.join(", ")));
             let own = "a term of the model file";
             text += &look.paragraph("      ", first.effect.map_or(own, |effect| effect.physics));
             rest = &rest[count..];

@@ -2,11 +2,14 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod effects;
+mod events;
 mod language;
+mod library;
 mod memory;
 mod mutated;
 mod own_candidates;
 mod refused;
 mod round_trip;
 mod simulated;
+mod support;
 mod units;

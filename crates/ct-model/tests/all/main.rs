@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod effects;
+mod events;
 mod language;
+mod library;
 mod linear_form;
 mod memory;
 mod mutated;
@@ -10,4 +12,5 @@ mod own_candidates;
 mod refused;
 mod round_trip;
 mod simulated;
+mod support;
 mod units;

@@ -7,7 +7,7 @@
 
 use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
-use crate::columns::{Found, Layout};
+use crate::columns::{Found, Layout, Purpose};
 use crate::csv::{check_width, delimiter, is_number};
 use crate::{Columns, Conversion, Error, escaped, quoted, unit};
 
@@ -172,7 +172,7 @@ impl Rows {
             mut inputs,
             outputs,
             ..
-        } = columns.resolve(file, row, &cells)?;
+        } = columns.resolve(file, row, &cells, Purpose::Fit)?;
         // One input at least.
         let input = inputs.swap_remove(0);
         rows.at = vec![time.index];

@@ -9,6 +9,7 @@ mod many_starts;
 mod model_setup;
 mod model_starts;
 mod output_noise;
+mod prediction;
 mod reading_grid;
 mod reading_step;
 mod setup;
@@ -25,6 +26,7 @@ pub use fit::{
 };
 pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use model_setup::ModelSetup;
+pub use prediction::{FitUncertainty, InitialStates, output_errors};
 pub use reading_grid::{ReadingGrid, reading_grid};
 pub use reading_step::exact_reading_step;
 pub use setup::{LoopRun, PriorValue, Setup, Simulated, at_rest, commands, weighted_rms};

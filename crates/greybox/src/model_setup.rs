@@ -203,6 +203,22 @@ impl<'a> ModelSetup<'a> {
         Ok(setup)
     }
 
+    /// The same model, clock and fitted parameters against other records, without priors.
+    ///
+    /// # Errors
+    /// As [`ModelSetup::new`].
+    pub fn with_records<'b>(&self, records: &'b [Record]) -> Result<ModelSetup<'b>, Error>
+    where
+        'a: 'b,
+    {
+        let fixed = (0..self.parameter_count()).filter(|i| !self.free.contains(i));
+        let known = fixed.map(|i| (self.names[i].clone(), self.start[i]));
+        let known: BTreeMap<String, f64> = known.collect();
+        let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
+        setup.clock = self.clock.with_records(records);
+        Ok(setup)
+    }
+
     /// Positions of the entries that are fitted.
     #[must_use]
     pub fn free(&self) -> &[usize] {

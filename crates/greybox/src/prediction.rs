@@ -88,12 +88,13 @@ impl FitUncertainty {
         ct_signals::student_half_width(level, self.freedom)
     }
 
-    /// The same with every standard error times a factor.
-    #[must_use]
-    pub fn widened(mut self, factor: f64) -> Self {
-        let rows = self.covariance.iter_mut().flatten();
-        rows.for_each(|c| *c *= factor * factor);
-        self
+    /// Adds an error that moves all entries together, by these amounts \[unit of each entry of the vector\].
+    pub fn widen(&mut self, moved: &[f64]) {
+        for (row, &i) in self.covariance.iter_mut().zip(&self.entries) {
+            for (value, &j) in row.iter_mut().zip(&self.entries) {
+                *value += moved[i] * moved[j];
+            }
+        }
     }
 }
 

@@ -18,6 +18,7 @@ mod exchange;
 mod exhausted;
 mod feedback_test;
 mod find;
+mod fitted;
 mod floating;
 mod gaps;
 mod groups;
@@ -56,6 +57,7 @@ pub use diagnosis::{
     Verdict,
 };
 pub use error::Error;
+pub use fitted::{Fitted, fitted};
 pub use gaps::{LONGEST_HOLD, MendedGaps};
 pub use groups::GROUP_MARGIN;
 pub use problem::{Options, Problem, Progress, TIME_LIMIT};

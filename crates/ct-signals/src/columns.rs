@@ -134,7 +134,9 @@ pub struct Heading {
 }
 
 impl Heading {
-    pub(crate) fn of(header: &str) -> Self {
+    /// From a header.
+    #[must_use]
+    pub fn of(header: &str) -> Self {
         let (name, unit) = unit::split(header);
         Self {
             header: header.into(),

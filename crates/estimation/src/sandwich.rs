@@ -56,7 +56,8 @@ pub fn robust(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Robust,
     rows.each_prior(fit.interior(), weight, |row| {
         sandwich.priors.push(row.to_vec())
     });
-    let variances = |noise: &Noise, variance: f64| Some(diagonal(&sandwich.covariance(noise, variance)?));
+    let variances =
+        |noise: &Noise, variance: f64| Some(diagonal(&sandwich.covariance(noise, variance)?));
     let (relative, variance) = noise.relative();
     let covariance = sandwich.covariance(&relative, variance);
     let own = covariance.as_ref().map(|c| diagonal(c)).unwrap_or_default();

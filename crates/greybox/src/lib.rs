@@ -14,6 +14,7 @@ mod reading_grid;
 mod reading_step;
 mod setup;
 mod starts;
+mod steady_state;
 mod time_limit;
 
 pub use clock::common_clock;
@@ -30,5 +31,6 @@ pub use prediction::{FitUncertainty, InitialStates, output_errors};
 pub use reading_grid::{ReadingGrid, reading_grid};
 pub use reading_step::exact_reading_step;
 pub use setup::{LoopRun, PriorValue, Setup, Simulated, at_rest, commands, weighted_rms};
-pub use starts::{random_starts, starts_around};
+pub use starts::{levels_from_readings, random_starts, starts_around};
+pub use steady_state::steady_state;
 pub use time_limit::TimeLimit;

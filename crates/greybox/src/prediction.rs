@@ -67,7 +67,11 @@ impl FitUncertainty {
         let own: Vec<usize> = (0..fit.interior().len())
             .filter(|&i| entry(&fit.interior()[i]) < parameters)
             .collect();
-        let least = freedom.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let least = freedom
+            .iter()
+            .flatten()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
         let left = fit.samples.saturating_sub(free.len()).max(1) as f64;
         let lost = (fit.samples as f64 / left).sqrt();
         Ok(Some(Self {
@@ -139,6 +143,32 @@ impl InitialStates {
             }
         }
         states
+    }
+
+    /// A function of the parameters, whose slopes are taken by differences over a hundredth of each standard error; `None` where it has no
+    /// value.
+    #[must_use]
+    pub fn of_parameters(
+        values: impl Fn(&[f64]) -> Option<Vec<f64>>,
+        parameters: &[f64],
+        known: Option<&FitUncertainty>,
+    ) -> Option<Self> {
+        const STEP: f64 = 0.01;
+        let entries: &[usize] = known.map_or(&[], |known| &known.entries);
+        let mut states = Self::known(values(parameters)?, entries.len());
+        for (column, &entry) in entries.iter().enumerate() {
+            let error = known.map_or(0.0, |known| known.covariance[column][column].sqrt());
+            let at = |sign: f64| {
+                let mut moved = parameters.to_vec();
+                moved[entry] += sign * STEP * error;
+                values(&moved)
+            };
+            let (above, below) = (at(1.0)?, at(-1.0)?);
+            for ((row, above), below) in states.by_parameters.iter_mut().zip(above).zip(below) {
+                row[column] = (above - below) / (2.0 * STEP * error);
+            }
+        }
+        Some(states)
     }
 
     /// Fitted to the readings of a record with the parameters as they are; `None` where the readings do not determine them.
@@ -255,8 +285,8 @@ pub fn output_errors(
                 at(column) + moved.map(|(s, row)| s * row[i]).sum::<f64>()
             })
             .collect();
-        let variance = quadratic(&known.covariance, &by_parameter)
-            + quadratic(&initial.covariance, &by_state);
+        let variance =
+            quadratic(&known.covariance, &by_parameter) + quadratic(&initial.covariance, &by_state);
         errors[sample.output].push(variance.max(0.0).sqrt());
         true
     })?;

@@ -50,10 +50,7 @@ fn of_whole<R>(
     let (setup, fit) = (&shown.setup, &shown.fit);
     let parameters = setup.parameter_count();
     let mut uncertainty = FitUncertainty::of(setup, fit, parameters, NOISE_ORDER)?;
-    if let (Some(known), true) = (
-        &mut uncertainty,
-        ControlLoop::widens(control_loop.as_ref()),
-    ) {
+    if let (Some(known), true) = (&mut uncertainty, ControlLoop::widens(control_loop.as_ref())) {
         let other = other_metric(setup, &shown)?;
         let moved = fit.x.iter().zip(&other).map(|(own, other)| own - other);
         known.widen(&moved.collect::<Vec<f64>>());

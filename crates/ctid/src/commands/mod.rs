@@ -2,6 +2,7 @@
 
 mod compare;
 mod identify;
+mod simulate;
 mod tables;
 
 use std::io::{self, Write};
@@ -11,6 +12,7 @@ use clap::{Args, Parser, Subcommand};
 
 use self::compare::{Compare, Diagnose};
 use self::identify::Identify;
+use self::simulate::Simulate;
 use self::tables::Tables;
 use crate::look::Look;
 use crate::output::{self, Found, Kind, Output};
@@ -43,6 +45,8 @@ enum Command {
     Effects(Effects),
     /// Read a model in Modelica and say what it holds: states, inputs, outputs, parameters, units that do not fit
     Check(Check),
+    /// Simulate a model on new inputs, with a 95 % band where it is fitted to records first
+    Simulate(Simulate),
     /// Propose the next experiment, which tells two effects apart
     Design(design::Arguments),
     /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
@@ -145,6 +149,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         }
         Some(Command::Effects(_)) => say(out, &catalogue::list(look)),
         Some(Command::Check(Check { model })) => say(out, &check::run(&model, look)?),
+        Some(Command::Simulate(arguments)) => arguments.run(out, look),
         Some(Command::Design(arguments)) => {
             let (proposal, outputs, notes) = arguments.run(look)?;
             let text = notes + &design::text::design(&proposal.design, look);

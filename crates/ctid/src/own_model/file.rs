@@ -52,13 +52,15 @@ enum Column {
 pub(crate) struct OwnModelFile {
     /// The model.
     pub model: Model,
+    /// Where its text is.
+    pub text: PathBuf,
     /// Which column is which input and output, in the order of the model.
-    columns: Columns,
+    pub columns: Columns,
     /// Parameters that are not fitted.
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
-    hold: Hold,
+    pub hold: Hold,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
     /// What stands in the file and is not used yet.
@@ -162,6 +164,7 @@ impl OwnModelFile {
         let unused = candidates.chain(controllers).collect();
         Ok(Self {
             model: Model::new(spec),
+            text: beside,
             columns,
             known: raw
                 .known
@@ -219,7 +222,7 @@ impl OwnModelFile {
     }
 
     /// Puts the channels into the units of the model, where the model file reads them in others.
-    fn convert(&self, record: &mut Record) -> Result<(), Error> {
+    pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
         let spec = self.model.spec();
         let inputs = spec.inputs.iter().map(|input| &input.about);
         let outputs = spec
@@ -253,7 +256,7 @@ impl OwnModelFile {
     }
 
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.
-    fn time_unit(&self, first: &Path) -> Result<f64, Error> {
+    pub fn time_unit(&self, first: &Path) -> Result<f64, Error> {
         if self.columns.time.is_some() {
             return Ok(self.columns.time_header().1);
         }

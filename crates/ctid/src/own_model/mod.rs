@@ -4,8 +4,10 @@ mod candidates;
 mod compare;
 mod file;
 pub(crate) mod ports;
+mod simulate;
 mod text;
 
 pub(crate) use self::compare::compare;
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
+pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;

@@ -46,6 +46,7 @@
 
 pub mod effects;
 mod expression;
+mod linear_form;
 mod linearity;
 mod scalar;
 mod simulation;
@@ -55,6 +56,7 @@ mod text;
 mod units;
 
 pub use expression::{Comparison, Condition, Expression, Function, Operator, Variable};
+pub use linear_form::{LinearForm, TransferFunction};
 pub use linearity::Linearity;
 pub use scalar::{Dual, Scalar};
 pub use simulation::{Method, Model, NoSolution, Simulation};

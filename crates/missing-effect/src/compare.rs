@@ -58,7 +58,7 @@ pub(crate) struct Believed<'a> {
     /// The fit under the noise model of its residual.
     own: Fit,
     left: Option<Left>,
-    lacking: bool,
+    pub lacking: bool,
     floor: Floors,
     pub control_loop: Option<ControlLoop>,
 }

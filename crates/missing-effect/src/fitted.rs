@@ -19,6 +19,8 @@ pub struct Fitted<'f, 'a> {
     pub fit: &'f Fit,
     /// How well its parameters are known; `None` where the records do not determine them.
     pub uncertainty: Option<&'f FitUncertainty>,
+    /// The model lacks something: its residual is more than noise.
+    pub lacking: bool,
 }
 
 /// Fits the believed model as [`crate::compare`] does, and hands the fit on.
@@ -45,6 +47,7 @@ fn of_whole<R>(
     let Believed {
         shown,
         control_loop,
+        lacking,
         ..
     } = believed(problem, options)?;
     let (setup, fit) = (&shown.setup, &shown.fit);
@@ -59,5 +62,6 @@ fn of_whole<R>(
         setup,
         fit,
         uncertainty: uncertainty.as_ref(),
+        lacking,
     }))
 }

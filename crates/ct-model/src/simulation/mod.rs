@@ -89,6 +89,11 @@ impl Model {
         &self.spec
     }
 
+    /// Its operations.
+    pub(crate) fn tape(&self) -> &Tape {
+        &self.tape
+    }
+
     /// The values of its parameters as the text has them, in the order of [`ModelSpec::parameters`].
     #[must_use]
     pub fn parameters(&self) -> Vec<f64> {

@@ -1,6 +1,7 @@
 //! The command line: what may be typed, and what is then called.
 
 mod compare;
+mod export;
 mod identify;
 mod simulate;
 mod tables;
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand};
 
 use self::compare::{Compare, Diagnose};
+use self::export::Export;
 use self::identify::Identify;
 use self::simulate::Simulate;
 use self::tables::Tables;
@@ -47,6 +49,8 @@ enum Command {
     Check(Check),
     /// Simulate a model on new inputs, with a 95 % band where it is fitted to records first
     Simulate(Simulate),
+    /// Write the fitted model as Modelica, or the curves and residuals of its fit as CSV
+    Export(Export),
     /// Propose the next experiment, which tells two effects apart
     Design(design::Arguments),
     /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
@@ -150,6 +154,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Effects(_)) => say(out, &catalogue::list(look)),
         Some(Command::Check(Check { model })) => say(out, &check::run(&model, look)?),
         Some(Command::Simulate(arguments)) => arguments.run(out, look),
+        Some(Command::Export(arguments)) => arguments.run(out, look),
         Some(Command::Design(arguments)) => {
             let (proposal, outputs, notes) = arguments.run(look)?;
             let text = notes + &design::text::design(&proposal.design, look);

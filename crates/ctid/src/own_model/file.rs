@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use ct_model::effects::OwnCandidate;
 use ct_model::{Model, ModelSpec, Variable};
-use ct_signals::{Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv, read_file};
+use ct_signals::{
+    ColumnFault, Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv, read_file,
+};
 use greybox::PriorValue;
 use serde::Deserialize;
 use toml::Spanned;
@@ -192,7 +194,7 @@ impl OwnModelFile {
             ..files.options.clone()
         };
         let read = |path: &PathBuf| -> Result<Reading, Error> {
-            let mut reading = read_csv(path, &self.columns, &options)?;
+            let mut reading = read_csv(path, &self.columns, &options).map_err(|e| self.named(e))?;
             reading.record.name = files.name_of(path);
             reading.summary.file.clone_from(&reading.record.name);
             self.convert(&mut reading.record)?;
@@ -219,6 +221,32 @@ impl OwnModelFile {
             time_unit: self.time_unit(&files.data[0])?,
             summaries,
         })
+    }
+
+    /// An error of the columns with the mend for this model, whose signals have names of their own under `[columns]`.
+    pub fn named(&self, error: ct_signals::Error) -> Error {
+        let ct_signals::Error::Column { file, row, fault } = &error else {
+            return error.into();
+        };
+        let ColumnFault::Missing { wanted, .. } = &**fault else {
+            return error.into();
+        };
+        let spec = self.model.spec();
+        let inputs = spec.inputs.iter().map(|input| &input.about);
+        let outputs = spec.outputs.iter().map(|o| spec.about(o.variable));
+        let columns = self.columns.inputs.iter().chain(&self.columns.outputs);
+        let mut signals = columns.zip(inputs.chain(outputs));
+        let own = signals.find(|(column, _)| *wanted == format!("\"{}\"", quoted(column)));
+        match own {
+            None => error.into(),
+            Some((_, about)) => {
+                let mend = format!("set {} = \"...\" under [columns]", about.name);
+                Error::Columns(format!(
+                    "{file}, row {row}{}",
+                    fault.said("[columns]", &mend)
+                ))
+            }
+        }
     }
 
     /// Puts the channels into the units of the model, where the model file reads them in others.

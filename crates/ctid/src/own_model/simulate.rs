@@ -60,7 +60,9 @@ pub(crate) fn simulate(
         hold: file.hold,
         ..inputs.options.clone()
     };
-    let mut read = read_inputs(&inputs.path, &file.columns, &read_options)?;
+    let mut read = read_inputs(&inputs.path, &file.columns, &read_options, |e| {
+        file.named(e)
+    })?;
     file.convert(&mut read.record)?;
     let mut summaries = Vec::new();
     let time_unit = match &mut records {

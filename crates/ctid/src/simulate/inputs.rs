@@ -27,7 +27,7 @@ pub(crate) struct ReadInputs {
     pub time: TimeColumn,
 }
 
-/// Reads the inputs; those outputs that the file has come with them.
+/// Reads the inputs; those outputs that the file has come with them. `named`: what a column that is not there is blamed on.
 ///
 /// # Errors
 /// One line that names the file, the place and the mend: where a column is not there, a sample of an input is missing, or rows are.
@@ -35,8 +35,9 @@ pub(crate) fn read_inputs(
     path: &Path,
     columns: &Columns,
     options: &ReadOptions,
+    named: impl Fn(ct_signals::Error) -> Error,
 ) -> Result<ReadInputs, Error> {
-    let reading = read_inputs_csv(path, columns, options)?;
+    let reading = read_inputs_csv(path, columns, options).map_err(named)?;
     let (mut record, summary) = (reading.record, reading.summary);
     record.name = escaped(&record.name).into_owned();
     check_whole(path, &record)?;

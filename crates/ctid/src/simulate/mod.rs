@@ -6,17 +6,23 @@
 //! | one of the plants | `plant.rs` |
 //! | the inputs, read and checked | `inputs.rs` |
 //! | what a person reads | `text.rs` |
+//!
+//! `ctid export` shares its time column and its fits: `curves.rs`, `plant_export.rs`, `own_model/export.rs`.
 
+mod curves;
 mod inputs;
 mod plant;
+mod plant_export;
 mod text;
 mod time_column;
 
 use greybox::FitUncertainty;
 use serde::Serialize;
 
+pub(crate) use self::curves::{Curves, FittedRecord};
 pub(crate) use self::inputs::{Inputs, begins_with_readings, first_readings, read_inputs};
 pub(crate) use self::plant::simulate as simulate_plant;
+pub(crate) use self::plant_export::export as export_plant;
 pub(crate) use self::text::said;
 pub(crate) use self::time_column::TimeColumn;
 use crate::output::Found;

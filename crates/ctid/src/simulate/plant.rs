@@ -37,7 +37,7 @@ pub(crate) fn simulate(
         ..inputs.options.clone()
     };
     let name = model.plant.id().to_string();
-    let mut read = read_inputs(&inputs.path, &columns, &read_options)?;
+    let mut read = read_inputs(&inputs.path, &columns, &read_options, Error::from)?;
     let input::Input {
         mut problem,
         mut summaries,
@@ -145,6 +145,7 @@ fn simulated(fitted: Fitted, inputs: &Inputs, record: &Record) -> Result<Found, 
         setup: own,
         fit,
         uncertainty,
+        lacking,
     } = fitted;
     let records = std::slice::from_ref(record);
     let mut setup = own.with_records(records).map_err(wrong)?;
@@ -198,6 +199,11 @@ fn simulated(fitted: Fitted, inputs: &Inputs, record: &Record) -> Result<Found, 
     };
     let names = setup.names();
     let mut warnings = Vec::new();
+    if lacking {
+        warnings.push(
+            "the model leaves more than noise of the records that it is fitted to, and what it lacks is in no band: `ctid diagnose` names it".to_string(),
+        );
+    }
     if states_from == StateSource::Rest && begins_with_readings(record) {
         warnings.push(format!(
             "the readings of {} do not determine the initial levels: the plant begins at rest under the first inputs",

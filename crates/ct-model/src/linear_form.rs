@@ -54,7 +54,9 @@ impl Model {
         }
         let mut registers = tape.registers(parameters);
         let read = |registers: &Registers<f64>, at: &[Register]| -> Vec<f64> {
-            at.iter().map(|&register| registers.values[register]).collect()
+            at.iter()
+                .map(|&register| registers.values[register])
+                .collect()
         };
         tape.evaluate_with_guards(&mut registers);
         let state_offset = read(&registers, &tape.derivatives);

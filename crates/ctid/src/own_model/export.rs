@@ -134,8 +134,7 @@ pub(crate) fn export(
     let output_units = spec.outputs.iter();
     let output_units = output_units.map(|output| spec.about(output.variable).unit.clone());
     let path = |name: &str| {
-        let mut paths = paths.iter();
-        let own = paths.find(|path| {
+        let own = paths.iter().find(|path| {
             path.file_name()
                 .is_some_and(|file| file.to_string_lossy() == name)
                 || path.display().to_string() == name

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use ct_model::effects::OwnCandidate;
-use ct_model::{Model, ModelSpec, Variable};
+use ct_model::{About, Model, ModelSpec, Variable};
 use ct_signals::{
-    ColumnFault, Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv, read_file,
+    Channel, ColumnFault, Columns, Hold, Reading, Record, Unit, csv_header, quoted, read_csv,
+    read_file,
 };
 use greybox::PriorValue;
 use serde::Deserialize;
@@ -259,26 +260,7 @@ impl OwnModelFile {
             .map(|output| spec.about(output.variable));
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
         for (channel, about) in channels.zip(inputs.chain(outputs)) {
-            if about.unit.is_empty() || channel.unit.is_empty() || channel.unit == about.unit {
-                channel.unit.clone_from(&about.unit);
-                continue;
-            }
-            let units = Unit::parse(&channel.unit).zip(Unit::parse(&about.unit));
-            let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
-            let Some(conversion) = conversion else {
-                return Err(Error::File {
-                    file: record.name.clone(),
-                    what: format!(
-                        "column \"{}\" is in {}, but {} of the model is in {}: correct the unit in the header, or in the model",
-                        channel.name, channel.unit, about.name, about.unit
-                    ),
-                });
-            };
-            channel
-                .values
-                .iter_mut()
-                .for_each(|value| *value = conversion.apply(*value));
-            channel.unit.clone_from(&about.unit);
+            convert(&record.name, channel, about)?;
         }
         Ok(())
     }
@@ -298,6 +280,32 @@ impl OwnModelFile {
         .time_header()
         .1)
     }
+}
+
+/// Puts a channel of a record into the unit of the model's signal.
+///
+/// # Errors
+/// Where its unit is of another dimension.
+pub(super) fn convert(record: &str, channel: &mut Channel, about: &About) -> Result<(), Error> {
+    if about.unit.is_empty() || channel.unit.is_empty() || channel.unit == about.unit {
+        channel.unit.clone_from(&about.unit);
+        return Ok(());
+    }
+    let units = Unit::parse(&channel.unit).zip(Unit::parse(&about.unit));
+    let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
+    let Some(conversion) = conversion else {
+        return Err(Error::File {
+            file: record.to_string(),
+            what: format!(
+                "column \"{}\" is in {}, but {} of the model is in {}: correct the unit in the header, or in the model",
+                channel.name, channel.unit, about.name, about.unit
+            ),
+        });
+    };
+    let values = channel.values.iter_mut();
+    values.for_each(|value| *value = conversion.apply(*value));
+    channel.unit.clone_from(&about.unit);
+    Ok(())
 }
 
 /// Reads the text of a model.

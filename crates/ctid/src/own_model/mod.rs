@@ -5,11 +5,13 @@ mod compare;
 mod export;
 mod file;
 pub(crate) mod ports;
+mod identify;
 mod simulate;
 mod text;
 
 pub(crate) use self::compare::compare;
 pub(crate) use self::export::{Exported, export};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
+pub(crate) use self::identify::{Beside, OneByOne};
 pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;

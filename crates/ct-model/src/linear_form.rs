@@ -108,7 +108,7 @@ impl LinearForm {
         let mut denominator = vec![0.0; n + 1];
         let mut numerator = vec![0.0; n + 1];
         denominator[n] = 1.0;
-        // M_k b, of which the numerator needs no more than c M_k b.
+        // M_k.
         let mut m: Vec<Vec<f64>> = (0..n)
             .map(|i| (0..n).map(|j| f64::from(u8::from(i == j))).collect())
             .collect();

@@ -4,6 +4,7 @@
 mod effects;
 mod language;
 mod memory;
+mod linear_form;
 mod mutated;
 mod own_candidates;
 mod refused;

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use ct_model::{Expression, Given, ModelSpec};
-use ct_signals::{Heading, ReadSummary, shown};
+use ct_signals::{Heading, ReadSummary};
 use greybox::{FitOptions, FitUncertainty};
 use serde::Serialize;
 
 use super::file::{OwnModelFile, Records};
 use super::simulate::{Fitted, blame, fitted};
 use crate::Error;
+use crate::numbers;
 use crate::output::Found;
 use crate::simulate::{Curves, FittedRecord, TimeColumn};
 
@@ -107,7 +108,7 @@ pub(crate) fn export(
             Some(known.covariance[at][at].sqrt())
         });
         let said = match error {
-            Some(error) => format!("{} {unit}", shown(error)),
+            Some(error) => format!("{} {unit}", numbers::significant(error, 3)),
             None if parameter.given != Given::Fitted || file.known.contains_key(name) => {
                 "known, not fitted".to_string()
             }

@@ -93,7 +93,7 @@ pub(crate) struct Simulated {
     /// Length of the record \[s\].
     #[serde(skip)]
     pub length: f64,
-    #[serde(skip)]
+    /// When each row is.
     pub time: TimeColumn,
     /// The bands of readings are written too.
     #[serde(skip)]

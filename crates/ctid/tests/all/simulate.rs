@@ -133,9 +133,16 @@ fn new_inputs_are_simulated_with_a_band() {
     assert!((0.08..0.13).contains(&wide), "{wide}");
     // Where the first row is known exactly nothing is uncertain.
     assert_eq!(low[0], high[0]);
-    // What was written is a record that the same model file reads.
-    let record = place.read("y.csv").replace("t [s],", "t [s],no,");
-    assert!(record.starts_with("t [s],no,block [degC],"));
+    // The same as JSON.
+    place.succeeds("simulate m.toml in.csv --fit a.csv b.csv --out y2.csv --json y.json");
+    let json = place.json("y.json");
+    assert_eq!(json["outputs"][0]["mean"][149].as_f64(), Some(mean[149]));
+    let half = json["outputs"][0]["band"]["output"][149].as_f64().unwrap();
+    assert!((half - (high[149] - mean[149])).abs() < 1e-12);
+    assert_eq!(
+        (&json["states_from"], &json["written_by"]),
+        (&"text".into(), &"ctid".into())
+    );
 }
 
 #[test]
@@ -316,7 +323,7 @@ fn what_is_exported_reads_back() {
         "{text}"
     );
     assert!(
-        text.contains("//   C: known, not fitted") && text.contains("//   k: 0.000"),
+        text.contains("//   C: known, not fitted") && text.contains("//   k: "),
         "{text}"
     );
     place.succeeds("check fitted.mo");

@@ -3,8 +3,8 @@
 
 mod effects;
 mod language;
-mod memory;
 mod linear_form;
+mod memory;
 mod mutated;
 mod own_candidates;
 mod refused;

@@ -4,8 +4,8 @@ mod candidates;
 mod compare;
 mod export;
 mod file;
-pub(crate) mod ports;
 mod identify;
+pub(crate) mod ports;
 mod simulate;
 mod text;
 

@@ -102,16 +102,16 @@ impl Simulate {
             .chain(json)
             .collect();
         let outputs = output::plan(&wanted, &all)?;
+        if let (AnyModelFile::Plant(_), []) = (&model, &self.fit[..]) {
+            return Err(Error::file(
+                &self.model,
+                "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
+            ));
+        }
         let bar = Bar::new();
         bar.phase("fitting the model");
         let found = match model {
             AnyModelFile::Plant(model) => {
-                if self.fit.is_empty() {
-                    return Err(Error::file(
-                        &self.model,
-                        "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
-                    ));
-                }
                 let options = Options {
                     time_limit: Some(self.effort.limit()),
                     interrupt: Some(interrupt::flag()),

@@ -10,7 +10,7 @@ mod simulate;
 mod text;
 
 pub(crate) use self::compare::compare;
-pub(crate) use self::export::{Exported, export};
+pub(crate) use self::export::{Exported, commented, export, number};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
 pub(crate) use self::identify::{Beside, OneByOne};
 pub(crate) use self::simulate::simulate;

@@ -384,6 +384,14 @@ fn what_cannot_be_exported_is_refused_in_one_line() {
     place.write("tank.toml", "plant = \"single-tank\"\n");
     place.refuses(
         "export tank.toml --modelica t.mo",
+        &[
+            "tank.toml: a model file of a plant holds first guesses",
+            "DATA.csv",
+        ],
+    );
+    place.write("tank.toml", "plant = \"three-tank\"\n");
+    place.refuses(
+        "export tank.toml --modelica t.mo",
         &["tank.toml: --modelica", "--csv"],
     );
     place.write(
@@ -422,6 +430,29 @@ fn the_curves_of_a_plant_are_exported() {
     let compared = place.result("compare tour.csv --model tour.toml");
     let rmse = compared["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rms / rmse - 1.0).abs() < 1e-6, "{rms} {rmse}");
+}
+
+#[test]
+fn a_plant_is_exported_as_modelica_and_reads_back() {
+    let place = Place::new();
+    place.succeeds("export tour.toml tour.csv --modelica tank.mo --csv curves.csv");
+    place.succeeds("check tank.mo");
+    place.write(
+        "own.toml",
+        "model = \"tank.mo\"\n[columns]\ntime = \"t [s]\"\nu = \"u [V]\"\nlevel = \"y [cm]\"\n",
+    );
+    let record = place.read("tour.csv");
+    let inputs = record
+        .lines()
+        .map(|line| line.rsplit_once(',').unwrap().0.to_string() + "\n");
+    place.write("in.csv", inputs.collect::<String>());
+    place.succeeds("simulate own.toml in.csv --out y.csv");
+    let own = column(&place.read("y.csv"), "y");
+    let model = column(&place.read("curves.csv"), "y model [cm]");
+    assert_eq!(own.len(), model.len());
+    for (own, model) in own.iter().zip(&model) {
+        assert!((own - model).abs() < 1e-5, "{own} {model}");
+    }
 }
 
 /// A block in a room that keeps its warmth.

@@ -389,7 +389,10 @@ fn what_cannot_be_exported_is_refused_in_one_line() {
             "DATA.csv",
         ],
     );
-    place.write("tank.toml", "plant = \"three-tank\"\n");
+    place.write(
+        "tank.toml",
+        "plant = \"three-tank\"\n[known]\nmeasured = \"T3\"\n",
+    );
     place.refuses(
         "export tank.toml --modelica t.mo",
         &["tank.toml: --modelica", "--csv"],

@@ -72,7 +72,7 @@ pub fn diagnose(
     let left = context.left(&confirmed, &own)?;
     tell("telling apart");
     let found = confirmed.added.len() > grown.base.added.len();
-    let share = found.then(|| explained(&grown.base, &confirmed, &own));
+    let share = found.then(|| explained(&base, &confirmed, &own, left.is_none()));
     let verdict_of = |groups: &[Vec<usize>]| match (found, &left, share) {
         (false, None, _) => Verdict::Adequate,
         (false, Some(_), _) => Verdict::Unexplained,
@@ -105,6 +105,7 @@ fn begin<'a>(
     let mut context = Context {
         problem,
         candidates: Vec::new(),
+        scales: None,
         limit,
     };
     let fit_options = FitOptions {
@@ -210,9 +211,14 @@ fn in_metric(
     Ok((grown, noise))
 }
 
-/// The share of the mean squared error above the noise that a set explains, outputs in units of their noise.
-fn explained(base: &Node, last: &Node, own: &Fit) -> f64 {
-    let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+/// The share of the mean squared error above the noise that a set explains, outputs in units of their noise; `whole`: all that remains is noise,
+/// and otherwise what its past does not predict.
+fn explained(base: &Node, last: &Node, own: &Fit, whole: bool) -> f64 {
+    let floors: Vec<f64> = if whole {
+        own.noise.iter().map(ArModel::stationary_std).collect()
+    } else {
+        own.noise.iter().map(ArModel::sigma).collect()
+    };
     let squares = |fit: &Fit| -> f64 {
         let each = fit.rmse.iter().zip(&floors);
         each.map(|(rmse, floor)| (rmse / floor.max(f64::MIN_POSITIVE)).powi(2))
@@ -247,6 +253,12 @@ fn report(
     } else {
         Noise::white(outputs.len())
     };
+    // Several outputs count by their noise.
+    let weighted = Context {
+        scales: (outputs.len() > 1).then(|| own.noise.iter().map(ArModel::sigma).collect()),
+        ..context.clone()
+    };
+    let context = &weighted;
     let ladder = ladder(context, base, last, &metric)?;
     let steps = ladder
         .iter()

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use crate::Error;
 use crate::node::{Context, Node};
+use crate::spectral_line::strongest_line;
 
 /// More starts of a candidate than this are thinned out.
 const MOST_STARTS: usize = 24;
@@ -32,11 +33,34 @@ pub(crate) struct Trial {
     pub starts: Vec<Vec<f64>>,
     /// Predicted fall of the deviance.
     pub fall: f64,
-    /// How many starts were looked at.
-    pub ways: usize,
 }
 
+/// The effect whose starts follow from the spectrum of the residual.
+const PERIODIC: &str = "periodic";
+
 impl Context<'_> {
+    /// Periods of the strongest lines of a set's residuals, and half a line to either side \[unit of the model's time\].
+    fn periods(&self, node: &Node) -> Result<Vec<f64>, Error> {
+        let setup = self.setup(&node.model)?;
+        let Some(residuals) = estimation::residuals(&setup, &node.fit.x) else {
+            return Ok(Vec::new());
+        };
+        let records = &self.problem.records;
+        let outputs = records[0].outputs.len();
+        let mut periods = Vec::new();
+        for (i, residual) in residuals.iter().enumerate() {
+            if residual.len() < 16 || residual.iter().all(|e| e.is_nan()) {
+                continue;
+            }
+            let duration = records[i / outputs].duration() / self.problem.time_unit;
+            if let Some(line) = strongest_line(residual)? {
+                let cycles = line.cycles as f64;
+                periods.extend([-0.5, 0.0, 0.5].map(|part| duration / (cycles + part)));
+            }
+        }
+        Ok(periods)
+    }
+
     /// Scores of all candidates that a set does not have, best first.
     pub fn trials(&self, node: &Node, noise: &Noise) -> Vec<Trial> {
         let others: Vec<usize> = (0..self.candidates.len())
@@ -87,6 +111,20 @@ impl Context<'_> {
             }
             if !starts.contains(&x) {
                 starts.push(x);
+            }
+        }
+        if candidate.effect.is_some_and(|effect| effect.id == PERIODIC) {
+            let at = candidate
+                .parameters
+                .iter()
+                .position(|own| own.short == "period");
+            if let (Some(Some(at)), Some(first)) = (at.map(|at| places[at]), starts.first()) {
+                let first = first.clone();
+                for period in self.periods(node)? {
+                    let mut x = first.clone();
+                    x[at] = within(period, setup.bounds()[at]);
+                    starts.insert(0, x);
+                }
             }
         }
         let ways = starts.len();
@@ -145,7 +183,6 @@ impl Context<'_> {
             model: model.clone(),
             starts,
             fall,
-            ways,
         }))
     }
 }

@@ -28,8 +28,6 @@ pub(crate) struct Grown {
     pub base: Node,
     /// Single effects, best first.
     pub singles: Vec<Node>,
-    /// Scores of the single effects.
-    pub trials: Vec<Trial>,
     /// The set with the least criterion.
     pub best: Node,
 }
@@ -116,7 +114,6 @@ impl Context<'_> {
         Ok(Grown {
             base,
             singles,
-            trials,
             best,
         })
     }

@@ -63,7 +63,15 @@ impl Context<'_> {
 
     /// Scores of all candidates that a set does not have, best first.
     pub fn trials(&self, node: &Node, noise: &Noise) -> Vec<Trial> {
-        let others: Vec<usize> = (0..self.candidates.len())
+        let all: Vec<usize> = (0..self.candidates.len()).collect();
+        self.trials_among(node, &all, noise)
+    }
+
+    /// The same of some candidates, by their positions.
+    pub fn trials_among(&self, node: &Node, among: &[usize], noise: &Noise) -> Vec<Trial> {
+        let others: Vec<usize> = among
+            .iter()
+            .copied()
             .filter(|i| !node.added.contains(i))
             .collect();
         let mut trials: Vec<Trial> = others

@@ -58,10 +58,10 @@ impl Export {
         let curves = self.csv.as_deref().map(|path| (Kind::Record, path));
         let wanted: Vec<(Kind, &Path)> = text.into_iter().chain(curves).collect();
         let outputs = output::plan(&wanted, &inputs)?;
-        if let (AnyModelFile::Plant(model), Some(_)) = (&model, &self.modelica) {
-            if let Some(why) = simulate::no_text(model) {
-                return Err(Error::file(&self.model, why));
-            }
+        if let (AnyModelFile::Plant(model), Some(_)) = (&model, &self.modelica)
+            && let Some(why) = simulate::no_text(model)
+        {
+            return Err(Error::file(&self.model, why));
         }
         if let (AnyModelFile::Plant(_), []) = (&model, &self.data[..]) {
             return Err(Error::file(

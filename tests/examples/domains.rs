@@ -1,0 +1,132 @@
+//! Records of nine models in which effects are hidden, from `../shared/domains` beside the checkout: what `ctid` says of each, and the answer
+//! where it lies beside.
+//!
+//! ```sh
+//! cargo build --release && cargo run --release -p ctid-tests --example domains [-- CASE...]
+//! ```
+//! Prints for each case the error of the believed model at each output as `compare` has it, against that of the answer, which was fitted in
+//! white noise or in the noise's own weighting, and the verdict of `diagnose`; then how many are right.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use serde_json::Value;
+
+fn main() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/domains");
+    let Ok(folder) = std::fs::read_dir(root.join("public")) else {
+        println!("skipped: {} is not there", root.display());
+        return;
+    };
+    let program = std::env::current_exe().unwrap().with_file_name("../ctid");
+    if !program.exists() {
+        println!(
+            "skipped: {} is not built: cargo build --release",
+            program.display()
+        );
+        return;
+    }
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    let mut cases: Vec<String> = folder
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|case| wanted.is_empty() || wanted.contains(case))
+        .collect();
+    cases.sort();
+    let scratch = tempfile::tempdir().unwrap();
+    let mut right: BTreeMap<String, (usize, usize)> = BTreeMap::new();
+    for case in cases {
+        let own = root.join("public").join(&case);
+        let run = |command: &str| -> (Value, f64) {
+            let json = scratch.path().join(format!("{case}-{command}.json"));
+            let began = Instant::now();
+            let status = Command::new(&program)
+                .arg(command)
+                .args(records(&own))
+                .arg("--model")
+                .arg(own.join("model.toml"))
+                .arg("--json")
+                .arg(&json)
+                .output()
+                .unwrap();
+            assert!(
+                status.status.success(),
+                "{case}: {}",
+                String::from_utf8_lossy(&status.stderr)
+            );
+            let text = std::fs::read_to_string(json).unwrap();
+            (
+                serde_json::from_str(&text).unwrap(),
+                began.elapsed().as_secs_f64(),
+            )
+        };
+        let (compared, _) = run("compare");
+        let (found, seconds) = run("diagnose");
+        println!(
+            "{case}: {} {} ({seconds:.1} s)",
+            found["verdict"], found["groups"]
+        );
+        let answer = std::fs::read_to_string(root.join(format!("answers/{case}.json")));
+        let Ok(answer) = answer else { continue };
+        let answer: Value = serde_json::from_str(&answer).unwrap();
+        println!("    hidden: {} {}", answer["type"], answer["truth"]);
+        for (i, (output, rmse)) in compared["steps"][0]["rmse_per_output"]
+            .as_object()
+            .unwrap()
+            .iter()
+            .enumerate()
+        {
+            let against = |key: &str| {
+                100.0 * (rmse.as_f64().unwrap() / answer[key][i].as_f64().unwrap() - 1.0)
+            };
+            println!(
+                "    {output}: {:+.2} % of the answer's fit in white noise, {:+.2} % of that in the noise's weighting",
+                against("rmse_base_white_fit"),
+                against("rmse_base")
+            );
+        }
+        let kind = answer["type"].as_str().unwrap().to_string();
+        let count = right.entry(kind.clone()).or_default();
+        count.1 += 1;
+        count.0 += usize::from(is_right(&kind, &answer, &found));
+    }
+    for (kind, (right, of)) in right {
+        println!("{kind}: {right} of {of} right");
+    }
+}
+
+fn records(folder: &Path) -> Vec<PathBuf> {
+    ["data.csv", "data2.csv"]
+        .map(|name| folder.join(name))
+        .into_iter()
+        .filter(|path| path.exists())
+        .collect()
+}
+
+/// Single effects and pairs: the truth, or what cannot be told from it, is in the groups; nothing hidden: adequate; from outside the
+/// candidates: unexplained or partial.
+fn is_right(kind: &str, answer: &Value, found: &Value) -> bool {
+    let verdict = found["verdict"].as_str().unwrap();
+    let claims = ["effect", "undecided", "partial"].contains(&verdict);
+    match kind {
+        "none" => verdict == "adequate",
+        "outside" => verdict == "unexplained" || verdict == "partial",
+        _ => {
+            let named: Vec<&Value> = found["groups"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .flat_map(|group| group.as_array().unwrap())
+                .collect();
+            let mut sets = vec![&answer["truth"]];
+            sets.extend(answer["also_right"].as_array().unwrap());
+            let all_named = |set: &&Value| match set.as_array() {
+                Some(set) => set.iter().all(|id| named.contains(&id)),
+                None => named.contains(set),
+            };
+            claims && sets.iter().any(all_named)
+        }
+    }
+}

@@ -63,10 +63,11 @@ mod scatter;
 mod sensitivity;
 mod settings;
 mod threshold;
+mod time_axis;
 mod tracker;
 mod watch;
 
-pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict, instant};
+pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict};
 pub use error::{Error, Refused};
 pub use learn::Model;
 pub use monitor::{
@@ -74,3 +75,4 @@ pub use monitor::{
 };
 pub use scatter::{ScatterAlarm, ScatterEvent};
 pub use settings::Settings;
+pub use time_axis::TimeAxis;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Alarm, Error, Model, Refused, ScatterAlarm, Settings, Units,
+    Alarm, Error, Model, Refused, ScatterAlarm, Settings, TimeAxis, Units,
     core::{Checkpoint, Core, Phase},
     fingerprint::{Fingerprint, differences, fingerprint},
     intake::{Intake, Sample, usable},
@@ -191,6 +191,8 @@ pub struct State {
     version: u32,
     model: Fingerprint,
     units: Units,
+    #[serde(default, skip_serializing_if = "TimeAxis::is_seconds")]
+    axis: TimeAxis,
     intake: Intake,
     checkpoint: Checkpoint,
     since: Vec<Sample>,
@@ -285,8 +287,20 @@ impl Monitor {
         }
         monitor.core = Core::restore(model, settings, state.units, state.checkpoint, &state.since)
             .map_err(|what| Error::Damaged { what })?;
+        monitor.core.axis = state.axis;
         monitor.intake = state.intake;
         Ok(monitor)
+    }
+
+    /// How times are said in sentences; a restored monitor goes on as before.
+    #[must_use]
+    pub fn axis(&self) -> &TimeAxis {
+        &self.core.axis
+    }
+
+    /// Says when the times of the rows are zero: to be known before the first row.
+    pub fn set_axis(&mut self, axis: TimeAxis) {
+        self.core.axis = axis;
     }
 
     /// All of it, to be saved.
@@ -297,6 +311,7 @@ impl Monitor {
             version: VERSION,
             model: self.fingerprint.clone(),
             units: self.units.clone(),
+            axis: self.core.axis.clone(),
             intake: self.intake.clone(),
             checkpoint: checkpoint.clone(),
             since: since.to_vec(),

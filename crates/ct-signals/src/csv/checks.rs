@@ -27,6 +27,16 @@ impl Table {
         options: &ReadOptions,
     ) -> Result<(), Error> {
         let rows = self.time.len();
+        if rows + self.outside == 0 && self.without_time > 0 {
+            let (end, words) = &self.untimed;
+            return Err(Error::NoSample {
+                file: file.into(),
+                row: line_number(text, *end),
+                column: quoted(&layout.time.header),
+                rows: self.without_time,
+                words: listed(words),
+            });
+        }
         if rows < MIN_ROWS {
             let why = match self.outside {
                 0 => String::new(),
@@ -47,13 +57,12 @@ impl Table {
         let channels = || layout.channels().zip(&self.values).zip(&self.missing);
         for ((column, values), words) in channels() {
             if values.iter().all(|value| value.is_nan()) {
-                let words = words.iter().map(|(word, _)| format!("\"{word}\""));
                 return Err(Error::NoSample {
                     file: file.into(),
                     row: line_number(text, self.ends[0]),
                     column: quoted(&column.header),
                     rows,
-                    words: words.collect::<Vec<_>>().join(", "),
+                    words: listed(words),
                 });
             }
         }
@@ -136,6 +145,15 @@ impl Table {
             }
         }
     }
+}
+
+/// What stands in cells whose sample is missing.
+fn listed(words: &[(String, usize)]) -> String {
+    let word = |(word, _): &(String, usize)| match word.as_str() {
+        "" => "empty cells".to_string(),
+        word => format!("\"{}\"", quoted(word)),
+    };
+    words.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
 fn check_saturation(file: &str, column: &Found, values: &[f64]) -> Result<(), Error> {

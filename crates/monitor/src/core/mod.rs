@@ -15,7 +15,7 @@ use plants::Structure;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Alarm, Estimate, MAX_OUTPUTS, Model, Notice, ScatterAlarm, Settings, Units,
+    Alarm, Estimate, MAX_OUTPUTS, Model, Notice, ScatterAlarm, Settings, TimeAxis, Units,
     bank::Bank,
     intake::{Follows, LONGEST_BLOCK, Sample},
     isolate::Kept,
@@ -105,6 +105,7 @@ pub(crate) struct Core {
     model: Model,
     settings: Settings,
     units: Units,
+    pub(crate) axis: TimeAxis,
     /// The present state, but for the tracker, which is as of the last checkpoint.
     now: Checkpoint,
     running: Option<Running>,
@@ -133,6 +134,7 @@ impl Core {
             model,
             settings,
             units,
+            axis: TimeAxis::default(),
             checkpoint: now.clone(),
             now,
             running: None,

@@ -246,7 +246,7 @@ impl Core {
             (following.score, running.threshold, following.output),
             &suspects,
             &running.structure,
-            &self.units,
+            (&self.units, &self.axis),
         );
         self.now.phase = Phase::Alarmed(Following {
             explained: alarm.verdict != Verdict::Unexplained,

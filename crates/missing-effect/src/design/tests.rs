@@ -126,24 +126,27 @@ fn noisy(records: &[Record], seed: u64) -> Vec<Record> {
     records
 }
 
-/// A side measurement is part of the refits: beside one that is all but exact they agree with fits in which its parameter is fixed at the
-/// value of the model that is taken to be true.
+/// Side measurements are part of the refits: beside such that are all but exact they agree with fits in which their parameters are fixed at
+/// the values of the model that is taken to be true.
 #[test]
 fn a_side_measurement_counts_in_the_refits() {
     let mut problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);
-    let exact = PriorValue {
-        value: 12.5,
-        std_error: 1e-3,
-    };
-    problem.priors.insert("alpha".into(), exact);
+    let plant = [("pump_gain", 10.0), ("alpha", 12.5)];
+    for (name, value) in plant {
+        let std_error = 1e-3;
+        let exact = PriorValue { value, std_error };
+        problem.priors.insert(name.into(), exact);
+    }
     let fitted = leak_or_curve(&problem);
     let (a, b, metric) = (&fitted.nodes[0], &fitted.nodes[1], &fitted.metric);
-    let alpha = b.setup.names().iter().position(|n| n == "alpha").unwrap();
     let cost = |records: &[Record], mut x: Vec<f64>, held: bool| {
         let mut fixed = b.setup.fixed.clone();
         if held {
-            x[alpha] = a.fit.x[alpha];
-            fixed.insert("alpha".into(), x[alpha]);
+            for (i, (name, _)) in plant.into_iter().enumerate() {
+                assert!(a.setup.names()[i] == name && b.setup.names()[i] == name);
+                x[i] = a.fit.x[i];
+                fixed.insert(name.into(), x[i]);
+            }
         }
         let mut setup = Setup::new(b.setup.structure.clone(), records, fixed).unwrap();
         setup.substeps = b.setup.substeps;

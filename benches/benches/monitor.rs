@@ -43,7 +43,7 @@ fn rows() -> Vec<Row> {
         .collect()
 }
 
-fn learned(rows: &[Row]) -> Monitor {
+fn learned(rows: &[Row]) -> Monitor<'static> {
     let model = Model::new(Plant::SingleTank, known());
     let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
     for row in &rows[..LEARNED] {
@@ -69,7 +69,7 @@ fn benchmark(criterion: &mut Criterion) {
             let mut sum = 0.0;
             for row in &rows[LEARNED..] {
                 sum += tank.read(0).re;
-                tank.advance(Command::held(row.input), 2.0);
+                tank.advance(Command::held(row.inputs[0]), 2.0);
             }
             black_box(sum)
         });

@@ -45,11 +45,15 @@ pub enum Function {
     Atan2,
     Min,
     Max,
+    /// `play(x, b)`: a play of half-width `b`; what it gives follows `x` from row to row at a distance of at most `b`.
+    Play,
+    /// `quantise(x, d)`: the multiple of `d` that is nearest to `x`; `x` itself where `d` is zero.
+    Quantise,
 }
 
 impl Function {
     /// All functions.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::Abs,
         Self::Sign,
         Self::Sqrt,
@@ -63,6 +67,8 @@ impl Function {
         Self::Atan2,
         Self::Min,
         Self::Max,
+        Self::Play,
+        Self::Quantise,
     ];
 
     /// Its name in a text.
@@ -82,6 +88,8 @@ impl Function {
             Self::Atan2 => "atan2",
             Self::Min => "min",
             Self::Max => "max",
+            Self::Play => "play",
+            Self::Quantise => "quantise",
         }
     }
 
@@ -89,7 +97,7 @@ impl Function {
     #[must_use]
     pub fn arguments(self) -> usize {
         match self {
-            Self::Atan2 | Self::Min | Self::Max => 2,
+            Self::Atan2 | Self::Min | Self::Max | Self::Play | Self::Quantise => 2,
             _ => 1,
         }
     }
@@ -180,7 +188,24 @@ impl Expression {
             }
     }
 
-    /// The value where variables have these values; a delay gives what it delays.
+    /// The same with other expressions in the place of variables.
+    #[must_use]
+    pub fn with(&self, of: &impl Fn(Variable) -> Self) -> Self {
+        let part = |a: &Self| Box::new(a.with(of));
+        match self {
+            Self::Number(_) | Self::Time => self.clone(),
+            Self::Variable(variable) => of(*variable),
+            Self::Negative(a) => Self::Negative(part(a)),
+            Self::Binary(operator, a, b) => Self::Binary(*operator, part(a), part(b)),
+            Self::Call(function, arguments) => {
+                Self::Call(*function, arguments.iter().map(|a| a.with(of)).collect())
+            }
+            Self::If(condition, a, b) => Self::If(Box::new(condition.with(of)), part(a), part(b)),
+            Self::Delay(a, by) => Self::Delay(part(a), part(by)),
+        }
+    }
+
+    /// The value where variables have these values; a delay and a play give what goes into them.
     #[must_use]
     pub fn value(&self, time: f64, of: &impl Fn(Variable) -> f64) -> f64 {
         match self {
@@ -217,6 +242,8 @@ impl Expression {
                     Function::Atan2 => a.atan2(argument(1)),
                     Function::Min => a.min(argument(1)),
                     Function::Max => a.max(argument(1)),
+                    Function::Play => a,
+                    Function::Quantise => quantised(a, argument(1)),
                 }
             }
             Self::If(condition, a, b) => {
@@ -231,7 +258,31 @@ impl Expression {
     }
 }
 
+/// The multiple of a step that is nearest to a value; the value itself where the step is zero.
+pub(crate) fn quantised(value: f64, step: f64) -> f64 {
+    if step == 0.0 {
+        value
+    } else {
+        step * (value / step).round()
+    }
+}
+
 impl Condition {
+    /// As [`Expression::with`].
+    #[must_use]
+    pub fn with(&self, of: &impl Fn(Variable) -> Expression) -> Self {
+        let part = |a: &Self| Box::new(a.with(of));
+        match self {
+            Self::Constant(value) => Self::Constant(*value),
+            Self::Compare(comparison, a, b) => {
+                Self::Compare(*comparison, Box::new(a.with(of)), Box::new(b.with(of)))
+            }
+            Self::Not(a) => Self::Not(part(a)),
+            Self::And(a, b) => Self::And(part(a), part(b)),
+            Self::Or(a, b) => Self::Or(part(a), part(b)),
+        }
+    }
+
     /// As [`Expression::each_variable`].
     pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
         match self {

@@ -44,7 +44,9 @@
 //! **Reference**: Modelica Association, Modelica - A Unified Object-Oriented Language for Systems Modeling, Language Specification 3.6, 2023:
 //! appendix A for the grammar of expressions.
 
+pub mod effects;
 mod expression;
+mod linear_form;
 mod linearity;
 mod scalar;
 mod simulation;
@@ -54,6 +56,7 @@ mod text;
 mod units;
 
 pub use expression::{Comparison, Condition, Expression, Function, Operator, Variable};
+pub use linear_form::{LinearForm, TransferFunction};
 pub use linearity::Linearity;
 pub use scalar::{Dual, Scalar};
 pub use simulation::{Method, Model, NoSolution, Simulation};

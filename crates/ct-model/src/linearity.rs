@@ -1,6 +1,6 @@
 //! Whether a model is linear in its states and inputs, found from its text.
 
-use crate::expression::{Expression, Operator, Variable};
+use crate::expression::{Expression, Function, Operator, Variable};
 use crate::spec::ModelSpec;
 
 /// Whether a model is linear in states and inputs, whatever its parameters are.
@@ -53,6 +53,107 @@ impl ModelSpec {
     }
 }
 
+/// Whether the states can be computed exactly from row to row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ExactSteps {
+    /// Not linear, or they change with time.
+    No,
+    /// A constant matrix, and any function of the inputs: linear where these are held.
+    HeldInputs,
+    /// Linear in the inputs too.
+    AllInputs,
+}
+
+impl ModelSpec {
+    /// Whether and when that is so; how outputs depend on them does not matter.
+    pub(crate) fn exact_steps(&self) -> ExactSteps {
+        let mut flows = vec![Part::Parameters; self.flows.len()];
+        for &i in &self.order {
+            flows[i] = part(&self.flows[i].value, &flows);
+        }
+        let mut worst = Part::Parameters;
+        for state in &self.states {
+            let coefficient = state.coefficient.as_ref();
+            if coefficient.is_some_and(|c| part(c, &flows) != Part::Parameters) {
+                return ExactSteps::No;
+            }
+            worst = worst.max(part(&state.right, &flows));
+        }
+        if worst == Part::Other {
+            return ExactSteps::No;
+        }
+        if self.is_linear_in_states_and_inputs() {
+            ExactSteps::AllInputs
+        } else {
+            ExactSteps::HeldInputs
+        }
+    }
+
+    /// Whether every state equation is linear in states and inputs.
+    fn is_linear_in_states_and_inputs(&self) -> bool {
+        let mut flows = vec![Degree::Constant; self.flows.len()];
+        for &i in &self.order {
+            flows[i] = degree(&self.flows[i].value, &flows);
+        }
+        let mut states = self.states.iter();
+        states.all(|state| degree(&state.right, &flows) != Degree::Other)
+    }
+}
+
+/// What a part of an equation is made of, with inputs that are held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Part {
+    Parameters,
+    /// Inputs and parameters.
+    Inputs,
+    /// Linear in states, with parameters as coefficients, and any function of inputs beside.
+    States,
+    Other,
+}
+
+fn part(expression: &Expression, flows: &[Part]) -> Part {
+    use Part::{Inputs, Other, Parameters, States};
+    let of = |inner: &Expression| part(inner, flows);
+    let of_inputs = |worst: Part| if worst <= Inputs { worst } else { Other };
+    match expression {
+        Expression::Number(_) => Parameters,
+        Expression::Time | Expression::Delay(..) => Other,
+        Expression::Variable(Variable::Parameter(_)) => Parameters,
+        Expression::Variable(Variable::Input(_)) => Inputs,
+        Expression::Variable(Variable::State(_)) => States,
+        Expression::Variable(Variable::Flow(i)) => flows[*i],
+        Expression::Negative(a) => of(a),
+        Expression::Binary(operator, a, b) => {
+            let (a, b) = (of(a), of(b));
+            match operator {
+                Operator::Add | Operator::Subtract => a.max(b),
+                Operator::Multiply if a == Parameters => b,
+                Operator::Multiply | Operator::Divide if b == Parameters => a,
+                _ => of_inputs(a.max(b)),
+            }
+        }
+        Expression::Call(_, arguments) => {
+            of_inputs(arguments.iter().map(of).max().unwrap_or(Parameters))
+        }
+        Expression::If(condition, a, b) => {
+            let mut worst = Parameters;
+            condition.each_variable(&mut |variable| {
+                worst = worst.max(of(&Expression::Variable(variable)));
+            });
+            let timed =
+                condition.any(&|part| matches!(part, Expression::Time | Expression::Delay(..)));
+            let branches = of(a).max(of(b));
+            match worst {
+                _ if timed => Other,
+                Parameters => branches,
+                // A branch that inputs choose changes the matrix where it holds states.
+                Inputs => of_inputs(branches.max(Inputs)),
+                States | Other => Other,
+            }
+        }
+    }
+}
+
 fn degree(expression: &Expression, flows: &[Degree]) -> Degree {
     use Degree::{Constant, Linear, Other};
     let of = |part: &Expression| degree(part, flows);
@@ -74,6 +175,8 @@ fn degree(expression: &Expression, flows: &[Degree]) -> Degree {
                 _ => constant_or_other(a.max(b)),
             }
         }
+        // It remembers, whatever goes into it.
+        Expression::Call(Function::Play, _) => Other,
         Expression::Call(_, arguments) => {
             constant_or_other(arguments.iter().map(of).max().unwrap_or(Constant))
         }

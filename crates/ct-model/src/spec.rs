@@ -57,7 +57,8 @@ pub struct State {
     pub coefficient: Option<Expression>,
     /// The other side of the equation.
     pub right: Expression,
-    /// Where its initial value starts, of parameters alone.
+    /// Where its initial value starts, of parameters alone; or its value at the first row as an `initial equation` gives it
+    /// ([`ModelSpec::is_settled`]).
     pub start: Expression,
     /// The initial value is known, and not fitted.
     pub fixed: bool,
@@ -141,6 +142,24 @@ impl ModelSpec {
         self.outputs
             .iter()
             .any(|output| output.variable == variable)
+    }
+
+    /// Whether an `initial equation` gives the initial value of a state from inputs, states or flows of the first row: the simulation
+    /// computes it, whatever initial value it is given.
+    ///
+    /// # Panics
+    /// For a state of another model.
+    #[must_use]
+    pub fn is_settled(&self, state: usize) -> bool {
+        let mut settled = false;
+        self.states[state]
+            .start
+            .each_variable(&mut |variable| match variable {
+                Variable::Parameter(_) => {}
+                Variable::Input(_) | Variable::State(_) => settled = true,
+                Variable::Flow(i) => settled |= !self.flows[i].of_parameters,
+            });
+        settled
     }
 
     /// Every expression that defines something as time goes on: flows, then coefficients and right-hand sides of the states.

@@ -9,7 +9,9 @@
 use std::cell::Cell;
 use std::collections::HashMap;
 
-use crate::expression::{Comparison, Condition, Expression, Function, Operator, Variable};
+use crate::expression::{
+    Comparison, Condition, Expression, Function, Operator, Variable, quantised,
+};
 use crate::scalar::Scalar;
 use crate::spec::ModelSpec;
 
@@ -35,6 +37,7 @@ enum Operation {
     Tan(Register),
     Tanh(Register),
     Atan2(Register, Register),
+    Quantise(Register, Register),
     /// One of two, by a condition.
     Select(usize, Register, Register),
 }
@@ -120,9 +123,22 @@ pub(crate) struct Tape {
     pub starts: Vec<Register>,
     /// What is delayed, and by how much.
     pub delays: Vec<(Register, Register)>,
+    pub plays: Vec<Play>,
+    /// States whose initial value is that of their start at the first row.
+    pub settled: Vec<usize>,
     first_delayed: Register,
     first_constant: Register,
     first_operation: Register,
+}
+
+/// A play: `min(max(held, x - b), x + b)`, where `held` is what it gave at the last row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Play {
+    /// What goes in.
+    pub from: Register,
+    pub held: Register,
+    /// What it gives.
+    pub to: Register,
 }
 
 /// What a tape computes with.
@@ -132,6 +148,8 @@ pub(crate) struct Registers<T> {
     /// The answers of the guards.
     pub answers: Vec<bool>,
     taken: Vec<bool>,
+    /// Roots, powers and logarithms that have no value are zero: beyond a branch that a step has to end at.
+    pub extended: bool,
 }
 
 struct Compiler<'a> {
@@ -144,6 +162,8 @@ struct Compiler<'a> {
     flows: Vec<Option<Register>>,
     delays: Vec<(Register, Register)>,
     delayed: HashMap<(Register, Register), Register>,
+    plays: Vec<Play>,
+    first_play: Register,
     first_delayed: Register,
     first_constant: Register,
     first_operation: Register,
@@ -152,7 +172,7 @@ struct Compiler<'a> {
 impl Tape {
     pub fn compile(spec: &ModelSpec) -> Self {
         // How many numbers and delays there are decides where registers stand: counted first.
-        let (numbers, delays) = (Cell::new(1), Cell::new(0));
+        let (numbers, delays, plays) = (Cell::new(1), Cell::new(0), Cell::new(0));
         let starts = spec.states.iter().map(|state| &state.start);
         for expression in spec.expressions().chain(starts) {
             expression.any(&|part| {
@@ -161,13 +181,14 @@ impl Tape {
                     Expression::Call(Function::Sign | Function::Abs, _) => {
                         numbers.set(numbers.get() + 2);
                     }
+                    Expression::Call(Function::Play, _) => plays.set(plays.get() + 1),
                     Expression::Delay(..) => delays.set(delays.get() + 1),
                     _ => {}
                 }
                 false
             });
         }
-        let (numbers, delays) = (numbers.get(), delays.get());
+        let (numbers, delays, plays) = (numbers.get(), delays.get(), plays.get());
         let first_delayed = 1 + spec.parameters.len() + spec.inputs.len() + spec.states.len();
         let mut compiler = Compiler {
             spec,
@@ -179,9 +200,11 @@ impl Tape {
             flows: vec![None; spec.flows.len()],
             delays: Vec::new(),
             delayed: HashMap::new(),
+            plays: Vec::new(),
+            first_play: first_delayed + delays,
             first_delayed,
-            first_constant: first_delayed + delays,
-            first_operation: first_delayed + delays + numbers,
+            first_constant: first_delayed + delays + plays,
+            first_operation: first_delayed + delays + plays + numbers,
         };
         for &flow in &spec.order {
             let register = compiler.expression(&spec.flows[flow].value);
@@ -219,6 +242,10 @@ impl Tape {
             outputs,
             starts,
             delays: compiler.delays,
+            plays: compiler.plays,
+            settled: (0..spec.states.len())
+                .filter(|&i| spec.is_settled(i))
+                .collect(),
             first_delayed,
             first_constant: compiler.first_constant,
             first_operation: compiler.first_operation,
@@ -270,6 +297,9 @@ impl Tape {
         for (what, by) in &mut self.delays {
             (*what, *by) = (moved(*what), moved(*by));
         }
+        for play in &mut self.plays {
+            (play.from, play.to) = (moved(play.from), moved(play.to));
+        }
     }
 
     pub fn registers<T: Scalar>(&self, parameters: &[T]) -> Registers<T> {
@@ -282,11 +312,12 @@ impl Tape {
         {
             *value = T::constant(*constant);
         }
-        self.run(0..self.once, &mut values, &[]);
+        self.run(0..self.once, &mut values, &[], false);
         Registers {
             values,
             answers: vec![false; self.guards.len()],
             taken: vec![false; self.branches.len()],
+            extended: false,
         }
     }
 
@@ -322,7 +353,8 @@ impl Tape {
     /// Computes everything from the time, inputs, states and delayed values, with the answers of the guards that the registers hold.
     pub fn evaluate<T: Scalar>(&self, registers: &mut Registers<T>) {
         let all = self.once..self.operations.len();
-        self.run(all, &mut registers.values, &registers.taken);
+        let extended = registers.extended;
+        self.run(all, &mut registers.values, &registers.taken, extended);
     }
 
     /// The same, where every guard answers by its difference.
@@ -356,7 +388,14 @@ impl Tape {
         to.taken.copy_from_slice(&from.taken);
     }
 
-    fn run<T: Scalar>(&self, which: std::ops::Range<usize>, values: &mut [T], taken: &[bool]) {
+    fn run<T: Scalar>(
+        &self,
+        which: std::ops::Range<usize>,
+        values: &mut [T],
+        taken: &[bool],
+        extended: bool,
+    ) {
+        let no_value = |x: f64| extended && x < 0.0;
         let begin = self.first_operation + which.start;
         for (i, operation) in self.operations[which].iter().enumerate() {
             values[begin + i] = match *operation {
@@ -365,6 +404,11 @@ impl Tape {
                 Operation::Subtract(a, b) => values[a] - values[b],
                 Operation::Multiply(a, b) => values[a] * values[b],
                 Operation::Divide(a, b) => values[a] / values[b],
+                Operation::Power(a, _) | Operation::Sqrt(a) | Operation::Log(a)
+                    if no_value(values[a].value()) =>
+                {
+                    T::constant(0.0)
+                }
                 Operation::Power(a, b) => power(values[a], values[b]),
                 Operation::WholePower(a, n) => whole_power(values[a], n),
                 Operation::Sqrt(a) => {
@@ -395,6 +439,11 @@ impl Tape {
                     let square = x * x + y * y;
                     let of = [(values[a], x / square), (values[b], -y / square)];
                     T::with_slopes(y.atan2(x), of)
+                }
+                Operation::Quantise(a, b) => {
+                    // What is rounded rises as what goes in, on the whole; its steps have no derivative.
+                    let value = quantised(values[a].value(), values[b].value());
+                    slope(values[a], value, 1.0)
                 }
                 Operation::Select(branch, a, b) => values[if taken[branch] { a } else { b }],
             };
@@ -431,6 +480,7 @@ impl Operation {
             | Self::Divide(a, b)
             | Self::Power(a, b)
             | Self::Atan2(a, b)
+            | Self::Quantise(a, b)
             | Self::Select(_, a, b) => [Some(a), Some(b)],
             Self::Negative(a)
             | Self::WholePower(a, _)
@@ -464,6 +514,7 @@ impl Operation {
             Self::Tan(a) => Self::Tan(moved(a)),
             Self::Tanh(a) => Self::Tanh(moved(a)),
             Self::Atan2(a, b) => Self::Atan2(moved(a), moved(b)),
+            Self::Quantise(a, b) => Self::Quantise(moved(a), moved(b)),
             Self::Select(branch, a, b) => Self::Select(branch, moved(a), moved(b)),
         }
     }
@@ -588,14 +639,10 @@ impl Compiler<'_> {
                 let otherwise = self.select(negative, minus_one, zero);
                 self.select(positive, one, otherwise)
             }
-            Function::Min => {
-                let smaller = self.guard(Comparison::LessOrEqual, a, b);
-                self.select(smaller, a, b)
-            }
-            Function::Max => {
-                let larger = self.guard(Comparison::GreaterOrEqual, a, b);
-                self.select(larger, a, b)
-            }
+            Function::Min => self.smaller(a, b),
+            Function::Max => self.larger(a, b),
+            Function::Play => self.play(a, b),
+            Function::Quantise => self.operation(Operation::Quantise(a, b)),
             Function::Sqrt => self.operation(Operation::Sqrt(a)),
             Function::Exp => self.operation(Operation::Exp(a)),
             Function::Log => self.operation(Operation::Log(a)),
@@ -606,6 +653,26 @@ impl Compiler<'_> {
             Function::Tanh => self.operation(Operation::Tanh(a)),
             Function::Atan2 => self.operation(Operation::Atan2(a, b)),
         }
+    }
+
+    fn smaller(&mut self, a: Register, b: Register) -> Register {
+        let smaller = self.guard(Comparison::LessOrEqual, a, b);
+        self.select(smaller, a, b)
+    }
+
+    fn larger(&mut self, a: Register, b: Register) -> Register {
+        let larger = self.guard(Comparison::GreaterOrEqual, a, b);
+        self.select(larger, a, b)
+    }
+
+    fn play(&mut self, from: Register, half_width: Register) -> Register {
+        let low = self.operation(Operation::Subtract(from, half_width));
+        let high = self.operation(Operation::Add(from, half_width));
+        let held = self.first_play + self.plays.len();
+        let pushed = self.larger(held, low);
+        let to = self.smaller(pushed, high);
+        self.plays.push(Play { from, held, to });
+        to
     }
 
     fn condition(&mut self, condition: &Condition) -> Branch {

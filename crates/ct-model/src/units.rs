@@ -173,7 +173,9 @@ impl Walk<'_> {
             },
             Expression::Call(function, arguments) => match (function, arguments.as_slice()) {
                 (Function::Abs, [a]) => self.dimension(a),
-                (Function::Min | Function::Max, [a, b]) => self.together(a, b),
+                (Function::Min | Function::Max | Function::Play | Function::Quantise, [a, b]) => {
+                    self.together(a, b)
+                }
                 (Function::Atan2, [a, b]) => {
                     self.together(a, b);
                     Known::Is(NONE)

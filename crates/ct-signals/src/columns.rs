@@ -143,7 +143,9 @@ pub struct Heading {
 }
 
 impl Heading {
-    pub(crate) fn of(header: &str) -> Self {
+    /// From a header.
+    #[must_use]
+    pub fn of(header: &str) -> Self {
         let (name, unit) = unit::split(header);
         Self {
             header: header.into(),
@@ -174,6 +176,17 @@ pub(crate) struct Layout {
     pub inputs: Vec<Found>,
     pub outputs: Vec<Found>,
     pub references: Vec<Found>,
+    /// Outputs that are named and not there, with their positions among the named ones; where outputs are needed there is none.
+    pub absent: Vec<(usize, String)>,
+}
+
+/// What a record is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// A fit, which needs every output.
+    Fit,
+    /// A simulation on its inputs: outputs may be missing.
+    Simulation,
 }
 
 impl Layout {
@@ -281,6 +294,7 @@ impl Columns {
         file: &str,
         row: u64,
         headers: &[String],
+        purpose: Purpose,
     ) -> Result<Layout, Error> {
         let header = Header {
             file,
@@ -296,7 +310,17 @@ impl Columns {
         let time: Vec<String> = self.time.iter().cloned().collect();
         let mut time = named(&TIME, &time)?;
         let mut inputs = named(&INPUT, &self.inputs)?;
-        let mut outputs = named(&OUTPUT, &self.outputs)?;
+        let mut absent = Vec::new();
+        let mut wanted = Vec::new();
+        for (at, output) in self.outputs.iter().enumerate() {
+            let there = purpose == Purpose::Fit || !header.lacks(&OUTPUT, output);
+            if there {
+                wanted.push(output.clone());
+            } else {
+                absent.push((at, output.clone()));
+            }
+        }
+        let mut outputs = named(&OUTPUT, &wanted)?;
         let mut references = named(&REFERENCE, &self.references)?;
 
         let mut taken: Vec<(usize, &'static str)> = Vec::new();
@@ -326,6 +350,13 @@ impl Columns {
             (&OUTPUT, &mut outputs),
         ] {
             let first_input = self.inputs.first().is_some_and(String::is_empty);
+            let optional = role.name == OUTPUT.name && purpose == Purpose::Simulation;
+            if optional && columns.is_empty() {
+                if self.outputs.is_empty() {
+                    columns.extend(header.guess(role, &taken).ok().flatten());
+                }
+                continue;
+            }
             if columns.is_empty() || role.name == INPUT.name && first_input {
                 let guessed = header.guess(role, &taken)?;
                 columns.insert(0, guessed.ok_or_else(|| header.missing(role, None))?);
@@ -348,11 +379,20 @@ impl Columns {
             inputs,
             outputs,
             references,
+            absent,
         })
     }
 }
 
 impl Header<'_> {
+    /// Whether no column has this name.
+    fn lacks(&self, role: &Role, wanted: &str) -> bool {
+        match self.named(role, wanted) {
+            Err(Error::Column { fault, .. }) => matches!(*fault, ColumnFault::Missing { .. }),
+            _ => false,
+        }
+    }
+
     fn named(&self, role: &Role, wanted: &str) -> Result<Found, Error> {
         let wanted = wanted.trim();
         let exact: Vec<usize> = self.indices(|header| header == wanted);

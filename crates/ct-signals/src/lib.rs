@@ -87,6 +87,7 @@ pub use column_fault::ColumnFault;
 pub use columns::{Columns, Heading};
 pub use csv::{
     Converted, MissingSamples, ReadOptions, ReadSummary, Reading, csv_header, parse_csv, read_csv,
+    read_inputs_csv,
 };
 pub use error::Error;
 pub use gaps::Gaps;

@@ -8,7 +8,7 @@
 
 use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
-use crate::columns::{Found, Layout};
+use crate::columns::{Found, Layout, Purpose};
 use crate::csv::{
     Cell, CellFault, Numbers, THOUSANDS, TIME_AS_NUMBER, Times, check_width, delimiter,
     delimiter_name, is_number, says_missing,
@@ -18,10 +18,8 @@ use crate::{
     quoted, unit,
 };
 
-/// The names of the columns in use, where they have no header; all behind the last are outputs.
+/// The names of the columns in use, where they have no header.
 const ROLES: [&str; 3] = ["time", "input", "output"];
-/// Roles before the outputs.
-const OUTPUTS: usize = 2;
 
 /// How the times of rows are written.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,15 +45,17 @@ pub struct Rows {
     header: Option<String>,
     /// Fields of a row.
     fields: usize,
-    /// Positions of time, input and outputs.
+    /// Positions of time, inputs and outputs.
     at: Vec<usize>,
+    /// How many of them are inputs, one at least.
+    inputs: usize,
     /// Their headers.
     names: Vec<String>,
-    /// Units of input and outputs.
+    /// Units of inputs and outputs.
     units: Vec<String>,
-    /// How input and outputs are converted to these, where the header has other ones.
+    /// How inputs and outputs are converted to these, where the header has other ones.
     conversions: Vec<Option<Conversion>>,
-    /// The cells of the latest row: time, input, outputs.
+    /// The cells of the latest row: time, inputs, outputs.
     values: Vec<Result<f64, BadLine>>,
     /// Seconds in one unit of the time, where it is a number.
     seconds: f64,
@@ -72,7 +72,7 @@ pub struct Rows {
 /// What a line holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Line {
-    /// Time \[s\] and input; the outputs are in [`Rows::outputs`].
+    /// Time \[s\] and the first input; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
     Row([f64; 2]),
     /// Nothing: it is blank, a comment, or the header again.
     Nothing,
@@ -178,6 +178,7 @@ impl Rows {
             header: None,
             fields: cells.len(),
             at: Vec::new(),
+            inputs: 1,
             names: Vec::new(),
             units: Vec::new(),
             conversions: Vec::new(),
@@ -220,7 +221,7 @@ impl Rows {
                 .collect();
             for (i, name) in rows.names.iter_mut().enumerate() {
                 if name.is_empty() {
-                    *name = ROLES[i.min(OUTPUTS)].to_string();
+                    *name = ROLES[i.min(ROLES.len() - 1)].to_string();
                 }
             }
             rows.conversions = vec![None; outputs + 1];
@@ -232,12 +233,11 @@ impl Rows {
         let Layout {
             time,
             seconds,
-            mut inputs,
+            inputs,
             outputs,
             ..
-        } = columns.resolve(file, row, &cells)?;
-        // One input at least.
-        let input = inputs.swap_remove(0);
+        } = columns.resolve(file, row, &cells, Purpose::Fit)?;
+        rows.inputs = inputs.len();
         rows.at = vec![time.index];
         rows.names = vec![time.header];
         for Found {
@@ -246,7 +246,7 @@ impl Rows {
             unit,
             converted,
             ..
-        } in std::iter::once(input).chain(outputs)
+        } in inputs.into_iter().chain(outputs)
         {
             rows.at.push(index);
             rows.names.push(header);
@@ -265,27 +265,37 @@ impl Rows {
         self.header.is_some()
     }
 
-    /// The header of time, input or the first output.
+    /// The header of the time, or of an input or output, counted from zero among its kind: `time`, `input`, `output`.
     #[must_use]
-    pub fn name(&self, role: &str) -> &str {
-        let at = ROLES.iter().position(|known| *known == role);
-        at.map_or("", |at| &self.names[at])
+    pub fn name(&self, role: &str, at: usize) -> &str {
+        let before = match ROLES.iter().position(|known| *known == role) {
+            Some(0) => 0,
+            Some(1) => 1,
+            _ => 1 + self.inputs,
+        };
+        self.names.get(before + at).map_or("", String::as_str)
     }
 
-    /// The header of an output, counted from zero.
-    #[must_use]
-    pub fn output_name(&self, output: usize) -> &str {
-        self.names.get(OUTPUTS + output).map_or("", String::as_str)
-    }
-
-    /// Units of input and outputs, in order and in printable text; empty where nothing says.
+    /// Units of inputs and outputs, in order and in printable text; empty where nothing says.
     pub fn units(&self) -> impl Iterator<Item = &str> {
         self.units.iter().map(String::as_str)
     }
 
     /// The outputs of the row that was read last, or why there is none: its cell says that the sample is missing, or holds no number.
     pub fn outputs(&self) -> &[Result<f64, BadLine>] {
-        &self.values[OUTPUTS..]
+        &self.values[1 + self.inputs..]
+    }
+
+    /// The inputs of the row that was read last, finite or not.
+    pub fn inputs(&self) -> impl Iterator<Item = f64> {
+        let inputs = self.values[1..=self.inputs].iter();
+        inputs.map(|value| *value.as_ref().unwrap_or(&f64::NAN))
+    }
+
+    /// Seconds in one unit of the time, as its header has it.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.seconds
     }
 
     /// How the times are written, once a row has been read.
@@ -321,22 +331,27 @@ impl Rows {
     /// In which order a row's fields are read, in words.
     #[must_use]
     pub fn order(&self) -> String {
-        let outputs = &self.names[OUTPUTS..];
+        let (inputs, outputs) = self.names[1..].split_at(self.inputs);
         let readings = if outputs.len() == 1 {
             "reading"
         } else {
             "readings"
         };
         if self.header.is_some() {
-            let names: Vec<String> = outputs
-                .iter()
-                .map(|name| format!("\"{}\"", quoted(name)))
-                .collect();
+            let list = |names: &[String]| {
+                let names = names.iter().map(|name| format!("\"{}\"", quoted(name)));
+                names.collect::<Vec<_>>().join(", ")
+            };
+            let command = if inputs.len() == 1 {
+                "command"
+            } else {
+                "inputs"
+            };
             return format!(
-                "a header: \"{}\" is the time, \"{}\" the command, {} the {readings}",
+                "a header: \"{}\" is the time, {} the {command}, {} the {readings}",
                 quoted(&self.names[0]),
-                quoted(&self.names[1]),
-                names.join(", ")
+                list(inputs),
+                list(outputs)
             );
         }
         let (reference, r) = if self.fields > self.names.len() {
@@ -387,6 +402,10 @@ impl Rows {
             }
         }
         let value = |role: usize| self.values[role].clone();
+        // Every input is needed.
+        for role in 2..=self.inputs {
+            value(role)?;
+        }
         Ok(Line::Row([value(0)?, value(1)?]))
     }
 
@@ -620,7 +639,7 @@ mod tests {
         assert!(rows.units().eq(["V", "cm", "cm"]));
         assert_eq!(read(&mut rows, "1,100,4,12"), Ok(Line::Row([1.0, 4.0])));
         assert_eq!(rows.outputs(), [Ok(12.0), Ok(10.0)]);
-        assert_eq!(rows.output_name(1), "lower [mm]");
+        assert_eq!(rows.name("output", 1), "lower [mm]");
         // Either may be lost for itself, in one row.
         assert_eq!(read(&mut rows, "2,,4,12"), Ok(Line::Row([2.0, 4.0])));
         assert_eq!(rows.outputs()[0], Ok(12.0));
@@ -741,6 +760,31 @@ mod tests {
         assert_eq!(
             read(&mut rows, "01/04/2026 10:00,4,12"),
             Ok(Line::Row([86_400.0, 4.0]))
+        );
+    }
+
+    #[test]
+    fn several_inputs_are_read_and_each_is_needed() {
+        let columns = Columns {
+            inputs: vec!["heater [%]".into(), "room [degC]".into()],
+            outputs: vec!["block [degC]".into()],
+            ..Columns::default()
+        };
+        let line = "t [h],room [degC],block [degC],heater [%]";
+        let (mut rows, _) = Rows::begin("input", 1, line, &columns).unwrap();
+        assert!(rows.units().eq(["%", "degC", "degC"]));
+        assert_eq!(rows.name("input", 1), "room [degC]");
+        assert_eq!(
+            rows.order(),
+            "a header: \"t [h]\" is the time, \"heater [%]\", \"room [degC]\" the inputs, \"block [degC]\" the reading"
+        );
+        assert_eq!(read(&mut rows, "1,21,,40"), Ok(Line::Row([3600.0, 40.0])));
+        assert!(rows.inputs().eq([40.0, 21.0]));
+        assert!(rows.outputs()[0].is_err());
+        let bad = read(&mut rows, "2,,50,40").unwrap_err();
+        assert_eq!(
+            bad,
+            "column \"room [degC]\": the cell is empty; check what writes the rows"
         );
     }
 

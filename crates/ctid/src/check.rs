@@ -16,7 +16,8 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     Ok(said(&own_model::read_model(path)?, look))
 }
 
-fn said(model: &ModelSpec, look: Look) -> String {
+/// What a model holds, in words.
+pub(crate) fn said(model: &ModelSpec, look: Look) -> String {
     let mut text = String::new();
     let title = match model.description.as_str() {
         "" => model.name.clone(),
@@ -69,6 +70,7 @@ fn said(model: &ModelSpec, look: Look) -> String {
         row(model.about(flow), &value, "")
     });
     part("Named flows", flows.collect());
+    text += &own_model::ports::summary(model, look);
     let warnings = unit_warnings(model);
     if !warnings.is_empty() {
         text.push('\n');

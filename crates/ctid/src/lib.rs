@@ -7,6 +7,7 @@
 //! | records and model, read and checked | [`input`] |
 //! | a missing term as a file | [`term_file`] |
 //! | the next experiment | [`mod@design`] |
+//! | a model on new inputs | `simulate` |
 //! | the tour | [`tour`] |
 //! | rows watched as they come | [`mod@monitor`] |
 //! | linear models from a record | [`mod@identify`] |
@@ -42,6 +43,7 @@ pub mod progress;
 pub mod report;
 pub mod serve;
 mod signature;
+mod simulate;
 pub mod tables;
 pub mod term_file;
 pub mod terminal;

@@ -45,6 +45,8 @@ pub enum Kind {
     Record,
     /// The shape of what is missing, as CSV; nothing is written where nothing is.
     Unknown,
+    /// A model's text.
+    Model,
 }
 
 /// What a command finds, which is written as JSON with `schema` and the mark that ctid knows its own files by, or as a page.
@@ -56,6 +58,11 @@ pub trait Found: Serialize {
 
     /// The record as CSV, where there is one.
     fn record(&self) -> Option<String> {
+        None
+    }
+
+    /// The model's text, where there is one.
+    fn model(&self) -> Option<String> {
         None
     }
 
@@ -188,6 +195,7 @@ impl Output {
             Kind::Report => Some(found.page()),
             Kind::Record => found.record(),
             Kind::Unknown => found.unknown(),
+            Kind::Model => found.model(),
         };
         let Some(content) = content else {
             return Ok(false);
@@ -286,8 +294,8 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
         return false;
     };
     match kind {
-        // Nothing in a record says who wrote it.
-        Kind::Record => false,
+        // Nothing in a record says who wrote it, and a text may have been changed by hand since.
+        Kind::Record | Kind::Model => false,
         Kind::Report => {
             let mut head = Vec::new();
             let read = file.take(HEAD).read_to_end(&mut head);
@@ -316,9 +324,11 @@ fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
             ));
         }
         Standing::NotOurs => {
-            // A record does not say who wrote it.
+            // These do not say who wrote them.
             let why = match kind {
-                Kind::Record => "it is there already; choose another name or delete it",
+                Kind::Record | Kind::Model => {
+                    "it is there already; choose another name or delete it"
+                }
                 _ => {
                     "it is there already, and ctid did not write it; choose another name or delete it"
                 }

@@ -22,6 +22,8 @@ pub struct Robust {
     pub std_errors: Vec<Option<f64>>,
     /// Degrees of freedom of each of them.
     pub freedom: Vec<Option<f64>>,
+    /// Covariance of the entries at [`Fit::interior`], row by row; `None` where they are not determined.
+    pub covariance: Option<Vec<Vec<f64>>>,
     /// The noise of the residual.
     pub noise: Noise,
 }
@@ -54,16 +56,23 @@ pub fn robust(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Robust,
     rows.each_prior(fit.interior(), weight, |row| {
         sandwich.priors.push(row.to_vec())
     });
-    let variances = |noise: &Noise, variance: f64| sandwich.variances(noise, variance);
+    let variances =
+        |noise: &Noise, variance: f64| Some(diagonal(&sandwich.covariance(noise, variance)?));
     let (relative, variance) = noise.relative();
-    let own = variances(&relative, variance).unwrap_or_default();
+    let covariance = sandwich.covariance(&relative, variance);
+    let own = covariance.as_ref().map(|c| diagonal(c)).unwrap_or_default();
     let freedom = marginal::freedom(&rows, fit.interior(), &noise, variances)
         .unwrap_or_else(|| vec![fit.degrees_left(); own.len()]);
     Ok(Robust {
         std_errors: fit.spread(own.into_iter().map(f64::sqrt)),
         freedom: fit.spread(freedom.into_iter()),
+        covariance,
         noise,
     })
+}
+
+fn diagonal(matrix: &[Vec<f64>]) -> Vec<f64> {
+    matrix.iter().enumerate().map(|(i, row)| row[i]).collect()
 }
 
 /// `C` and the rows `M J` of the entries that are not at a bound. Rows whose reading is missing have no part in either.
@@ -120,7 +129,7 @@ impl Sandwich {
     }
 
     /// Under noise of scales relative to that of the first output, and the variance of that.
-    fn variances(&self, noise: &Noise, variance: f64) -> Option<Vec<f64>> {
+    fn covariance(&self, noise: &Noise, variance: f64) -> Option<Vec<Vec<f64>>> {
         let bread = self.bread.as_ref()?;
         if self.lanes == 0 {
             return Some(Vec::new());
@@ -141,18 +150,21 @@ impl Sandwich {
             filling.push(&row.iter().map(|value| scale * value).collect::<Vec<f64>>());
         }
         filling.finish();
+        // G C, a row for each entry: the covariance is the product of two of them.
+        let sums: Vec<Vec<f64>> = bread
+            .iter()
+            .map(|row| {
+                let sum = |i: usize| (i..self.lanes).map(|j| filling.at(i, j) * row[j]).sum();
+                (0..self.lanes).map(sum).collect()
+            })
+            .collect();
+        let product = |a: &Vec<f64>, b: &Vec<f64>| {
+            let sum: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+            sum * variance
+        };
+        let rows = sums.iter();
         Some(
-            bread
-                .iter()
-                .map(|row| {
-                    (0..self.lanes)
-                        .map(|i| {
-                            let sum: f64 = (i..self.lanes).map(|j| filling.at(i, j) * row[j]).sum();
-                            sum * sum
-                        })
-                        .sum::<f64>()
-                        * variance
-                })
+            rows.map(|a| sums.iter().map(|b| product(a, b)).collect())
                 .collect(),
         )
     }
@@ -174,7 +186,7 @@ mod tests {
                 let weights = metric.inverse_scales();
                 let bread = rows.fold(&[0, 1, 2], &metric, &weights).covariance(&[0, 1]);
                 let ours = Sandwich::new(&rows, &[0, 1], (&metric, &weights), bread)
-                    .variances(&noise, 0.5)
+                    .covariance(&noise, 0.5)
                     .unwrap();
                 let weighted = covariance(&metric, &rows.lengths, &there)
                     .try_inverse()
@@ -184,8 +196,12 @@ mod tests {
                 let filling =
                     weighted.transpose() * covariance(&noise, &rows.lengths, &there) * &weighted;
                 let dense = &bread * filling * &bread * 0.5;
+                let size = dense.amax();
                 for (i, ours) in ours.iter().enumerate() {
-                    assert_relative_eq!(*ours, dense[(i, i)], max_relative = 1e-9);
+                    for (j, ours) in ours.iter().enumerate() {
+                        assert_relative_eq!(*ours, dense[(i, j)], epsilon = 1e-9 * size);
+                    }
+                    assert_relative_eq!(ours[i], dense[(i, i)], max_relative = 1e-9);
                 }
             }
         }

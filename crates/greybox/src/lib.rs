@@ -7,10 +7,14 @@ mod feedback;
 mod fit;
 mod many_starts;
 mod model_setup;
+mod model_starts;
+mod output_noise;
+mod prediction;
 mod reading_grid;
 mod reading_step;
 mod setup;
 mod starts;
+mod steady_state;
 mod time_limit;
 
 pub use clock::common_clock;
@@ -23,8 +27,10 @@ pub use fit::{
 };
 pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use model_setup::ModelSetup;
+pub use prediction::{FitUncertainty, InitialStates, output_errors};
 pub use reading_grid::{ReadingGrid, reading_grid};
 pub use reading_step::exact_reading_step;
 pub use setup::{LoopRun, PriorValue, Setup, Simulated, at_rest, commands, weighted_rms};
-pub use starts::{random_starts, starts_around};
+pub use starts::{levels_from_readings, random_starts, starts_around};
+pub use steady_state::steady_state;
 pub use time_limit::TimeLimit;

@@ -9,13 +9,8 @@ use std::collections::BTreeMap;
 use ct_model::{About, Dual, Given, Model, Simulation, Variable};
 use ct_signals::{Hold, Record};
 use estimation::{Fit, Noise, Prior, Residuals, Sample, Start, within};
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 
-use crate::{Error, FitOptions, PriorValue, clock::Clock};
-
-/// Spread of the starts of positive parameters, of their logarithm: a guess is off by a factor of two as often as not.
-const SPREAD: f64 = 0.7;
+use crate::{Error, FitOptions, PriorValue, clock::Clock, output_noise::output_noise};
 
 /// A model, the records, and which parameters are free.
 #[derive(Debug, Clone)]
@@ -39,7 +34,7 @@ pub struct ModelSetup<'a> {
 /// Where the text sets no bound a parameter stays within this factor of its value there, ...
 const REACH: f64 = 30.0;
 /// ... and an initial state within this one.
-const STATE_REACH: f64 = 10.0;
+const STATE_REACH: f64 = 30.0;
 /// Rounds in which outputs are weighted anew by their noise.
 const WEIGHTINGS: usize = 3;
 /// Scales of the noise have settled when none changes by more than this share.
@@ -63,6 +58,15 @@ fn bounds_of(about: &About, value: f64, factor: f64) -> (f64, f64) {
         reach
     };
     (low, high)
+}
+
+/// Samples of each output in all records, missing ones aside.
+fn samples_of(records: &[Record], outputs: usize) -> Vec<usize> {
+    let present = |o: usize| {
+        let outputs = records.iter().map(move |record| &record.outputs[o]);
+        outputs.map(|y| y.values.len() - y.missing()).sum()
+    };
+    (0..outputs).map(present).collect()
 }
 
 impl<'a> ModelSetup<'a> {
@@ -147,7 +151,6 @@ impl<'a> ModelSetup<'a> {
         }
         let outputs = 0..spec.outputs.len();
         let all = |o: usize| records.iter().map(move |record| &record.outputs[o]);
-        let count = |o| all(o).map(|y| y.values.len() - y.missing()).sum();
         let floor = |o| {
             let ranges = all(o).map(ct_signals::Channel::range);
             let range = ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
@@ -159,7 +162,7 @@ impl<'a> ModelSetup<'a> {
             }
         };
         Ok(Self {
-            samples: outputs.clone().map(count).collect(),
+            samples: samples_of(records, spec.outputs.len()),
             floors: outputs.map(floor).collect(),
             clock: Clock::of(records),
             model,
@@ -200,6 +203,22 @@ impl<'a> ModelSetup<'a> {
         Ok(setup)
     }
 
+    /// The same model, clock and fitted parameters against other records, without priors.
+    ///
+    /// # Errors
+    /// As [`ModelSetup::new`].
+    pub fn with_records<'b>(&self, records: &'b [Record]) -> Result<ModelSetup<'b>, Error>
+    where
+        'a: 'b,
+    {
+        let fixed = (0..self.parameter_count()).filter(|i| !self.free.contains(i));
+        let known = fixed.map(|i| (self.names[i].clone(), self.start[i]));
+        let known: BTreeMap<String, f64> = known.collect();
+        let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
+        setup.clock = self.clock.with_records(records);
+        Ok(setup)
+    }
+
     /// Positions of the entries that are fitted.
     #[must_use]
     pub fn free(&self) -> &[usize] {
@@ -230,31 +249,60 @@ impl<'a> ModelSetup<'a> {
         self.model
     }
 
-    /// Starts: that of the text and of the records, and others around it, each free parameter moved by its own factor.
+    /// Instants of a record's rows on the clock of the model \[unit of the model's time\].
     #[must_use]
-    pub fn starts(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        let mut starts = vec![self.start.clone()];
-        while starts.len() < n.max(1) {
-            let mut start = self.start.clone();
-            for &i in self.free.iter().filter(|&&i| i < self.parameter_count()) {
-                let draw: f64 = StandardNormal.sample(&mut rng);
-                let (value, (low, high)) = (self.start[i], self.bounds[i]);
-                let moved = if value == 0.0 {
-                    let reach = if high.is_finite() && low.is_finite() {
-                        0.2 * (high - low)
-                    } else {
-                        1.0
-                    };
-                    draw * reach
-                } else {
-                    value * (SPREAD * draw).exp()
-                };
-                start[i] = within(moved, (low, high));
-            }
-            starts.push(start);
+    pub fn model_time(&self, record: usize) -> Vec<f64> {
+        let time = &self.records[record].time;
+        let begin = self.clock.begins[record] / self.time_unit;
+        time.iter()
+            .map(|t| begin + (t - time[0]) / self.time_unit)
+            .collect()
+    }
+
+    /// How many outputs.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Samples of each output, missing ones aside.
+    pub(crate) fn samples_per_output(&self) -> &[usize] {
+        &self.samples
+    }
+
+    /// Bounds of an entry.
+    pub(crate) fn bound(&self, i: usize) -> (f64, f64) {
+        self.bounds[i]
+    }
+
+    /// An entry is the initial value of a state that an output reads.
+    pub(crate) fn is_read(&self, i: usize) -> bool {
+        let spec = self.model.spec();
+        i.checked_sub(self.parameter_count()).is_some_and(|i| {
+            let state = Variable::State(i % spec.states.len());
+            spec.is_output(state)
+        })
+    }
+
+    /// The first rows of every record, a share of each.
+    pub(crate) fn first_rows(&self, share: f64) -> Vec<Record> {
+        let first = |record: &Record| {
+            let rows = (share * record.len() as f64).ceil() as usize;
+            record.rows(0..rows.clamp(1, record.len()))
+        };
+        self.records.iter().map(first).collect()
+    }
+
+    /// The same model, entries and starts against other records of the same number and outputs.
+    pub(crate) fn against<'b>(&self, records: &'b [Record]) -> ModelSetup<'b>
+    where
+        'a: 'b,
+    {
+        ModelSetup {
+            records,
+            samples: samples_of(records, self.outputs()),
+            ..self.clone()
         }
-        starts
     }
 
     /// Fits from many starts. Of several outputs each counts by its noise, which is what the past of its residual does not explain: where the
@@ -264,29 +312,33 @@ impl<'a> ModelSetup<'a> {
     /// Where no start gives a finite simulation.
     pub fn fit(&self, options: &FitOptions) -> Result<Fit, Error> {
         let white = Noise::white(self.samples.len());
-        let starts = |own: &Self| {
-            own.starts(options.starts, options.seed)
-                .into_iter()
-                .map(Start::from)
-        };
-        let mut fit = estimation::fit_from(self, starts(self).collect(), &white, options.stopping)?;
+        let starts = self.starts(options.starts, options.seed, options.stopping);
+        let mut fit = estimation::fit_from(self, starts.clone(), &white, options.stopping)?;
+        if self.samples.len() < 2 {
+            return Ok(fit);
+        }
         let mut weighted = self.clone();
         for round in 0..WEIGHTINGS {
-            let noise = estimation::noise_of(&weighted, &fit, options.noise_order)?;
-            let scales: Vec<f64> = noise.iter().map(ct_signals::ArModel::sigma).collect();
+            let simulated = weighted.simulate(&fit.x).ok_or(Error::Stopped)?;
+            let noise = output_noise(self.records, &simulated);
+            let scales: Vec<f64> = noise
+                .into_iter()
+                .zip(&fit.rmse)
+                .map(|(noise, rmse)| noise.unwrap_or(*rmse))
+                .collect();
             let settled = weighted.known_scales.as_ref().is_some_and(|known| {
                 known
                     .iter()
                     .zip(&scales)
                     .all(|(a, b)| (a / b - 1.0).abs() < SETTLED)
             });
-            if settled || scales.len() < 2 {
+            if settled {
                 break;
             }
             weighted.known_scales = Some(scales);
             let mut from: Vec<Start> = vec![fit.x.clone().into()];
             if round == 0 {
-                from.extend(starts(self));
+                from.extend(starts.iter().cloned());
             }
             fit = estimation::fit_from(&weighted, from, &white, options.stopping)?;
         }

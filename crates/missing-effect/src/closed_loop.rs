@@ -161,7 +161,8 @@ pub(crate) fn widened(
         .collect())
 }
 
-fn other_metric(setup: &Setup, node: &Node) -> Result<Vec<f64>, Error> {
+/// Where the fit in another metric ends: white noise for one with a noise model, and the other way round.
+pub(crate) fn other_metric(setup: &Setup, node: &Node) -> Result<Vec<f64>, Error> {
     Ok(if node.fit.noise.order() == 0 {
         coloured(setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.x
     } else {

@@ -2,18 +2,19 @@
 
 use std::time::Instant;
 
-use greybox::coloured;
+use greybox::{Fit, coloured};
 
 use crate::{
     ControlLoop, Diagnosis, Error, Options, Problem, Verdict,
     confirm::{BIC_MARGIN, beyond_chance},
     diagnose::{allow, assemble, effort, floors},
+    diagnosis::Floors,
     gaps::Mended,
     node::Node,
     noise_floor::{NOISE_ORDER, wanders},
     problem::{STOPPING, base},
     proposal::singles,
-    remains::remains,
+    remains::{Left, remains},
     sentences, step,
 };
 
@@ -42,13 +43,32 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     Ok(diagnosis)
 }
 
-/// The same of records without gaps.
-fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
-    // One model has to be fitted, and no sets of effects are searched.
-    let options = &Options {
+/// One model has to be fitted, and no sets of effects are searched.
+fn of_one_model<'a>(options: &Options<'a>) -> Options<'a> {
+    Options {
         time_limit: options.time_limit.map(|limit| limit.mul_f64(SHARE)),
         ..*options
-    };
+    }
+}
+
+/// The believed model as a comparison shows it.
+pub(crate) struct Believed<'a> {
+    /// The fit that is shown.
+    pub shown: Node<'a>,
+    /// The fit under the noise model of its residual.
+    own: Fit,
+    left: Option<Left>,
+    pub lacking: bool,
+    floor: Floors,
+    pub control_loop: Option<ControlLoop>,
+}
+
+/// Fits the believed model to records without gaps.
+pub(crate) fn believed<'a>(
+    problem: &'a Problem,
+    options: &Options<'a>,
+) -> Result<Believed<'a>, Error> {
+    let options = &of_one_model(options);
     let (base, control_loop) = base(problem, options, FITTED)?;
     allow(&base, TRIED);
     let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
@@ -63,11 +83,6 @@ fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Erro
         .any(|single| single.gain_over(&in_noise) > BIC_MARGIN && beyond_chance(single, &in_noise));
     let left = remains(&base, &own)?;
     let lacking = tempted || left.is_some();
-    let verdict = if lacking {
-        Verdict::Unexplained
-    } else {
-        Verdict::Adequate
-    };
     let floor = floors(problem, &own.noise, "the residual of the believed model");
     // In the metric of a noise that wanders a simulation may drift off.
     let shown = if lacking || wanders(&base, &own.noise) {
@@ -83,6 +98,31 @@ fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Erro
     } else {
         floor
     };
+    Ok(Believed {
+        shown,
+        own,
+        left,
+        lacking,
+        floor,
+        control_loop,
+    })
+}
+
+/// The same of records without gaps.
+fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
+    let Believed {
+        shown,
+        own,
+        left,
+        lacking,
+        floor,
+        control_loop,
+    } = believed(problem, options)?;
+    let verdict = if lacking {
+        Verdict::Unexplained
+    } else {
+        Verdict::Adequate
+    };
     let widen = ControlLoop::widens(control_loop.as_ref());
     let step = step::report(&shown, own.bic(), &floor.noise()?, &problem.test, widen)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
@@ -93,6 +133,6 @@ fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Erro
     let more = [held_out, minimum, sentences::of_terms(problem)];
     diagnosis.sentences.extend(more.into_iter().flatten());
     diagnosis.speak_of_the_loop(control_loop);
-    diagnosis.effort = effort(&shown, options);
+    diagnosis.effort = effort(&shown, &of_one_model(options));
     Ok(diagnosis)
 }

@@ -18,6 +18,7 @@ mod exchange;
 mod exhausted;
 mod feedback_test;
 mod find;
+mod fitted;
 mod floating;
 mod gaps;
 mod groups;
@@ -43,7 +44,6 @@ mod sentences;
 mod series;
 #[cfg(test)]
 mod simulated;
-mod spectral_line;
 mod step;
 mod sticking;
 mod trail;
@@ -57,6 +57,7 @@ pub use diagnosis::{
     Verdict,
 };
 pub use error::Error;
+pub use fitted::{Fitted, fitted};
 pub use gaps::{LONGEST_HOLD, MendedGaps};
 pub use groups::GROUP_MARGIN;
 pub use problem::{Options, Problem, Progress, TIME_LIMIT};

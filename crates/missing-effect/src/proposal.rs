@@ -3,6 +3,7 @@
 use std::{f64::consts::TAU, sync::OnceLock};
 
 use ct_signals::Record;
+use effect_search::strongest_line;
 use greybox::{
     Noise, Setup, Start, Stopping, Triangle, fit_onward, keep_best_simulated, with_other_speeds,
 };
@@ -13,7 +14,6 @@ use crate::{
     hidden_step::{self, hidden_step},
     node::{Node, ROUGH, best_first, position_of, transfer},
     series::{series, standardised},
-    spectral_line::strongest_line,
 };
 
 /// Damping of the step that a promise takes, against what the data do not determine.

@@ -17,32 +17,15 @@
 //! **References**: L. D. Haugh, J. American Statistical Association 71 (1976) 378-385; S. A. Billings, W. S. F. Voon,
 //! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244.
 
-use std::f64::consts::SQRT_2;
-
 use ct_signals::{ArModel, Record, residual_tests::prewhitened_input_test};
+use effect_search::residual::{instant, level_p, of_command, period, standardised};
 use greybox::{Fit, Noise};
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use statrs::{
-    distribution::{ChiSquared, ContinuousCDF},
-    function::erf::erfc,
-};
 
-use crate::{
-    Error, control_loop::slowest_time_constant, node::Node, noise_floor::slowness_of,
-    spectral_line::strongest_line,
-};
+use crate::{Error, control_loop::slowest_time_constant, node::Node, noise_floor::slowness_of};
 
 /// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
 const NOT_NOISE: f64 = 1e-4;
-/// Longest window that is looked at, as a part of the record.
-const LONGEST_WINDOW: usize = 4;
-
-/// Knots of the functions of the level, evenly over the range that the model visits.
-const KNOTS: usize = 11;
-/// A function counts where its squares sum to so many samples: fewer are as Gaussian as the noise is, and no more.
-const VISITED: f64 = 5.0;
-
 /// What a residual shows that noise does not; the first that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Remains {
@@ -100,13 +83,7 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
     };
     for (i, residual) in residuals.iter().enumerate() {
         let record = &records[i / outputs];
-        let found = match period(record, residual, level)? {
-            None => {
-                let white = standardised(own.noise.of_series(i), residual);
-                instant(record, &white, level)
-            }
-            found => found,
-        };
+        let found = place_in_time(record, residual, own.noise.of_series(i), level)?;
         if let Some(what) = found {
             return Ok(Some(left(what, i)));
         }
@@ -187,190 +164,17 @@ fn least_p(
     Ok(((least * count).min(1.0), at))
 }
 
-/// The command, its square about the mean, and the size of its moves.
-fn of_command(u: &[f64]) -> Vec<Vec<f64>> {
-    let mean = u.iter().sum::<f64>() / u.len() as f64;
-    let square = u.iter().map(|u| (u - mean).powi(2)).collect();
-    let mut moves = vec![0.0];
-    moves.extend(u.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
-    vec![u.to_vec(), square, moves]
-}
-
-/// The whitened residual, of unit variance; zero where the sample is missing, so that sums and products leave it out.
-fn standardised(noise: &ArModel, residual: &[f64]) -> Vec<f64> {
-    let mut white = noise.whiten(residual);
-    let present = || white.iter().filter(|w| !w.is_nan());
-    let count = present().count().max(1);
-    let rms = (present().map(|w| w * w).sum::<f64>() / count as f64).sqrt();
-    for w in &mut white {
-        *w = if w.is_nan() {
-            0.0
-        } else {
-            *w / rms.max(f64::MIN_POSITIVE)
-        };
+/// A period of a residual, or else an instant.
+fn place_in_time(
+    record: &Record,
+    residual: &[f64],
+    noise: &ArModel,
+    level: f64,
+) -> Result<Option<Remains>, Error> {
+    if let Some(cycles) = period(residual, level)? {
+        return Ok(Some(Remains::Period(record.duration() / cycles as f64)));
     }
-    white
-}
-
-/// p-value of the test that a whitened residual is independent of what the model read a sample before.
-fn level_p(model: &[f64], white: &[f64]) -> f64 {
-    let (low, high) = model
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
-            (low.min(y), high.max(y))
-        });
-    let width = (high - low) / (KNOTS - 1) as f64;
-    if !(width.is_finite() && width > 0.0) {
-        return 1.0;
-    }
-    // Hats, which sum to one: at a sample two neighbours are not zero.
-    let mut gram = DMatrix::<f64>::zeros(KNOTS, KNOTS);
-    let mut moment = DVector::<f64>::zeros(KNOTS);
-    // Zero where the sample is missing.
-    for (y, w) in model.iter().zip(&white[1..]).filter(|(_, w)| **w != 0.0) {
-        let at = (y - low) / width;
-        let left = (at as usize).min(KNOTS - 2);
-        let hats = [(left, left as f64 + 1.0 - at), (left + 1, at - left as f64)];
-        for (i, a) in hats {
-            moment[i] += a * w;
-            for (j, b) in hats {
-                gram[(i, j)] += a * b;
-            }
-        }
-    }
-    let visited: Vec<usize> = (0..KNOTS).filter(|&i| gram[(i, i)] > VISITED).collect();
-    let gram = gram.select_rows(&visited).select_columns(&visited);
-    let moment = moment.select_rows(&visited);
-    let explained = gram
-        .cholesky()
-        .map_or(0.0, |factor| moment.dot(&factor.solve(&moment)));
-    ChiSquared::new(visited.len() as f64).map_or(1.0, |chi| chi.sf(explained.max(0.0)))
-}
-
-fn instant(record: &Record, white: &[f64], level: f64) -> Option<Remains> {
-    let n = white.len();
-    let lengths =
-        || std::iter::successors(Some(1), |l| Some(2 * l)).take_while(|l| LONGEST_WINDOW * l <= n);
-    let windows: usize = lengths().map(|length| n - length + 1).sum();
-    let mut running = vec![0.0];
-    running.extend(white.iter().scan(0.0, |sum, w| {
-        *sum += w;
-        Some(*sum)
-    }));
-    let (size, from, length) = lengths()
-        .flat_map(|length| (0..=n - length).map(move |from| (from, length)))
-        .map(|(from, length)| {
-            let sum: f64 = running[from + length] - running[from];
-            (sum.abs() / (length as f64).sqrt(), from, length)
-        })
-        .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let chance = windows as f64 * erfc(size / SQRT_2);
-    (chance < level).then(|| {
-        let to = (from + length).min(n - 1);
-        Remains::Instant(record.time[from], record.time[to] - record.time[from])
-    })
-}
-
-fn period(record: &Record, residual: &[f64], level: f64) -> Result<Option<Remains>, Error> {
-    Ok(strongest_line(residual)?
-        .filter(|line| line.chance < level)
-        .map(|line| Remains::Period(record.duration() / line.cycles as f64)))
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, clippy::panic)]
-    use std::f64::consts::PI;
-
-    use ct_signals::ArModel;
-
-    use super::*;
-    use ct_signals::{Channel, noise};
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-
-    const SAMPLES: usize = 800;
-
-    fn record() -> Record {
-        Record {
-            name: "r".to_string(),
-            time: (0..SAMPLES).map(|k| 2.0 * k as f64).collect(),
-            inputs: vec![Channel::new("u", "V", vec![0.0; SAMPLES])],
-            outputs: vec![Channel::new("y", "cm", vec![0.0; SAMPLES])],
-            references: Vec::new(),
-            calendar: None,
-        }
-    }
-
-    #[test]
-    fn noise_of_any_colour_has_no_period_and_no_instant() {
-        let record = record();
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        // At a level of one in a hundred, 600 series: chance exceeds 15 of them once in a thousand.
-        let (mut periods, mut instants, mut levels) = (0, 0, 0);
-        // A level that wanders, and one that steps and stays.
-        let wander = noise::ar1(SAMPLES, 3.0, 0.99, &mut rng);
-        let steps: Vec<f64> = (0..SAMPLES).map(|k| wander[k / 50 * 50]).collect();
-        for run in 0..600 {
-            let colour = [0.0, 0.8, 0.95][run % 3];
-            let e = noise::ar1(SAMPLES, 0.1, colour, &mut rng);
-            let model = ArModel::from_coefficients(&[colour], 1.0).unwrap();
-            periods += usize::from(period(&record, &e, 0.01).unwrap().is_some());
-            let white = standardised(&model, &e);
-            instants += usize::from(instant(&record, &white, 0.01).is_some());
-            levels += usize::from(level_p([&wander, &steps][run % 2], &white) < 0.01);
-        }
-        assert!(periods <= 15 && instants <= 15, "{periods}, {instants}");
-        assert!((1..=15).contains(&levels), "{levels}");
-    }
-
-    #[test]
-    fn a_period_is_found_with_its_length_in_noise_of_its_own_size() {
-        let record = record();
-        let mut rng = ChaCha8Rng::seed_from_u64(2);
-        for wanted in [5.0, 21.3, 160.0, 400.0] {
-            let e: Vec<f64> = noise::white(SAMPLES, 0.1, &mut rng)
-                .into_iter()
-                .zip(&record.time)
-                .map(|(e, t)| e + 0.14 * (2.0 * PI * t / wanted).sin())
-                .collect();
-            let Some(Remains::Period(found)) = period(&record, &e, NOT_NOISE).unwrap() else {
-                panic!("no period of {wanted} s");
-            };
-            // To the width of a line.
-            assert!((1.0 / found - 1.0 / wanted).abs() < 1.0 / record.duration());
-        }
-    }
-
-    #[test]
-    fn a_function_of_the_level_is_found_under_noise_of_its_own_size() {
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let level = noise::ar1(SAMPLES, 3.0, 0.99, &mut rng);
-        let mut white = noise::white(SAMPLES, 1.0, &mut rng);
-        assert!(level_p(&level, &white) > 0.01);
-        for k in 1..SAMPLES {
-            white[k] += 0.5 * (2.0 * level[k - 1]).sin();
-        }
-        assert!(level_p(&level, &white) < NOT_NOISE);
-        assert!(level_p(&[2.0; SAMPLES], &white) == 1.0);
-    }
-
-    #[test]
-    fn an_instant_is_found_where_it_is() {
-        let record = record();
-        let mut white = noise::white(SAMPLES, 1.0, &mut ChaCha8Rng::seed_from_u64(3));
-        white[300] += 8.0;
-        assert_eq!(
-            instant(&record, &white, NOT_NOISE),
-            Some(Remains::Instant(600.0, 2.0))
-        );
-        white[300] -= 8.0;
-        for value in &mut white[500..520] {
-            *value += 2.0;
-        }
-        let Some(Remains::Instant(from, length)) = instant(&record, &white, NOT_NOISE) else {
-            panic!("nothing was found");
-        };
-        assert!((from - 1000.0).abs() < 20.0 && (length - 40.0).abs() < 30.0);
-    }
+    let found = instant(&standardised(noise, residual), level);
+    Ok(found
+        .map(|(from, to)| Remains::Instant(record.time[from], record.time[to] - record.time[from])))
 }

@@ -4,7 +4,7 @@ use missing_effect::numbers::significant;
 use plants::{Domain, Place, Structure};
 use serde::{Deserialize, Serialize};
 
-use crate::{TimeAxis, isolate::Suspect};
+use crate::{TimeAxis, isolate::Suspect, watched::Raised};
 
 /// The number of the schema of [`Alarm`]; it rises when a key changes its meaning.
 pub const SCHEMA: u32 = 1;
@@ -97,10 +97,30 @@ pub struct Units {
     pub input: String,
 }
 
-/// What a look at the rows found; `raised`: when the alarm was; `output`: at which it shows most.
+impl Alarm {
+    /// Nothing explains the rows so far; `output`: the name of the one at which it shows most, of several. The sentence is not there yet.
+    pub(crate) fn unexplained(raised: &Raised, output: Option<String>) -> Self {
+        Self {
+            schema: SCHEMA,
+            event: raised.stage,
+            time: raised.time,
+            since: None,
+            verdict: Verdict::Unexplained,
+            effects: Vec::new(),
+            evidence: None,
+            next: None,
+            size: None,
+            score: raised.score,
+            threshold: raised.threshold,
+            output,
+            sentence: String::new(),
+        }
+    }
+}
+
+/// What a look at the rows found.
 pub(crate) fn alarm(
-    (event, time, raised): (Stage, f64, f64),
-    (score, threshold, output): (f64, f64, usize),
+    raised: &Raised,
     suspects: &[Suspect],
     structure: &Structure,
     (units, axis): (&Units, &TimeAxis),
@@ -108,24 +128,8 @@ pub(crate) fn alarm(
     let best = suspects
         .first()
         .filter(|best| best.plausible && best.evidence > 0.0 && !best.leaves_more_than_noise());
-    let mut alarm = Alarm {
-        schema: SCHEMA,
-        event,
-        time,
-        since: None,
-        verdict: Verdict::Unexplained,
-        effects: Vec::new(),
-        evidence: None,
-        next: None,
-        size: None,
-        score,
-        threshold,
-        output: structure
-            .known
-            .output_name(structure.plant, output)
-            .map(str::to_string),
-        sentence: String::new(),
-    };
+    let output = structure.known.output_name(structure.plant, raised.output);
+    let mut alarm = Alarm::unexplained(raised, output.map(str::to_string));
     let mut place = Place::Vessel;
     if let Some(best) = best {
         let group: Vec<&Suspect> = suspects.iter().filter(|s| s.near(best)).collect();
@@ -157,7 +161,7 @@ pub(crate) fn alarm(
         });
         place = best.placed.effect.place;
     }
-    alarm.sentence = sentence(&alarm, raised, place, structure.domain, axis);
+    alarm.sentence = sentence(&alarm, raised.since, place, structure.domain, axis);
     alarm
 }
 

@@ -1,7 +1,5 @@
 //! What a monitor refuses.
 
-use crate::MAX_OUTPUTS;
-
 /// Why there is no monitor.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -30,12 +28,16 @@ pub enum Error {
         "the model has a measured disturbance, and a row of the monitor has one input: delete disturbance under [known] and its column"
     )]
     Disturbance,
-    /// More outputs than a row carries.
-    #[error("{outputs} outputs are more than the monitor watches: at most {MAX_OUTPUTS}")]
-    TooManyOutputs {
-        /// How many.
-        outputs: usize,
-    },
+    /// A model of its user's own that follows the time itself.
+    #[error(
+        "the model uses `time`, and what is watched has no beginning: give what follows the clock as an input"
+    )]
+    Time,
+    /// A model of its user's own without parameters that are fitted.
+    #[error(
+        "the model has no parameter that is fitted: declare one of them as `parameter`, so that it can be learned and tracked"
+    )]
+    NoParameters,
     /// A setting is outside its range.
     #[error("{setting} is {value}, but has to be {range}")]
     Setting {
@@ -82,6 +84,8 @@ pub enum Refused {
     NotFinite {
         /// `time`, `input` or `output`.
         column: &'static str,
+        /// Which of the inputs or outputs, counted from zero.
+        at: usize,
         /// The value.
         value: f64,
     },
@@ -90,6 +94,8 @@ pub enum Refused {
     TooLarge {
         /// `time`, `input` or `output`.
         column: &'static str,
+        /// Which of the inputs or outputs, counted from zero.
+        at: usize,
         /// The value.
         value: f64,
         /// What has to be larger than it.
@@ -128,6 +134,15 @@ pub enum Refused {
 }
 
 impl Refused {
+    /// Which of the inputs or outputs is to be looked at, counted from zero.
+    #[must_use]
+    pub fn at(&self) -> usize {
+        match self {
+            Self::NotFinite { at, .. } | Self::TooLarge { at, .. } => *at,
+            _ => 0,
+        }
+    }
+
     /// The column to look at: `time`, `input` or `output`.
     #[must_use]
     pub fn column(&self) -> &'static str {

@@ -6,6 +6,9 @@ use greybox::PriorValue;
 
 use crate::Model;
 
+/// Of a model of its user's own the seconds in one unit of its time.
+pub(crate) const TIME_UNIT: &str = "unit of time, s";
+
 /// A longer value is not quoted: a term may have 512 knots.
 const LONGEST: usize = 60;
 

@@ -13,7 +13,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{MAX_OUTPUTS, Notice, Refused, Row};
+use crate::{Each, Notice, Refused, Row};
 
 /// Steps from which the usual one is taken.
 const STEPS: usize = 21;
@@ -32,15 +32,16 @@ const MOST_ROWS: u64 = 1 << 53;
 /// Rows in a block.
 pub(crate) const LONGEST_BLOCK: usize = 1 << 24;
 
-/// A reading of each output; `None` where it is lost, and behind the last output.
-pub(crate) type Readings = [Option<f64>; MAX_OUTPUTS];
+/// A reading of each output; `None` where it is lost.
+pub(crate) type Readings = Each<Option<f64>>;
 
 /// A row, or the mean of a block of rows, as it is watched.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sample {
     /// \[s\]
     pub time: f64,
-    pub input: f64,
+    /// In the order of the inputs.
+    pub inputs: Each<f64>,
     /// In the order of the outputs.
     pub outputs: Readings,
     /// How it follows the one before.
@@ -65,14 +66,15 @@ pub(crate) struct Taken {
     pub notice: Option<Notice>,
 }
 
-/// A value that can be computed with.
-pub(crate) fn usable(column: &'static str, value: f64) -> Result<f64, Refused> {
+/// A value that can be computed with; `at`: of the inputs or the outputs which.
+pub(crate) fn usable(column: &'static str, at: usize, value: f64) -> Result<f64, Refused> {
     if !value.is_finite() {
-        return Err(Refused::NotFinite { column, value });
+        return Err(Refused::NotFinite { column, at, value });
     }
     if value.abs() > LARGEST {
         return Err(Refused::TooLarge {
             column,
+            at,
             value,
             limit: LARGEST,
         });
@@ -96,8 +98,9 @@ pub(crate) struct Intake {
     usual: Option<(f64, f64)>,
     /// Steps of another length in a row.
     other: usize,
-    /// Sums of the block's times (since its first) and commands; rows in it; its first time.
-    sums: [f64; 2],
+    /// Sum of the block's times (since its first), and of each of its inputs; rows in it; its first time.
+    sum: f64,
+    inputs: Vec<f64>,
     filled: usize,
     begun: f64,
     follows: Follows,
@@ -117,7 +120,7 @@ struct Output {
 }
 
 impl Intake {
-    pub(crate) fn new(outputs: usize) -> Self {
+    pub(crate) fn new(inputs: usize, outputs: usize) -> Self {
         Self {
             every: 1,
             rows: 0,
@@ -126,7 +129,8 @@ impl Intake {
             steps: Vec::with_capacity(STEPS),
             usual: None,
             other: 0,
-            sums: [0.0; 2],
+            sum: 0.0,
+            inputs: vec![0.0; inputs],
             filled: 0,
             begun: 0.0,
             follows: Follows::Gap,
@@ -135,13 +139,14 @@ impl Intake {
     }
 
     /// The numbers that a file may have spoilt.
-    pub(crate) fn sound(&self, outputs: usize) -> bool {
+    pub(crate) fn sound(&self, inputs: usize, outputs: usize) -> bool {
         (1..=LONGEST_BLOCK).contains(&self.every)
             && self.rows <= MOST_ROWS
             && self.steps.len() <= STEPS
             && self.back.is_none_or(|(_, count)| count < BACK)
             && self.other < OTHER
             && self.filled < self.every
+            && self.inputs.len() == inputs
             && self.outputs.len() == outputs
             && self
                 .outputs
@@ -152,7 +157,8 @@ impl Intake {
     /// Begins a new block, after `every` has changed.
     pub(crate) fn begin(&mut self) {
         self.filled = 0;
-        self.sums = [0.0; 2];
+        self.sum = 0.0;
+        self.inputs.fill(0.0);
         for output in &mut self.outputs {
             (output.sum, output.readings) = (0.0, 0);
         }
@@ -160,8 +166,10 @@ impl Intake {
 
     /// Takes in a row with those of its `readings` that can be used.
     pub(crate) fn take(&mut self, row: &Row, readings: &Readings) -> Result<Taken, Refused> {
-        let time = usable("time", row.time)?;
-        let input = usable("input", row.input)?;
+        let time = usable("time", 0, row.time)?;
+        for at in 0..self.inputs.len() {
+            usable("input", at, row.input(at))?;
+        }
         let mut notice = None;
         if let Some(previous) = self.last {
             if time == previous {
@@ -179,8 +187,10 @@ impl Intake {
         if self.filled == 0 {
             self.begun = time;
         }
-        self.sums[0] += time - self.begun;
-        self.sums[1] += input;
+        self.sum += time - self.begun;
+        for (at, sum) in self.inputs.iter_mut().enumerate() {
+            *sum += row.input(at);
+        }
         self.filled += 1;
         for (output, reading) in self.outputs.iter_mut().zip(readings) {
             match reading {
@@ -190,15 +200,15 @@ impl Intake {
         }
         let sample = (self.filled == self.every).then(|| {
             let mean = |sum: f64| sum / self.every as f64;
-            let mut means = [None; MAX_OUTPUTS];
-            for ((output, reading), of_block) in self.outputs.iter().zip(readings).zip(&mut means) {
+            let outputs = self.outputs.iter().zip(readings);
+            let of_block = |(output, reading): (&Output, &Option<f64>)| {
                 let enough = reading.is_some() && 2 * output.readings >= self.every;
-                *of_block = enough.then(|| mean(output.sum));
-            }
+                enough.then(|| mean(output.sum))
+            };
             Sample {
-                time: self.begun + mean(self.sums[0]),
-                input: mean(self.sums[1]),
-                outputs: means,
+                time: self.begun + mean(self.sum),
+                inputs: self.inputs.iter().map(|sum| mean(*sum)).collect(),
+                outputs: outputs.map(of_block).collect(),
                 follows: self.follows,
             }
         });

@@ -15,12 +15,12 @@ use std::collections::BTreeMap;
 use ct_signals::{ArModel, Hold, Record};
 use greybox::{Noise, Setup, Stopping, fit_from};
 use missing_effect::GROUP_MARGIN;
-use plants::{MAX_VESSELS, Placed, Simulator, Structure, Unit};
+use plants::{Placed, Simulator, Structure, Unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    MAX_OUTPUTS,
+    Each,
     intake::Sample,
     learn::{BEGIN as BEGIN_IN_BAND, Learned, record},
     lost::interpolated,
@@ -67,22 +67,22 @@ const BEYOND: f64 = 4.0;
 const LEFT: f64 = 0.1;
 
 /// A row that is kept, with what the learned model said of it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Kept {
     pub sample: Sample,
-    /// Levels of the learned model.
-    pub levels: [f64; MAX_VESSELS],
+    /// States of the learned model: the levels, of a plant.
+    pub states: Each<f64>,
     /// Where in it stood what the command moves: play has a memory without an end, and no run-up finds it.
     pub stands: f64,
     /// Readings of the learned model.
-    pub modelled: [f64; MAX_OUTPUTS],
+    pub modelled: Each<f64>,
     /// Whitened residual of each output in its standard deviations; zero where the reading is lost.
-    pub innovations: [f64; MAX_OUTPUTS],
+    pub innovations: Each<f64>,
 }
 
 impl Kept {
     /// Measured minus the learned model.
-    fn residual(&self, output: usize) -> Option<f64> {
+    pub(crate) fn residual(&self, output: usize) -> Option<f64> {
         Some(self.sample.outputs[output]? - self.modelled[output])
     }
 }
@@ -126,14 +126,14 @@ pub(crate) fn isolate(
     learned: &Learned,
     hold: Hold,
     rows: &[Kept],
-    growth: [f64; MAX_OUTPUTS],
+    growth: &Each<f64>,
 ) -> Vec<Suspect> {
     let Some(noise) = learned.noise() else {
         return Vec::new();
     };
     let mut squares = vec![0.0; rows.len()];
     let mut series = Vec::with_capacity(noise.outputs());
-    for (output, (noise, growth)) in noise.iter().zip(growth).enumerate() {
+    for (output, (noise, &growth)) in noise.iter().zip(growth).enumerate() {
         let residuals: Vec<Option<f64>> = rows.iter().map(|row| row.residual(output)).collect();
         let Some(residuals) = interpolated(&residuals) else {
             series.push(Series::without_readings(rows.len()));
@@ -334,8 +334,8 @@ impl Search<'_> {
         let mut begun = Simulator::<f64>::new(
             self.structure,
             &self.learned.theta,
-            &first.levels[..vessels],
-            first.sample.input,
+            &first.states[..vessels],
+            first.sample.inputs[0],
         )
         .ok()?;
         begun.set_substeps(self.learned.substeps);
@@ -366,6 +366,7 @@ impl Search<'_> {
         let rows = &self.rows[from..];
         let mut records = [record(
             rows.iter().map(|row| &row.sample),
+            1,
             self.series
                 .iter()
                 .map(|series| series.readings[from..].to_vec())
@@ -404,7 +405,7 @@ impl Search<'_> {
             }
         }
         let (first, vessels) = (setup.parameter_count(), setup.structure.plant.vessels());
-        x[first..first + vessels].copy_from_slice(&rows[0].levels[..vessels]);
+        x[first..first + vessels].copy_from_slice(&rows[0].states[..vessels]);
         let free = setup.free().to_vec();
         let starts: Vec<Vec<f64>> = match near {
             Some(values) => vec![values.to_vec()],

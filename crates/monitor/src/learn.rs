@@ -21,7 +21,7 @@ use crate::{
 const STILL: f64 = 1e-9;
 
 /// Fewest rows with a reading of each output, as a part of all.
-const READ: f64 = 0.5;
+pub(crate) const READ: f64 = 0.5;
 
 /// Fits in turn with what is expected of lost readings: each leaves of the error of the one before the share of the information that is lost.
 const ROUNDS: usize = 2;
@@ -100,7 +100,10 @@ pub(crate) struct Learned {
     pub time_constant: f64,
     /// The usual step of the time \[s\].
     pub interval: f64,
-    pub scales: Scales,
+    /// States where it works as a rule.
+    pub operating: Vec<f64>,
+    /// Of a plant: sizes by which its effects are scaled, and steps of the simulation in an interval.
+    pub scales: Option<Scales>,
     pub substeps: usize,
 }
 
@@ -188,9 +191,15 @@ impl Learned {
     }
 }
 
+/// Whether an input of this range has not moved.
+pub(crate) fn stands_still(low: f64, high: f64) -> bool {
+    high - low <= STILL * high.abs().max(low.abs())
+}
+
 /// Rows as a record, with the readings of each output; the time counts from the first.
 pub(crate) fn record<'a>(
     rows: impl Iterator<Item = &'a Sample>,
+    inputs: usize,
     readings: Vec<Vec<f64>>,
     hold: Hold,
 ) -> Record {
@@ -198,7 +207,7 @@ pub(crate) fn record<'a>(
     let mut record = Record {
         name: "the rows".to_string(),
         time: Vec::new(),
-        inputs: vec![Channel::default().with_hold(hold)],
+        inputs: vec![Channel::default().with_hold(hold); inputs],
         outputs: outputs
             .map(|readings| Channel::new("", "", readings))
             .collect(),
@@ -208,7 +217,9 @@ pub(crate) fn record<'a>(
     let mut first = None;
     for row in rows {
         record.time.push(row.time - *first.get_or_insert(row.time));
-        record.inputs[0].values.push(row.input);
+        for (channel, value) in record.inputs.iter_mut().zip(&row.inputs) {
+            channel.values.push(*value);
+        }
     }
     record
 }
@@ -249,7 +260,7 @@ pub(crate) fn learn(
         };
         filled.push(values);
     }
-    let records = &[record(samples.iter(), filled, hold)];
+    let records = &[record(samples.iter(), 1, filled, hold)];
     let options = FitOptions::default();
     let said = |error: &dyn std::fmt::Display| error.to_string();
     let mut fixed = model.fixed();
@@ -272,7 +283,7 @@ pub(crate) fn learn(
     let record = records.first().ok_or("no row")?;
     ct_signals::require_samples(records, setup.free().len()).map_err(|error| said(&error))?;
     let (low, high) = record.input_range();
-    if high - low <= STILL * high.abs().max(low.abs()) {
+    if stands_still(low, high) {
         return Err(format!(
             "the command has stood still at {low}, which says nothing about the plant: move it"
         ));
@@ -311,54 +322,16 @@ pub(crate) fn learn(
     let all_over_read = |output: usize| samples.len() as f64 / read(output) as f64;
     let most = (0..outputs).map(all_over_read).fold(1.0, f64::max);
     let widened = most * most;
-    let errors = fit.std_errors();
-    let mut covariance = vec![0.0; n * n];
-    if let Some((positions, correlations)) = fit.correlations() {
-        let named = || positions.iter().enumerate().filter(|(_, i)| **i < n);
-        for (a, &i) in named() {
-            for (b, &j) in named() {
-                let (Some(ei), Some(ej)) = (errors[i], errors[j]) else {
-                    continue;
-                };
-                covariance[i * n + j] = widened * correlations[a][b] * ei * ej;
-            }
-        }
-    } else {
-        return Err(
-            "the rows do not determine the parameters: the command has not moved enough".into(),
-        );
-    }
-    if !covariance.iter().all(|c| c.is_finite()) {
-        return Err(NO_NOISE.into());
-    }
+    let covariance = covariance(&fit, n, widened)?;
     let residuals = setup.residuals(&fit.x).map_err(|error| said(&error))?;
-    let mut noises = Vec::with_capacity(outputs);
-    for (output, residuals) in residuals.into_iter().enumerate() {
+    let of_output = |(output, residuals): (usize, Vec<f64>)| {
         let noise = fit.noise.output(output);
-        let sigma = noise.sigma() * all_over_read(output).sqrt();
-        if !(sigma.is_finite() && sigma > 0.0) {
-            return Err(NO_NOISE.into());
-        }
-        let mut whitener = noise.whitener(1);
-        let mut innovations = Vec::with_capacity(read(output));
-        for (mut residual, sample) in residuals.into_iter().zip(samples) {
-            if sample.outputs[output].is_some() {
-                whitener.push(std::slice::from_mut(&mut residual));
-                innovations.push(residual / sigma);
-            } else {
-                whitener.skip();
-            }
-        }
-        // Of several outputs each has fewer parameters to itself: the limit is a little wide.
-        let scatter = Limit::learned(&innovations, setup.free().len())
-            .ok_or("the model leaves no noise to judge by: do the readings move?")?;
-        noises.push(OutputNoise {
-            coefficients: noise.coefficients().to_vec(),
-            sigma,
-            readings: read(output),
-            scatter,
-        });
-    }
+        let noise = noise.with_sigma(noise.sigma() * all_over_read(output).sqrt());
+        output_noise(&noise, residuals, samples, output, setup.free().len())
+    };
+    let outputs: Result<Vec<OutputNoise>, String> =
+        residuals.into_iter().enumerate().map(of_output).collect();
+    let noises = outputs?;
     let commands = &record.inputs[0].values;
     let mean = commands.iter().sum::<f64>() / commands.len() as f64;
     let interval = record.sample_interval();
@@ -379,11 +352,69 @@ pub(crate) fn learn(
         outputs: noises,
         time_constant: slowest,
         interval,
-        scales: setup.structure.scales.clone(),
+        operating: setup.structure.scales.operating_level.to_vec(),
+        scales: Some(setup.structure.scales.clone()),
         substeps: setup.substeps,
     };
     let levels = fit.x[n..].to_vec();
     Ok((learned, levels))
+}
+
+/// The covariance of a fit's first `n` entries, row by row, so many times as large; zero for what was not fitted, or held at a bound.
+pub(crate) fn covariance(fit: &Fit, n: usize, widened: f64) -> Result<Vec<f64>, String> {
+    let errors = fit.std_errors();
+    let mut covariance = vec![0.0; n * n];
+    let Some((positions, correlations)) = fit.correlations() else {
+        return Err(
+            "the rows do not determine the parameters: the command has not moved enough".into(),
+        );
+    };
+    let named = || positions.iter().enumerate().filter(|(_, i)| **i < n);
+    for (a, &i) in named() {
+        for (b, &j) in named() {
+            let (Some(ei), Some(ej)) = (errors[i], errors[j]) else {
+                continue;
+            };
+            covariance[i * n + j] = widened * correlations[a][b] * ei * ej;
+        }
+    }
+    if !covariance.iter().all(|c| c.is_finite()) {
+        return Err(NO_NOISE.into());
+    }
+    Ok(covariance)
+}
+
+/// The noise of an output from the residuals of a fit of so many `parameters`.
+pub(crate) fn output_noise(
+    noise: &ArModel,
+    residuals: Vec<f64>,
+    samples: &[Sample],
+    output: usize,
+    parameters: usize,
+) -> Result<OutputNoise, String> {
+    let sigma = noise.sigma();
+    if !(sigma.is_finite() && sigma > 0.0) {
+        return Err(NO_NOISE.into());
+    }
+    let mut whitener = noise.whitener(1);
+    let mut innovations = Vec::with_capacity(residuals.len());
+    for (mut residual, sample) in residuals.into_iter().zip(samples) {
+        if sample.outputs[output].is_some() {
+            whitener.push(std::slice::from_mut(&mut residual));
+            innovations.push(residual / sigma);
+        } else {
+            whitener.skip();
+        }
+    }
+    // Of several outputs each has fewer parameters to itself: the limit is a little wide.
+    let scatter = Limit::learned(&innovations, parameters)
+        .ok_or("the model leaves no noise to judge by: do the readings move?")?;
+    Ok(OutputNoise {
+        coefficients: noise.coefficients().to_vec(),
+        sigma,
+        readings: innovations.len(),
+        scatter,
+    })
 }
 
 /// The fit once more, with what is expected of lost readings beside it in the record.

@@ -1,9 +1,9 @@
 //! Watches a plant row by row: tracks its parameters, says when the model stops fitting, since when, and which effect of the
-//! catalogue it looks like.
+//! catalogue it looks like. It watches one of the plants, or a model of its user's own.
 //!
 //! | question | answer |
 //! |---|---|
-//! | Where do I start? | [`Monitor::new`] with the believed [`Model`], then [`Monitor::update`] once a row |
+//! | Where do I start? | [`Monitor::new`] with the believed [`Model`] or [`OwnModel`], then [`Monitor::update`] once a row |
 //! | What does a row say? | [`Step`]: the innovation of each output, and now and then an [`Alarm`], a [`ScatterAlarm`] or a [`Notice`] |
 //! | What are the parameters now? | [`Monitor::estimates`] |
 //! | What if it is stopped? | [`Monitor::state`] is saved, [`Monitor::restore`] goes on as if nothing had happened |
@@ -11,11 +11,15 @@
 //! It learns first: the believed model is fitted to the first rows (a thousand and twenty time constants at least), with the
 //! colour of the noise at each output. From then on the learned model runs beside the plant on the measured command, and never
 //! learns: so a feedback that hides a change in the reading shows it in the command, and a slow change does not pass for
-//! normal. After an alarm it stays the learned one, until it fits again. Memory is constant, and a row allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
+//! normal. After an alarm it stays the learned one, until it fits again. Memory is constant, and a row of up to eight inputs, outputs and states
+//! each allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
 //!
-//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`]. Each output has a noise of its own, independent of the
+//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`], or of the outputs of the text. Each output has a noise of its own, independent of the
 //! others, and may lack readings for itself. One model runs beside all of them: scores, tracker and isolation take each innovation in units
 //! of its own standard deviation, and an alarm that speaks of a sensor says of which.
+//!
+//! **Models of their user's own** have any number of inputs, outputs and states. Which effect a change looks like is not asked of them: an alarm
+//! says since when the model does not fit.
 //!
 //! # Example
 //! A tank loses water from the 3000th row on.
@@ -59,6 +63,8 @@ mod isolate;
 mod learn;
 mod lost;
 mod monitor;
+mod own;
+mod plant;
 mod scatter;
 mod sensitivity;
 mod settings;
@@ -66,13 +72,16 @@ mod threshold;
 mod time_axis;
 mod tracker;
 mod watch;
+mod watched;
 
 pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict};
 pub use error::{Error, Refused};
 pub use learn::Model;
 pub use monitor::{
-    Estimate, Gathered, Innovation, MAX_OUTPUTS, Monitor, Notice, Progress, Row, State, Step,
+    Each, Estimate, Gathered, Innovation, Monitor, Notice, Progress, Row, State, Step,
 };
+pub use own::OwnModel;
 pub use scatter::{ScatterAlarm, ScatterEvent};
 pub use settings::Settings;
 pub use time_axis::TimeAxis;
+pub use watched::Watched;

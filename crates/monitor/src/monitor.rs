@@ -2,48 +2,53 @@
 
 use serde::{Deserialize, Serialize};
 
+use smallvec::SmallVec;
+
 use crate::{
-    Alarm, Error, Model, Refused, ScatterAlarm, Settings, TimeAxis, Units,
+    Alarm, Error, Refused, ScatterAlarm, Settings, TimeAxis, Units, Watched,
     core::{Checkpoint, Core, Phase},
-    fingerprint::{Fingerprint, differences, fingerprint},
-    intake::{Intake, Sample, usable},
+    fingerprint::{Fingerprint, TIME_UNIT, differences},
+    intake::{Intake, Readings, Sample, usable},
 };
 
-/// The most outputs that are watched.
-pub const MAX_OUTPUTS: usize = plants::MAX_VESSELS;
+/// A value for each input, output or state; nothing is allocated for eight or fewer.
+pub type Each<T> = SmallVec<[T; 8]>;
 /// The version of [`State`].
-const VERSION: u32 = 5;
-/// A command above so many times its full range is in another unit, or none, as in a record.
-const BEYOND: f64 = 1.01;
-/// A reading above so many times the tank's height is in another unit, or none; below it a sensor may be off, which is to be seen.
-const ABOVE: f64 = 1.5;
+const VERSION: u32 = 6;
 
 /// A row.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Time \[s\], above that of the row before.
     pub time: f64,
-    /// Command \[input unit\].
-    pub input: f64,
-    /// Readings in the order of the outputs \[output unit\], made before the command acts. NaN where one is lost: the command and the other
-    /// readings of the row are used all the same. Entries behind the last output are not looked at.
-    pub outputs: [f64; MAX_OUTPUTS],
+    /// Inputs in the order of the model \[their units\].
+    pub inputs: Each<f64>,
+    /// Readings in the order of the outputs \[their units\], made before the inputs act. NaN where one is lost: the inputs and the other
+    /// readings of the row are used all the same.
+    pub outputs: Each<f64>,
 }
 
 impl Row {
-    /// A row of time \[s\], command \[input unit\] and readings \[output unit\]; outputs without one have lost it, and readings behind
-    /// [`MAX_OUTPUTS`] are left out.
+    /// A row of time \[s\], the only input \[its unit\] and readings \[their units\]; outputs without one have lost it, and readings behind
+    /// the last output are not looked at.
     #[must_use]
     pub fn new(time: f64, input: f64, readings: &[f64]) -> Self {
-        let mut outputs = [f64::NAN; MAX_OUTPUTS];
-        for (output, reading) in outputs.iter_mut().zip(readings) {
-            *output = *reading;
-        }
+        Self::with_inputs(time, &[input], readings)
+    }
+
+    /// The same with any number of inputs.
+    #[must_use]
+    pub fn with_inputs(time: f64, inputs: &[f64], readings: &[f64]) -> Self {
         Self {
             time,
-            input,
-            outputs,
+            inputs: Each::from_slice(inputs),
+            outputs: Each::from_slice(readings),
         }
+    }
+
+    /// An input; NaN where the row has none.
+    pub(crate) fn input(&self, at: usize) -> f64 {
+        self.inputs.get(at).copied().unwrap_or(f64::NAN)
     }
 }
 
@@ -51,15 +56,15 @@ impl Row {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Step {
     /// The learned model beside the reading of each output; `None` while learning, within a block of rows, and without a reading.
-    pub innovations: [Option<Innovation>; MAX_OUTPUTS],
-    /// Why the reading of an output is not used, where it is not; the command is.
-    pub lost: [Option<Refused>; MAX_OUTPUTS],
+    pub innovations: Each<Option<Innovation>>,
+    /// Of each output why its reading is not used, where it is not; the inputs are.
+    pub lost: Each<Option<Refused>>,
     /// Something about the rows or the phase, where there is something.
     pub notices: [Option<Notice>; 2],
     /// The model does not fit any more, or more is known of that.
     pub alarm: Option<Alarm>,
-    /// The noise of an output has grown, or is back where it was.
-    pub scatter: [Option<ScatterAlarm>; MAX_OUTPUTS],
+    /// Outputs whose noise has grown, or is back where it was.
+    pub scatter: Vec<ScatterAlarm>,
 }
 
 /// The learned model beside a reading.
@@ -204,62 +209,45 @@ impl State {
     pub fn units(&self) -> &Units {
         &self.units
     }
+
+    /// Seconds in one unit of the time of a model of its user's own, as the state has it.
+    #[must_use]
+    pub fn time_unit(&self) -> Option<f64> {
+        self.model.get(TIME_UNIT)?.parse().ok()
+    }
 }
 
-/// A monitor.
-pub struct Monitor {
+/// A monitor; `'a` is how long a model of its user's own lives.
+pub struct Monitor<'a> {
+    model: Watched<'a>,
     intake: Intake,
-    core: Core,
+    core: Core<'a>,
     fingerprint: Fingerprint,
     units: Units,
-    outputs: usize,
 }
 
-impl Monitor {
-    /// A monitor that has seen nothing yet.
+impl<'a> Monitor<'a> {
+    /// A monitor that has seen nothing yet, of a [`Model`](crate::Model) of a plant or an [`OwnModel`](crate::OwnModel).
+    ///
+    /// `units` are those of a plant's rows; a model of its user's own has units itself.
     ///
     /// # Errors
-    /// [`Error::Setting`], [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::TooManyOutputs`], [`Error::ByClock`] for an effect in the model that follows the time since a record began, [`Error::Structure`].
-    pub fn new(model: Model, settings: Settings, units: Units) -> Result<Self, Error> {
+    /// [`Error::Setting`]; of a plant [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::ByClock`] for an effect in the model that follows
+    /// the time since a record began, [`Error::Structure`]; of a model of its user's own [`Error::Time`], [`Error::NoParameters`].
+    pub fn new(
+        model: impl Into<Watched<'a>>,
+        settings: Settings,
+        units: Units,
+    ) -> Result<Self, Error> {
         settings.check()?;
-        if model.plant.pumps() > 1 {
-            return Err(Error::TwoPumps {
-                plant: model.plant.id(),
-            });
-        }
-        if model.known.disturbance.is_some() {
-            return Err(Error::Disturbance);
-        }
-        let outputs = model.known.outputs(model.plant).len();
-        if outputs > MAX_OUTPUTS {
-            return Err(Error::TooManyOutputs { outputs });
-        }
-        if let Some(placed) = model.effects.iter().find(|placed| placed.effect.by_clock) {
-            return Err(Error::ByClock {
-                effect: placed.effect.id.to_string(),
-            });
-        }
-        if let Some(term) = model
-            .terms
-            .iter()
-            .find(|term| term.variable == plants::Variable::Time)
-        {
-            return Err(Error::ByClock {
-                effect: term.name.clone(),
-            });
-        }
-        model.structure(plants::Scales::from_ranges(
-            (0.0, 1.0),
-            (0.0, 1.0),
-            1.0,
-            1.0,
-        ))?;
+        let model: Watched<'a> = model.into();
+        model.0.check()?;
         Ok(Self {
-            intake: Intake::new(outputs),
-            fingerprint: fingerprint(&model),
-            core: Core::new(model, settings, units.clone()),
+            intake: Intake::new(model.0.inputs(), model.0.outputs()),
+            fingerprint: model.0.fingerprint(),
+            core: Core::new(model.clone(), settings, units.clone()),
             units,
-            outputs,
+            model,
         })
     }
 
@@ -267,8 +255,13 @@ impl Monitor {
     ///
     /// # Errors
     /// As [`Monitor::new`], and [`Error::Version`], [`Error::OtherModel`], [`Error::Damaged`].
-    pub fn restore(model: Model, settings: Settings, state: State) -> Result<Self, Error> {
-        let mut monitor = Self::new(model.clone(), settings, state.units.clone())?;
+    pub fn restore(
+        model: impl Into<Watched<'a>>,
+        settings: Settings,
+        state: State,
+    ) -> Result<Self, Error> {
+        let mut monitor = Self::new(model, settings, state.units.clone())?;
+        let model = monitor.model.clone();
         if state.version != VERSION {
             return Err(Error::Version {
                 found: state.version,
@@ -280,7 +273,7 @@ impl Monitor {
                 differences: differences(&state.model, &monitor.fingerprint),
             });
         }
-        if !state.intake.sound(monitor.outputs) {
+        if !state.intake.sound(model.0.inputs(), model.0.outputs()) {
             return Err(Error::Damaged {
                 what: "its counts of rows do not go together".into(),
             });
@@ -326,26 +319,20 @@ impl Monitor {
     /// # Errors
     /// [`Refused`]: time or command cannot be used, and the row is not.
     pub fn update(&mut self, row: &Row) -> Result<Step, Refused> {
-        let known = self.core.known();
-        let mut readings = [None; MAX_OUTPUTS];
+        let model = &self.model.0;
+        let mut readings = Readings::new();
         let mut step = Step::default();
-        for (output, &value) in row.outputs[..self.outputs].iter().enumerate() {
-            let reading = match known.tank_height {
-                Some(height) if value > ABOVE * height => Err(Refused::AboveTank { value, height }),
-                _ => usable("output", value),
-            };
-            match reading {
-                Ok(reading) => readings[output] = Some(reading),
-                Err(lost) => step.lost[output] = Some(lost),
-            }
+        for output in 0..model.outputs() {
+            let value = row.outputs.get(output).copied().unwrap_or(f64::NAN);
+            let reading = model
+                .check_reading(value)
+                .and_then(|()| usable("output", output, value));
+            readings.push(reading.as_ref().ok().copied());
+            step.lost.push(reading.err());
+            step.innovations.push(None);
         }
-        if let Some(range) = known.input_range
-            && row.input.abs() > BEYOND * range
-        {
-            return Err(Refused::BeyondRange {
-                value: row.input,
-                range,
-            });
+        for input in 0..model.inputs() {
+            model.check_input(row.input(input))?;
         }
         let taken = self.intake.take(row, &readings)?;
         step.notices[0] = taken.notice;
@@ -380,7 +367,7 @@ impl Monitor {
     /// How many outputs there are.
     #[must_use]
     pub fn outputs(&self) -> usize {
-        self.outputs
+        self.model.0.outputs()
     }
 
     /// The parameters as they are tracked, with their band; empty while learning. Allocates.

@@ -11,11 +11,8 @@
 //! too. A block that has more of them than it has with a probability of its share is an alarm. What was fitted lies a little closer to the
 //! model than what comes later: the limit is wider by `sqrt((N + p)/(N - p))`, Akaike's final prediction error.
 
-use plants::Domain;
 use serde::{Deserialize, Serialize};
 use statrs::function::{beta::ln_beta, factorial::ln_binomial};
-
-use crate::Units;
 
 /// The share of the false alarms that is promised for the scatter; the scores have the rest.
 pub(crate) const SHARE: f64 = 0.1;
@@ -248,18 +245,17 @@ pub enum ScatterEvent {
 }
 
 impl ScatterAlarm {
-    /// `output`: its name, of several; `noise`: as it was learned.
+    /// `output`: its name, of several, and what it is in words; `noise`: as it was learned, with its unit.
     pub(crate) fn new(
         moved: Moved,
         time: f64,
-        (output, noise): (Option<&str>, f64),
-        domain: Domain,
-        units: &Units,
+        output: Option<(String, String)>,
+        (noise, unit): (f64, String),
     ) -> Self {
-        let unit = &units.output;
-        let of = output.map_or(String::new(), |name| {
-            format!(" at the {}", domain.sensor_words(name))
-        });
+        let (output, of) = match output {
+            Some((name, words)) => (Some(name), format!(" at the {words}")),
+            None => (None, String::new()),
+        };
         let written = |value: f64| {
             let number = missing_effect::numbers::significant(value, 3);
             format!("{number} {unit}").trim_end().to_string()
@@ -287,10 +283,10 @@ impl ScatterAlarm {
             schema: crate::SCHEMA,
             event,
             time,
-            output: output.map(str::to_string),
+            output,
             learned: noise,
             now,
-            unit: unit.clone(),
+            unit,
             sentence,
         }
     }

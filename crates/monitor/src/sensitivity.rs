@@ -1,28 +1,31 @@
 //! The learned model on the rows as they come, with exact derivatives of its readings.
 
 use ct_signals::Hold;
-use plants::{Command, Dual, MAX_VESSELS, Scalar, Simulator, Structure};
+use plants::{Command, Dual, Scalar, Simulator, Structure};
 
-use crate::intake::Sample;
+use crate::{Each, intake::Sample};
 
 /// The most parameters by which derivatives are taken; further ones stay as they were learned.
 pub(crate) const MOST_LANES: usize = 16;
 
 /// A simulation with derivatives by the parameters of its structure.
 pub(crate) trait Model: Send {
-    /// The reading of an output now, once a sample; its derivatives go to `row`, as many as there are lanes.
+    /// Reads all outputs now, under the inputs of this row; once a sample.
+    fn observe(&mut self, sample: &Sample);
+    /// The reading of an output as it was observed, once a sample; its derivatives go to `row`, as many as there are lanes.
     fn read(&mut self, output: usize, row: &mut [f64]) -> f64;
-    /// Moves on under a command for `h` seconds.
-    fn advance(&mut self, command: Command, h: f64);
-    /// The level of each vessel.
-    fn levels(&self) -> [f64; MAX_VESSELS];
-    /// Where what the command moves stands.
+    /// Moves on from one sample to the next.
+    fn advance(&mut self, hold: Hold, from: &Sample, to: &Sample);
+    /// The states: the level of each vessel, of a plant.
+    fn states(&self) -> Each<f64>;
+    /// Where what the command of a plant moves stands.
     fn stands(&self) -> f64;
 }
 
 struct Lanes<const N: usize>(Simulator<Dual<N>>);
 
 impl<const N: usize> Model for Lanes<N> {
+    fn observe(&mut self, _sample: &Sample) {}
     fn read(&mut self, output: usize, row: &mut [f64]) -> f64 {
         let y = self.0.read(output);
         for (to, derivative) in row.iter_mut().zip(y.eps) {
@@ -30,11 +33,11 @@ impl<const N: usize> Model for Lanes<N> {
         }
         y.re
     }
-    fn advance(&mut self, command: Command, h: f64) {
-        self.0.advance(command, h);
+    fn advance(&mut self, hold: Hold, from: &Sample, to: &Sample) {
+        self.0.advance(command(hold, from, to), to.time - from.time);
     }
-    fn levels(&self) -> [f64; MAX_VESSELS] {
-        self.0.levels().map(Scalar::value)
+    fn states(&self) -> Each<f64> {
+        self.0.levels().map(Scalar::value).into_iter().collect()
     }
     fn stands(&self) -> f64 {
         self.0.stands()
@@ -82,7 +85,7 @@ fn in_lanes<const N: usize>(
 /// The command from one sample to the next.
 pub(crate) fn command(hold: Hold, from: &Sample, to: &Sample) -> Command {
     match hold {
-        Hold::Zero => Command::held(from.input),
-        Hold::First => Command::ramp(from.input, to.input),
+        Hold::Zero => Command::held(from.inputs[0]),
+        Hold::First => Command::ramp(from.inputs[0], to.inputs[0]),
     }
 }

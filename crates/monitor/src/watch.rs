@@ -1,21 +1,21 @@
 //! The learned model beside the plant: innovations, scores and the tracked parameters, a row at a time.
 
 use ct_signals::{Hold, Whitener};
-use plants::{MAX_VESSELS, Structure};
 
 use crate::{
-    Innovation, MAX_OUTPUTS,
+    Each, Innovation,
     bank::Bank,
     intake::Sample,
     isolate::Kept,
     learn::Learned,
-    sensitivity::{Model, command, lanes, model},
+    sensitivity::Model,
     tracker::{Tracker, TrackerState},
+    watched::Watched,
 };
 
 /// The running model; what it holds is rebuilt from rows, and never saved.
-pub(crate) struct Watch {
-    model: Box<dyn Model>,
+pub(crate) struct Watch<'a> {
+    model: Box<dyn Model + 'a>,
     /// The noise of each output: what whitens it, and one over its standard deviation.
     noises: Vec<(Whitener, f64)>,
     hold: Hold,
@@ -31,16 +31,16 @@ pub(crate) struct Watch {
 }
 
 /// What the learned model says of a row.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Said {
-    /// Its levels.
-    pub levels: [f64; MAX_VESSELS],
+    /// Its states.
+    pub states: Each<f64>,
     /// Where what the command moves stands \[input unit\].
     pub stands: f64,
     /// Its readings \[output unit\].
-    pub modelled: [f64; MAX_OUTPUTS],
+    pub modelled: Each<f64>,
     /// What each reading says; `None` where that is lost.
-    pub innovations: [Option<Innovation>; MAX_OUTPUTS],
+    pub innovations: Each<Option<Innovation>>,
     /// Seconds since the sample with a reading before; zero for the first.
     pub step: f64,
 }
@@ -50,12 +50,14 @@ impl Said {
     pub(crate) fn of(&self, sample: Sample) -> Kept {
         Kept {
             sample,
-            levels: self.levels,
+            states: self.states.clone(),
             stands: self.stands,
-            modelled: self.modelled,
+            modelled: self.modelled.clone(),
             innovations: self
                 .innovations
-                .map(|said| said.map_or(0.0, |said| said.standardised)),
+                .iter()
+                .map(|said| said.map_or(0.0, |said| said.standardised))
+                .collect(),
         }
     }
 
@@ -65,27 +67,19 @@ impl Said {
     }
 }
 
-impl Watch {
-    /// From given levels on; `None` where the learned numbers do not make a model.
+impl<'a> Watch<'a> {
+    /// From given states on; `None` where the learned numbers do not make a model.
     pub(crate) fn new(
-        structure: &Structure,
+        model: &Watched<'a>,
         learned: &Learned,
         hold: Hold,
-        levels: &[f64],
+        states: &[f64],
         at_rest: f64,
     ) -> Option<Self> {
-        let lanes = lanes(learned.theta.len());
-        let (vessels, outputs) = (structure.plant.vessels(), learned.outputs.len());
-        let model = model(
-            structure,
-            learned.substeps,
-            &learned.theta,
-            levels.get(..vessels)?,
-            at_rest,
-        )
-        .ok()?;
+        let lanes = model.0.lanes(learned.theta.len());
+        let outputs = learned.outputs.len();
         Some(Self {
-            model,
+            model: model.0.run(learned, states, at_rest)?,
             noises: learned
                 .noise()?
                 .iter()
@@ -103,16 +97,16 @@ impl Watch {
     /// Follows the plant to its next row.
     pub(crate) fn follow(&mut self, sample: &Sample) -> Said {
         if let Some(last) = &self.last {
-            let step = sample.time - last.time;
-            self.model.advance(command(self.hold, last, sample), step);
-            self.since += step;
+            self.model.advance(self.hold, last, sample);
+            self.since += sample.time - last.time;
         }
-        self.last = Some(*sample);
+        self.model.observe(sample);
+        self.last = Some(sample.clone());
         let mut said = Said {
-            levels: self.model.levels(),
+            states: self.model.states(),
             stands: self.model.stands(),
-            modelled: [0.0; MAX_OUTPUTS],
-            innovations: [None; MAX_OUTPUTS],
+            modelled: Each::new(),
+            innovations: Each::new(),
             step: 0.0,
         };
         let (lanes, last) = (self.lanes, self.lanes + self.noises.len());
@@ -120,9 +114,10 @@ impl Watch {
         for (output, (whitener, inverse_sigma)) in self.noises.iter_mut().enumerate() {
             let row = &mut self.rows[self.read.len() * (last + 1)..][..=last];
             let modelled = self.model.read(output, &mut row[..lanes]);
-            said.modelled[output] = modelled;
+            said.modelled.push(modelled);
             let Some(reading) = sample.outputs[output] else {
                 whitener.skip();
+                said.innovations.push(None);
                 continue;
             };
             let residual = reading - modelled;
@@ -133,10 +128,10 @@ impl Watch {
             for value in row.iter_mut() {
                 *value *= *inverse_sigma;
             }
-            said.innovations[output] = Some(Innovation {
+            said.innovations.push(Some(Innovation {
                 residual,
                 standardised: row[last],
-            });
+            }));
             self.read.push(output);
         }
         if said.any() {
@@ -152,7 +147,7 @@ impl Watch {
         tracker: Option<&mut Tracker>,
         covariance: &[f64],
         threshold: f64,
-        (step, growth): (f64, [f64; MAX_OUTPUTS]),
+        (step, growth): (f64, &Each<f64>),
     ) -> bool {
         let width = self.lanes + self.noises.len() + 1;
         let rows = &mut self.rows[..self.read.len() * width];
@@ -176,14 +171,14 @@ impl Watch {
 }
 
 /// The tracker as it was learned.
-pub(crate) fn as_learned(learned: &Learned) -> TrackerState {
-    let positions: Vec<usize> = tracked(learned).iter().map(|(i, _)| *i).collect();
+pub(crate) fn as_learned(learned: &Learned, lanes: usize) -> TrackerState {
+    let positions: Vec<usize> = tracked(learned, lanes).iter().map(|(i, _)| *i).collect();
     TrackerState::learned(&learned.covariance_of(&positions))
 }
 
-/// Lanes and learned standard errors of the parameters that are tracked.
-pub(crate) fn tracked(learned: &Learned) -> Vec<(usize, f64)> {
+/// Lanes and learned standard errors of the parameters that are tracked, of those that have a lane.
+pub(crate) fn tracked(learned: &Learned, lanes: usize) -> Vec<(usize, f64)> {
     let mut errors = learned.errors();
-    errors.retain(|(i, _)| *i < lanes(learned.theta.len()));
+    errors.retain(|(i, _)| *i < lanes);
     errors
 }

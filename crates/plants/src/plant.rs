@@ -98,6 +98,21 @@ impl Plant {
         }
     }
 
+    /// The plant as the text of a model ([`ct_model::ModelSpec::parse`]): its fitted parameters, in the order of [`Plant::parameters`], its
+    /// levels, vessel by vessel, and as output the level of the last vessel, of [`Plant::ThreeTank`] that of T3. What may be known
+    /// ([`Known`]) are `final parameter`s, as they are where it is not.
+    #[must_use]
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::SingleTank => include_str!("../models/single-tank.mo"),
+            Self::SingleTankLinear => include_str!("../models/single-tank-linear.mo"),
+            Self::CascadedTanks => include_str!("../models/cascaded-tanks.mo"),
+            Self::CascadedTanksLinear => include_str!("../models/cascaded-tanks-linear.mo"),
+            Self::FirstOrder => include_str!("../models/first-order.mo"),
+            Self::ThreeTank => include_str!("../models/three-tank.mo"),
+        }
+    }
+
     /// How many vessels it has; the last one is measured, unless [`crate::Known::measured`] says otherwise.
     #[must_use]
     pub fn vessels(self) -> usize {

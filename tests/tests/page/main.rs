@@ -10,6 +10,7 @@ mod held_up;
 mod hostile;
 mod other_users;
 mod overtaken;
+mod own_model;
 mod server;
 mod three_tanks;
 mod two_levels;

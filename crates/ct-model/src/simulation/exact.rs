@@ -53,16 +53,22 @@ impl<T: Scalar> Exact<T> {
         for j in 0..n {
             work.registers.values[first + j] = T::constant(1.0);
             tape.evaluate(&mut work.registers);
-            work.registers.values[first + j] = zero;
+            // Read before the state is set back: in `der(s) = v` the derivative is the state's own register.
             for (i, slope) in slopes(work).into_iter().enumerate() {
                 a[i * n + j] = slope - constant[i];
             }
+            work.registers.values[first + j] = zero;
         }
         Self {
             a,
             kept: Vec::new(),
             oldest: 0,
         }
+    }
+
+    /// Whether the matrix has a value.
+    pub fn is_finite(&self) -> bool {
+        self.a.iter().all(|value| value.value().is_finite())
     }
 
     /// The states after an interval, from their slope at its beginning and what the inputs add to it per unit of time.

@@ -56,7 +56,7 @@ impl Jacobian {
     /// Computes it where these registers are.
     pub fn compute<T: Scalar>(&mut self, tape: &Tape, at: &Registers<T>) {
         let n = tape.states;
-        let up_to = tape.delayed(tape.delays.len());
+        let up_to = tape.delayed(tape.delays.len() + tape.plays.len());
         for begin in (0..n).step_by(LANES) {
             for (own, value) in self.registers.values[..up_to].iter_mut().zip(&at.values) {
                 *own = Dual::constant(value.value());

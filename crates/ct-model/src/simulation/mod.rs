@@ -1,6 +1,7 @@
 //! Simulates a model, with exact derivatives by parameters and initial states.
 //!
-//! - Linear models ([`crate::Linearity`]) without delays go from row to row exactly.
+//! - Models without delays whose states go linearly into their equations, and inputs that are held in any way, go from row to row exactly;
+//!   with inputs in straight lines where these go in linearly too.
 //! - All others by an explicit method of order five whose steps follow its error, until its steps are far shorter than the error asks for:
 //!   then the model is stiff there, and an implicit method of order four goes on ([`Method`]).
 //! - Steps end where an input jumps, where a delay lets a jump through, and where a branch changes (`if`, `min`, `max`, `abs`, `sign`).
@@ -13,13 +14,14 @@ mod delays;
 mod exact;
 mod explicit;
 mod implicit;
+mod memory;
 mod step;
 
 use self::delays::{Delay, Delays, POINTS};
 use self::exact::Exact;
 use self::implicit::Jacobian;
 use self::step::{Drive, Step};
-use crate::linearity::Linearity;
+use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
 use crate::spec::ModelSpec;
 use crate::tape::Tape;
@@ -68,7 +70,7 @@ pub struct NoSolution {
 pub struct Model {
     spec: ModelSpec,
     tape: Tape,
-    exact: bool,
+    exact: ExactSteps,
 }
 
 impl Model {
@@ -76,9 +78,11 @@ impl Model {
     #[must_use]
     pub fn new(spec: ModelSpec) -> Self {
         let tape = Tape::compile(&spec);
-        let exact = spec.linearity() == Linearity::Linear
-            && tape.delays.is_empty()
-            && !spec.states.is_empty();
+        let exact = if tape.delays.is_empty() && !spec.states.is_empty() {
+            spec.exact_steps()
+        } else {
+            ExactSteps::No
+        };
         Self { spec, tape, exact }
     }
 
@@ -86,6 +90,11 @@ impl Model {
     #[must_use]
     pub fn spec(&self) -> &ModelSpec {
         &self.spec
+    }
+
+    /// Its operations.
+    pub(crate) fn tape(&self) -> &Tape {
+        &self.tape
     }
 
     /// The values of its parameters as the text has them, in the order of [`ModelSpec::parameters`].
@@ -129,6 +138,8 @@ pub struct Simulation<'a, T> {
     last: Vec<f64>,
     scratch: Vec<T>,
     begun: bool,
+    /// Settled states have their initial values.
+    settled: bool,
 }
 
 impl<'a, T: Scalar> Simulation<'a, T> {
@@ -143,7 +154,9 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         assert_eq!(parameters.len(), tape.parameters, "parameters");
         assert_eq!(initial.len(), tape.states, "initial states");
         let mut work = Step::new(tape, parameters);
-        let exact = model.exact.then(|| Exact::new(tape, &mut work));
+        let exact = (model.exact != ExactSteps::No).then(|| Exact::new(tape, &mut work));
+        // A function of inputs may have no value at zero, where the matrix is read.
+        let exact = exact.filter(Exact::is_finite);
         let zero = T::constant(0.0);
         let delays = tape.delays.iter().zip(tape.known_ahead());
         let delays = delays.map(|(&(_, by), ahead)| {
@@ -153,15 +166,15 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         });
         let plain: Vec<f64> = parameters.iter().map(|value| value.value()).collect();
         Self {
-            method: if model.exact {
+            method: if exact.is_some() {
                 Method::Exact
             } else {
                 Method::Explicit
             },
             time: T::constant(start),
             state: initial.to_vec(),
+            jacobian: exact.is_none().then(|| Jacobian::new(tape, &plain)),
             exact,
-            jacobian: (!model.exact).then(|| Jacobian::new(tape, &plain)),
             delays: Some(Delays {
                 all: delays.collect(),
             }),
@@ -173,6 +186,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             last: vec![0.0; tape.inputs],
             scratch: vec![zero; tape.states],
             begun: false,
+            settled: false,
             work,
             model,
         }
@@ -205,25 +219,14 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let tape = &self.model.tape;
         drive.load(tape, &mut self.work, self.time, &self.state);
         if self.begun {
-            tape.evaluate_with_guards(&mut self.work.registers);
+            self.let_through(&delays);
         } else {
             self.before_the_record();
         }
+        self.remember();
         self.delays = Some(delays);
         for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {
             *output = self.work.registers.values[register];
-        }
-    }
-
-    /// Before the record everything was as at its beginning: what a delay lets through too.
-    fn before_the_record(&mut self) {
-        let tape = &self.model.tape;
-        // A delay may delay what another one lets through.
-        for _ in 0..=tape.delays.len() {
-            tape.evaluate_with_guards(&mut self.work.registers);
-            for (i, &(what, _)) in tape.delays.iter().enumerate() {
-                self.work.registers.values[tape.delayed(i)] = self.work.registers.values[what];
-            }
         }
     }
 
@@ -252,10 +255,14 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let tape = &model.tape;
         let begin = self.time.value();
         let interval = until - begin;
+        self.settle(from, delays);
         for ((rise, from), to) in self.rise.iter_mut().zip(from).zip(to) {
             *rise = (to - from) / interval;
         }
         let rise = std::mem::take(&mut self.rise);
+        if self.model.exact == ExactSteps::HeldInputs && rise.iter().any(|rise| *rise != 0.0) {
+            self.go_on_in_steps();
+        }
         let result = if self.exact.is_some() {
             self.step_exactly(from, &rise, interval)
         } else {
@@ -272,6 +279,19 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         }
     }
 
+    /// From here on the inputs go in straight lines through what is not linear.
+    fn go_on_in_steps(&mut self) {
+        if self.exact.take().is_none() {
+            return;
+        }
+        let tape = &self.model.tape;
+        let parameters = &self.work.registers.values[1..=tape.parameters];
+        let plain: Vec<f64> = parameters.iter().map(|value| value.value()).collect();
+        self.jacobian = Some(Jacobian::new(tape, &plain));
+        self.method = Method::Explicit;
+        self.note_largest();
+    }
+
     fn step_exactly(&mut self, from: &[f64], rise: &[f64], h: f64) -> Result<(), NoSolution> {
         let tape = &self.model.tape;
         let n = tape.states;
@@ -286,8 +306,11 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let held = vec![0.0; from.len()];
         drive.rise = &held;
         drive.load(tape, &mut self.work, self.time, &self.state);
-        tape.evaluate(&mut self.work.registers);
+        // A branch may stand on an input.
+        tape.evaluate_with_guards(&mut self.work.registers);
         self.work.keep_slope(tape, 0);
+        self.remember();
+        self.begun = true;
         let mut added = vec![T::constant(0.0); n];
         if rise.iter().any(|rise| *rise != 0.0) {
             let ends: Vec<f64> = from.iter().zip(rise).map(|(u, r)| u + r * h).collect();
@@ -345,6 +368,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         };
         drive.load(tape, &mut self.work, self.time, &self.state);
         tape.evaluate_with_guards(&mut self.work.registers);
+        self.remember();
     }
 
     /// Keeps what is delayed over the next or the last step: what is known ahead for a whole interval, everything else after each step.
@@ -440,7 +464,15 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             }
             let whole = limit.value() <= longest * (1.0 + 1e-9);
             let mut h = if whole { limit } else { T::constant(longest) };
-            let error = self.attempt(tape, (from, rise), begin, h, delays);
+            let mut error = self.attempt(tape, (from, rise), begin, h, delays);
+            let mut beyond = None;
+            if error.is_nan() {
+                let at = (begin, interval);
+                beyond = self.branch_before(tape, (from, rise), at, h, delays);
+            }
+            if let Some((event, error_there)) = &beyond {
+                (h, error) = (event.after, *error_there);
+            }
             if (error > 1.0 || error.is_nan()) && h.value() > shortest {
                 // What is no number asks for a much shorter step.
                 let factor = if error.is_finite() {
@@ -455,11 +487,15 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 return Err(NoSolution { time: now });
             }
             let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
-            let event = self.first_event(tape, (from, rise), (begin, interval), h, delays);
+            let is_new = beyond.is_none();
+            let event = match beyond {
+                Some((event, _)) => Some(event),
+                None => self.first_event(tape, (from, rise), (begin, interval), h, delays),
+            };
             if event.is_none() && (!whole || grown > self.length || error > 0.5) {
                 self.length = grown.max(shortest);
             }
-            if let Some(Event { after, .. }) = &event {
+            if let Some(Event { after, .. }) = event.as_ref().filter(|_| is_new) {
                 h = *after;
                 self.attempt(tape, (from, rise), begin, h, delays);
             }
@@ -508,6 +544,30 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 self.look_for_stiffness(tape, h.value());
             }
         }
+    }
+
+    /// Where an equation has no value within a step: the change of a branch before that, `sqrt(max(x, 0))` at zero, and the error of the step
+    /// to it, which stands computed.
+    fn branch_before(
+        &mut self,
+        tape: &Tape,
+        inputs: (&[f64], &[f64]),
+        (begin, interval): (f64, f64),
+        h: T,
+        delays: &Delays<T>,
+    ) -> Option<(Event<T>, f64)> {
+        self.work.registers.extended = true;
+        let error = self.attempt(tape, inputs, begin, h, delays);
+        let event = error
+            .is_finite()
+            .then(|| self.first_event(tape, inputs, (begin, interval), h, delays))
+            .flatten();
+        let found = event.map(|event| {
+            let error = self.attempt(tape, inputs, begin, event.after, delays);
+            (event, error)
+        });
+        self.work.registers.extended = false;
+        found
     }
 
     /// Carries the derivative of what is left of an interval whose last step ended at its very end.

@@ -7,9 +7,15 @@ use super::{
     syntax::{Kept, Kind, Node, Syntax},
 };
 use crate::expression::{Function, Operator, Variable};
+use crate::spec::ModelSpec;
 
 /// Names that a variable cannot have.
 const RESERVED: [&str; 6] = ["time", "delay", "noEvent", "smooth", "Real", "der"];
+
+/// Whether a name has a meaning of its own.
+pub(crate) fn is_reserved(name: &str) -> bool {
+    RESERVED.contains(&name) || Function::ALL.iter().any(|f| f.name() == name)
+}
 
 /// What a name stands for. Flows are in the order of the text until they are sorted.
 pub(super) struct Names {
@@ -80,6 +86,17 @@ pub(super) fn differentiated(left: &Node) -> Option<(&str, Option<&Node>)> {
 }
 
 impl Names {
+    /// The names of a model.
+    pub(super) fn of_model(spec: &ModelSpec) -> Self {
+        let name = |variable| (spec.about(variable).name.clone(), variable);
+        Self {
+            all: spec.variables().map(name).collect(),
+            flows: Vec::new(),
+            states: Vec::new(),
+            tied: spec.flows.iter().filter(|flow| flow.of_parameters).count(),
+        }
+    }
+
     pub(super) fn of(text: &str, syntax: &Syntax) -> Result<Self, TextError> {
         let is_differentiated: BTreeSet<&str> = syntax
             .equations
@@ -103,7 +120,7 @@ impl Names {
         for (index, declaration) in syntax.declarations.iter().enumerate() {
             let name = declaration.name.as_str();
             let at = |what: String| TextError::at(text, declaration.from, what);
-            if RESERVED.contains(&name) || Function::ALL.iter().any(|f| f.name() == name) {
+            if is_reserved(name) {
                 let what = format!(
                     "{} has a meaning of its own: choose another name",
                     shown(name)

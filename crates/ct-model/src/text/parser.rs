@@ -1,7 +1,7 @@
 //! The grammar: a model of declarations and equations, expressions with Modelica's precedence.
 //!
 //! ```text
-//! model       = "model" name [text] {declaration ";"} ["equation" {equation ";"}] "end" name ";"
+//! model       = "model" name [text] {declaration ";"} {["initial"] "equation" {equation ";"}} "end" name ";"
 //! declaration = ["final"] ["constant" | "parameter" | "input" | "output"] "Real" variable {"," variable}
 //! variable    = name ["(" attribute {"," attribute} ")"] ["=" expression] [text]
 //! equation    = sum "=" expression [text]
@@ -47,6 +47,37 @@ pub(crate) fn parse(text: &str) -> Result<Syntax, TextError> {
         brackets: 0,
     }
     .model()
+}
+
+/// An expression that stands alone.
+pub(crate) fn parse_expression(text: &str) -> Result<Node, TextError> {
+    parse_part(text, |parser| parser.expression())
+}
+
+/// An equation that stands alone, with or without its `;`.
+pub(crate) fn parse_equation(text: &str) -> Result<Equation, TextError> {
+    parse_part(text, |parser| {
+        let (left, right) = parser.sides()?;
+        parser.take_sign(";");
+        Ok(Equation { left, right })
+    })
+}
+
+fn parse_part<T>(
+    text: &str,
+    part: impl Fn(&mut Parser) -> Result<T, TextError>,
+) -> Result<T, TextError> {
+    let mut parser = Parser {
+        text,
+        tokens: words(text)?,
+        at: 0,
+        brackets: 0,
+    };
+    let part = part(&mut parser)?;
+    if *parser.word() != Word::End {
+        return parser.unexpected("the end of the expression");
+    }
+    Ok(part)
 }
 
 /// What an operator makes of the parts beside it.
@@ -131,9 +162,7 @@ fn outside(word: &str) -> Option<&'static str> {
         }
         "for" | "while" | "loop" => "loops are outside the subset: write every equation",
         "algorithm" => "algorithms are outside the subset: write equations under `equation`",
-        "initial" => {
-            "initial equations are outside the subset: give the state a start, and fixed = true where it is known"
-        }
+        "initial" => "`equation` has to follow it: write `initial equation`",
         "extends" | "import" | "within" | "redeclare" | "replaceable" | "constrainedby" => {
             "a model is one text: write in it what it takes from others"
         }
@@ -267,14 +296,28 @@ impl Parser<'_> {
             description: self.description()?,
             declarations: Vec::new(),
             equations: Vec::new(),
+            initial: Vec::new(),
         };
-        while !self.is_name("equation") && !self.is_name("end") {
+        while !["initial", "equation", "end"]
+            .iter()
+            .any(|word| self.is_name(word))
+        {
             self.declarations(&mut syntax.declarations)?;
         }
-        while self.take_name("equation") {
-            while !self.is_name("end") && !self.is_name("equation") {
-                let equation = self.equation()?;
-                syntax.equations.push(equation);
+        while !self.is_name("end") {
+            let all = if self.take_name("initial") {
+                &mut syntax.initial
+            } else {
+                &mut syntax.equations
+            };
+            if !self.take_name("equation") {
+                return self.unexpected("`equation` or `end`");
+            }
+            while !["initial", "equation", "end"]
+                .iter()
+                .any(|word| self.is_name(word))
+            {
+                all.push(self.equation()?);
             }
         }
         self.next();
@@ -380,12 +423,16 @@ impl Parser<'_> {
         {
             return self.unexpected("an equation");
         }
-        let left = self.sum()?;
-        self.expect_sign("=", "`=`")?;
-        let right = self.expression()?;
+        let (left, right) = self.sides()?;
         self.description()?;
         self.expect_sign(";", "`;`")?;
         Ok(Equation { left, right })
+    }
+
+    fn sides(&mut self) -> Result<(Node, Node), TextError> {
+        let left = self.sum()?;
+        self.expect_sign("=", "`=`")?;
+        Ok((left, self.expression()?))
     }
 
     /// What holds more than so many within each other would take a stack of any size.

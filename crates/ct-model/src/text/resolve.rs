@@ -12,11 +12,21 @@ use crate::expression::{Condition, Expression, Function, Variable};
 use crate::spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
 
 pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
+    resolve_with(text, syntax, true)
+}
+
+/// The text of an effect: it may declare what it does not use.
+pub(crate) fn resolve_effect(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
+    resolve_with(text, syntax, false)
+}
+
+fn resolve_with(text: &str, syntax: Syntax, all_used: bool) -> Result<ModelSpec, TextError> {
     let names = Names::of(text, &syntax)?;
     let builder = Builder {
         text,
         names,
         used: BTreeSet::new(),
+        all_used,
         spec: ModelSpec {
             name: syntax.name,
             description: syntax.description,
@@ -28,14 +38,88 @@ pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError
             outputs: Vec::new(),
         },
     };
-    builder.build(&syntax.declarations, syntax.equations)
+    builder.build(&syntax.declarations, syntax.equations, &syntax.initial)
 }
 
 struct Builder<'a> {
     text: &'a str,
     names: Names,
     used: BTreeSet<Variable>,
+    /// What is declared has to be used.
+    all_used: bool,
     spec: ModelSpec,
+}
+
+/// Expressions that stand outside a text, in the words of a model.
+pub(crate) struct Scope<'a> {
+    spec: &'a ModelSpec,
+}
+
+impl<'a> Scope<'a> {
+    /// The variables of a model.
+    pub fn new(spec: &'a ModelSpec) -> Self {
+        Self { spec }
+    }
+
+    fn builder<'b>(&self, text: &'b str) -> Builder<'b> {
+        Builder {
+            text,
+            names: Names::of_model(self.spec),
+            used: BTreeSet::new(),
+            all_used: false,
+            spec: self.spec.clone(),
+        }
+    }
+
+    /// An expression.
+    pub fn expression(&self, text: &str) -> Result<Expression, TextError> {
+        let node = super::parser::parse_expression(text)?;
+        self.builder(text).expression(&node, Holds::Everything)
+    }
+
+    /// The equation of a state, `c*der(x) = e`: its coefficient and its right-hand side.
+    pub fn equation(
+        &self,
+        text: &str,
+        state: &str,
+    ) -> Result<(Option<Expression>, Expression), TextError> {
+        let Equation { left, right } = super::parser::parse_equation(text)?;
+        let mut builder = self.builder(text);
+        let Some((_, coefficient)) = differentiated(&left).filter(|(name, _)| *name == state)
+        else {
+            let what =
+                format!("on the left of this equation stands `der({state})` or `c*der({state})`");
+            return builder.error(left.from, what);
+        };
+        let coefficient = coefficient
+            .map(|node| builder.expression(node, Holds::Everything))
+            .transpose()?;
+        Ok((coefficient, builder.expression(&right, Holds::Everything)?))
+    }
+}
+
+impl ModelSpec {
+    /// The flows that each flow needs; a delayed one too, as its present value goes into the delay.
+    fn needs(&self) -> Vec<Vec<usize>> {
+        let of = |flow: &Flow| {
+            let mut needed = Vec::new();
+            flow.value.each_variable(&mut |variable| {
+                if let Variable::Flow(i) = variable {
+                    needed.push(i);
+                }
+            });
+            needed.sort_unstable();
+            needed.dedup();
+            needed
+        };
+        self.flows.iter().map(of).collect()
+    }
+
+    /// Sorts the flows anew, after equations have changed; the flows of a circle where there is one.
+    pub(crate) fn sort_flows(&mut self) -> Result<(), Vec<usize>> {
+        self.order = sorted(&self.needs())?;
+        Ok(())
+    }
 }
 
 /// What an expression may hold.
@@ -57,7 +141,9 @@ impl Builder<'_> {
         mut self,
         declarations: &[Declaration],
         equations: Vec<Equation>,
+        initial: &[Equation],
     ) -> Result<ModelSpec, TextError> {
+        let mut initial = self.initial(initial)?;
         let (mut assigned, mut differential) = self.matched(declarations, &equations)?;
         // Parameters first: what is declared above may stand in what is declared below.
         for declaration in declarations {
@@ -74,7 +160,10 @@ impl Builder<'_> {
                 continue;
             };
             let about = self.about(declaration, &["start", "fixed"])?;
-            let (start, fixed) = self.start(declaration)?;
+            let (start, fixed) = match initial.remove(declaration.name.as_str()) {
+                Some(node) => self.initial_value(declaration, node)?,
+                None => self.start(declaration)?,
+            };
             let coefficient = coefficient
                 .map(|node| self.expression(node, Holds::Everything))
                 .transpose()?;
@@ -122,7 +211,9 @@ impl Builder<'_> {
             let what = "the model has no output: declare what is measured, `output Real y = ...;`";
             return self.error(0, what);
         }
-        self.unused(declarations)?;
+        if self.all_used {
+            self.unused(declarations)?;
+        }
         self.sort(&froms)?;
         Ok(self.spec)
     }
@@ -410,6 +501,46 @@ impl Builder<'_> {
         Ok((start, fixed))
     }
 
+    /// The right-hand sides under `initial equation`, by state.
+    fn initial<'n>(
+        &self,
+        equations: &'n [Equation],
+    ) -> Result<BTreeMap<&'n str, &'n Node>, TextError> {
+        let mut all = BTreeMap::new();
+        for Equation { left, right } in equations {
+            let name = match &left.kind {
+                Kind::Name(name) => name.as_str(),
+                _ => "",
+            };
+            if !matches!(self.names.all.get(name), Some(Variable::State(_))) {
+                let what = "on the left of an initial equation stands one state: write `x = ...;`";
+                return self.error(left.from, what);
+            }
+            if all.insert(name, right).is_some() {
+                let what = format!("{} has two initial equations: keep one", shown(name));
+                return self.error(left.from, what);
+            }
+        }
+        Ok(all)
+    }
+
+    /// As [`Self::start`], from an initial equation.
+    fn initial_value(
+        &mut self,
+        declaration: &Declaration,
+        node: &Node,
+    ) -> Result<(Expression, bool), TextError> {
+        let is_start = |(name, ..): &&(String, usize, Attribute)| name == "start";
+        if let Some((_, from, _)) = declaration.attributes.iter().find(is_start) {
+            let what = format!(
+                "{} has a start and an initial equation: keep one of them",
+                shown(&declaration.name)
+            );
+            return self.error(*from, what);
+        }
+        Ok((self.expression(node, Holds::Everything)?, true))
+    }
+
     fn expression(&mut self, node: &Node, holds: Holds) -> Result<Expression, TextError> {
         let mut part = |node: &Node| self.expression(node, holds).map(Box::new);
         Ok(match &node.kind {
@@ -597,25 +728,8 @@ impl Builder<'_> {
 
     /// Finds an order of the flows in which each needs only those before it, else as in the text.
     fn sort(&mut self, froms: &[usize]) -> Result<(), TextError> {
-        let needs: Vec<Vec<usize>> = self
-            .spec
-            .flows
-            .iter()
-            .map(|flow| {
-                let mut needed = Vec::new();
-                // A delayed flow is needed too: its present value goes into the line.
-                flow.value.each_variable(&mut |variable| {
-                    if let Variable::Flow(i) = variable {
-                        needed.push(i);
-                    }
-                });
-                needed.sort_unstable();
-                needed.dedup();
-                needed
-            })
-            .collect();
-        let order = match sorted(&needs) {
-            Ok(order) => order,
+        match self.spec.sort_flows() {
+            Ok(()) => Ok(()),
             Err(circle) => {
                 let mut names: Vec<&str> = circle
                     .iter()
@@ -626,10 +740,8 @@ impl Builder<'_> {
                     "{} depend on each other in a circle: make one of them a state, or solve the equations for it",
                     names.join(" -> ")
                 );
-                return self.error(froms[circle[0]], what);
+                self.error(froms[circle[0]], what)
             }
-        };
-        self.spec.order = order;
-        Ok(())
+        }
     }
 }

@@ -90,4 +90,6 @@ pub(crate) struct Syntax {
     pub(crate) description: String,
     pub(crate) declarations: Vec<Declaration>,
     pub(crate) equations: Vec<Equation>,
+    /// Under `initial equation`.
+    pub(crate) initial: Vec<Equation>,
 }

@@ -292,14 +292,25 @@ impl Display for ModelSpec {
             match variable {
                 Variable::State(i) => {
                     let state = &self.states[i];
-                    let mut more = vec![("start", self.write(&state.start))];
-                    if state.fixed {
+                    let mut more = Vec::new();
+                    if !self.is_settled(i) {
+                        more.push(("start", self.write(&state.start)));
+                    }
+                    if state.fixed && !self.is_settled(i) {
                         more.push(("fixed", "true".to_string()));
                     }
                     writeln!(f, "  {kept}Real {}{words};", declared(about, &more))?;
                 }
                 _ => writeln!(f, "  {kept}Real {}{words};", declared(about, &[]))?,
             }
+        }
+        let settled = (0..self.states.len()).filter(|&i| self.is_settled(i));
+        for (count, i) in settled.enumerate() {
+            if count == 0 {
+                writeln!(f, "initial equation")?;
+            }
+            let state = &self.states[i];
+            writeln!(f, "  {} = {};", state.about.name, self.write(&state.start))?;
         }
         writeln!(f, "equation")?;
         for flow in self.flows.iter().filter(|flow| !flow.of_parameters) {

@@ -1,9 +1,16 @@
 //! One program for all tests.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod effects;
+mod events;
 mod language;
+mod library;
+mod linear_form;
+mod memory;
 mod mutated;
+mod own_candidates;
 mod refused;
 mod round_trip;
 mod simulated;
+mod support;
 mod units;

@@ -315,10 +315,10 @@ fn outside_the_subset() {
         "equation",
     );
     refuses(
-        "  initial equation x = 1;",
-        3,
-        "`initial`: initial equations",
-        "start",
+        "  initial algorithm x := 1;",
+        11,
+        "`algorithm`: algorithms",
+        "equation",
     );
     let equation = |line: &str, begins: &str, mend: &str| {
         let text = format!(

@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::{ReadOptions, Table, text::line_number};
-use crate::columns::{Found, Layout};
-use crate::record::{MIN_ROWS, median_step};
+use super::{ReadOptions, Table, fewest_rows, text::line_number};
+use crate::columns::{Found, Layout, Purpose};
+use crate::record::median_step;
 use crate::{Error, quoted};
 
 /// A record is refused when more than this share of the output sits exactly at its limits ...
@@ -24,7 +24,7 @@ impl Table {
         file: &str,
         text: &str,
         layout: &Layout,
-        options: &ReadOptions,
+        (options, purpose): (&ReadOptions, Purpose),
     ) -> Result<(), Error> {
         let rows = self.time.len();
         if rows + self.outside == 0 && self.without_time > 0 {
@@ -37,7 +37,8 @@ impl Table {
                 words: listed(words),
             });
         }
-        if rows < MIN_ROWS {
+        let needed = fewest_rows(purpose);
+        if rows < needed {
             let why = match self.outside {
                 0 => String::new(),
                 outside => format!(
@@ -47,7 +48,7 @@ impl Table {
             return Err(Error::TooFewRows {
                 record: file.into(),
                 rows,
-                needed: MIN_ROWS,
+                needed,
                 why,
             });
         }
@@ -55,7 +56,11 @@ impl Table {
             self.check_gaps(file, text, &layout.time)?;
         }
         let channels = || layout.channels().zip(&self.values).zip(&self.missing);
-        for ((column, values), words) in channels() {
+        let needed = match purpose {
+            Purpose::Fit => self.values.len(),
+            Purpose::Simulation => layout.inputs.len(),
+        };
+        for ((column, values), words) in channels().take(needed) {
             if values.iter().all(|value| value.is_nan()) {
                 return Err(Error::NoSample {
                     file: file.into(),
@@ -65,6 +70,9 @@ impl Table {
                     words: listed(words),
                 });
             }
+        }
+        if purpose == Purpose::Simulation {
+            return self.check_scale(file, text, layout, purpose);
         }
         let outputs = layout.inputs.len()..layout.inputs.len() + layout.outputs.len();
         for ((column, values), _) in channels().take(outputs.end).skip(outputs.start) {
@@ -77,14 +85,20 @@ impl Table {
                 });
             }
         }
-        self.check_scale(file, text, layout)?;
+        self.check_scale(file, text, layout, purpose)?;
         channels()
             .take(outputs.end)
             .skip(outputs.start)
             .try_for_each(|((column, values), _)| check_saturation(file, column, values))
     }
 
-    fn check_scale(&self, file: &str, text: &str, layout: &Layout) -> Result<(), Error> {
+    fn check_scale(
+        &self,
+        file: &str,
+        text: &str,
+        layout: &Layout,
+        purpose: Purpose,
+    ) -> Result<(), Error> {
         let interval = median_step(&self.time);
         if !(1.0 / LARGEST..=LARGEST).contains(&interval) {
             return Err(Error::InvalidInterval {
@@ -107,7 +121,8 @@ impl Table {
                 });
             }
             let largest = values.iter().fold(0.0, |high: f64, v| high.max(v.abs()));
-            if largest < 1.0 / LARGEST {
+            // What is simulated may rest at zero.
+            if purpose == Purpose::Fit && largest < 1.0 / LARGEST {
                 return Err(Error::TooSmall {
                     file: file.into(),
                     column: quoted(&column.header),

@@ -22,7 +22,7 @@ pub use self::summary::{Converted, MissingSamples, ReadSummary};
 use self::{
     cells::is_word,
     place::Place,
-    text::{check_header, decode, line_number, read, reader},
+    text::{check_header, decode, line_number, read as next_row, reader},
     time::Bounds,
 };
 pub(crate) use self::{
@@ -31,7 +31,7 @@ pub(crate) use self::{
     text::{check_width, delimiter, delimiter_name, is_number},
     time::Times,
 };
-use crate::columns::{Columns, Found, Heading, Layout};
+use crate::columns::{Columns, Found, Heading, Layout, Purpose};
 use crate::{
     Calendar, Channel, Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, escaped, quoted, read_file,
     unit,
@@ -85,9 +85,31 @@ pub struct Reading {
 /// [`MIN_ROWS`](crate::MIN_ROWS)), [`Error::NoSample`], [`Error::ConstantOutput`], [`Error::InvalidInterval`], [`Error::TooLarge`],
 /// [`Error::TooSmall`], [`Error::Saturated`]; where it is to be strict [`Error::EmptyCell`], [`Error::NotFinite`] and [`Error::Gap`] too.
 pub fn read_csv(path: &Path, columns: &Columns, options: &ReadOptions) -> Result<Reading, Error> {
+    read(path, columns, options, Purpose::Fit)
+}
+
+/// Reads a record on whose inputs a model is simulated: an output whose column is not there has no sample, and two rows are enough.
+/// Outputs that are there may stand still.
+///
+/// # Errors
+/// As [`read_csv`], but for what is wrong with outputs alone.
+pub fn read_inputs_csv(
+    path: &Path,
+    columns: &Columns,
+    options: &ReadOptions,
+) -> Result<Reading, Error> {
+    read(path, columns, options, Purpose::Simulation)
+}
+
+fn read(
+    path: &Path,
+    columns: &Columns,
+    options: &ReadOptions,
+    purpose: Purpose,
+) -> Result<Reading, Error> {
     let file = path.display().to_string();
     let bytes = read_file(path, LARGEST_RECORD)?;
-    let mut reading = parse_csv(&file, &bytes, columns, options)?;
+    let mut reading = parse(&file, &bytes, columns, (options, purpose))?;
     if let Some(name) = path.file_name() {
         reading.record.name = name.to_string_lossy().into_owned();
         reading.summary.file.clone_from(&reading.record.name);
@@ -105,10 +127,19 @@ pub fn parse_csv(
     columns: &Columns,
     options: &ReadOptions,
 ) -> Result<Reading, Error> {
+    parse(file, content, columns, (options, Purpose::Fit))
+}
+
+fn parse(
+    file: &str,
+    content: &[u8],
+    columns: &Columns,
+    (options, purpose): (&ReadOptions, Purpose),
+) -> Result<Reading, Error> {
     let text = decode(file, content)?;
-    let (layout, table) = read_table(file, text, columns, options)?;
-    table.check(file, text, &layout, options)?;
-    table.into_reading(file, text, layout, options)
+    let (layout, table) = read_table(file, text, columns, (options, purpose))?;
+    table.check(file, text, &layout, (options, purpose))?;
+    table.into_reading(file, text, layout, (options, purpose))
 }
 
 /// The header of a file: what there is to choose from, before anything is read.
@@ -119,13 +150,21 @@ pub fn csv_header(file: &str, content: &[u8]) -> Result<Vec<Heading>, Error> {
     let text = decode(file, content)?;
     let mut reader = reader(text);
     let mut record = StringRecord::new();
-    while read(file, &mut reader, &mut record)? {
+    while next_row(file, &mut reader, &mut record)? {
         if !record.iter().all(str::is_empty) {
             check_header(file, || line_number(text, end_of(&reader)), &record)?;
             return Ok(record.iter().map(Heading::of).collect());
         }
     }
     Err(Error::EmptyFile { file: file.into() })
+}
+
+/// The fewest rows of a record.
+fn fewest_rows(purpose: Purpose) -> usize {
+    match purpose {
+        Purpose::Fit => MIN_ROWS,
+        Purpose::Simulation => 2,
+    }
 }
 
 fn end_of(reader: &csv::Reader<&[u8]>) -> usize {
@@ -155,7 +194,7 @@ fn read_table(
     file: &str,
     text: &str,
     columns: &Columns,
-    options: &ReadOptions,
+    (options, purpose): (&ReadOptions, Purpose),
 ) -> Result<(Layout, Table), Error> {
     let delimiter = delimiter(text);
     let mut reader = reader(text);
@@ -165,7 +204,7 @@ fn read_table(
     let mut numbers = Numbers::new(delimiter != b',', options.strict, &columns.missing);
     let mut table = Table::default();
 
-    while read(file, &mut reader, &mut record)? {
+    while next_row(file, &mut reader, &mut record)? {
         let end = end_of(&reader);
         if record.iter().all(str::is_empty) {
             continue;
@@ -174,7 +213,7 @@ fn read_table(
             let row = || line_number(text, end);
             check_header(file, row, &record)?;
             let headers: Vec<String> = record.iter().map(str::to_string).collect();
-            let layout = columns.resolve(file, row(), &headers)?;
+            let layout = columns.resolve(file, row(), &headers, purpose)?;
             let channels = layout.channels().count();
             table.values.resize_with(channels, Vec::new);
             table.missing.resize_with(channels, Vec::new);
@@ -297,7 +336,7 @@ impl Table {
         file: &str,
         text: &str,
         layout: Layout,
-        options: &ReadOptions,
+        (options, purpose): (&ReadOptions, Purpose),
     ) -> Result<Reading, Error> {
         // Times begin at the first row in use where they are dates.
         if let (Some(calendar), Some(&first)) = (&mut self.calendar, self.time.first()) {
@@ -322,6 +361,12 @@ impl Table {
             references: channels(&layout.references),
             calendar: self.calendar,
         };
+        for (at, header) in &layout.absent {
+            let (name, unit) = unit::split(header);
+            let none = vec![f64::NAN; record.len()];
+            let channel = Channel::new(printable(name), printable(unit), none);
+            record.outputs.insert(*at, channel);
+        }
         let named = layout.channels().zip(&self.missing);
         let missing = named
             .filter(|(_, words)| !words.is_empty())
@@ -359,11 +404,11 @@ impl Table {
         };
         if let Some(interval) = options.resample {
             record = record.resampled(interval)?;
-            if record.len() < MIN_ROWS {
+            if record.len() < fewest_rows(purpose) {
                 return Err(Error::TooFewRows {
                     record: file.into(),
                     rows: record.len(),
-                    needed: MIN_ROWS,
+                    needed: fewest_rows(purpose),
                     why: " on the grid of --resample".into(),
                 });
             }

@@ -5,4 +5,5 @@ mod ar;
 mod csv_file;
 mod residual_tests;
 mod signals;
+mod simulated_inputs;
 mod tolerant_reading;

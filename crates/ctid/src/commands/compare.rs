@@ -166,12 +166,7 @@ impl Diagnose {
         files.check_repetition()?;
         let model = match AnyModelFile::read(&self.compare.model)? {
             AnyModelFile::Plant(model) => *model,
-            AnyModelFile::Own(_) => {
-                return Err(Error::file(
-                    &self.compare.model,
-                    "diagnose knows the six plants alone: `ctid compare` fits a model of your own",
-                ));
-            }
+            AnyModelFile::Own(model) => return self.run_own(&model, &files, out, look),
         };
         let waiting = model.waiting.clone();
         let input = files.read_with(model)?;
@@ -193,5 +188,38 @@ impl Diagnose {
             out,
             look,
         )
+    }
+    /// A model of the user's own.
+    fn run_own(
+        &self,
+        model: &OwnModelFile,
+        files: &Files,
+        out: &mut dyn Write,
+        look: Look,
+    ) -> Result<(), Error> {
+        if self.compare.results.report.is_some() || self.unknown.is_some() {
+            return Err(Error::Usage(
+                "--report and --unknown: they cannot be written of a model of your own yet; leave them out, or write --json".to_string(),
+            ));
+        }
+        let records = model.records(files)?;
+        let outputs = self.compare.results.plan(&files.all(), None)?;
+        let mut options = effect_search::Options {
+            time_limit: Some(self.compare.effort.limit()),
+            interrupt: Some(interrupt::flag()),
+            ..effect_search::Options::default()
+        };
+        if let Some(most) = self.max_effects {
+            options.max_effects = usize::from(most);
+        }
+        let bar = Bar::with_limit(options.time_limit);
+        let diagnosis = own_model::diagnose(model, &records, &options, &|progress| {
+            bar.phase(progress.phase);
+        });
+        bar.clear();
+        let diagnosis = diagnosis?;
+        let text =
+            input::notes(&records.summaries, look) + &own_model::diagnosis_said(&diagnosis, look);
+        finish(&diagnosis, &text, &outputs, out, look)
     }
 }

@@ -15,7 +15,8 @@ use crate::identify::side_by_side::{self, Orders};
 use crate::identify::{self, DelayChoice, LevelChoice, Method, Request, side_by_side_text};
 use crate::input::{self, ReadArguments};
 use crate::look::Look;
-use crate::model_file::{self, ControllerSettings};
+use crate::model_file::{ControllerSettings, ModelFile};
+use crate::own_model::{AnyModelFile, Beside, OneByOne};
 use crate::progress::Bar;
 
 #[derive(Debug, Args)]
@@ -37,9 +38,16 @@ pub(super) struct Identify {
     /// Records that are not fitted, on which the models are tried
     #[arg(long, value_name = "TEST.csv", num_args = 1..)]
     test: Vec<PathBuf>,
-    /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used
+    /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used; beside a
+    /// linear model of your own stands its own transfer function
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
+    /// Of a linear model of your own with several inputs: the one that is identified
+    #[arg(long, value_name = "NAME", requires = "model")]
+    input: Option<String>,
+    /// The same of several outputs
+    #[arg(long, value_name = "NAME", requires = "model")]
+    output: Option<String>,
     /// The columns' names, where their first letters do not tell; several inputs with + between them, for srivc and rivc. Without a fourth name there is
     /// no reference
     #[arg(long, value_name = "TIME,INPUT,OUTPUT[,REFERENCE]", value_parser = columns)]
@@ -112,12 +120,35 @@ fn first_missing(record: &Record, channel: &Channel) -> f64 {
     lacks.map_or(f64::NAN, |(time, _)| *time)
 }
 
+/// Which columns are read and how, and the model of the user's own that they are of.
+type Layout<'l> = (&'l Columns, Hold, Option<&'l OneByOne<'l>>);
+
 impl Identify {
+    /// The model file, where one is given.
+    fn model_file(&self) -> Result<Option<AnyModelFile>, Error> {
+        let file = self.model.as_deref().map(AnyModelFile::read).transpose()?;
+        if let (Some(AnyModelFile::Plant(_)), Some(path), true) = (
+            &file,
+            &self.model,
+            self.input.is_some() || self.output.is_some(),
+        ) {
+            let what = "--input and --output choose a signal of a model of your own; of a plant, name one column under [columns]";
+            return Err(Error::file(path, what));
+        }
+        Ok(file)
+    }
+
     /// Which columns, the hold, and the controller with its limits.
-    fn layout(&self) -> Result<(Columns, Hold, Option<ControllerSettings>), Error> {
-        if let Some(model) = &self.model {
-            let path = model;
-            let model = model_file::read(path)?;
+    fn layout(
+        &self,
+        model: Option<ModelFile>,
+        own: Option<&OneByOne>,
+    ) -> Result<(Columns, Hold, Option<ControllerSettings>), Error> {
+        if let Some(own) = own {
+            let (columns, hold) = own.columns();
+            return Ok((columns, hold, None));
+        }
+        if let (Some(path), Some(model)) = (&self.model, model) {
             if model.columns.outputs.len() > 1 {
                 return Err(Error::file(
                     path,
@@ -259,14 +290,18 @@ impl Identify {
     }
 
     /// A record as `--columns` and `--model` say. The methods take whole records: what is missing is refused.
-    fn read(&self, path: &Path, columns: &Columns, hold: Hold) -> Result<Reading, Error> {
+    fn read(&self, path: &Path, (columns, hold, own): Layout) -> Result<Reading, Error> {
         let options = ReadOptions {
             hold,
             ..self.reading.options()
         };
         let reading = read_csv(path, columns, &options).map_err(self.named_by())?;
         let Reading { record, summary } = reading;
-        let record = self.without_unnamed(record);
+        let mut record = self.without_unnamed(record);
+        if let Some(own) = own {
+            record.references.clear();
+            own.convert(&mut record)?;
+        }
         let missing = record.channels().find(|channel| channel.missing() > 0);
         let rows = record.missing_rows();
         let clock = Clock::of([&record]);
@@ -296,13 +331,8 @@ impl Identify {
     }
 
     /// A record that is simulated only, in the units of the one that is fitted.
-    fn read_test(
-        &self,
-        path: &Path,
-        (columns, hold): (&Columns, Hold),
-        fitted: &Record,
-    ) -> Result<Reading, Error> {
-        let Reading { record, summary } = self.read(path, columns, hold)?;
+    fn read_test(&self, path: &Path, layout: Layout, fitted: &Record) -> Result<Reading, Error> {
+        let Reading { record, summary } = self.read(path, layout)?;
         let inputs = record.inputs.iter().zip(&fitted.inputs);
         let pairs = inputs.chain(record.outputs.iter().zip(&fitted.outputs));
         for (test, fitted) in pairs {
@@ -347,13 +377,25 @@ impl Identify {
                 return Err(Error::file(path, "is given twice; give each record once"));
             }
         }
-        let (columns, hold, controller) = self.layout()?;
+        let (plant, own) = match self.model_file()? {
+            None => (None, None),
+            Some(AnyModelFile::Plant(model)) => (Some(*model), None),
+            Some(AnyModelFile::Own(model)) => (None, Some(model)),
+        };
+        let chosen = (self.input.as_deref(), self.output.as_deref());
+        let own = match (&own, &self.model) {
+            (Some(model), Some(path)) => Some(OneByOne::of(path, model, chosen)?),
+            _ => None,
+        };
+        let own = own.as_ref();
+        let (columns, hold, controller) = self.layout(plant, own)?;
+        let layout = (&columns, hold, own);
         self.check_options(&methods)?;
         let requests = methods
             .into_iter()
             .map(|method| self.request(method, controller.as_ref()))
             .collect::<Result<Vec<_>, _>>()?;
-        let Reading { record, summary } = self.read(data, &columns, hold)?;
+        let Reading { record, summary } = self.read(data, layout)?;
         let mut summaries = vec![summary];
         let mut noted = |reading: Reading| {
             summaries.push(reading.summary);
@@ -363,17 +405,11 @@ impl Identify {
         let test = self
             .test
             .iter()
-            .map(|path| {
-                self.read_test(path, (&columns, hold), &record)
-                    .map(&mut noted)
-            })
+            .map(|path| self.read_test(path, layout, &record).map(&mut noted))
             .collect::<Result<Vec<_>, _>>()?;
         let more = more
             .iter()
-            .map(|path| {
-                self.read_test(path, (&columns, hold), &record)
-                    .map(&mut noted)
-            })
+            .map(|path| self.read_test(path, layout, &record).map(&mut noted))
             .collect::<Result<Vec<_>, _>>()?;
         let inputs: Vec<&Path> = self
             .data
@@ -383,6 +419,10 @@ impl Identify {
             .map(PathBuf::as_path)
             .collect();
         let outputs = self.results.plan(&inputs, None)?;
+        let transfer = match own {
+            Some(own) => own.transfer_function(data)?,
+            None => None,
+        };
         let notes = input::notes(&summaries, look);
         let bar = Bar::new();
         if let ([request], [_], []) = (&requests[..], &self.order.0[..], &test[..]) {
@@ -395,8 +435,15 @@ impl Identify {
             };
             bar.clear();
             let found = found?;
-            let text = notes + &identify::text::text(&found, look);
-            return finish(&found, &text, &outputs, out, look);
+            let mut text = notes + &identify::text::text(&found, look);
+            if let Some(transfer) = &transfer {
+                text += &transfer.said(Some((found.order, &found.parameters)), look);
+            }
+            let beside = Beside {
+                found: &found,
+                own_model: transfer.as_ref(),
+            };
+            return finish(&beside, &text, &outputs, out, look);
         }
         let total = requests.len() * self.order.0.len();
         let done = AtomicUsize::new(0);
@@ -415,8 +462,15 @@ impl Identify {
         let found = side_by_side::compare(records, &requests, &self.order.0, &tell);
         bar.clear();
         let found = found?;
-        let text = notes + &side_by_side_text::text(&found, look);
-        finish(&found, &text, &outputs, out, look)
+        let mut text = notes + &side_by_side_text::text(&found, look);
+        if let Some(transfer) = &transfer {
+            text += &transfer.said(None, look);
+        }
+        let beside = Beside {
+            found: &found,
+            own_model: transfer.as_ref(),
+        };
+        finish(&beside, &text, &outputs, out, look)
     }
 }
 

@@ -1,7 +1,9 @@
 //! The command line: what may be typed, and what is then called.
 
 mod compare;
+mod export;
 mod identify;
+mod simulate;
 mod tables;
 
 use std::io::{self, Write};
@@ -10,11 +12,13 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand};
 
 use self::compare::{Compare, Diagnose};
+use self::export::Export;
 use self::identify::Identify;
+use self::simulate::Simulate;
 use self::tables::Tables;
 use crate::look::Look;
-use crate::model_file;
 use crate::output::{self, Found, Kind, Output};
+use crate::own_model::{self, AnyModelFile};
 use crate::progress::Bar;
 use crate::{Error, catalogue, check, design, edit, monitor, serve, tour};
 
@@ -43,6 +47,10 @@ enum Command {
     Effects(Effects),
     /// Read a model in Modelica and say what it holds: states, inputs, outputs, parameters, units that do not fit
     Check(Check),
+    /// Simulate a model on new inputs, with a 95 % band where it is fitted to records first
+    Simulate(Simulate),
+    /// Write the fitted model as Modelica, or the curves and residuals of its fit as CSV
+    Export(Export),
     /// Propose the next experiment, which tells two effects apart
     Design(design::Arguments),
     /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
@@ -136,9 +144,17 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         })) => say(out, &catalogue::describe(&effect, look)?),
         Some(Command::Effects(Effects {
             model: Some(model), ..
-        })) => say(out, &catalogue::list_for(&model_file::read(&model)?, look)),
+        })) => {
+            let text = match AnyModelFile::read(&model)? {
+                AnyModelFile::Plant(model) => catalogue::list_for(&model, look),
+                AnyModelFile::Own(model) => own_model::ports::listed(&model, look)?,
+            };
+            say(out, &text)
+        }
         Some(Command::Effects(_)) => say(out, &catalogue::list(look)),
         Some(Command::Check(Check { model })) => say(out, &check::run(&model, look)?),
+        Some(Command::Simulate(arguments)) => arguments.run(out, look),
+        Some(Command::Export(arguments)) => arguments.run(out, look),
         Some(Command::Design(arguments)) => {
             let (proposal, outputs, notes) = arguments.run(look)?;
             let text = notes + &design::text::design(&proposal.design, look);

@@ -181,6 +181,42 @@ pub fn with_effect(
     Ok(Edited { text, done })
 }
 
+/// The text with a column for a signal under `[columns]`; an empty name takes it away.
+///
+/// # Errors
+/// Where the text is no TOML, or `columns` is no table.
+pub(crate) fn with_column(
+    file: &str,
+    text: &str,
+    signal: &str,
+    column: &str,
+) -> Result<String, Error> {
+    let mut document = document(file, text)?;
+    let table = document
+        .entry("columns")
+        .or_insert_with(toml_edit::table)
+        .as_table_like_mut()
+        .ok_or_else(|| Error::File {
+            file: file.to_string(),
+            what: "columns has to be a table: write [columns], and a line for each signal below it"
+                .to_string(),
+        })?;
+    match table
+        .get_mut(signal)
+        .and_then(toml_edit::Item::as_value_mut)
+    {
+        _ if column.is_empty() => drop(table.remove(signal)),
+        Some(said) => {
+            // A comment behind it stays.
+            let decor = said.decor().clone();
+            *said = column.into();
+            *said.decor_mut() = decor;
+        }
+        None => drop(table.insert(signal, toml_edit::value(column))),
+    }
+    Ok(document.to_string())
+}
+
 /// Whether the document has a `[term.X]` table.
 fn has_table(document: &DocumentMut, name: &str) -> bool {
     document

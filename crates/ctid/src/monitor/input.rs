@@ -5,17 +5,21 @@ use std::path::Path;
 use ::monitor::{Monitor, Refused, Row, TimeAxis, Units};
 use ct_signals::{BadLine, LONGEST_LINE, Line, RowTimes, Rows, TimestampError, quoted};
 
-use super::{Halt, INPUT, Session, blame, lines::Cut};
+use super::{Believed, Halt, INPUT, Session, blame, lines::Cut};
+use crate::own_model::{OwnModelFile, conversion};
 use crate::{Error, one_line};
 
 /// So many lines at the beginning may be parts of rows.
 const PARTS: usize = 2;
-/// What becomes of a row without a reading.
-const LOST: &str = "the reading is lost, the command of the row is used";
+/// What becomes of a row without a reading, of a plant and of a model of its user's own.
+const LOST: [&str; 2] = [
+    "the reading is lost, the command of the row is used",
+    "the reading is lost, the inputs of the row are used",
+];
 /// The mend where names are missing: `tail -f` alone begins in the middle of the file.
 const HEADER_FIRST: &str = "begin with the header: tail -n +1 -f FILE";
 
-impl Session<'_> {
+impl<'a> Session<'a> {
     pub(super) fn line(&mut self, cut: Cut) -> Result<(), Halt> {
         self.line += 1;
         let line = match cut {
@@ -48,9 +52,9 @@ impl Session<'_> {
         }
         match read {
             Ok(Line::Nothing) => Ok(()),
-            Ok(Line::Row([time, input])) => {
+            Ok(Line::Row([time, _])) => {
                 self.times()?;
-                let (row, bad) = self.readings(time, input);
+                let (row, bad) = self.readings(time);
                 self.row(&row, bad)
             }
             Err(BadLine::Time { error, .. }) if never_understood(&error) => {
@@ -80,14 +84,23 @@ impl Session<'_> {
     }
 
     /// The row that was read last, and why it lacks the first reading that it lacks, where the line says so.
-    fn readings(&self, time: f64, input: f64) -> (Row, Option<BadLine>) {
-        let mut row = Row::new(time, input, &[]);
+    fn readings(&self, time: f64) -> (Row, Option<BadLine>) {
+        let mut row = Row::with_inputs(time, &[], &[]);
         let mut bad = None;
-        let outputs = self.rows.as_ref().map_or(&[][..], Rows::outputs);
-        for (reading, output) in row.outputs.iter_mut().zip(outputs) {
-            match output {
-                Ok(value) => *reading = *value,
-                Err(why) => bad = bad.or_else(|| Some(why.clone())),
+        let Some(rows) = &self.rows else {
+            return (row, bad);
+        };
+        row.inputs.extend(rows.inputs());
+        for output in rows.outputs() {
+            row.outputs.push(*output.as_ref().unwrap_or(&f64::NAN));
+            if let Err(why) = output {
+                bad = bad.or_else(|| Some(why.clone()));
+            }
+        }
+        let signals = row.inputs.iter_mut().chain(&mut row.outputs);
+        for (value, conversion) in signals.zip(&self.conversions) {
+            if let Some(conversion) = conversion {
+                *value = conversion.apply(*value);
             }
         }
         (row, bad)
@@ -176,7 +189,13 @@ impl Session<'_> {
             String::new()
         };
         self.screen.say(&format!("{INPUT}: {}{hint}", rows.order()));
-        let units = self.units(&rows)?;
+        let units = match self.model {
+            Believed::Plant(_) => self.units(&rows)?,
+            Believed::Own(file, time_unit) => {
+                self.own_units(file, time_unit, &rows)?;
+                Units::default()
+            }
+        };
         if self.restored {
             self.resumed(&units)?;
             if let (Some(calendar), Some(last)) =
@@ -185,14 +204,23 @@ impl Session<'_> {
                 rows.count_from(calendar, last);
             }
         } else {
-            self.monitor = Monitor::new(self.model.clone(), self.settings, units.clone())
+            self.monitor = Monitor::new(self.model.watched(), self.settings, units.clone())
                 .map_err(|error| blame(error, self.arguments))?;
         }
         if self.monitor.gathered().is_some() {
             self.screen.say("learning the plant from the first rows");
         }
-        let names = (0..self.monitor.outputs()).map(|output| rows.output_name(output));
-        self.screen.outputs(names, &units.output);
+        let names = (0..self.monitor.outputs()).map(|output| rows.name("output", output));
+        match self.model {
+            Believed::Plant(_) => self
+                .screen
+                .outputs(names.map(|name| (name, &*units.output))),
+            Believed::Own(file, _) => {
+                let outputs = file.signals().skip(file.model.spec().inputs.len());
+                let units = outputs.map(|about| about.unit.as_str());
+                self.screen.outputs(names.zip(units));
+            }
+        }
         self.rows = Some(rows);
         Ok(is_row)
     }
@@ -223,6 +251,34 @@ impl Session<'_> {
             output: output.to_string(),
             input,
         })
+    }
+
+    /// How the rows of a model of its user's own are put into its units, and in which one its time is.
+    fn own_units(
+        &mut self,
+        file: &'a OwnModelFile,
+        time_unit: f64,
+        rows: &Rows,
+    ) -> Result<(), Error> {
+        let inputs = file.model.spec().inputs.len();
+        let names = (0..inputs).map(|i| rows.name("input", i));
+        let names = names.chain((0..).map(|i| rows.name("output", i)));
+        let signals = file.signals().zip(names.zip(rows.units()));
+        let conversion = |(about, (name, unit))| {
+            conversion(about, &quoted(name), &quoted(unit))
+                .map_err(|what| Error::Usage(format!("{INPUT}, row {}: {what}", self.line)))
+        };
+        self.conversions = signals.map(conversion).collect::<Result<_, Error>>()?;
+        let seconds = rows.seconds();
+        if file.columns.time.is_none() && seconds != time_unit {
+            if self.restored {
+                return Err(Error::Usage(format!(
+                    "the saved state has a time in units of {time_unit} s, but the rows have one of {seconds} s; convert the rows, or name another --state"
+                )));
+            }
+            self.model = Believed::Own(file, seconds);
+        }
+        Ok(())
     }
 
     /// The saved state and the rows have to be in the same units.
@@ -307,7 +363,7 @@ impl Session<'_> {
     /// The header of the time.
     fn time_name(&self) -> String {
         let rows = self.rows.as_ref();
-        rows.map_or(String::new(), |rows| quoted(rows.name("time")))
+        rows.map_or(String::new(), |rows| quoted(rows.name("time", 0)))
     }
 
     /// A row; `bad`: why it lacks a reading, where the line says so.
@@ -344,10 +400,17 @@ impl Session<'_> {
         let first_lost = lost.find_map(|(output, lost)| Some((output, lost.as_ref()?)));
         match (bad, first_lost) {
             (None, None) => self.trouble.good(),
-            (Some(bad), _) => self.trouble_in_row(|| format!("{bad}; {LOST}")),
+            (Some(bad), _) => {
+                let lost = self.words(LOST[0], LOST[1]);
+                self.trouble_in_row(|| format!("{bad}; {lost}"));
+            }
             (None, Some((output, lost))) => {
-                let text = self.named(lost, output);
-                self.trouble_in_row(|| format!("{text}; {LOST}"));
+                let text = format!(
+                    "{}; {}",
+                    self.named(lost, output),
+                    self.words(LOST[0], LOST[1])
+                );
+                self.trouble_in_row(|| text);
             }
         }
         self.last_time = row.time;
@@ -355,7 +418,7 @@ impl Session<'_> {
             self.notice(notice)?;
         }
         self.screen.innovations(row.time, &step.innovations);
-        for scatter in step.scatter.iter().flatten() {
+        for scatter in &step.scatter {
             self.warn(scatter.time, &scatter.sentence);
             self.print(scatter, scatter.time, None)?;
         }
@@ -390,18 +453,15 @@ impl Session<'_> {
     }
 
     fn refused(&mut self, refused: &Refused) {
-        // Time and command alone refuse a row.
-        let text = self.named(refused, 0);
+        // Time and inputs alone refuse a row.
+        let text = self.named(refused, refused.at());
         self.bad(|| text);
     }
 
-    /// What is wrong with a row's value, with its column and the mend; `output`: whose reading it is, where it is one.
-    fn named(&self, refused: &Refused, output: usize) -> String {
+    /// What is wrong with a row's value, with its column and the mend; `at`: of which input or output.
+    fn named(&self, refused: &Refused, at: usize) -> String {
         let column = self.rows.as_ref().map_or(String::new(), |rows| {
-            quoted(match refused.column() {
-                "output" => rows.output_name(output),
-                column => rows.name(column),
-            })
+            quoted(rows.name(refused.column(), at))
         });
         let mend = match refused {
             Refused::NotFinite { .. } => "check what writes it",

@@ -13,13 +13,14 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
 
-use ::monitor::{Model, Monitor, Settings, Units};
+use ::monitor::{Model, Monitor, OwnModel, Settings, Units, Watched};
 use clap::Args;
-use ct_signals::{Columns, Rows};
+use ct_signals::{Columns, Conversion, Rows};
 
 use crate::Error;
 use crate::look::Look;
-use crate::model_file::{self, ModelFile};
+use crate::model_file::ModelFile;
+use crate::own_model::{AnyModelFile, OwnModelFile};
 use lines::Lines;
 use saver::Saver;
 use screen::{DRAWN_EVERY, Screen};
@@ -57,7 +58,8 @@ impl Arguments {
     /// # Errors
     /// Where the model, the state or the first line cannot be used, nothing comes, or something cannot be written.
     pub fn run(&self, out: &mut dyn Write) -> Result<(), Error> {
-        let mut session = Session::new(self, out)?;
+        let file = AnyModelFile::read(&self.model)?;
+        let mut session = Session::new(self, &file, out)?;
         let events = source::open()?;
         let mut lines = Lines::default();
         let ended = loop {
@@ -107,14 +109,40 @@ impl From<Error> for Halt {
     }
 }
 
+/// What is watched.
+#[derive(Clone)]
+enum Believed<'a> {
+    Plant(Model),
+    /// And the seconds in one unit of its time.
+    Own(&'a OwnModelFile, f64),
+}
+
+impl<'a> Believed<'a> {
+    fn watched(&self) -> Watched<'a> {
+        match self {
+            Self::Plant(model) => model.clone().into(),
+            Self::Own(file, time_unit) => OwnModel {
+                model: &file.model,
+                known: file.known.clone(),
+                priors: file.priors.clone(),
+                hold: file.hold,
+                time_unit: *time_unit,
+            }
+            .into(),
+        }
+    }
+}
+
 /// A run of the command.
 struct Session<'a> {
     arguments: &'a Arguments,
     out: &'a mut dyn Write,
-    model: Model,
+    model: Believed<'a>,
     columns: Columns,
     settings: Settings,
-    monitor: Monitor,
+    monitor: Monitor<'a>,
+    /// Of each input and output of a model of its user's own how it is put into the model's unit.
+    conversions: Vec<Option<Conversion>>,
     /// The monitor goes on from a saved state.
     restored: bool,
     rows: Option<Rows>,
@@ -134,7 +162,11 @@ struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    fn new(arguments: &'a Arguments, out: &'a mut dyn Write) -> Result<Self, Error> {
+    fn new(
+        arguments: &'a Arguments,
+        file: &'a AnyModelFile,
+        out: &'a mut dyn Write,
+    ) -> Result<Self, Error> {
         let settings = Settings {
             rows_between_false_alarms: arguments.false_alarm_every,
             learning_rows: arguments.learn,
@@ -147,18 +179,26 @@ impl<'a> Session<'a> {
                 "--interval {seconds} has to be above zero: give the seconds between estimates"
             )));
         }
-        let file = model_file::read(&arguments.model)?;
-        let columns = file.columns.clone();
-        let model = believed(file);
         let blame = |error: ::monitor::Error| blame(error, arguments);
         let state = match &arguments.state {
             Some(path) => state_file::read(path, &arguments.model)?,
             None => None,
         };
         let restored = state.is_some();
+        let (columns, model) = match file {
+            AnyModelFile::Plant(file) => (file.columns.clone(), Believed::Plant(believed(file))),
+            AnyModelFile::Own(file) => {
+                // Where the model file does not say in which unit the time is, the header does.
+                let declared = file.columns.time.is_some();
+                let declared = declared.then(|| file.columns.time_header().1);
+                let saved = state.as_ref().and_then(::monitor::State::time_unit);
+                let time_unit = declared.or(saved).unwrap_or(1.0);
+                (file.columns.clone(), Believed::Own(file, time_unit))
+            }
+        };
         let monitor = match state {
-            Some(state) => Monitor::restore(model.clone(), settings, state),
-            None => Monitor::new(model.clone(), settings, Units::default()),
+            Some(state) => Monitor::restore(model.watched(), settings, state),
+            None => Monitor::new(model.watched(), settings, Units::default()),
         }
         .map_err(blame)?;
         let saver = Saver::new(arguments.state.clone(), monitor.rows());
@@ -170,6 +210,7 @@ impl<'a> Session<'a> {
             columns,
             settings,
             monitor,
+            conversions: Vec::new(),
             restored,
             rows: None,
             parts: 0,
@@ -183,6 +224,14 @@ impl<'a> Session<'a> {
             last_time,
             saver,
         })
+    }
+
+    /// The words for one of the plants, or for a model of its user's own.
+    fn words<'w>(&self, of_plant: &'w str, of_own: &'w str) -> &'w str {
+        match self.model {
+            Believed::Plant(_) => of_plant,
+            Believed::Own(..) => of_own,
+        }
     }
 
     /// Between two chunks of rows.
@@ -229,22 +278,22 @@ impl<'a> Session<'a> {
 }
 
 /// What the model file says that the monitor needs.
-fn believed(file: ModelFile) -> Model {
+fn believed(file: &ModelFile) -> Model {
     Model {
         plant: file.plant,
-        known: file.known,
-        effects: file.effects,
-        terms: file.terms.into_iter().map(|own| own.term).collect(),
-        start: file.start,
-        fixed: file.fixed,
-        priors: file.priors,
+        known: file.known.clone(),
+        effects: file.effects.clone(),
+        terms: file.terms.iter().map(|own| own.term.clone()).collect(),
+        start: file.start.clone(),
+        fixed: file.fixed.clone(),
+        priors: file.priors.clone(),
         hold: file.hold,
     }
 }
 
 /// An error of the monitor, with the file that is to blame.
 fn blame(error: ::monitor::Error, arguments: &Arguments) -> Error {
-    use ::monitor::Error::{ByClock, Damaged, OtherModel, Structure, Version};
+    use ::monitor::Error::{ByClock, Damaged, NoParameters, OtherModel, Structure, Time, Version};
     match (&error, &arguments.state) {
         (OtherModel { .. } | Damaged { .. } | Version { .. }, Some(path)) => {
             Error::file(path, error.to_string())
@@ -256,7 +305,7 @@ fn blame(error: ::monitor::Error, arguments: &Arguments) -> Error {
                 arguments.model.display()
             ),
         ),
-        (Structure(_), _) => Error::file(&arguments.model, error.to_string()),
+        (Structure(_) | Time | NoParameters, _) => Error::file(&arguments.model, error.to_string()),
         _ => Error::Usage(error.to_string()),
     }
 }

@@ -24,14 +24,20 @@ impl Session<'_> {
             } => {
                 let (line, span) = (self.line, axis.span(*from, *to));
                 let what = if *bridged {
-                    "the command is taken to have been held"
+                    self.words(
+                        "the command is taken to have been held",
+                        "the inputs are taken to have been held",
+                    )
                 } else {
-                    "what the levels are is waited for"
+                    self.words(
+                        "what the levels are is waited for",
+                        "what the states are is waited for",
+                    )
                 };
                 let name = self
                     .rows
                     .as_ref()
-                    .map_or(String::new(), |rows| quoted(rows.name("time")));
+                    .map_or(String::new(), |rows| quoted(rows.name("time", 0)));
                 let rows = match missing {
                     1 => "1 row is".to_string(),
                     n => format!("{n} rows are"),
@@ -48,8 +54,9 @@ impl Session<'_> {
             Notice::ClockSetBack { from, to } => {
                 self.next_estimate = *to;
                 format!(
-                    "the time goes back {} and stays there: the rows are followed from here on; what the levels are is waited for",
-                    axis.span(*from, *to)
+                    "the time goes back {} and stays there: the rows are followed from here on; what the {} are is waited for",
+                    axis.span(*from, *to),
+                    self.words("levels", "states")
                 )
             }
             Notice::FitsAgain { time, since } => {

@@ -29,7 +29,6 @@ pub(super) struct Screen {
     drawn: usize,
     /// The signals that are plotted, one for each output.
     signals: Vec<Signal>,
-    unit: String,
     fresh: bool,
     last: Option<Instant>,
 }
@@ -38,6 +37,8 @@ pub(super) struct Screen {
 struct Signal {
     /// The output, where there are several.
     name: Option<String>,
+    /// The unit of its readings.
+    unit: String,
     /// Time and innovation, the latest of them.
     innovations: VecDeque<(f64, f64)>,
     residual: f64,
@@ -51,23 +52,22 @@ impl Screen {
             term: term.is_term().then_some(term),
             drawn: 0,
             signals: Vec::new(),
-            unit: String::new(),
             fresh: false,
             last: None,
         }
     }
 
-    /// The names of the outputs, and the unit of their readings.
-    pub(super) fn outputs<'a>(&mut self, names: impl Iterator<Item = &'a str>, unit: &str) {
-        let names: Vec<&str> = names.collect();
-        let several = names.len() > 1;
-        let signal = |name: &str| Signal {
+    /// The outputs: their names, and the units of their readings.
+    pub(super) fn outputs<'a>(&mut self, outputs: impl Iterator<Item = (&'a str, &'a str)>) {
+        let outputs: Vec<(&str, &str)> = outputs.collect();
+        let several = outputs.len() > 1;
+        let signal = |(name, unit): (&str, &str)| Signal {
             name: several.then(|| quoted(name)),
+            unit: unit.to_string(),
             innovations: VecDeque::with_capacity(DRAWN),
             residual: 0.0,
         };
-        self.signals = names.into_iter().map(signal).collect();
-        self.unit = unit.to_string();
+        self.signals = outputs.into_iter().map(signal).collect();
     }
 
     /// A line; whoever has closed standard error does not miss it.
@@ -183,7 +183,7 @@ impl Screen {
         let plot = plot(&[curve], times, (-most, most), ROWS, self.look);
         let width = self.term.as_ref().map_or(0, |term| term.size().1);
         let of = signal.name.as_deref();
-        let heading = heading(of, signal.residual, &self.unit, scores, width);
+        let heading = heading(of, signal.residual, &signal.unit, scores, width);
         format!("{heading}\n{plot}")
     }
 }

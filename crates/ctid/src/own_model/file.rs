@@ -3,14 +3,17 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use ct_model::{Model, ModelSpec, Variable};
+use ct_model::effects::OwnCandidate;
+use ct_model::{About, Model, ModelSpec, Variable};
 use ct_signals::{
-    Columns, Hold, Reading, Record, Unit, Zone, csv_header, quoted, read_csv, read_file,
+    Channel, ColumnFault, Columns, Conversion, Heading, Hold, Reading, Record, Unit, Zone,
+    csv_header, quoted, read_csv, read_file,
 };
 use greybox::PriorValue;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::candidates::{self, RawCandidates};
 use crate::input::Files;
 use crate::model_file::{self, ModelFile, Source};
 use crate::{Error, names};
@@ -31,7 +34,7 @@ struct Raw {
     #[serde(default)]
     prior: BTreeMap<Spanned<String>, [f64; 2]>,
     #[serde(default)]
-    candidates: BTreeMap<String, toml::Table>,
+    candidates: RawCandidates,
     #[serde(default)]
     controller: BTreeMap<String, toml::Table>,
     #[serde(default)]
@@ -52,13 +55,18 @@ enum Column {
 pub(crate) struct OwnModelFile {
     /// The model.
     pub model: Model,
+    /// Where its text is.
+    pub text: PathBuf,
     /// Which column is which input and output, in the order of the model.
-    columns: Columns,
+    pub columns: Columns,
     /// Parameters that are not fitted.
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
-    hold: Hold,
+    /// What the inputs do between rows.
+    pub hold: Hold,
+    /// Effects of the user's own.
+    pub candidates: BTreeMap<String, OwnCandidate>,
     /// What stands in the file and is not used yet.
     pub unused: Vec<String>,
 }
@@ -105,21 +113,31 @@ impl OwnModelFile {
     /// # Errors
     /// One line that names the file, the line, what is wrong and the mend.
     fn parse(path: &Path, text: &str) -> Result<Self, Error> {
+        Self::parse_with(path, text, |named| {
+            read_model(&path.parent().unwrap_or(Path::new("")).join(named))
+        })
+    }
+
+    /// The same, the model from wherever `read` has it; it is given the name that stands in the file.
+    ///
+    /// # Errors
+    /// As [`OwnModelFile::parse`].
+    pub fn parse_with(
+        path: &Path,
+        text: &str,
+        read: impl FnOnce(&Path) -> Result<ModelSpec, Error>,
+    ) -> Result<Self, Error> {
         let file = path.display().to_string();
         let source = Source { file: &file, text };
         let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
-        let beside = path
-            .parent()
-            .unwrap_or(Path::new(""))
-            .join(raw.model.as_ref());
-        let spec = read_model(&beside)?;
+        let spec = read(Path::new(raw.model.as_ref()))?;
         if let Some(effect) = raw.effects.first() {
             return Err(source.at(
                 effect.span().start,
                 format!(
                     "{} cannot be added to a model of your own yet: write its equation into {}, and leave effects = []",
                     quoted(effect.as_ref()),
-                    beside.display()
+                    raw.model.as_ref()
                 ),
             ));
         }
@@ -147,11 +165,12 @@ impl OwnModelFile {
             is_parameter(name)?;
         }
         let columns = columns(&spec, &raw, &source)?;
+        let own_candidates = candidates::read(&spec, &raw.candidates, &source)?;
         let own = |name: Spanned<String>| name.into_inner();
         let candidates = raw
             .candidates
             .keys()
-            .map(|name| format!("candidates.{name}"));
+            .map(|name| format!("candidates.{}", name.as_ref()));
         let controllers = raw
             .controller
             .keys()
@@ -159,6 +178,10 @@ impl OwnModelFile {
         let unused = candidates.chain(controllers).collect();
         Ok(Self {
             model: Model::new(spec),
+            text: path
+                .parent()
+                .unwrap_or(Path::new(""))
+                .join(raw.model.as_ref()),
             columns,
             known: raw
                 .known
@@ -171,6 +194,7 @@ impl OwnModelFile {
                 .map(|(name, [value, std_error])| (own(name), PriorValue { value, std_error }))
                 .collect(),
             hold: raw.hold,
+            candidates: own_candidates,
             unused,
         })
     }
@@ -185,21 +209,36 @@ impl OwnModelFile {
             ..files.options.clone()
         };
         let read = |path: &PathBuf| -> Result<Reading, Error> {
-            let mut reading = read_csv(path, &self.columns, &options)?;
+            let mut reading = read_csv(path, &self.columns, &options).map_err(|e| self.named(e))?;
             reading.record.name = files.name_of(path);
             reading.summary.file.clone_from(&reading.record.name);
-            self.convert(&mut reading.record)?;
             Ok(reading)
         };
         let all = files.data.iter().chain(&files.test).map(read);
+        let all = all.collect::<Result<Vec<Reading>, Error>>()?;
+        self.gathered(all, files.data.len(), self.time_unit(&files.data[0])?)
+    }
+
+    /// Readings of records, of which so many come first that are fitted, as the model takes them; `time_unit`: seconds in one of the model's.
+    ///
+    /// # Errors
+    /// Where a column's unit is none of its signal.
+    pub fn gathered(
+        &self,
+        mut all: Vec<Reading>,
+        fitted: usize,
+        time_unit: f64,
+    ) -> Result<Records, Error> {
+        for reading in &mut all {
+            self.convert(&mut reading.record)?;
+        }
         let (mut all, summaries): (Vec<Record>, Vec<_>) = all
-            .collect::<Result<Vec<Reading>, Error>>()?
             .into_iter()
             .map(|reading| (reading.record, reading.summary))
             .unzip();
         crate::input::on_one_clock(&mut all);
-        crate::input::check_clocks(&all[..files.data.len()], &summaries)?;
-        let test = all.split_off(files.data.len());
+        crate::input::check_clocks(&all[..fitted], &summaries)?;
+        let test = all.split_off(fitted);
         // An input that is missing is held for a row; a longer gap parts the record.
         let whole = |records: Vec<Record>| -> Vec<Record> {
             let parts = records
@@ -210,60 +249,116 @@ impl OwnModelFile {
         Ok(Records {
             records: whole(all),
             test: whole(test),
-            time_unit: self.time_unit(&files.data[0])?,
+            time_unit,
             summaries,
         })
     }
 
-    /// Puts the channels into the units of the model, where the model file reads them in others.
-    fn convert(&self, record: &mut Record) -> Result<(), Error> {
+    /// An error of the columns with the mend for this model, whose signals have names of their own under `[columns]`.
+    pub fn named(&self, error: ct_signals::Error) -> Error {
+        let ct_signals::Error::Column { file, row, fault } = &error else {
+            return error.into();
+        };
+        let ColumnFault::Missing { wanted, .. } = &**fault else {
+            return error.into();
+        };
         let spec = self.model.spec();
         let inputs = spec.inputs.iter().map(|input| &input.about);
-        let outputs = spec
-            .outputs
-            .iter()
-            .map(|output| spec.about(output.variable));
-        let channels = record.inputs.iter_mut().chain(&mut record.outputs);
-        for (channel, about) in channels.zip(inputs.chain(outputs)) {
-            if about.unit.is_empty() || channel.unit.is_empty() || channel.unit == about.unit {
-                channel.unit.clone_from(&about.unit);
-                continue;
+        let outputs = spec.outputs.iter().map(|o| spec.about(o.variable));
+        let columns = self.columns.inputs.iter().chain(&self.columns.outputs);
+        let mut signals = columns.zip(inputs.chain(outputs));
+        let own = signals.find(|(column, _)| *wanted == format!("\"{}\"", quoted(column)));
+        match own {
+            None => error.into(),
+            Some((_, about)) => {
+                let mend = format!("set {} = \"...\" under [columns]", about.name);
+                Error::Columns(format!(
+                    "{file}, row {row}{}",
+                    fault.said("[columns]", &mend)
+                ))
             }
-            let units = Unit::parse(&channel.unit).zip(Unit::parse(&about.unit));
-            let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
-            let Some(conversion) = conversion else {
-                return Err(Error::File {
-                    file: record.name.clone(),
-                    what: format!(
-                        "column \"{}\" is in {}, but {} of the model is in {}: correct the unit in the header, or in the model",
-                        channel.name, channel.unit, about.name, about.unit
-                    ),
-                });
-            };
-            channel
-                .values
-                .iter_mut()
-                .for_each(|value| *value = conversion.apply(*value));
-            channel.unit.clone_from(&about.unit);
+        }
+    }
+
+    /// Puts the channels into the units of the model, where the model file reads them in others.
+    pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
+        let channels = record.inputs.iter_mut().chain(&mut record.outputs);
+        for (channel, about) in channels.zip(self.signals()) {
+            convert(&record.name, channel, about)?;
         }
         Ok(())
     }
 
+    /// Inputs and outputs in the order of the model.
+    pub fn signals(&self) -> impl Iterator<Item = &About> {
+        let spec = self.model.spec();
+        let inputs = spec.inputs.iter().map(|input| &input.about);
+        inputs.chain(
+            spec.outputs
+                .iter()
+                .map(|output| spec.about(output.variable)),
+        )
+    }
+
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.
-    fn time_unit(&self, first: &Path) -> Result<f64, Error> {
+    pub fn time_unit(&self, first: &Path) -> Result<f64, Error> {
         if self.columns.time.is_some() {
             return Ok(self.columns.time_header().1);
         }
         let content = read_file(first, ct_signals::LARGEST_RECORD)?;
         let headings = csv_header(&first.display().to_string(), &content)?;
-        let time = Columns::guessed(&headings).time;
-        Ok(Columns {
+        Ok(self.time_unit_of(&headings))
+    }
+
+    /// The same, where the header of the first record is known.
+    pub fn time_unit_of(&self, headings: &[Heading]) -> f64 {
+        let guessed = || Columns::guessed(headings).time;
+        let time = self.columns.time.clone().or_else(guessed);
+        let columns = Columns {
             time,
             ..Columns::default()
-        }
-        .time_header()
-        .1)
+        };
+        columns.time_header().1
     }
+}
+
+/// Puts a channel of a record into the unit of the model's signal.
+///
+/// # Errors
+/// Where its unit is of another dimension.
+pub(super) fn convert(record: &str, channel: &mut Channel, about: &About) -> Result<(), Error> {
+    let blame = |what| Error::File {
+        file: record.to_string(),
+        what,
+    };
+    if let Some(conversion) = conversion(about, &channel.name, &channel.unit).map_err(blame)? {
+        let values = channel.values.iter_mut();
+        values.for_each(|value| *value = conversion.apply(*value));
+    }
+    channel.unit.clone_from(&about.unit);
+    Ok(())
+}
+
+/// How values of a column in this unit are put into that of a signal; `None` where they are in it, or one of them says nothing.
+///
+/// # Errors
+/// In words where the units do not go together.
+pub(crate) fn conversion(
+    about: &About,
+    column: &str,
+    unit: &str,
+) -> Result<Option<Conversion>, String> {
+    if about.unit.is_empty() || unit.is_empty() || unit == about.unit {
+        return Ok(None);
+    }
+    let units = Unit::parse(unit).zip(Unit::parse(&about.unit));
+    let conversion = units.and_then(|(from, to)| from.conversion_to(&to));
+    conversion.map(Some).ok_or_else(|| {
+        format!(
+            "column \"{column}\" is in {unit}, but {} of the model is in {}: correct the unit in the header, or in the model",
+            about.name, about.unit
+        )
+    })
 }
 
 /// Reads the text of a model.

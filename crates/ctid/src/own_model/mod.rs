@@ -1,9 +1,19 @@
 //! Models of their user's own: `model = "block.mo"` in the model file instead of a plant.
 
+mod candidates;
 mod compare;
+mod diagnose;
+mod export;
 mod file;
+mod identify;
+pub(crate) mod ports;
+mod simulate;
 mod text;
 
-pub(crate) use self::compare::compare;
-pub(crate) use self::file::{AnyModelFile, OwnModelFile, read_model};
+pub(crate) use self::compare::{Comparison, compare};
+pub(crate) use self::diagnose::{diagnose, said as diagnosis_said};
+pub(crate) use self::export::{Exported, export};
+pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
+pub(crate) use self::identify::{Beside, OneByOne};
+pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;

@@ -3,7 +3,7 @@
 /// Indices to keep of a series: at most `limit` of them (but never fewer than four), among them
 /// the first, the last, and the smallest and the largest value of every stretch. A stretch without
 /// a finite value keeps its first index, so that a gap stays a gap.
-pub(super) fn min_max(values: &[f64], limit: usize) -> Vec<usize> {
+pub(crate) fn min_max(values: &[f64], limit: usize) -> Vec<usize> {
     if values.len() <= limit.max(4) {
         return (0..values.len()).collect();
     }

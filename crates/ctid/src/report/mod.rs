@@ -24,6 +24,7 @@ use missing_effect::{Diagnosis, Failures, OutputStep, ResidualTests, Shown, Step
 
 pub use self::baysse::html as baysse;
 pub(crate) use self::data::{json as drawing, records as drawing_of_records, rounded};
+pub(crate) use self::decimate::min_max;
 pub use self::identification::html as identification;
 pub use self::page::head;
 use self::page::{NOTICES, Page, figure, figure_with, items, large, section};

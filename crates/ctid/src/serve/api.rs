@@ -23,7 +23,7 @@ use super::session::{Session, lock};
 use super::sessions::Shared;
 use super::settings::Form;
 use super::upload::Upload;
-use super::{App, downloads, state};
+use super::{App, downloads, own, state};
 use crate::edit;
 use crate::effort::EffortLevel;
 use crate::term_file::TermFile;
@@ -41,6 +41,7 @@ pub(super) fn routes(app: &Arc<App>) -> Router<Arc<App>> {
         .route("/api/state", get(show))
         .route("/api/settings", post(settings))
         .route("/api/text", post(text))
+        .route("/api/own", post(own))
         .route("/api/effect", post(effect))
         .route("/api/loop", post(treat_loop))
         .route("/api/run", post(run))
@@ -129,7 +130,7 @@ async fn open(State(app): State<Arc<App>>, Json(open): Json<Open>) -> Answer {
         session.refresh();
         let state = state::state(&mut session);
         Ok(Json(
-            json!({ "session": id, "state": state, "plants": state::plants() }),
+            json!({ "session": id, "state": state, "plants": state::plants(), "examples": own::examples() }),
         ))
     })
     .await
@@ -242,6 +243,23 @@ async fn text(
 ) -> Answer {
     with(&app, &tab.session, move |session| {
         Ok(session.replace(&text.from, text.text)?)
+    })
+    .await
+}
+
+async fn own(
+    State(app): State<Arc<App>>,
+    Query(tab): Query<Tab>,
+    Json(change): Json<own::Change>,
+) -> Answer {
+    let answer = with(&app, &tab.session, move |session| {
+        own::change(session, change)
+    });
+    let answer = answer.await?;
+    let all = app.clone();
+    aside(move || {
+        all.sessions.make_room();
+        Ok(answer)
     })
     .await
 }

@@ -16,7 +16,7 @@ const STYLE: &str = "text/css; charset=utf-8";
 const PAGE: &str = "text/html; charset=utf-8";
 
 /// Path, kind and content of what does not change.
-const FILES: [(&str, &str, &str); 15] = [
+const FILES: [(&str, &str, &str); 16] = [
     ("/", PAGE, include_str!("page/index.html")),
     ("/report.css", STYLE, report::STYLE),
     ("/page.css", STYLE, include_str!("page/page.css")),
@@ -28,6 +28,7 @@ const FILES: [(&str, &str, &str); 15] = [
     ("/data.js", SCRIPT, include_str!("page/data.js")),
     ("/model.js", SCRIPT, include_str!("page/model.js")),
     ("/fit.js", SCRIPT, include_str!("page/fit.js")),
+    ("/own.js", SCRIPT, include_str!("page/own.js")),
     ("/chains.js", SCRIPT, include_str!("page/chains.js")),
     ("/findings.js", SCRIPT, include_str!("page/findings.js")),
     ("/unknown.js", SCRIPT, include_str!("page/unknown.js")),

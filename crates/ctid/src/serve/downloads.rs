@@ -17,7 +17,7 @@ use super::App;
 use super::api::{Tab, aside, find, plain_name};
 use super::guard::Refusal;
 use super::session::{UNNAMED, lock};
-use super::words;
+use super::{own, words};
 use crate::design::Proposal;
 use crate::input;
 use crate::output::Found as _;
@@ -80,6 +80,10 @@ async fn model(
     let session = find(&app, &which.session)?;
     aside(move || {
         let session = lock(&session);
+        let own = session.own.as_ref().and_then(|own| own.fit.as_ref());
+        if let Some(fit) = own.filter(|fit| fit.id == which.id) {
+            return Ok(as_json(fit.body.clone()));
+        }
         if let Some(of) = session.diagnosis.as_ref().filter(|of| of.id == which.id) {
             return Ok(as_json(words::fitted(of.id, &of.found).into()));
         }
@@ -100,6 +104,8 @@ async fn model(
 #[serde(rename_all = "lowercase")]
 enum Wanted {
     Model,
+    /// The text of a model of its user's own.
+    Text,
     Report,
     Experiment,
 }
@@ -119,6 +125,18 @@ async fn file(
         let session = lock(&session);
         let missing = |what: &str| Refusal::new(StatusCode::NOT_FOUND, what);
         let (name, kind, text) = match download.of {
+            Wanted::Model | Wanted::Text if session.own.is_some() => {
+                let own = session.own.clone().unwrap_or_default();
+                match download.of {
+                    Wanted::Text => (
+                        "model.mo".to_string(),
+                        "text/plain; charset=utf-8",
+                        own.text,
+                    ),
+                    _ => (own::FILE.to_string(), "application/toml", own.file),
+                }
+            }
+            Wanted::Text => return Err(missing("there is no model of your own")),
             Wanted::Model => {
                 let path = session.file.as_deref().unwrap_or(Path::new(UNNAMED));
                 let name = path

@@ -14,6 +14,7 @@ use missing_effect::design::{Design, Limits, design};
 use missing_effect::{Diagnosis, Options, Problem, Progress, Verdict, compare, diagnose};
 
 use super::guard::Refusal;
+use super::own;
 use super::session::{Fitted, Found, Job, Kind, Session, lock};
 use super::sessions::Shared;
 use super::words;
@@ -21,6 +22,7 @@ use crate::design::candidacy;
 use crate::effort::EffortLevel;
 use crate::input::{self, Files};
 use crate::model_file::{self, ModelFile};
+use crate::own_model::Comparison;
 use crate::{Error, edit};
 
 /// What is to be computed.
@@ -43,8 +45,15 @@ pub(super) enum Task {
     },
 }
 
+/// What a task works on.
+enum Input {
+    Plant(Box<Work>),
+    Own(Box<own::Work>),
+}
+
 /// What came out.
 enum Outcome {
+    Own(Box<Comparison>),
     Fitted(Diagnosis),
     Diagnosed(Diagnosis),
     Designed(Box<Design>, Columns),
@@ -133,12 +142,22 @@ impl Work {
 pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     let mut session = lock(shared);
     session.stop();
-    let text = match &task {
-        Task::Compare | Task::Diagnose { .. } => session.text.clone(),
-        Task::Chain(effects) => with_effects(&session, effects)?,
-        Task::Design { group, between, .. } => beside(&session, *group, between)?,
+    let work = match (&task, &session.own) {
+        (Task::Compare, Some(_)) => Input::Own(Box::new(own::Work::new(&mut session)?)),
+        (_, Some(_)) => {
+            return Err(Refusal::input(
+                "this is not there for models of your own yet: write what is missing into the text, and fit it again",
+            ));
+        }
+        (task, None) => {
+            let text = match task {
+                Task::Compare | Task::Diagnose { .. } => session.text.clone(),
+                Task::Chain(effects) => with_effects(&session, effects)?,
+                Task::Design { group, between, .. } => beside(&session, *group, between)?,
+            };
+            Input::Plant(Box::new(Work::new(&mut session, text)?))
+        }
     };
-    let work = Work::new(&mut session, text)?;
     let number = session.number();
     let stop = Arc::new(AtomicBool::new(false));
     let interrupt = Arc::new(AtomicBool::new(false));
@@ -146,12 +165,16 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     session.job = Some(Job {
         number,
         kind: match task {
+            Task::Compare if session.own.is_some() => Kind::Own,
             Task::Compare => Kind::Compare,
             Task::Chain(_) => Kind::Chain,
             Task::Diagnose { .. } => Kind::Diagnose,
             Task::Design { .. } => Kind::Design,
         },
-        model: work.model.clone(),
+        model: match &work {
+            Input::Plant(work) => Some(work.model.clone()),
+            Input::Own(_) => None,
+        },
         begun: Instant::now(),
         limit: match task {
             Task::Diagnose { effort, .. } => Some(effort.limit()),
@@ -165,6 +188,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     session.failure = None;
     session.version += 1;
     let place = Arc::downgrade(shared);
+    let own_fits = session.own_fits.clone();
     let run = move || {
         let show = |now: Progress| {
             let mut shown = lock(&progress);
@@ -175,8 +199,20 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 *shown = Some(now);
             }
         };
-        let options = work.options(&stop, &interrupt);
-        let outcome = catch_unwind(AssertUnwindSafe(|| compute(&work, &task, options, &show)));
+        let outcome = catch_unwind(AssertUnwindSafe(|| match &work {
+            Input::Plant(work) => {
+                let options = work.options(&stop, &interrupt);
+                compute(work, &task, options, &show)
+            }
+            Input::Own(work) => {
+                // Such a fit goes on where it is stopped: the next one waits for its end.
+                let _alone = lock(&own_fits);
+                if stop.load(Ordering::Relaxed) {
+                    return Err(Error::Usage("stopped".to_string()));
+                }
+                work.compute().map(|found| Outcome::Own(Box::new(found)))
+            }
+        }));
         // The tab may be gone, and so is whoever waits.
         let Some(shared) = place.upgrade() else {
             return;
@@ -239,9 +275,15 @@ fn compute(
 }
 
 /// Puts what came out where the page finds it.
-fn settle(session: &mut Session, work: Work, outcome: Outcome) {
+fn settle(session: &mut Session, work: Input, outcome: Outcome) {
+    let work = match (work, &outcome) {
+        (Input::Own(work), Outcome::Own(found)) => return work.settle(session, found),
+        (Input::Plant(work), _) => *work,
+        (Input::Own(_), _) => return,
+    };
     let id = session.number();
     match outcome {
+        Outcome::Own(_) => {}
         Outcome::Fitted(found) => {
             let Some(step) = found.steps.last() else {
                 return;

@@ -7,6 +7,7 @@
 //! | the page's files | `assets.rs`, `page/` |
 //! | what one tab works on | `session.rs`, its records `upload.rs`; all of them: `sessions.rs`; what they hold: `held.rs` |
 //! | the form of the model | `settings.rs` |
+//! | a model of its user's own, and its fits | `own.rs` |
 //! | computations | `jobs.rs` |
 //! | what the page is told | `state.rs`, `words.rs` |
 //! | the routes | `api.rs`, `downloads.rs` |
@@ -29,6 +30,7 @@
 //! | `POST /api/forget?session=` | `{name}` of a record | the state |
 //! | `POST /api/settings?session=` | `{plant, hold, columns, known, controller}`, as the model file has them, and `from`: the same as the form was filled from | the state; 409 where the model says something else than `from` |
 //! | `POST /api/text?session=` | `{text}`, a whole model file, and `from`: the text that it replaces | the state; 409 where another stands there |
+//! | `POST /api/own?session=` | `{do: "begin"}`, `{do: "end"}`, `{do: "example", name}`, `{do: "write", text, file}` of which one may be missing, `{do: "column", signal, column}` | the state |
 //! | `POST /api/effect?session=` | `{do: "add" or "remove", effect, place}`; `{do: "keep", effect}` adds what the diagnosis left unexplained under that name | the state |
 //! | `POST /api/loop?session=` | `{measured}`: whether models run on the measured command where the loop could be simulated | the state |
 //! | `POST /api/run?session=` | `{what: "compare"}`, `{what: "diagnose", max_effects, effort}`, effort `quick`, `normal` or `thorough`, `{what: "chain", effects: [[effect, place], ...]}`, `{what: "design", group, between: [a, b], range: [low, high], slew, duration}`, of which the last three may be missing | the state |
@@ -36,9 +38,9 @@
 //! | `POST /api/finish?session=` | | the state; a search ends soon with the best that it has found |
 //! | `GET /api/data?session=` | | the records' curves, as the report draws them |
 //! | `GET /api/model?session=&id=` | the number of a fit or of the diagnosis | its curves, parameters and sentences |
-//! | `GET /api/file?session=&of=` | `model`, `report` or `experiment` | the file |
+//! | `GET /api/file?session=&of=` | `model`, `text`, `report` or `experiment` | the file |
 //!
-//! The state is `{version, file, text, model_error, settings, effects, waiting, records, warnings, headings, guessed, current, trail, models,
+//! The state is `{version, own, file, text, model_error, settings, effects, waiting, records, warnings, headings, guessed, current, trail, models,
 //! chains, loop, diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits of its first
 //! effects, `job` `{what, phase, done, total, seconds, limit, ending}` while something is computed. A fit stops where the model becomes another.
 //!
@@ -58,6 +60,7 @@ mod downloads;
 mod guard;
 mod held;
 mod jobs;
+mod own;
 mod session;
 mod sessions;
 mod settings;
@@ -79,6 +82,7 @@ use tokio::sync::Semaphore;
 use self::api::LARGEST_REQUEST;
 use self::connections::Bounds;
 use self::guard::{Guard, LARGEST_BODY};
+use self::own::Own;
 use self::sessions::Sessions;
 use self::upload::Upload;
 use crate::Error;
@@ -86,6 +90,7 @@ use crate::commands::say;
 use ct_signals::ReadOptions;
 
 use crate::input::Files;
+use crate::own_model::AnyModelFile;
 
 /// Where the page is, if nothing else is there.
 const PORT: u16 = 8420;
@@ -130,7 +135,7 @@ impl Arguments {
             .worker_threads(2)
             .enable_all()
             .build()?;
-        let records = self.records()?;
+        let (records, own) = self.records()?;
         let listener = runtime.block_on(listen(self.port))?;
         let address = listener.local_addr()?;
         let guard = Guard::new(address.port());
@@ -141,32 +146,42 @@ impl Arguments {
                 "The page is at http://{address}/{secret}/, on this machine, for whoever knows this address; Ctrl-C ends it.\n"
             ),
         )?;
-        let sessions = Sessions::new(self.model.clone(), records);
+        // What the page edits is the model file of a plant.
+        let file = self.model.clone().filter(|_| own.is_none());
+        let sessions = Sessions::new(file, own, records);
         runtime.block_on(serve(listener, guard, sessions))
     }
 
     /// The records of the command line; what is wrong with them or the model is said before anything is served.
-    fn records(&self) -> Result<Vec<Upload>, Error> {
+    fn records(&self) -> Result<(Vec<Upload>, Option<Own>), Error> {
         let files = Files {
             data: self.data.clone(),
             test: self.test.clone(),
             model: self.model.clone().unwrap_or_default(),
             options: ReadOptions::default(),
         };
-        if self.model.is_some() {
-            let model = files.read_model()?;
-            if !self.data.is_empty() {
-                files.read_with(model)?;
+        files.check_repetition()?;
+        let mut own = None;
+        if let Some(path) = &self.model {
+            match AnyModelFile::read(path)? {
+                AnyModelFile::Plant(model) if !self.data.is_empty() => {
+                    files.read_with(*model)?;
+                }
+                AnyModelFile::Plant(_) => {}
+                AnyModelFile::Own(model) => {
+                    if !self.data.is_empty() {
+                        model.records(&files)?;
+                    }
+                    own = Some(Own::read(path)?);
+                }
             }
-        } else {
-            files.check_repetition()?;
         }
         let fitted = self.data.iter().map(|path| (path, false));
         let held_out = self.test.iter().map(|path| (path, true));
-        fitted
+        let records = fitted
             .chain(held_out)
-            .map(|(path, held_out)| read(path, &files.name_of(path), held_out))
-            .collect()
+            .map(|(path, held_out)| read(path, &files.name_of(path), held_out));
+        Ok((records.collect::<Result<_, Error>>()?, own))
     }
 }
 

@@ -14,6 +14,7 @@ use plants::Domain;
 
 use super::guard::{LARGEST_BODY, Refusal};
 use super::held::of_diagnosis;
+use super::own::Own;
 use super::upload::Upload;
 use crate::Error;
 use crate::edit::{self, Edited};
@@ -67,6 +68,8 @@ pub(super) enum Kind {
     Chain,
     Diagnose,
     Design,
+    /// The fit of a model of its user's own.
+    Own,
 }
 
 /// A computation that runs.
@@ -74,8 +77,8 @@ pub(super) enum Kind {
 pub(super) struct Job {
     pub number: u64,
     pub kind: Kind,
-    /// What it computes with.
-    pub model: ModelFile,
+    /// What it computes with; `None` for a model of its user's own.
+    pub model: Option<ModelFile>,
     pub begun: Instant,
     /// Limit on the time of a search.
     pub limit: Option<Duration>,
@@ -91,6 +94,10 @@ pub(super) struct Session {
     /// The model file, where there is one; else the text is kept here alone.
     pub file: Option<PathBuf>,
     pub text: String,
+    /// A model of its user's own, where one is looked at in place of a plant.
+    pub own: Option<Own>,
+    /// Its fits run one after the other, those that were stopped too.
+    pub own_fits: Arc<Mutex<()>>,
     pub records: Vec<Upload>,
     /// Counts the changes of the records.
     pub data: u64,
@@ -118,10 +125,12 @@ impl Drop for Session {
 }
 
 impl Session {
-    pub(super) fn new(file: Option<PathBuf>, records: Vec<Upload>) -> Self {
+    pub(super) fn new(file: Option<PathBuf>, own: Option<Own>, records: Vec<Upload>) -> Self {
         let mut session = Self {
             file,
             text: String::new(),
+            own,
+            own_fits: Arc::default(),
             records,
             data: 0,
             version: 1,
@@ -145,7 +154,8 @@ impl Session {
         let fits: usize = self.models.iter().map(|fitted| fitted.body.len()).sum();
         let found = [&self.fitted, &self.diagnosis].into_iter().flatten();
         let found: usize = found.map(|found| of_diagnosis(&found.found)).sum();
-        records + fits + found
+        let own = self.own.as_ref().map_or(0, Own::held);
+        records + fits + found + own
     }
 
     /// A number that no other result of this session has.
@@ -195,12 +205,12 @@ impl Session {
         self.failure = None;
         self.version += 1;
         let Some(job) = &self.job else { return };
-        let of_use = match (job.kind, self.model()) {
-            (Kind::Compare, Ok(model)) => same(&job.model, &model),
-            (Kind::Chain, Ok(model)) => without_effects(&job.model) == without_effects(&model),
-            (Kind::Compare | Kind::Chain, Err(_)) => false,
+        let of_use = match (job.kind, self.model(), &job.model) {
+            (Kind::Compare, Ok(model), Some(own)) => same(own, &model),
+            (Kind::Chain, Ok(model), Some(own)) => without_effects(own) == without_effects(&model),
+            (Kind::Compare | Kind::Chain, ..) => false,
             // What it finds is said to be of the model that it was asked for.
-            (Kind::Diagnose | Kind::Design, _) => true,
+            (Kind::Diagnose | Kind::Design | Kind::Own, ..) => true,
         };
         if !of_use {
             self.stop();
@@ -242,6 +252,9 @@ impl Session {
 
     /// Columns and hold as the model names them; what can be guessed where there is no model yet.
     pub(super) fn layout(&self) -> (Columns, ReadOptions) {
+        if let Some(own) = &self.own {
+            return own.layout();
+        }
         match self.model() {
             Ok(model) => (model.columns, model.hold.into()),
             Err(_) => (Columns::default(), ReadOptions::default()),
@@ -330,6 +343,12 @@ impl Session {
         Ok(())
     }
 
+    /// Takes a record in place of all others.
+    pub(super) fn take_alone(&mut self, upload: Upload) {
+        self.records = vec![upload];
+        self.data_changed();
+    }
+
     /// Takes a record away; there may be none of that name.
     pub(super) fn drop_record(&mut self, name: &str) {
         self.records.retain(|record| record.name != name);
@@ -400,7 +419,7 @@ impl Session {
     pub(super) fn stop_abandoned(&mut self) {
         let Some(job) = &self.job else { return };
         let what = match job.kind {
-            Kind::Compare | Kind::Chain => None,
+            Kind::Compare | Kind::Chain | Kind::Own => None,
             Kind::Diagnose => Some(("the search", "Diagnose")),
             Kind::Design => Some(("the design of the experiment", "What would tell?")),
         };

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use super::own::Own;
 use super::session::{Session, lock};
 use super::upload::Upload;
 
@@ -30,15 +31,17 @@ struct Tab {
 #[derive(Debug)]
 pub(super) struct Sessions {
     model: Option<PathBuf>,
+    own: Option<Own>,
     records: Vec<Upload>,
     /// Never held while a session is locked.
     all: Mutex<Vec<Tab>>,
 }
 
 impl Sessions {
-    pub(super) fn new(model: Option<PathBuf>, records: Vec<Upload>) -> Self {
+    pub(super) fn new(model: Option<PathBuf>, own: Option<Own>, records: Vec<Upload>) -> Self {
         Self {
             model,
+            own,
             records,
             all: Mutex::new(Vec::new()),
         }
@@ -55,7 +58,7 @@ impl Sessions {
     /// A new session and its number.
     pub(super) fn open(&self) -> (String, Shared) {
         let id = format!("{:032x}", rand::random::<u128>());
-        let session = Session::new(self.model.clone(), self.records.clone());
+        let session = Session::new(self.model.clone(), self.own.clone(), self.records.clone());
         let session = Arc::new(Mutex::new(session));
         let mut all = lock(&self.all);
         all.push(Tab {
@@ -131,7 +134,7 @@ mod tests {
 
     #[test]
     fn the_oldest_tab_goes() {
-        let sessions = Sessions::new(None, Vec::new());
+        let sessions = Sessions::new(None, None, Vec::new());
         let (first, _) = sessions.open();
         let (second, _) = sessions.open();
         assert!(sessions.find(&first).is_some());
@@ -146,7 +149,7 @@ mod tests {
     /// Two records that take little as they were sent, and more once they are read.
     #[test]
     fn what_is_read_needs_room_too() {
-        let sessions = Sessions::new(None, Vec::new());
+        let sessions = Sessions::new(None, None, Vec::new());
         let tabs = [sessions.open(), sessions.open()];
         let rows: String = (0..500)
             .map(|k| format!("{k},{},{}\n", k % 3, k % 9))
@@ -176,7 +179,7 @@ mod tests {
         Job {
             number: 1,
             kind,
-            model: model_file::parse("m.toml", "plant = \"single-tank\"").unwrap(),
+            model: Some(model_file::parse("m.toml", "plant = \"single-tank\"").unwrap()),
             begun: Instant::now(),
             limit: None,
             interrupt: Arc::default(),
@@ -187,7 +190,7 @@ mod tests {
 
     #[test]
     fn what_was_stopped_because_nobody_asked_says_so() {
-        let sessions = Sessions::new(None, Vec::new());
+        let sessions = Sessions::new(None, None, Vec::new());
         let (id, session) = sessions.open();
         for (kind, button) in [
             (Kind::Diagnose, "Diagnose"),
@@ -222,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_busy_tab_is_found_and_keeps_no_other_waiting() {
-        let sessions = Sessions::new(None, Vec::new());
+        let sessions = Sessions::new(None, None, Vec::new());
         let (busy, session) = sessions.open();
         let (other, _) = sessions.open();
         let work = lock(&session);

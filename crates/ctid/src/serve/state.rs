@@ -23,7 +23,7 @@ pub(super) fn job(session: &Session) -> Value {
     let progress = *lock(&job.progress);
     json!({
         "what": match job.kind {
-            Kind::Compare | Kind::Chain => "compare",
+            Kind::Compare | Kind::Chain | Kind::Own => "compare",
             Kind::Diagnose => "diagnose",
             Kind::Design => "design",
         },
@@ -54,7 +54,13 @@ pub(super) fn state(session: &mut Session) -> Value {
         .collect();
     let fitted = session.records.iter().filter(|upload| !upload.held_out);
     let fitted: Vec<&Record> = fitted.filter_map(Upload::as_read).collect();
-    let warnings = excitation::of_records(fitted.into_iter());
+    // What they say is of one command.
+    let excited = if session.own.is_some() {
+        Vec::new()
+    } else {
+        fitted
+    };
+    let warnings = excitation::of_records(excited.into_iter());
     let remarks = session.records.iter().filter_map(Upload::remark);
     let warnings: Vec<String> = remarks
         .chain(warnings.iter().map(ToString::to_string))
@@ -89,6 +95,7 @@ pub(super) fn state(session: &mut Session) -> Value {
     });
     json!({
         "version": session.version,
+        "own": session.own.as_ref().map(|own| own.state(session.data)),
         "file": session.file.as_ref().map(|path| path.display().to_string()),
         "text": session.text,
         "model_error": error,
@@ -135,8 +142,8 @@ fn about(record: &Record) -> Value {
         "samples": record.len(),
         "length": numbers::duration(record.duration()),
         "interval": numbers::duration(record.sample_interval()),
-        "input": signal(&record.inputs[0]),
-        "input_2": record.inputs.get(1).map(signal),
+        "input": record.inputs.first().map(signal),
+        "inputs": record.inputs.iter().map(signal).collect::<Vec<_>>(),
         "outputs": record.outputs.iter().map(signal).collect::<Vec<_>>(),
         "reference": record.references.first().map(signal),
     })

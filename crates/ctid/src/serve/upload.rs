@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use axum::body::Bytes;
-use ct_signals::{Columns, Heading, ReadOptions, ReadSummary, Record, csv_header, parse_csv};
+use ct_signals::{
+    Columns, Heading, ReadOptions, ReadSummary, Reading, Record, csv_header, parse_csv,
+};
 
 use super::guard::Refusal;
 use super::held::of_record;
@@ -71,6 +73,21 @@ impl Upload {
         let (_, _, read) = self.read.as_ref()?;
         let (_, summary) = read.as_ref().ok()?;
         (!summary.is_plain()).then(|| summary.to_string())
+    }
+
+    /// The record with what was missing in it, read again only where the columns have changed.
+    pub(super) fn reading(
+        &mut self,
+        columns: &Columns,
+        options: &ReadOptions,
+    ) -> Result<Reading, String> {
+        self.record(columns, options)?;
+        let (_, _, read) = self.read.as_ref().ok_or("the record was not read")?;
+        let (record, summary) = read.as_ref().map_err(String::clone)?;
+        Ok(Reading {
+            record: record.as_ref().clone(),
+            summary: summary.clone(),
+        })
     }
 
     /// The record, read again only where the columns have changed.

@@ -69,3 +69,51 @@ fn what_is_wrong_is_said_in_one_line() {
     refused("C*der(T)", "connect(a, b)", "11:3: `connect`", "equations");
     place.refuses("check missing.mo", &["missing.mo"]);
 }
+
+#[test]
+fn it_says_what_can_act_where() {
+    let place = Place::empty();
+    place.write("block.mo", documented());
+    let text = place.succeeds("check block.mo");
+    let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in [
+        "inputs u, Ta: delay, nonlinearity, dead_zone, saturation, gain_drift, backlash, lag",
+        "outputs y: lag, nonlinearity, saturation, hysteresis, drift, offset, quantisation",
+        "balances T: constant, loss, step, periodic, hidden_state, limit",
+        "parameters C, k, g: drift, step, varies_with(p,x)",
+    ] {
+        assert!(said.contains(part), "{part}\n{text}");
+    }
+}
+
+#[test]
+fn effects_of_a_model_of_ones_own_are_listed_with_its_candidates() {
+    let place = Place::empty();
+    place.write("block.mo", documented());
+    let file = |term: &str| {
+        format!(
+            "model = \"block.mo\"\n\n[candidates.radiation]\nparameters = {{ e = {{ unit = \"W/K4\", min = 0.0, start = 1e-9 }} }}\nterms = {{ T = \"{term}\" }}\n"
+        )
+    };
+    place.write("m.toml", file("-e*((T + 273.15)^4 - (Ta + 273.15)^4)"));
+    let text = place.succeeds("effects --model m.toml");
+    for part in [
+        "lag(u), lag(Ta)",
+        "constant(T)",
+        "varies_with(k,T)",
+        "of the model file",
+        "radiation",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    place.write("m.toml", file("-e*(Tb + 273.15)^4"));
+    place.refuses(
+        "effects --model m.toml",
+        &[
+            "m.toml",
+            "line 5",
+            "candidates.radiation.terms.T: 1:5: `Tb` is not declared",
+            "did you mean `Ta`?",
+        ],
+    );
+}

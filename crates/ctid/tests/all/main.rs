@@ -19,6 +19,7 @@ mod prior;
 mod program;
 mod results;
 mod side_by_side;
+mod simulate;
 mod system_limits;
 mod tables;
 mod udink_reference;

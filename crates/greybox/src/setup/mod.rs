@@ -484,7 +484,7 @@ impl<'a> Setup<'a> {
     }
 
     /// Holds every parameter; only initial levels stay free.
-    pub(crate) fn freeze_parameters(&mut self) {
+    pub fn freeze_parameters(&mut self) {
         let count = self.parameter_count();
         self.free.retain(|&i| i >= count);
     }

@@ -11,6 +11,7 @@ mod minima;
 mod minimise;
 mod outputs;
 mod parts;
+mod prediction;
 mod records;
 mod sandwich;
 mod support;

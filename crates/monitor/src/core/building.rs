@@ -1,7 +1,6 @@
 //! What runs is built from plain numbers and the rows that are kept.
 
 use ct_signals::Hold;
-use plants::Domain;
 
 use super::{Core, Running};
 use crate::{
@@ -16,7 +15,7 @@ use crate::{
 /// Rows on which the simulation settles when it is built again.
 const RUN_UP: usize = 1024;
 
-impl Core {
+impl<'a> Core<'a> {
     pub(super) fn set_checkpoint(&mut self) {
         self.since.clear();
         self.checkpoint.clone_from(&self.now);
@@ -45,27 +44,24 @@ impl Core {
         if self.now.every > 1 {
             Hold::First
         } else {
-            self.model.hold
+            self.model.0.hold()
         }
     }
 
-    /// Builds what runs, from given levels on.
-    pub(super) fn start(&mut self, levels: &[f64], at_rest: f64) {
-        self.running = self.running_from(levels, at_rest);
+    /// Builds what runs, from given states on.
+    pub(super) fn start(&mut self, states: &[f64], at_rest: f64) {
+        self.running = self.running_from(states, at_rest);
     }
 
-    pub(super) fn running_from(&self, levels: &[f64], at_rest: f64) -> Option<Running> {
+    pub(super) fn running_from(&self, states: &[f64], at_rest: f64) -> Option<Running<'a>> {
         let learned = self.now.learned.as_ref()?;
         let bank = self.now.bank.as_ref()?;
-        let mut structure = self.model.structure(learned.scales.clone()).ok()?;
-        structure.domain = Domain::of(structure.plant, &self.units.output);
-        let watch = Watch::new(&structure, learned, self.hold(), levels, at_rest)?;
+        let watch = Watch::new(&self.model, learned, self.hold(), states, at_rest)?;
         let memory = self.settings.memory * learned.time_constant;
-        let tracker = self
-            .now
-            .tracker
-            .as_ref()
-            .and_then(|state| Tracker::new(state, &tracked(learned), memory));
+        let tracker =
+            self.now.tracker.as_ref().and_then(|state| {
+                Tracker::new(state, &tracked(learned, bank.parameters()), memory)
+            });
         let lanes: Vec<usize> = (0..bank.parameters()).collect();
         let outputs = &learned.outputs;
         let most =
@@ -79,7 +75,6 @@ impl Core {
             learned.relative_error()?,
         );
         Some(Running {
-            structure,
             watch,
             tracker,
             covariance: learned.covariance_of(&lanes),
@@ -92,7 +87,7 @@ impl Core {
     pub(super) fn build(&mut self) -> Option<()> {
         let from = self.now.kept.len().saturating_sub(RUN_UP);
         let first = self.now.kept.get(from)?;
-        let mut running = self.running_from(&first.levels, first.stands)?;
+        let mut running = self.running_from(&first.states, first.stands)?;
         for kept in self.now.kept.range(from..) {
             running.watch.follow(&kept.sample);
         }

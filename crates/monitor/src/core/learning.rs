@@ -6,17 +6,17 @@ use ct_signals::ArModel;
 
 use super::{Core, Fed, KEPT, Phase};
 use crate::{
-    Gathered, MAX_OUTPUTS, Notice,
+    Each, Gathered, Notice,
     bank::Bank,
     intake::{LONGEST_BLOCK, Sample},
     isolate::Kept,
-    learn::{Learned, learn},
+    learn::Learned,
     lost::interpolated,
     scatter::Scatter,
     watch::as_learned,
 };
 
-impl Core {
+impl Core<'_> {
     /// Begins to learn anew.
     pub(super) fn begin(&mut self, every: usize) {
         self.now.phase = Phase::Learning {
@@ -52,18 +52,24 @@ impl Core {
 
     /// Gathers a row to learn from; a fit is tried at `next` rows. `span`: so many seconds are known to be needed.
     pub(super) fn gather(&mut self, sample: Sample, next: usize, span: Option<f64>) -> Fed {
+        let time = sample.time;
         self.now.kept.push_back(Kept {
+            stands: at_rest(&sample),
             sample,
-            levels: [0.0; plants::MAX_VESSELS],
-            stands: sample.input,
-            modelled: [0.0; MAX_OUTPUTS],
-            innovations: [0.0; MAX_OUTPUTS],
+            states: Each::new(),
+            modelled: Each::new(),
+            innovations: Each::new(),
         });
         if self.now.kept.len() < next.min(KEPT) {
             return Fed::default();
         }
-        let samples: Vec<Sample> = self.now.kept.iter().map(|kept| kept.sample).collect();
-        let notice = match learn(&self.model, &samples, self.hold()) {
+        let samples: Vec<Sample> = self
+            .now
+            .kept
+            .iter()
+            .map(|kept| kept.sample.clone())
+            .collect();
+        let notice = match self.model.0.learn(&samples, self.hold()) {
             Err(why) => {
                 // The older half goes: what comes next may say more.
                 self.later(2 * next, span, |kept, _| {
@@ -71,8 +77,8 @@ impl Core {
                 });
                 Some(Notice::NotLearned { why })
             }
-            Ok((learned, levels)) => {
-                let span = sample.time - samples[0].time;
+            Ok((learned, states)) => {
+                let span = time - samples[0].time;
                 let needed = self.settings.learning_time_constants * learned.time_constant;
                 if span < needed {
                     let full = self.now.kept.len() == KEPT;
@@ -85,7 +91,7 @@ impl Core {
                     }
                     None
                 } else {
-                    self.take_over(learned, &levels)
+                    self.take_over(learned, &states)
                 }
             }
         };
@@ -115,7 +121,7 @@ impl Core {
     }
 
     /// The learned model is run over the rows that it was learned from, and watched from now on.
-    fn take_over(&mut self, learned: Learned, levels: &[f64]) -> Option<Notice> {
+    fn take_over(&mut self, learned: Learned, states: &[f64]) -> Option<Notice> {
         let (rows, time_constant) = (learned.rows() * self.now.every, learned.time_constant);
         let noise = learned
             .noise()?
@@ -123,19 +129,19 @@ impl Core {
             .map(ArModel::stationary_std)
             .collect();
         let unit = learned.rows_per_time_constant();
-        let lanes = crate::sensitivity::lanes(learned.theta.len());
+        let lanes = self.model.0.lanes(learned.theta.len());
         self.now.bank = Some(Bank::new(unit, lanes, learned.outputs.len()));
-        self.now.tracker = Some(as_learned(&learned));
+        self.now.tracker = Some(as_learned(&learned, lanes));
         self.now.learned = Some(learned);
         self.now.phase = Phase::Watching;
         self.now.settling = 0;
-        let at_rest = self.now.kept.front()?.sample.input;
-        self.start(levels, at_rest);
+        let at_rest = at_rest(&self.now.kept.front()?.sample);
+        self.start(states, at_rest);
         let mut kept = std::mem::take(&mut self.now.kept);
         if let Some(running) = &mut self.running {
             for kept in &mut kept {
                 let said = running.watch.follow(&kept.sample);
-                *kept = said.of(kept.sample);
+                *kept = said.of(kept.sample.clone());
             }
         }
         self.now.judged = kept.len();
@@ -151,6 +157,11 @@ impl Core {
     }
 }
 
+/// The first input of a sample, of which the simulation of a plant says where what it moves stands.
+pub(super) fn at_rest(sample: &Sample) -> f64 {
+    sample.inputs.first().copied().unwrap_or(0.0)
+}
+
 /// Means of pairs of rows; a pair without any reading of an output has none of it.
 fn halve(kept: &mut VecDeque<Kept>, outputs: usize) {
     let pairs = kept.len() / 2;
@@ -160,16 +171,16 @@ fn halve(kept: &mut VecDeque<Kept>, outputs: usize) {
     };
     let filled: Vec<Vec<f64>> = (0..outputs).map(of_output).collect();
     for i in 0..pairs {
-        let (a, b) = (kept[2 * i].sample, kept[2 * i + 1].sample);
-        let mut means = [None; MAX_OUTPUTS];
-        for (output, filled) in filled.iter().enumerate() {
+        let (a, b) = (kept[2 * i].sample.clone(), kept[2 * i + 1].sample.clone());
+        let mean = |(output, filled): (usize, &Vec<f64>)| {
             let any = a.outputs[output].or(b.outputs[output]);
-            means[output] = any.map(|_| 0.5 * (filled[2 * i] + filled[2 * i + 1]));
-        }
+            any.map(|_| 0.5 * (filled[2 * i] + filled[2 * i + 1]))
+        };
+        let inputs = a.inputs.iter().zip(&b.inputs);
         kept[i].sample = Sample {
             time: 0.5 * (a.time + b.time),
-            input: 0.5 * (a.input + b.input),
-            outputs: means,
+            inputs: inputs.map(|(a, b)| 0.5 * (a + b)).collect(),
+            outputs: filled.iter().enumerate().map(mean).collect(),
             follows: a.follows,
         };
     }

@@ -11,11 +11,10 @@ mod watching;
 
 use std::collections::VecDeque;
 
-use plants::Structure;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Alarm, Estimate, MAX_OUTPUTS, Model, Notice, ScatterAlarm, Settings, TimeAxis, Units,
+    Alarm, Estimate, Notice, ScatterAlarm, Settings, TimeAxis, Units, Watched,
     bank::Bank,
     intake::{Follows, LONGEST_BLOCK, Sample},
     isolate::Kept,
@@ -87,13 +86,12 @@ pub(crate) struct Fed {
     pub said: Option<Said>,
     pub notice: Option<Notice>,
     pub alarm: Option<Alarm>,
-    pub scatter: [Option<ScatterAlarm>; MAX_OUTPUTS],
+    pub scatter: Vec<ScatterAlarm>,
 }
 
 /// What is built from the learned numbers.
-struct Running {
-    structure: Structure,
-    watch: Watch,
+struct Running<'a> {
+    watch: Watch<'a>,
     tracker: Option<Tracker>,
     covariance: Vec<f64>,
     threshold: f64,
@@ -101,21 +99,21 @@ struct Running {
     most: Vec<Most>,
 }
 
-pub(crate) struct Core {
-    model: Model,
+pub(crate) struct Core<'a> {
+    model: Watched<'a>,
     settings: Settings,
     units: Units,
     pub(crate) axis: TimeAxis,
     /// The present state, but for the tracker, which is as of the last checkpoint.
     now: Checkpoint,
-    running: Option<Running>,
+    running: Option<Running<'a>>,
     checkpoint: Checkpoint,
     since: Vec<Sample>,
 }
 
-impl Core {
-    pub(crate) fn new(model: Model, settings: Settings, units: Units) -> Self {
-        let outputs = model.known.outputs(model.plant).len();
+impl<'a> Core<'a> {
+    pub(crate) fn new(model: Watched<'a>, settings: Settings, units: Units) -> Self {
+        let outputs = model.0.outputs();
         let now = Checkpoint {
             phase: Phase::Learning {
                 next: settings.learning_rows,
@@ -144,7 +142,7 @@ impl Core {
 
     /// From a checkpoint and the rows since; in words what does not go together.
     pub(crate) fn restore(
-        model: Model,
+        model: Watched<'a>,
         settings: Settings,
         units: Units,
         checkpoint: Checkpoint,
@@ -165,21 +163,34 @@ impl Core {
         let mut core = Self::new(model, settings, units);
         let outputs = core.now.scatter.len();
         core.now = checkpoint;
+        let (inputs, states) = (core.model.0.inputs(), core.model.0.states());
+        let fits =
+            |sample: &Sample| sample.inputs.len() == inputs && sample.outputs.len() == outputs;
+        // What is gathered has not been simulated yet.
+        let (states, shown) = if learning { (0, 0) } else { (states, outputs) };
+        let whole = |kept: &Kept| {
+            fits(&kept.sample)
+                && kept.states.len() == states
+                && kept.modelled.len() == shown
+                && kept.innovations.len() == shown
+        };
+        if !(since.iter().all(fits) && core.now.kept.iter().all(whole)) {
+            return Err(OTHER_NUMBERS.into());
+        }
         let scatter = &core.now.scatter;
         if scatter.len() != outputs || !scatter.iter().all(Scatter::sound) {
             return Err(OTHER_NUMBERS.into());
         }
         if let Some(learned) = &core.now.learned {
-            let parameters = core
-                .model
-                .structure(learned.scales.clone())
-                .map_err(|error| error.to_string())?
-                .parameters()
-                .len();
-            let lanes = crate::sensitivity::lanes(parameters);
+            let parameters = core.model.0.parameters(learned, &core.units)?.len();
+            let lanes = core.model.0.lanes(parameters);
             let bank = core.now.bank.as_ref();
             let scores = bank.is_some_and(|bank| bank.sound(lanes, outputs));
-            if !learned.sound(parameters, outputs) || !scores || core.now.kept.is_empty() {
+            if learned.operating.len() != states
+                || !learned.sound(parameters, outputs)
+                || !scores
+                || core.now.kept.is_empty()
+            {
                 return Err(OTHER_NUMBERS.into());
             }
         }
@@ -188,18 +199,13 @@ impl Core {
             core.build().ok_or("its numbers make no model")?;
         }
         for sample in since {
-            core.feed(*sample);
+            core.feed(sample.clone());
         }
         Ok(core)
     }
 
     pub(crate) fn saved(&self) -> (&Checkpoint, &[Sample]) {
         (&self.checkpoint, &self.since)
-    }
-
-    /// What is known of the plant.
-    pub(crate) fn known(&self) -> &plants::Known {
-        &self.model.known
     }
 
     pub(crate) fn every(&self) -> usize {
@@ -223,23 +229,22 @@ impl Core {
         let (Some(learned), Some(running)) = (&self.now.learned, &self.running) else {
             return Vec::new();
         };
-        let lanes = tracked(learned);
+        let lanes = tracked(learned, self.model.0.lanes(learned.theta.len()));
         let estimates: Vec<(f64, f64)> = running
             .tracker
             .as_ref()
             .map_or(Vec::new(), |tracker| tracker.estimates().collect());
-        let structure = &running.structure;
-        let named = structure.parameter_names().into_iter();
+        let named = self.model.0.parameters(learned, &self.units);
+        let named = named.unwrap_or_default().into_iter();
         named
-            .zip(&structure.parameters())
             .zip(&learned.theta)
             .enumerate()
-            .map(|(i, ((name, info), &learned))| {
+            .map(|(i, ((name, unit), &learned))| {
                 let at = lanes.iter().position(|(lane, _)| *lane == i);
                 let tracked = at.and_then(|at| estimates.get(at));
                 Estimate {
                     name,
-                    unit: structure.unit_label(info, &self.units.output, &self.units.input),
+                    unit,
                     learned,
                     value: tracked.map_or(learned, |(deviation, _)| learned + deviation),
                     half_width: tracked.map(|(_, error)| BAND * error),
@@ -268,7 +273,7 @@ impl Core {
             Follows::Gap => notice = self.resume(&sample),
         }
         // Behind a checkpoint that a new beginning has set: the sample belongs to what follows it.
-        self.since.push(sample);
+        self.since.push(sample.clone());
         let fed = match self.now.phase {
             Phase::Learning { next, span } => self.gather(sample, next, span),
             _ => self.watch(sample),

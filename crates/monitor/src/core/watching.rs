@@ -1,12 +1,12 @@
 //! Watching: what scores and scatter say of a row, and the looks after an alarm.
 
-use super::{Core, Fed, Following, KEPT, Phase, STRETCH};
+use super::{Core, Fed, Following, KEPT, Phase, STRETCH, learning::at_rest};
 use crate::{
-    Alarm, Innovation, MAX_OUTPUTS, Notice, ScatterAlarm, Stage, Verdict,
-    alarm::alarm,
+    Alarm, Each, Innovation, Notice, ScatterAlarm, Stage, Verdict,
     intake::Sample,
-    isolate::{Kept, isolate},
+    isolate::Kept,
     scatter::{Moved, Scatter},
+    watched::Raised,
 };
 
 /// After a long gap the levels are not known for so many slowest time constants.
@@ -23,7 +23,7 @@ const QUIET: f64 = 0.75;
 /// ... for so many slowest time constants, the longest window of the scores.
 const QUIET_FOR: f64 = 6.0;
 
-impl Core {
+impl Core<'_> {
     /// After a long gap: what was gathered is no record, and levels are not known.
     pub(super) fn resume(&mut self, sample: &Sample) -> Option<Notice> {
         let Some(learned) = &self.now.learned else {
@@ -43,19 +43,16 @@ impl Core {
         }
         self.now.settling = (SETTLING * learned.rows_per_time_constant()).ceil() as usize;
         // What is read is where it is read; the others are taken where they were.
-        let mut levels = self
-            .now
-            .kept
-            .back()
-            .map_or(learned.scales.operating_level, |k| k.levels);
-        let read = self.model.known.outputs(self.model.plant);
-        for (vessel, reading) in read.into_iter().zip(sample.outputs) {
-            levels[vessel] = reading.unwrap_or(levels[vessel]);
-        }
+        let last = self.now.kept.back();
+        let mut states = last.map_or_else(
+            || Each::from_slice(&learned.operating),
+            |kept| kept.states.clone(),
+        );
+        self.model.0.put_readings(&mut states, &sample.outputs);
         self.now.kept.clear();
         self.now.judged = 0;
         self.now.scatter.iter_mut().for_each(Scatter::begin);
-        self.start(&levels, sample.input);
+        self.start(&states, at_rest(sample));
         None
     }
 
@@ -68,19 +65,18 @@ impl Core {
         if self.now.kept.len() == KEPT {
             self.now.kept.pop_front();
         }
+        let time = sample.time;
         self.now.kept.push_back(said.of(sample));
-        let mut fed = Fed {
-            said: Some(said),
-            ..Fed::default()
-        };
+        let mut fed = Fed::default();
         let finite = |said: &Innovation| said.standardised.is_finite();
         if !said.innovations.iter().flatten().all(finite) {
             // A level that left all bounds: what was learned is of no use any more.
             let every = self.now.every;
             self.begin(every);
             fed.notice = Some(Notice::LearnsAnew {
-                why: "under these commands the learned model leaves all bounds",
+                why: "under these inputs the learned model leaves all bounds",
             });
+            fed.said = Some(said);
             return fed;
         }
         let settling = self.now.settling;
@@ -100,31 +96,28 @@ impl Core {
                 running.tracker.as_mut(),
                 &running.covariance,
                 share * running.threshold,
-                (said.step, growth),
+                (said.step, &growth),
             );
             for (output, innovation) in said.innovations.iter().enumerate() {
                 if let Some(innovation) = innovation {
                     let e = innovation.standardised;
-                    fed.scatter[output] = self.scatter(output, e, sample.time);
+                    fed.scatter.extend(self.scatter(output, e, time));
                 }
             }
             // A score of the smaller noise says nothing of the larger.
-            let passed = passed && fed.scatter.iter().all(Option::is_none);
-            (fed.alarm, fed.notice) = self.judge(passed, sample.time);
+            let passed = passed && fed.scatter.is_empty();
+            (fed.alarm, fed.notice) = self.judge(passed, time);
         }
         if self.since.len() >= STRETCH {
             self.settle_checkpoint();
         }
+        fed.said = Some(said);
         fed
     }
 
     /// How many times as large as learned the noise of each output is.
-    fn growth(&self) -> [f64; MAX_OUTPUTS] {
-        let mut growth = [1.0; MAX_OUTPUTS];
-        for (growth, scatter) in growth.iter_mut().zip(&self.now.scatter) {
-            *growth = scatter.growth();
-        }
-        growth
+    fn growth(&self) -> Each<f64> {
+        self.now.scatter.iter().map(Scatter::growth).collect()
     }
 
     /// Whether the scatter of an output has moved. Where an effect explains an alarm, its residual is no noise.
@@ -143,17 +136,12 @@ impl Core {
             // What was summed up of larger noise than was reckoned with says nothing.
             bank.begin();
         }
-        let structure = &running.structure;
-        let name = structure.known.output_name(structure.plant, output);
+        let model = &self.model.0;
+        let words = |name| (name, model.output_words(output, &self.units));
+        let name = model.output_name(output).map(words);
         let noise = noise.model()?.stationary_std();
-        let domain = structure.domain;
-        Some(ScatterAlarm::new(
-            moved,
-            time,
-            (name, noise),
-            domain,
-            &self.units,
-        ))
+        let unit = model.output_unit(output, &self.units);
+        Some(ScatterAlarm::new(moved, time, name, (noise, unit)))
     }
 
     /// What follows from whether a score has passed, or, while an alarm is followed, has not stayed small.
@@ -238,16 +226,18 @@ impl Core {
         };
         let (learned, running) = (self.now.learned.as_ref()?, self.running.as_ref()?);
         let from = self.now.kept.len() - self.now.judged;
-        let rows: Vec<Kept> = self.now.kept.range(from..).copied().collect();
-        let growth = self.growth();
-        let suspects = isolate(&running.structure, learned, self.hold(), &rows, growth);
-        let alarm = alarm(
-            (stage, time, following.since),
-            (following.score, running.threshold, following.output),
-            &suspects,
-            &running.structure,
-            (&self.units, &self.axis),
-        );
+        let rows: Vec<Kept> = self.now.kept.range(from..).cloned().collect();
+        let raised = Raised {
+            stage,
+            time,
+            since: following.since,
+            score: following.score,
+            threshold: running.threshold,
+            output: following.output,
+        };
+        let (hold, growth) = (self.hold(), self.growth());
+        let (model, said_in) = (&self.model.0, (&self.units, &self.axis));
+        let alarm = model.look(learned, hold, &rows, &growth, &raised, said_in);
         self.now.phase = Phase::Alarmed(Following {
             explained: alarm.verdict != Verdict::Unexplained,
             ..following

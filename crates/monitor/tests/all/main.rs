@@ -5,5 +5,6 @@ mod dead_time;
 mod domain;
 mod monitor;
 mod outputs;
+mod own;
 mod play;
 mod support;

@@ -172,7 +172,7 @@ fn a_scatter_that_grows_is_said_in_words_and_is_no_effect() {
             row.outputs[0] += extra;
         }
         let steps = all(&mut new(model()), &rows);
-        let said: Vec<&ScatterAlarm> = steps.iter().filter_map(|s| s.scatter[0].as_ref()).collect();
+        let said: Vec<&ScatterAlarm> = steps.iter().filter_map(|s| s.scatter.first()).collect();
         let [up, down] = said[..] else {
             panic!("{said:?}");
         };
@@ -196,10 +196,7 @@ fn readings_that_alternate_are_no_fit() {
         row.outputs[0] += [0.25, -0.25][k % 2];
     }
     let steps = all(&mut new(model()), &rows);
-    let first = steps
-        .iter()
-        .find_map(|step| step.scatter[0].as_ref())
-        .unwrap();
+    let first = steps.iter().find_map(|step| step.scatter.first()).unwrap();
     assert!(
         first.time <= rows[2040].time && first.now > 4.0 * first.learned,
         "{first:?}"
@@ -215,7 +212,7 @@ fn a_leak_grows_no_scatter() {
     };
     let steps = all(&mut new(model()), &tank.run());
     assert!(!alarms(&steps).is_empty());
-    assert!(steps.iter().all(|step| step.scatter[0].is_none()));
+    assert!(steps.iter().all(|step| step.scatter.is_empty()));
 }
 
 #[test]
@@ -381,20 +378,20 @@ fn bad_rows_change_nothing() {
             let time = row.time;
             let refusals = [
                 Row {
-                    input: f64::INFINITY,
-                    ..*row
+                    inputs: [f64::INFINITY].into_iter().collect(),
+                    ..row.clone()
                 },
                 Row {
                     time: f64::NAN,
-                    ..*row
+                    ..row.clone()
                 },
                 Row {
                     time: time - 2.0,
-                    ..*row
+                    ..row.clone()
                 },
                 Row {
                     time: time - 100.0,
-                    ..*row
+                    ..row.clone()
                 },
             ];
             let columns = refusals.map(|row| monitor.update(&row).unwrap_err().column());
@@ -416,7 +413,7 @@ fn bad_rows_change_nothing() {
 fn without_steps(rows: &[Row], behind: usize) -> Vec<Row> {
     let mut lost = rows.to_vec();
     for k in 1..rows.len() {
-        if rows[k].input != rows[k - 1].input {
+        if rows[k].inputs != rows[k - 1].inputs {
             for row in &mut lost[k..(k + 1 + behind).min(rows.len())] {
                 row.outputs[0] = f64::NAN;
             }
@@ -649,7 +646,7 @@ fn another_sampling_interval_is_learned_anew() {
         .iter()
         .enumerate()
         .filter(|(k, _)| *k < 2000 || k % 3 == 0)
-        .map(|(_, row)| *row)
+        .map(|(_, row)| row.clone())
         .collect();
     let steps = all(&mut new(model()), &kept);
     let changed = notices(&steps).into_iter().find_map(|notice| match notice {
@@ -719,7 +716,7 @@ fn false_alarms_are_promised_in_rows_whatever_the_blocks() {
         let of = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
         Row::new(
             of(|row| row.time),
-            of(|row| row.input),
+            of(|row| row.inputs[0]),
             &[of(|row| row.outputs[0])],
         )
     };

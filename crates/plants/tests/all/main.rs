@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod absent;
+mod as_text;
 mod closed_loop;
 mod composition;
 mod derivatives;

@@ -2,6 +2,7 @@
 import { $, fill, make } from "./dom.js";
 import * as server from "./server.js";
 import * as data from "./data.js";
+import * as own from "./own.js";
 import * as model from "./model.js";
 import * as fit from "./fit.js";
 import * as findings from "./findings.js";
@@ -43,6 +44,7 @@ function say(text) {
 
 /** What to do next. */
 function next(state) {
+  if (own.is(state)) return own.next(state);
   const fitted = state.records.filter((one) => !one.held_out);
   if (!fitted.length) return "drop a record";
   if (state.records.some((one) => one.error)) return "say which column is what";
@@ -80,7 +82,7 @@ const task = (state) => JSON.stringify([state.text, state.records.map((one) => [
 function compareIfNeeded(state) {
   const fitted = state.records.filter((one) => !one.held_out);
   const ready = state.text && !state.model_error && fitted.length && state.records.every((one) => one.read);
-  const waits = ready && state.current === null && !state.job && !state.failure;
+  const waits = !own.is(state) && ready && state.current === null && !state.job && !state.failure;
   $("fit").hidden = !(waits && cancelled === task(state));
   if (waits && cancelled !== task(state) && before !== state.version) {
     before = state.version;
@@ -104,11 +106,20 @@ function show(state, trouble) {
   if (state.version === version) return;
   version = state.version;
   fail(state.failure);
-  $("place").textContent = state.file ? `edits ${state.file}` : "model kept in this tab";
-  for (const [id, there] of [["model", state.text], ["report", state.current || state.diagnosis]]) {
+  const mine = own.is(state);
+  $("place").textContent = state.file && !mine ? `edits ${state.file}` : "model kept in this tab";
+  for (const [id, there] of [["text", mine], ["model", mine || state.text], ["report", !mine && (state.current || state.diagnosis)]]) {
     $(`download-${id}`).hidden = !there;
     $(`download-${id}`).href = server.link(id);
   }
+  if (mine) {
+    data.show(state, fail, model.signals(), true);
+    fall({ ...state, trail: [] });
+    compareIfNeeded(state);
+    own.show(state).catch((e) => fail(e.message));
+    return;
+  }
+  own.show(state).catch((e) => fail(e.message));
   model.show(state, fail);
   data.show(state, fail, model.signals(), model.drafting());
   model.askForPlant();
@@ -124,6 +135,7 @@ function show(state, trouble) {
 try {
   const opened = await server.begin(show);
   data.start(model.changed, fail);
+  own.start(opened.examples, fail);
   model.start(opened.plants, fail);
   findings.start(fail);
   chains.start(fail);
@@ -132,7 +144,7 @@ try {
   $("finish").addEventListener("click", () => server.send("api/finish").catch((e) => fail(e.message)));
   $("fit").addEventListener("click", compare);
   show(opened.state);
-  plots.start(() => { fit.draw(); unknown.draw(); chains.draw(); experiment.draw(); });
+  plots.start(() => { own.draw(); fit.draw(); unknown.draw(); chains.draw(); experiment.draw(); });
 } catch (error) {
   fail(error.message);
 }

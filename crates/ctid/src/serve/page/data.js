@@ -1,6 +1,7 @@
 // The records: dropped, listed, and which of their columns is what.
 import { $, button, fill, make } from "./dom.js";
 import * as server from "./server.js";
+import * as own from "./own.js";
 
 const OUTPUTS = ["output", "output_2", "output_3"];
 const ROLES = [["time", "Time"], ["input", "Command u"], ["input_2", "Command of pump 2"],
@@ -36,7 +37,8 @@ async function replace(file) {
 async function take(files, heldOut, fail) {
   for (const file of files) {
     try {
-      if (/\.toml$/i.test(file.name)) await replace(file);
+      if (/\.mo$/i.test(file.name) || (/\.toml$/i.test(file.name) && own.isModelFile(await file.text()))) await own.take(file);
+      else if (/\.toml$/i.test(file.name)) await replace(file);
       else await server.upload(file, heldOut);
     } catch (error) {
       fail(error.message);
@@ -70,7 +72,7 @@ export function start(changed, fail) {
   $("column-fields").addEventListener("change", changed);
 }
 
-const signals = (read) => [read.input, read.input_2, ...read.outputs].filter(Boolean).map((one) => `${one.name} ${one.range}`).join(", ");
+const signals = (read) => [...read.inputs, ...read.outputs].map((one) => `${one.name} ${one.range}`).join(", ");
 
 function record(one, fail) {
   const { read } = one;

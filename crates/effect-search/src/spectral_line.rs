@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use ct_signals::ArModel;
 use realfft::RealFftPlanner;
 
-use crate::Error;
+use ct_signals::Error;
 
 /// Neighbours of a line, from where its taper ends to where a smooth spectrum may have changed, and the fewest that do.
 const NEAREST: usize = 3;
@@ -23,7 +23,7 @@ const CYCLES: usize = 3;
 
 /// The line that stands out most.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Line {
+pub struct Line {
     /// Periods in the series.
     pub cycles: usize,
     /// Probability that the most outstanding of all lines of a noise stands out as far; above one where none does.
@@ -31,7 +31,7 @@ pub(crate) struct Line {
 }
 
 /// The strongest line of a series; `None` where it is too short, or does not move.
-pub(crate) fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
+pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
     let n = series.len();
     // Flat enough for neighbours to be compared, by a filter that has no room for a line.
     let mut flat = ArModel::fit(&[series], 1)?.whiten(series);

@@ -1,0 +1,358 @@
+//! All effects at all ports of a model.
+
+use std::collections::BTreeMap;
+
+use super::effect::{Effect, Place, Role, Starts};
+use super::fragment::{Counts, Fragment, instance};
+use super::port::Port;
+use super::scale::{Scales, balance_unit, divided};
+use super::visited::{Span, Visited};
+use super::{all_effects, domain};
+use crate::expression::Variable;
+use crate::spec::{Given, ModelSpec};
+use crate::text::is_reserved;
+
+/// A parameter of an effect at a port.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectParameter {
+    /// Its name in the model that the effect was added to: `lag_u_tau`.
+    pub name: String,
+    /// Its name in the effect: `tau`.
+    pub short: String,
+    /// Its unit.
+    pub unit: String,
+    /// What it is.
+    pub description: String,
+    /// What it is to a search.
+    pub role: Role,
+    /// Its value where the effect is not there: of a [`Role::Shape`] the value does not matter.
+    pub absent: f64,
+    /// Smallest and largest value.
+    pub bounds: (f64, f64),
+    /// Where fits start; several parameters: every combination.
+    pub starts: Vec<f64>,
+}
+
+/// An effect at a port of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its identifier: `lag(u)`, `varies_with(k,T)`, or the name of an own candidate.
+    pub id: String,
+    /// Where it acts.
+    pub port: Port,
+    /// The effect; `None` for a candidate of the model file.
+    pub effect: Option<&'static Effect>,
+    /// Its parameters.
+    pub parameters: Vec<EffectParameter>,
+    pub(super) fragment: Fragment,
+    /// Names of its variables begin with this.
+    pub(super) stem: String,
+}
+
+impl Candidate {
+    /// Whether the outputs have a derivative by every size where the effect is not there: it can be scored there, over the starts of its
+    /// shapes.
+    #[must_use]
+    pub fn is_smooth(&self) -> bool {
+        let mut roles = self.parameters.iter().map(|parameter| parameter.role);
+        roles.all(|role| matches!(role, Role::Size | Role::Shape))
+    }
+
+    /// How many parameters are fitted.
+    #[must_use]
+    pub fn fitted(&self) -> usize {
+        let roles = self.parameters.iter().map(|parameter| parameter.role);
+        roles.filter(|role| *role != Role::Choice).count()
+    }
+
+    /// Every combination of the starts, a value for each parameter.
+    #[must_use]
+    pub fn starts(&self) -> Vec<Vec<f64>> {
+        let mut all = vec![Vec::new()];
+        for parameter in &self.parameters {
+            let longer = all.iter().flat_map(|begun: &Vec<f64>| {
+                parameter.starts.iter().map(|start| {
+                    let mut begun = begun.clone();
+                    begun.push(*start);
+                    begun
+                })
+            });
+            all = longer.collect();
+        }
+        all
+    }
+
+    /// Gives the variables the names that they have in the model.
+    pub(super) fn name_variables(&mut self, spec: &ModelSpec) {
+        let stem = identifier(&self.id);
+        let free = |name: String| {
+            let mut name = name;
+            while spec.find(&name).is_some() || is_reserved(&name) {
+                name.push('_');
+            }
+            name
+        };
+        let named = |name: &str| match name {
+            "v" => free(stem.clone()),
+            name => free(format!("{stem}_{name}")),
+        };
+        let fragment = &mut self.fragment;
+        for parameter in &mut fragment.parameters {
+            parameter.about.name = named(&parameter.about.name);
+        }
+        // Constants of the effect stand behind its parameters.
+        for (own, parameter) in self.parameters.iter_mut().zip(&fragment.parameters) {
+            own.name.clone_from(&parameter.about.name);
+        }
+        let states = fragment.states.iter_mut().map(|state| &mut state.about);
+        let flows = fragment.flows.iter_mut().map(|flow| &mut flow.about);
+        for about in states.chain(flows) {
+            about.name = named(&about.name);
+        }
+        self.stem = stem;
+    }
+}
+
+/// A name of Modelica from an identifier: `varies_with(k,T)` is `varies_with_k_T`.
+fn identifier(id: &str) -> String {
+    let clean = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    let name: String = id.trim_end_matches(')').chars().map(clean).collect();
+    if name.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        name
+    } else {
+        format!("own_{name}")
+    }
+}
+
+/// All effects that can act in a model, at all its ports.
+///
+/// Not offered: effects in equations that only say that one state is the speed of another, but for a limit; an input to a balance in which
+/// it stands already; a flow that a fitted parameter scales, as the parameter's own effects are the same.
+#[must_use]
+pub fn candidates(spec: &ModelSpec, visited: &Visited) -> Vec<Candidate> {
+    let ports = spec.ports();
+    let mut all = Vec::new();
+    for effect in all_effects() {
+        for port in ports_of(spec, visited, effect, &ports) {
+            all.extend(candidate(spec, visited, effect, port));
+        }
+    }
+    all
+}
+
+fn ports_of(
+    spec: &ModelSpec,
+    visited: &Visited,
+    effect: &Effect,
+    ports: &super::Ports,
+) -> Vec<Port> {
+    let single = || ports.single.iter().copied();
+    let states = 0..spec.states.len();
+    let balances = || states.clone().filter(|&i| spec.speed_of(i).is_none());
+    match effect.place {
+        Place::Input => single()
+            .filter(|port| matches!(port, Port::Input(_)))
+            .collect(),
+        Place::Output => single()
+            .filter(|port| matches!(port, Port::Output(_)))
+            .collect(),
+        Place::Balance if effect.id == "limit" => states.map(Port::Balance).collect(),
+        Place::Balance => balances().map(Port::Balance).collect(),
+        Place::Parameter => ports.values.clone(),
+        Place::ParameterAndSignal => {
+            let inputs = (0..spec.inputs.len()).map(Variable::Input);
+            let signals = states.map(Variable::State).chain(inputs);
+            let moves = |signal: &Variable| {
+                let span = visited.spans.get(signal);
+                span.is_none_or(|span| span.high > span.low)
+            };
+            let signals: Vec<Variable> = signals.filter(moves).collect();
+            let of = |port: &Port| match port {
+                Port::Value(value) => Some(*value),
+                _ => None,
+            };
+            let values = ports.values.iter().filter_map(of);
+            values
+                .flat_map(|value| signals.iter().map(move |x| Port::Dependence(value, *x)))
+                .collect()
+        }
+        Place::States => {
+            let unit = |i: usize| spec.states[i].about.unit.as_str();
+            let pairs = balances().flat_map(|a| balances().map(move |b| (a, b)));
+            let alike = |&(a, b): &(usize, usize)| {
+                let units = [a, b].map(|i| balance_unit(spec, i, &visited.time_unit));
+                let same = units[0] == units[1] || units.iter().any(String::is_empty);
+                a < b && unit(a) == unit(b) && same
+            };
+            pairs
+                .filter(alike)
+                .map(|(a, b)| Port::Between(a, b))
+                .collect()
+        }
+        Place::InputAndBalance => {
+            let inputs = 0..spec.inputs.len();
+            let pairs = inputs.flat_map(|u| balances().map(move |x| (u, x)));
+            pairs
+                .filter(|&(u, x)| !spec.depends_on(x, Variable::Input(u)))
+                .map(|(u, x)| Port::InputAndBalance(u, x))
+                .collect()
+        }
+        Place::BalanceAndSurrounding | Place::Motion | Place::Terminal => {
+            domain::ports(spec, effect)
+        }
+    }
+}
+
+/// The variables of an effect's inputs, by their names there, the signal first; states to whose equations it is added, and whether it is
+/// subtracted there.
+type Wiring = (Vec<(&'static str, Variable)>, Vec<(usize, bool)>);
+
+/// An effect at a port; `None` where its text cannot be read, which a test excludes.
+fn candidate(
+    spec: &ModelSpec,
+    visited: &Visited,
+    effect: &'static Effect,
+    port: Port,
+) -> Option<Candidate> {
+    let state = Variable::State;
+    let (inputs, targets): Wiring = match port {
+        Port::Input(u) => (vec![("u", Variable::Input(u))], Vec::new()),
+        Port::Output(y) => (
+            vec![
+                ("y", spec.outputs[y].variable),
+                ("u", spec.outputs[y].variable),
+            ],
+            Vec::new(),
+        ),
+        Port::Balance(x) => (vec![("x", state(x))], vec![(x, false)]),
+        Port::Value(p) => (vec![("p", p)], Vec::new()),
+        Port::Dependence(p, x) => (vec![("x", x), ("p", p)], Vec::new()),
+        Port::Between(a, b) => (
+            vec![("x1", state(a)), ("x2", state(b))],
+            vec![(a, true), (b, false)],
+        ),
+        Port::InputAndBalance(u, x) => (vec![("u", Variable::Input(u))], vec![(x, false)]),
+        Port::BalanceAnd(x, a) => (vec![("x", state(x)), ("a", a)], vec![(x, false)]),
+        Port::OutputAnd(y, a) => (vec![("a", a), ("y", spec.outputs[y].variable)], Vec::new()),
+        Port::Own => return None,
+    };
+    let signal = inputs[0].1;
+    let mut span = visited.span(signal);
+    if let Port::Between(_, b) = port {
+        span = span.joined(&visited.span(state(b)));
+    }
+    if let Port::BalanceAnd(_, a) = port
+        && effect.place == Place::BalanceAndSurrounding
+    {
+        span = span.joined(&visited.span(a));
+    }
+    let scales = Scales::of(spec, visited);
+    let balance = targets.iter().map(|&(x, _)| scales.balance(x));
+    let balance = balance.fold(0.0, f64::max);
+    let balance = if balance > 0.0 {
+        balance
+    } else {
+        scales.reading(port)
+    };
+    // Of a temperature: its zero above absolute zero.
+    let zero = if spec.about(signal).unit == "K" {
+        0.0
+    } else {
+        273.15
+    };
+    let constants = BTreeMap::from([
+        ("low", span.low),
+        ("high", span.high),
+        ("middle", 0.5 * (span.low + span.high)),
+        ("width", span.width()),
+        ("first", span.first),
+        ("begin", visited.begin),
+        ("zero", zero),
+        ("duration", visited.duration),
+        ("interval", visited.interval),
+        ("balance", balance),
+    ]);
+    let mut fragment = instance(effect, &inputs, &constants, Counts::of(spec), &targets).ok()?;
+    let port_unit = spec.about(signal).unit.clone();
+    let balance_unit = match (targets.first(), port) {
+        (Some(&(x, _)), _) => balance_unit(spec, x, &visited.time_unit),
+        (None, Port::OutputAnd(y, _)) => spec.about(spec.outputs[y].variable).unit.clone(),
+        _ => String::new(),
+    };
+    let value_unit = match port {
+        Port::Value(p) | Port::Dependence(p, _) => spec.about(p).unit.clone(),
+        _ => String::new(),
+    };
+    let unit = |symbol: &str| match symbol {
+        "port" | "signal" => port_unit.clone(),
+        "value" => value_unit.clone(),
+        "time" => visited.time_unit.clone(),
+        "balance" => balance_unit.clone(),
+        "balance/port" => divided(&balance_unit, &port_unit),
+        other => other.to_string(),
+    };
+    let states = fragment.states.iter_mut().map(|state| &mut state.about);
+    let flows = fragment.flows.iter_mut().map(|flow| &mut flow.about);
+    let parameters = fragment.parameters.iter_mut();
+    for about in states.chain(flows).chain(parameters.map(|p| &mut p.about)) {
+        about.unit = unit(&about.unit);
+    }
+    let parameters = fragment.parameters.iter();
+    let parameters = parameters.filter(|parameter| parameter.given != Given::Constant);
+    let parameters = parameters.map(|parameter| {
+        let about = &parameter.about;
+        let known = effect
+            .parameters
+            .iter()
+            .find(|(name, ..)| *name == about.name);
+        let (role, starts) = known
+            .map_or((Role::Size, Starts::Values(&[])), |(_, role, starts)| {
+                (*role, *starts)
+            });
+        // A reading of a row is later by a row with the slightest delay of what it shows at once.
+        let jumps = effect.id == "delay" && spec.is_read_directly(signal);
+        let role = if jumps { Role::Threshold } else { role };
+        EffectParameter {
+            name: String::new(),
+            short: about.name.clone(),
+            unit: about.unit.clone(),
+            description: about.description.clone(),
+            role,
+            absent: parameter.value,
+            bounds: (about.min, about.max),
+            starts: values(starts, &span, visited, balance)
+                .into_iter()
+                .map(|start| start.clamp(about.min, about.max))
+                .collect(),
+        }
+    });
+    let mut candidate = Candidate {
+        id: format!("{}({})", effect.id, port.names(spec)),
+        port,
+        effect: Some(effect),
+        parameters: parameters.collect(),
+        fragment,
+        stem: String::new(),
+    };
+    candidate.name_variables(spec);
+    Some(candidate)
+}
+
+fn values(starts: Starts, span: &Span, visited: &Visited, balance: f64) -> Vec<f64> {
+    let (shares, of): (&[f64], Box<dyn Fn(f64) -> f64 + '_>) = match starts {
+        Starts::Values(all) => (all, Box::new(|share| share)),
+        Starts::Quantiles(all) => (all, Box::new(|share| span.quantile(share))),
+        Starts::Widths(all) => (all, Box::new(|share| share * span.width())),
+        Starts::Times(all) => {
+            let time = |share: f64| visited.begin + share * visited.duration;
+            (all, Box::new(time))
+        }
+        Starts::Durations(all) => (all, Box::new(|share| share * visited.duration)),
+        Starts::Intervals(all) => (all, Box::new(|share| share * visited.interval)),
+        Starts::Balances(all) => (all, Box::new(move |share| share * balance)),
+        Starts::BalancesPerWidth(all) => {
+            (all, Box::new(move |share| share * balance / span.width()))
+        }
+    };
+    shares.iter().map(|share| of(*share)).collect()
+}

@@ -1,0 +1,63 @@
+//! Which ports the effects of a domain have, from the units of states, inputs and readings.
+
+use ct_signals::{Dimension, Unit};
+
+use super::effect::{Effect, Place};
+use super::port::Port;
+use crate::expression::Variable;
+use crate::spec::ModelSpec;
+
+pub(super) fn ports(spec: &ModelSpec, effect: &Effect) -> Vec<Port> {
+    match effect.place {
+        Place::BalanceAndSurrounding => thermal(spec),
+        Place::Motion => mechanical(spec),
+        Place::Terminal => electrical(spec),
+        _ => Vec::new(),
+    }
+}
+
+fn is(spec: &ModelSpec, variable: Variable, unit: &str) -> bool {
+    let dimension = |unit: &str| Unit::parse(unit).map(|unit| unit.dimension());
+    let own = dimension(&spec.about(variable).unit);
+    own.is_some_and(|own| own != Dimension::NONE) && own == dimension(unit)
+}
+
+/// Temperatures whose balance holds another temperature.
+fn thermal(spec: &ModelSpec) -> Vec<Port> {
+    let inputs = (0..spec.inputs.len()).map(Variable::Input);
+    let states = (0..spec.states.len()).map(Variable::State);
+    let surroundings: Vec<Variable> = inputs
+        .chain(states)
+        .filter(|&variable| is(spec, variable, "K"))
+        .collect();
+    let warm = (0..spec.states.len()).filter(|&x| is(spec, Variable::State(x), "K"));
+    let pairs = warm.flat_map(|x| surroundings.iter().map(move |a| (x, *a)));
+    pairs
+        .filter(|&(x, a)| a != Variable::State(x) && spec.depends_on(x, a))
+        .map(|(x, a)| Port::BalanceAnd(x, a))
+        .collect()
+}
+
+/// Speeds: states of such a unit, or of which another state is the position.
+fn mechanical(spec: &ModelSpec) -> Vec<Port> {
+    let states = 0..spec.states.len();
+    let positions: Vec<Option<usize>> = states.clone().map(|i| spec.speed_of(i)).collect();
+    let is_speed = |&x: &usize| {
+        let unit = &spec.states[x].about.unit;
+        let turns = ["rad/s", "rpm", "1/min", "deg/s"].contains(&unit.as_str());
+        turns || is(spec, Variable::State(x), "m/s") || positions.contains(&Some(x))
+    };
+    let balances = states.filter(|&x| spec.speed_of(x).is_none());
+    balances.filter(is_speed).map(Port::Balance).collect()
+}
+
+/// Voltages that are read, with each current that is an input.
+fn electrical(spec: &ModelSpec) -> Vec<Port> {
+    let outputs = 0..spec.outputs.len();
+    let voltages = outputs.filter(|&y| is(spec, spec.outputs[y].variable, "V"));
+    let inputs = (0..spec.inputs.len()).map(Variable::Input);
+    let currents: Vec<Variable> = inputs.filter(|&i| is(spec, i, "A")).collect();
+    voltages
+        .flat_map(|y| currents.iter().map(move |i| Port::OutputAnd(y, *i)))
+        .collect()
+}

@@ -1,0 +1,88 @@
+//! What an effect is: a small model, and what its text cannot say.
+
+/// Where an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Place {
+    /// Between an input and the model: the effect of `u` gives what the model receives.
+    Input,
+    /// Between what is measured and the reading: the effect of `y` gives the reading.
+    Output,
+    /// In the equation of a state `x`: added to its right-hand side, or, made of `rate`, in its place.
+    Balance,
+    /// A parameter or a named flow `p`, in the place of which the effect stands.
+    Parameter,
+    /// A parameter or a named flow `p` that depends on a state or an input `x`.
+    ParameterAndSignal,
+    /// A flow from a state `x1` to a state `x2`.
+    States,
+    /// An input `u`, and the equation of a state that it is added to.
+    InputAndBalance,
+    /// The equation of a state `x`, to which a surrounding of the same quantity `a` (a state or an input) belongs.
+    BalanceAndSurrounding,
+    /// The equation of a speed `x`.
+    Motion,
+    /// A voltage that is read, `y`, with a current that is an input, `a`.
+    Terminal,
+}
+
+/// What a parameter of an effect is to a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// At its absent value the effect is not there, and the outputs have a derivative by it (from one side where a bound is there).
+    Size,
+    /// It says when, where or how fast: without a size no output depends on it. A grid of starts covers it.
+    Shape,
+    /// At its absent value the effect is not there, but the outputs have no derivative by it there: a limit at the edge of what was
+    /// visited, a step of a converter. A grid of starts covers it.
+    Threshold,
+    /// One of the starts, and nothing between them: upper or lower. It is not fitted.
+    Choice,
+}
+
+/// Where fits of a parameter start, as shares of what was visited.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Starts {
+    /// As they stand.
+    Values(&'static [f64]),
+    /// Quantiles of the signal, and at the same shares of its range where no quantiles are known.
+    Quantiles(&'static [f64]),
+    /// Shares of the width of the signal's range.
+    Widths(&'static [f64]),
+    /// Instants: shares of the record, from its beginning.
+    Times(&'static [f64]),
+    /// Shares of the record's duration.
+    Durations(&'static [f64]),
+    /// Multiples of the interval between rows.
+    Intervals(&'static [f64]),
+    /// Shares of the largest term of the equation.
+    Balances(&'static [f64]),
+    /// Shares of the largest term of the equation, per width of the signal's range.
+    BalancesPerWidth(&'static [f64]),
+}
+
+/// An effect.
+///
+/// Its text is a model: the inputs are the port (their names say which part of it: [`Place`]), the output `v` is what the effect gives, the
+/// value of a parameter is the absent one, and a `final parameter` is a [`Role::Choice`]. Constants of these names take the values that the
+/// data visit: `low`, `high`, `middle`, `width`, `first` (of the signal), `begin`, `duration`, `interval` (of the record), `zero` (of a temperature's unit above absolute zero), `balance` (the
+/// largest term of the equation). In units `port` (or `signal`), `value`, `time` and `balance`
+/// stand for those of the signal, of the parameter or flow, of the time and of the equation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effect {
+    /// Its name: `lag`.
+    pub id: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// Its text.
+    pub text: &'static str,
+    /// Role and starts of the parameters.
+    pub parameters: &'static [(&'static str, Role, Starts)],
+    /// Its physics in a sentence.
+    pub physics: &'static str,
+    /// Effects that leave similar traces, as `name(port)`.
+    pub confused_with: &'static [&'static str],
+    /// How a person confirms it at the plant.
+    pub confirm: &'static str,
+    /// Words that a person may describe it with.
+    pub symptoms: &'static [&'static str],
+}

@@ -1,0 +1,163 @@
+//! An effect at a port, in the words of the model that it may be added to: its variables, and what it does to the equations.
+
+use std::collections::BTreeMap;
+
+use super::effect::{Effect, Place};
+use crate::expression::{Expression, Operator, Variable};
+use crate::spec::{Flow, Given, ModelSpec, Parameter, State};
+use crate::text::{TextError, parse_effect};
+
+/// Variables whose positions are below the counts of the model are the model's, the others are own ones.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Fragment {
+    pub parameters: Vec<Parameter>,
+    pub states: Vec<State>,
+    pub flows: Vec<Flow>,
+    pub action: Action,
+}
+
+/// What it does.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Action {
+    /// Its result, an own flow, stands in the place of the input, output, parameter or flow of its port.
+    Stand(Variable),
+    /// This is added to the equations of states, to flows, or to readings, by position in the outputs.
+    Add(Vec<(Target, Expression)>),
+    /// Its result stands in the place of the right-hand side, for which this flow of its own is kept.
+    Govern { result: Variable, rate: Variable },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Target {
+    State(usize),
+    Flow(usize),
+    Output(usize),
+}
+
+/// How many variables of each kind the model has.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counts {
+    pub parameters: usize,
+    pub states: usize,
+    pub flows: usize,
+}
+
+impl Counts {
+    pub fn of(spec: &ModelSpec) -> Self {
+        Self {
+            parameters: spec.parameters.len(),
+            states: spec.states.len(),
+            flows: spec.flows.len(),
+        }
+    }
+}
+
+/// The name of the flow that an effect gives.
+const RESULT: &str = "v";
+/// The name of the right-hand side in an effect that governs it.
+const RATE: &str = "rate";
+
+/// An effect at a port, whose inputs are these variables of the model, with these values of its constants.
+pub(super) fn instance(
+    effect: &Effect,
+    ports: &[(&str, Variable)],
+    constants: &BTreeMap<&str, f64>,
+    counts: Counts,
+    targets: &[(usize, bool)],
+) -> Result<Fragment, TextError> {
+    let small = parse_effect(effect.text, constants)?;
+    let mut fragment = Fragment {
+        parameters: Vec::new(),
+        states: Vec::new(),
+        flows: Vec::new(),
+        action: Action::Add(Vec::new()),
+    };
+    // Parameters first, then the constants that equations use; a pure number stands where it is used.
+    let mut own: Vec<Expression> = small.parameters.iter().map(|p| signed(p.value)).collect();
+    for constants in [false, true] {
+        for (i, parameter) in small.parameters.iter().enumerate() {
+            let is_constant = parameter.given == Given::Constant;
+            let kept = !is_constant
+                || !parameter.about.unit.is_empty()
+                    && small.occurrences(Variable::Parameter(i)) > 0;
+            if kept && is_constant == constants {
+                let at = counts.parameters + fragment.parameters.len();
+                own[i] = Expression::Variable(Variable::Parameter(at));
+                fragment.parameters.push(Parameter {
+                    definition: None,
+                    ..parameter.clone()
+                });
+            }
+        }
+    }
+    // The right-hand side is a flow of its own, behind those of the effect.
+    let rate = Variable::Flow(counts.flows + small.flows.len());
+    let of = |variable: Variable| match variable {
+        Variable::Parameter(i) => own[i].clone(),
+        Variable::State(i) => Expression::Variable(Variable::State(counts.states + i)),
+        Variable::Flow(i) => Expression::Variable(Variable::Flow(counts.flows + i)),
+        Variable::Input(i) => {
+            let name = small.inputs[i].about.name.as_str();
+            let port = ports.iter().find(|(port, _)| *port == name);
+            Expression::Variable(port.map_or(rate, |(_, variable)| *variable))
+        }
+    };
+    for state in &small.states {
+        fragment.states.push(State {
+            about: state.about.clone(),
+            coefficient: state.coefficient.as_ref().map(|c| c.with(&of)),
+            right: state.right.with(&of),
+            start: state.start.with(&of),
+            fixed: state.fixed,
+        });
+    }
+    for flow in &small.flows {
+        fragment.flows.push(Flow {
+            about: flow.about.clone(),
+            value: flow.value.with(&of),
+            of_parameters: false,
+        });
+    }
+    let is_result = |flow: &Flow| flow.about.name == RESULT;
+    let position = small.flows.iter().position(is_result).unwrap_or(0);
+    let result = Variable::Flow(counts.flows + position);
+    let governs = small.inputs.iter().any(|input| input.about.name == RATE);
+    fragment.action = match effect.place {
+        Place::Input
+        | Place::Output
+        | Place::Parameter
+        | Place::ParameterAndSignal
+        | Place::Terminal => Action::Stand(result),
+        _ if governs => Action::Govern { result, rate },
+        _ => {
+            let term = |negative: bool| {
+                let value = Expression::Variable(result);
+                if negative {
+                    Expression::Negative(Box::new(value))
+                } else {
+                    value
+                }
+            };
+            let of = |&(state, negative)| (Target::State(state), term(negative));
+            Action::Add(targets.iter().map(of).collect())
+        }
+    };
+    Ok(fragment)
+}
+
+/// A number of any sign.
+pub(super) fn signed(value: f64) -> Expression {
+    if value < 0.0 {
+        Expression::Negative(Box::new(Expression::Number(-value)))
+    } else {
+        Expression::Number(value)
+    }
+}
+
+/// A sum; `a - b` where what is added is negative.
+pub(super) fn sum(a: Expression, b: Expression) -> Expression {
+    match b {
+        Expression::Negative(b) => Expression::Binary(Operator::Subtract, Box::new(a), b),
+        b => Expression::Binary(Operator::Add, Box::new(a), Box::new(b)),
+    }
+}

@@ -1,0 +1,67 @@
+//! Ports of a model, and effects at them: what may be missing in a model, as a transformation of the model.
+//!
+//! An effect is a small model itself ([`Effect`]), one file each. [`candidates`] lists which effect can act at which port of a model,
+//! [`apply`] gives the model with some of them in it, whose parameters are parameters of the new model. At their absent values the new
+//! model gives the outputs of the old one.
+//!
+//! ```
+//! use ct_model::effects::{Visited, apply, candidates};
+//! use ct_model::ModelSpec;
+//!
+//! let block = ModelSpec::parse(
+//!     "model Block
+//!        parameter Real k(unit=\"1/s\", min=0) = 0.1;
+//!        input Real u(unit=\"degC\");
+//!        output Real T(unit=\"degC\", start=20);
+//!      equation
+//!        der(T) = k*(u - T);
+//!      end Block;",
+//! )?;
+//! let visited = Visited::nominal(&block);
+//! let all = candidates(&block, &visited);
+//! let lag = all.iter().find(|candidate| candidate.id == "lag(u)").unwrap();
+//! let mended = apply(&block, &[lag])?;
+//! assert_eq!(mended.parameters[1].about.name, "lag_u_tau");
+//! assert_eq!(mended.states.len(), 2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod apply;
+mod balance;
+mod between;
+mod candidate;
+mod domain;
+mod effect;
+mod electrical;
+mod fragment;
+mod input;
+mod mechanical;
+mod output;
+mod own;
+mod parameter;
+mod port;
+mod scale;
+mod thermal;
+mod visited;
+
+pub use apply::{ApplyError, apply};
+pub use candidate::{Candidate, EffectParameter, candidates};
+pub use effect::{Effect, Place, Role, Starts};
+pub use own::{OwnCandidate, OwnError, OwnParameter, OwnState, own_candidate, own_candidates};
+pub use port::{Port, Ports};
+pub use visited::{Span, Visited};
+
+/// All effects, by place; those of a chain in its order.
+pub fn all_effects() -> impl Iterator<Item = &'static Effect> {
+    const GROUPS: [&[Effect]; 8] = [
+        &input::EFFECTS,
+        &electrical::EFFECTS,
+        &output::EFFECTS,
+        &thermal::EFFECTS,
+        &mechanical::EFFECTS,
+        &balance::EFFECTS,
+        &parameter::EFFECTS,
+        &between::EFFECTS,
+    ];
+    GROUPS.into_iter().flatten()
+}

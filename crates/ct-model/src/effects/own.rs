@@ -1,0 +1,384 @@
+//! Candidates of the model file: terms of the user's own, offered to the search like the catalogue's effects.
+
+use std::collections::BTreeMap;
+
+use super::candidate::{Candidate, EffectParameter};
+use super::effect::Role;
+use super::fragment::{Action, Counts, Fragment, Target, signed};
+use super::port::Port;
+use crate::expression::{Expression, Variable};
+use crate::spec::{About, Given, ModelSpec, Parameter, State};
+use crate::text::{Scope, TextError, is_reserved};
+
+/// A candidate as the model file has it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct OwnCandidate {
+    /// Its parameters, by name.
+    pub parameters: BTreeMap<String, OwnParameter>,
+    /// States that it brings, by name.
+    pub states: BTreeMap<String, OwnState>,
+    /// What is added: to the right-hand side of the equation of a state, to a named flow, or to an output, by their names.
+    pub terms: BTreeMap<String, String>,
+}
+
+/// A parameter of a candidate.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct OwnParameter {
+    /// Its unit; empty where none is given.
+    pub unit: String,
+    /// Its smallest value.
+    pub min: Option<f64>,
+    /// Its largest value.
+    pub max: Option<f64>,
+    /// Where a fit starts.
+    pub start: f64,
+}
+
+/// A state of a candidate.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct OwnState {
+    /// Its unit; empty where none is given.
+    pub unit: String,
+    /// Where its initial value starts.
+    pub start: f64,
+    /// The initial value is known, and not fitted.
+    pub fixed: bool,
+    /// `c*der(x) = e`.
+    pub equation: String,
+}
+
+/// A candidate of the model file that is refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}: {what}", place.join("."))]
+pub struct OwnError {
+    /// The keys below `candidates`: the candidate's name, `terms`, `T`.
+    pub place: Vec<String>,
+    /// What is wrong and the mend; of an expression with line and column in it.
+    pub what: String,
+}
+
+/// Reads candidates of the model file in the scope of a model, and says where two are the same.
+///
+/// # Errors
+/// The place in the model file and in the expression, what is wrong and the mend.
+pub fn own_candidates(
+    spec: &ModelSpec,
+    all: &BTreeMap<String, OwnCandidate>,
+) -> Result<Vec<Candidate>, OwnError> {
+    let mut read: Vec<Candidate> = Vec::new();
+    for (name, own) in all {
+        let candidate = own_candidate(spec, name, own)?;
+        let same = |other: &&Candidate| {
+            let (a, b) = (&other.fragment, &candidate.fragment);
+            let rights = |fragment: &Fragment| -> Vec<(Option<Expression>, Expression)> {
+                let states = fragment.states.iter();
+                states
+                    .map(|state| (state.coefficient.clone(), state.right.clone()))
+                    .collect()
+            };
+            a.action == b.action && rights(a) == rights(b)
+        };
+        if let Some(other) = read.iter().find(same) {
+            return Err(OwnError {
+                place: vec![name.clone()],
+                what: format!("it is the same as {}: keep one of them", other.id),
+            });
+        }
+        read.push(candidate);
+    }
+    Ok(read)
+}
+
+/// Reads a candidate of the model file in the scope of a model.
+///
+/// # Errors
+/// The place in the model file and in the expression, what is wrong and the mend.
+pub fn own_candidate(
+    spec: &ModelSpec,
+    name: &str,
+    own: &OwnCandidate,
+) -> Result<Candidate, OwnError> {
+    let error = |keys: &[&str], what: String| OwnError {
+        place: std::iter::once(name)
+            .chain(keys.iter().copied())
+            .map(String::from)
+            .collect(),
+        what,
+    };
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || !name.chars().all(fits) {
+        let what = "a candidate's name has letters, digits, `_` and `-` alone, as `radiation`";
+        return Err(error(&[], what.to_string()));
+    }
+    let free = |kind: &str, key: &str| {
+        let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        if !key.starts_with(|c: char| c.is_ascii_alphabetic()) || !key.chars().all(letters) {
+            let what = "a name begins with a letter and has letters, digits and `_` alone";
+            return Err(error(&[kind, key], what.to_string()));
+        }
+        if spec.find(key).is_some() {
+            let what = format!(
+                "`{key}` is a variable of {}: choose another name",
+                spec.name
+            );
+            return Err(error(&[kind, key], what));
+        }
+        if is_reserved(key) {
+            let what = format!("`{key}` has a meaning of its own: choose another name");
+            return Err(error(&[kind, key], what));
+        }
+        Ok(())
+    };
+    let counts = Counts::of(spec);
+    let mut scope = spec.clone();
+    for (key, parameter) in &own.parameters {
+        free("parameters", key)?;
+        let about = about(key, &parameter.unit, parameter.min, parameter.max);
+        let start = parameter.start;
+        if !start.is_finite() || about.min.is_nan() || about.max.is_nan() {
+            let what = "start, min and max are numbers: write finite ones";
+            return Err(error(&["parameters", key], what.to_string()));
+        }
+        if start < about.min || start > about.max {
+            let what = format!(
+                "start = {start} is outside min = {} and max = {}: correct one of them",
+                about.min, about.max
+            );
+            return Err(error(&["parameters", key], what));
+        }
+        scope.parameters.push(Parameter {
+            about,
+            value: start,
+            definition: None,
+            given: Given::Fitted,
+        });
+    }
+    for (key, state) in &own.states {
+        free("states", key)?;
+        if own.parameters.contains_key(key) {
+            let what = format!("`{key}` is a parameter of the candidate too: choose another name");
+            return Err(error(&["states", key], what));
+        }
+        if !state.start.is_finite() {
+            let what = "start is a number: write a finite one";
+            return Err(error(&["states", key, "start"], what.to_string()));
+        }
+        scope.states.push(State {
+            about: about(key, &state.unit, None, None),
+            coefficient: None,
+            right: Expression::Number(0.0),
+            start: signed(state.start),
+            fixed: state.fixed,
+        });
+    }
+    let said = |keys: &[&str], source: TextError| error(keys, source.to_string());
+    let words = Scope::new(&scope);
+    let mut states = scope.states[counts.states..].to_vec();
+    for (state, (key, given)) in states.iter_mut().zip(&own.states) {
+        let equation = words.equation(&given.equation, key);
+        (state.coefficient, state.right) =
+            equation.map_err(|source| said(&["states", key, "equation"], source))?;
+    }
+    let mut terms = Vec::new();
+    for (key, text) in &own.terms {
+        let target = target(spec, key).map_err(|what| error(&["terms", key], what))?;
+        let term = words.expression(text);
+        terms.push((
+            target,
+            term.map_err(|source| said(&["terms", key], source))?,
+        ));
+    }
+    if terms.is_empty() {
+        let what = "it has no terms: write what it adds to which equation, terms = { T = \"...\" }";
+        return Err(error(&[], what.to_string()));
+    }
+    let mut used = vec![false; scope.parameters.len()];
+    let parts = states
+        .iter()
+        .flat_map(|state| state.coefficient.iter().chain([&state.right]))
+        .chain(terms.iter().map(|(_, term)| term));
+    for part in parts {
+        part.each_variable(&mut |variable| {
+            if let Variable::Parameter(i) = variable {
+                used[i] = true;
+            }
+        });
+    }
+    let own_used = used[counts.parameters..].iter();
+    if let Some((key, _)) = own
+        .parameters
+        .keys()
+        .zip(own_used)
+        .find(|(_, used)| !**used)
+    {
+        let what = "it is used nowhere: delete it, or write it into a term or an equation";
+        return Err(error(&["parameters", key], what.to_string()));
+    }
+    if own.parameters.is_empty() {
+        let what =
+            "it has no parameter: give it one that makes its terms vanish at zero, as a factor";
+        return Err(error(&[], what.to_string()));
+    }
+    let sizes = sizes(&scope, counts, &states, &terms);
+    let Some(sizes) = sizes else {
+        let what = "no values of its parameters make its terms vanish: give every term a parameter as a factor, which is zero where the effect is not there";
+        return Err(error(&[], what.to_string()));
+    };
+    if let Some(i) = (0..sizes.len()).find(|&i| {
+        let about = &scope.parameters[counts.parameters + i].about;
+        sizes[i] && (about.min > 0.0 || about.max < 0.0)
+    }) {
+        let key = &scope.parameters[counts.parameters + i].about.name;
+        let what = "at zero the effect is not there, but its bounds leave zero out: widen them";
+        return Err(error(&["parameters", key], what.to_string()));
+    }
+    let mut parameters = scope.parameters[counts.parameters..].to_vec();
+    let effect = parameters
+        .iter_mut()
+        .zip(sizes)
+        .map(|(parameter, is_size)| {
+            let start = parameter.value;
+            let about = &parameter.about;
+            if is_size {
+                parameter.value = 0.0;
+            }
+            let starts = if !is_size {
+                vec![start, start / 4.0, start * 4.0]
+            } else if about.min < 0.0 {
+                vec![start, -start]
+            } else {
+                vec![start]
+            };
+            EffectParameter {
+                name: String::new(),
+                short: about.name.clone(),
+                unit: about.unit.clone(),
+                description: String::new(),
+                role: if is_size { Role::Size } else { Role::Shape },
+                absent: parameter.value,
+                bounds: (about.min, about.max),
+                starts: starts
+                    .into_iter()
+                    .filter(|start| (about.min..=about.max).contains(start))
+                    .collect(),
+            }
+        });
+    let mut candidate = Candidate {
+        id: name.to_string(),
+        port: Port::Own,
+        effect: None,
+        parameters: effect.collect(),
+        fragment: Fragment {
+            parameters,
+            states,
+            flows: Vec::new(),
+            action: Action::Add(terms),
+        },
+        stem: String::new(),
+    };
+    candidate.name_variables(spec);
+    Ok(candidate)
+}
+
+fn about(name: &str, unit: &str, min: Option<f64>, max: Option<f64>) -> About {
+    About {
+        name: name.to_string(),
+        unit: unit.to_string(),
+        description: String::new(),
+        min: min.unwrap_or(f64::NEG_INFINITY),
+        max: max.unwrap_or(f64::INFINITY),
+    }
+}
+
+/// What a term is added to.
+fn target(spec: &ModelSpec, name: &str) -> Result<Target, String> {
+    let output = spec
+        .outputs
+        .iter()
+        .position(|output| spec.about(output.variable).name == name);
+    match (spec.find(name), output) {
+        (Some(Variable::State(i)), _) => Ok(Target::State(i)),
+        (Some(Variable::Flow(_)), Some(y)) => Ok(Target::Output(y)),
+        (Some(Variable::Flow(i)), None) if !spec.flows[i].of_parameters => Ok(Target::Flow(i)),
+        _ => {
+            let states = (0..spec.states.len()).map(Variable::State);
+            let flows = (0..spec.flows.len()).filter(|&i| !spec.flows[i].of_parameters);
+            let all = states.chain(flows.map(Variable::Flow));
+            let names: Vec<&str> = all.map(|v| spec.about(v).name.as_str()).collect();
+            Err(format!(
+                "`{name}` is no state, named flow or output of {}: a term is added to one of {}",
+                spec.name,
+                names.join(", ")
+            ))
+        }
+    }
+}
+
+/// Which parameters are zero where the effect is not there: one alone that makes all terms vanish, else all of those that do so together.
+/// Terms vanish too where the states of the candidate stay at their start and they vanish there.
+fn sizes(
+    scope: &ModelSpec,
+    counts: Counts,
+    states: &[State],
+    terms: &[(Target, Expression)],
+) -> Option<Vec<bool>> {
+    let first = counts.parameters;
+    let count = scope.parameters.len() - first;
+    let value =
+        |expression: &Expression, trial: u32, at_rest: bool, zero: &dyn Fn(usize) -> bool| {
+            let of = |variable: Variable| {
+                let (kind, i) = match variable {
+                    Variable::Parameter(i) if i >= first && zero(i - first) => return 0.0,
+                    Variable::State(i) if at_rest && i >= counts.states => {
+                        return scope.states[i].start.value(0.0, &|_| f64::NAN);
+                    }
+                    Variable::Parameter(i) => (0, i),
+                    Variable::Input(i) => (1, i),
+                    Variable::State(i) => (2, i),
+                    Variable::Flow(i) => (3, i),
+                };
+                // Numbers with nothing in common, of either sign.
+                let turn = 1.7 + f64::from(trial) * 2.39 + f64::from(kind) * 1.13 + i as f64 * 0.71;
+                let size = 1.5 + turn.sin();
+                if kind > 0 && trial.is_multiple_of(2) {
+                    -7.0 * size
+                } else {
+                    11.0 * size
+                }
+            };
+            expression.value(3.7 * f64::from(trial), &of)
+        };
+    let all_zero = |part: &Expression, at_rest: bool, zero: &dyn Fn(usize) -> bool| {
+        let values = (1..=6).map(|trial| value(part, trial, at_rest, zero));
+        let finite: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+        !finite.is_empty() && finite.iter().all(|value| *value == 0.0)
+    };
+    let vanish = |zero: &dyn Fn(usize) -> bool| {
+        let terms = |at_rest| terms.iter().all(|(_, term)| all_zero(term, at_rest, zero));
+        let rests = || {
+            states
+                .iter()
+                .all(|state| all_zero(&state.right, true, zero))
+        };
+        terms(false) || (terms(true) && rests())
+    };
+    let alone: Vec<bool> = (0..count).map(|i| vanish(&|own| own == i)).collect();
+    if alone.iter().any(|is| *is) {
+        // One is enough: the first, where several are factors.
+        let first = alone.iter().position(|is| *is);
+        return Some((0..count).map(|i| Some(i) == first).collect());
+    }
+    if !vanish(&|_| true) {
+        return None;
+    }
+    // All but those that the others can do without.
+    let mut zero = vec![true; count];
+    for i in 0..count {
+        zero[i] = false;
+        let kept = zero.clone();
+        if !vanish(&|own| kept[own]) {
+            zero[i] = true;
+        }
+    }
+    Some(zero)
+}

@@ -1,0 +1,181 @@
+//! Where effects can act in a model.
+
+use crate::expression::{Expression, Operator, Variable};
+use crate::spec::{Given, ModelSpec, Output};
+
+/// A port of a model; positions are those of [`ModelSpec`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Port {
+    /// An input.
+    Input(usize),
+    /// An output, by its position in [`ModelSpec::outputs`].
+    Output(usize),
+    /// The equation of a state.
+    Balance(usize),
+    /// A parameter or a named flow.
+    Value(Variable),
+    /// A parameter or a named flow, and what it depends on.
+    Dependence(Variable, Variable),
+    /// Two states.
+    Between(usize, usize),
+    /// An input, and the equation of a state.
+    InputAndBalance(usize, usize),
+    /// The equation of a state, and another variable that takes part.
+    BalanceAnd(usize, Variable),
+    /// An output, and another variable that takes part.
+    OutputAnd(usize, Variable),
+    /// Several places: a candidate of the model file.
+    Own,
+}
+
+/// What of a model has ports.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Ports {
+    /// Inputs, outputs and the equations of states that are balances: not those that only say that one state is another's speed.
+    pub single: Vec<Port>,
+    /// Parameters that are fitted, and named flows that no fitted parameter scales alone.
+    pub values: Vec<Port>,
+}
+
+impl Port {
+    /// Its names, as they stand in an identifier: `u`, `k,T`.
+    #[must_use]
+    pub fn names(self, spec: &ModelSpec) -> String {
+        let of = |variable| spec.about(variable).name.as_str();
+        let output = |i: usize| of(spec.outputs[i].variable);
+        match self {
+            Self::Input(i) => of(Variable::Input(i)).to_string(),
+            Self::Output(i) => output(i).to_string(),
+            Self::Balance(i) => of(Variable::State(i)).to_string(),
+            Self::Value(p) => of(p).to_string(),
+            Self::Dependence(p, x) => format!("{},{}", of(p), of(x)),
+            Self::Between(a, b) => {
+                format!("{},{}", of(Variable::State(a)), of(Variable::State(b)))
+            }
+            Self::InputAndBalance(u, x) => {
+                format!("{},{}", of(Variable::Input(u)), of(Variable::State(x)))
+            }
+            Self::BalanceAnd(x, a) => format!("{},{}", of(Variable::State(x)), of(a)),
+            Self::OutputAnd(y, a) => format!("{},{}", output(y), of(a)),
+            Self::Own => String::new(),
+        }
+    }
+}
+
+impl ModelSpec {
+    /// Its ports.
+    #[must_use]
+    pub fn ports(&self) -> Ports {
+        let inputs = (0..self.inputs.len()).map(Port::Input);
+        let outputs = (0..self.outputs.len()).map(Port::Output);
+        let balances = (0..self.states.len()).map(Port::Balance);
+        let fitted = (0..self.parameters.len())
+            .filter(|&i| {
+                self.parameters[i].given == Given::Fitted
+                    && self.occurrences(Variable::Parameter(i)) > 0
+            })
+            .map(Variable::Parameter);
+        let flows = (0..self.flows.len())
+            .filter(|&i| self.is_own_flow(i))
+            .map(Variable::Flow);
+        Ports {
+            single: inputs.chain(outputs).chain(balances).collect(),
+            values: fitted.chain(flows).map(Port::Value).collect(),
+        }
+    }
+
+    /// The state whose derivative a state is: the position of a speed.
+    pub(super) fn speed_of(&self, position: usize) -> Option<usize> {
+        let state = &self.states[position];
+        match (&state.coefficient, self.behind(&state.right)) {
+            (None, Expression::Variable(Variable::State(speed))) => Some(*speed),
+            _ => None,
+        }
+    }
+
+    /// An expression, or what a flow that stands alone is equal to.
+    pub(super) fn behind<'a>(&'a self, mut expression: &'a Expression) -> &'a Expression {
+        // Flows are sorted: no circle.
+        while let Expression::Variable(Variable::Flow(i)) = expression {
+            expression = &self.flows[*i].value;
+        }
+        expression
+    }
+
+    /// How often a variable stands in the equations.
+    pub(super) fn occurrences(&self, of: Variable) -> usize {
+        let mut count = 0;
+        for expression in self.expressions() {
+            expression.each_variable(&mut |variable| count += usize::from(variable == of));
+        }
+        count
+    }
+
+    /// Whether a flow is more than a reading, another name, and a product with a fitted parameter that stands nowhere else.
+    fn is_own_flow(&self, i: usize) -> bool {
+        let flow = &self.flows[i];
+        let variable = Variable::Flow(i);
+        if flow.of_parameters || self.is_output(variable) || self.occurrences(variable) == 0 {
+            return false;
+        }
+        let is_read = |output: &Output| match output.variable {
+            Variable::Flow(o) => self.flows[o].value == Expression::Variable(variable),
+            _ => false,
+        };
+        if matches!(flow.value, Expression::Variable(_)) || self.outputs.iter().any(is_read) {
+            return false;
+        }
+        let mut factors = Vec::new();
+        factors_of(&flow.value, &mut factors);
+        let scales = |factor: &&Expression| match factor {
+            Expression::Variable(p @ Variable::Parameter(k)) => {
+                self.parameters[*k].given == Given::Fitted && self.occurrences(*p) == 1
+            }
+            _ => false,
+        };
+        !factors.iter().any(scales)
+    }
+
+    /// Whether the equation of a state holds a variable, flows looked through.
+    pub(super) fn depends_on(&self, state: usize, on: Variable) -> bool {
+        let mut seen = vec![false; self.flows.len()];
+        self.holds(&self.states[state].right, on, &mut seen)
+    }
+
+    /// Whether an output holds a variable, without a state between.
+    pub(super) fn is_read_directly(&self, variable: Variable) -> bool {
+        let mut seen = vec![false; self.flows.len()];
+        let mut outputs = self.outputs.iter();
+        outputs.any(|output| {
+            let reading = Expression::Variable(output.variable);
+            self.holds(&reading, variable, &mut seen)
+        })
+    }
+
+    fn holds(&self, expression: &Expression, on: Variable, seen: &mut [bool]) -> bool {
+        let mut found = false;
+        let mut flows = Vec::new();
+        expression.each_variable(&mut |variable| {
+            found |= variable == on;
+            if let Variable::Flow(i) = variable {
+                flows.push(i);
+            }
+        });
+        found
+            || flows.into_iter().any(|i| {
+                !std::mem::replace(&mut seen[i], true) && self.holds(&self.flows[i].value, on, seen)
+            })
+    }
+}
+
+/// The factors of a product.
+fn factors_of<'a>(expression: &'a Expression, all: &mut Vec<&'a Expression>) {
+    match expression {
+        Expression::Binary(Operator::Multiply, a, b) => {
+            factors_of(a, all);
+            factors_of(b, all);
+        }
+        Expression::Binary(Operator::Divide, a, _) | Expression::Negative(a) => factors_of(a, all),
+        other => all.push(other),
+    }
+}

@@ -1,0 +1,474 @@
+//! Effects at the ports of models: every one at every port is added, gives the outputs of the model without it where it is absent, and has
+//! the derivatives that differences have.
+
+use ct_model::effects::{
+    Candidate, EffectParameter, Role, Visited, all_effects, apply, candidates,
+};
+use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation, unit_warnings};
+
+const BLOCK: &str = r#"
+model Block "a heated block"
+  parameter Real C(unit="J/K", min=0) = 50;
+  parameter Real k(unit="W/K", min=0) = 0.5 "loss";
+  parameter Real g(unit="W/W", min=0) = 0.9;
+  input Real u(unit="W");
+  input Real Ta(unit="degC");
+  output Real y(unit="degC") = T;
+  Real T(unit="degC", start=31);
+  Real loss(unit="W") = k*(T - Ta);
+equation
+  C*der(T) = g*u - loss;
+end Block;
+"#;
+
+const SPRING: &str = r#"
+model Spring
+  parameter Real c(unit="N.s/m", min=0) = 0.7;
+  parameter Real k(unit="N/m", min=0) = 2;
+  final parameter Real m(unit="kg") = 1.1;
+  input Real F(unit="N");
+  output Real s(unit="m", start=0.1);
+  Real v(unit="m/s", start=0);
+equation
+  der(s) = v;
+  m*der(v) = F - c*v - k*s;
+end Spring;
+"#;
+
+const TANKS: &str = r#"
+model Tanks
+  parameter Real p(unit="cm3/(s.V)", min=0) = 6;
+  parameter Real a1(unit="cm2", min=0) = 0.2;
+  parameter Real a2(unit="cm2", min=0) = 0.22;
+  final parameter Real S(unit="cm2") = 26;
+  constant Real gravity(unit="cm/s2") = 981;
+  input Real u(unit="V");
+  output Real y1(unit="cm");
+  output Real y2(unit="cm");
+  Real h1(unit="cm", start=18);
+  Real h2(unit="cm", start=15);
+  Real q1(unit="cm3/s");
+equation
+  q1 = a1*sqrt(2*gravity*max(h1, 0));
+  S*der(h1) = p*u - q1;
+  S*der(h2) = q1 - a2*sqrt(2*gravity*max(h2, 0));
+  y1 = h1;
+  y2 = h2;
+end Tanks;
+"#;
+
+const BATTERY: &str = r#"
+model Battery
+  parameter Real R(unit="Ohm", min=0) = 0.05;
+  parameter Real Q(unit="A.s", min=0) = 3000;
+  parameter Real e(unit="V") = 0.8;
+  input Real i(unit="A");
+  output Real v(unit="V");
+  Real soc(start=0.5, fixed=true);
+equation
+  Q*der(soc) = i;
+  v = 3.2 + e*soc + R*i;
+end Battery;
+"#;
+
+/// A model and what drives it, held from row to row.
+struct Driven {
+    spec: ModelSpec,
+    time: Vec<f64>,
+    inputs: Vec<Vec<f64>>,
+}
+
+impl Driven {
+    fn all() -> Vec<Self> {
+        let steps = |k: usize, levels: &[f64], long: usize| levels[(k / long) % levels.len()];
+        let of = |text: &str, step: f64, input: &dyn Fn(usize) -> Vec<f64>| Self {
+            spec: ModelSpec::parse(text).unwrap(),
+            time: (0..60).map(|k| step * k as f64).collect(),
+            inputs: (0..60).map(input).collect(),
+        };
+        vec![
+            of(BLOCK, 10.0, &|k| {
+                vec![steps(k, &[5.0, 20.0, 12.0, 3.0], 9), 20.0 + 0.05 * k as f64]
+            }),
+            of(SPRING, 0.2, &|k| {
+                vec![steps(k, &[0.4, -0.3, 0.8, -0.7], 11)]
+            }),
+            of(TANKS, 4.0, &|k| vec![steps(k, &[6.0, 8.5, 5.0, 9.0], 8)]),
+            of(BATTERY, 5.0, &|k| {
+                vec![steps(k, &[2.0, -3.0, 1.0, -1.0], 7)]
+            }),
+        ]
+    }
+
+    fn run<T: Scalar>(&self, model: &Model, parameters: &[T]) -> Vec<Vec<T>> {
+        let initial = model.starts(parameters);
+        let mut simulation = Simulation::new(model, parameters, &initial, 0.0);
+        let mut rows = Vec::new();
+        for (k, inputs) in self.inputs.iter().enumerate() {
+            let mut y = vec![T::constant(0.0); model.spec().outputs.len()];
+            simulation.read(inputs, &mut y);
+            rows.push(y);
+            if k + 1 < self.time.len() {
+                let done = simulation.advance(inputs, inputs, self.time[k + 1]);
+                done.unwrap_or_else(|error| panic!("{error}\n{}", model.spec()));
+            }
+        }
+        rows
+    }
+
+    fn method(&self, model: &Model) -> Method {
+        let parameters = model.parameters();
+        Simulation::new(model, &parameters, &model.starts(&parameters), 0.0).method()
+    }
+
+    fn visited(&self) -> Visited {
+        let model = Model::new(self.spec.clone());
+        let parameters = model.parameters();
+        let initial = model.starts(&parameters);
+        let at = (&parameters[..], &initial[..]);
+        Visited::of_simulation(&self.spec, at, &self.time, &self.inputs, "s").unwrap()
+    }
+
+    fn candidates(&self) -> Vec<Candidate> {
+        candidates(&self.spec, &self.visited())
+    }
+}
+
+fn largest_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    let pairs = a.iter().flatten().zip(b.iter().flatten());
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn range(rows: &[Vec<f64>]) -> f64 {
+    let largest = |sign: f64| {
+        let all = rows.iter().flatten().map(|y| sign * y);
+        all.fold(f64::NEG_INFINITY, f64::max)
+    };
+    largest(1.0) + largest(-1.0)
+}
+
+/// Where a fit of the candidate would start: some of its starts, with a size that shows.
+fn active(candidate: &Candidate) -> Vec<f64> {
+    // Quantiles are levels at which an input stays: a limit that moves over one has no derivative.
+    let of = |p: &EffectParameter| {
+        let start = match p.role {
+            Role::Size => p.starts[0],
+            _ => p.starts[p.starts.len() / 2],
+        };
+        let aside = if p.role == Role::Threshold {
+            0.013
+        } else {
+            0.0
+        };
+        start + aside * (p.bounds.1 - p.bounds.0)
+    };
+    candidate.parameters.iter().map(of).collect()
+}
+
+#[test]
+fn every_effect_has_its_place_and_its_words() {
+    for effect in all_effects() {
+        assert!(!effect.physics.is_empty() && !effect.confirm.is_empty());
+        assert!(!effect.symptoms.is_empty());
+        for other in effect.confused_with {
+            let id = other.split('(').next().unwrap();
+            assert!(all_effects().any(|e| e.id == id), "{other}");
+        }
+    }
+}
+
+#[test]
+fn all_candidates_are_listed_with_their_ports() {
+    let block = &Driven::all()[0];
+    let all = block.candidates();
+    let ids: Vec<&str> = all.iter().map(|candidate| candidate.id.as_str()).collect();
+    for wanted in [
+        "dead_zone(u)",
+        "saturation(u)",
+        "nonlinearity(Ta)",
+        "gain_drift(u)",
+        "lag(u)",
+        "delay(u)",
+        "backlash(u)",
+        "offset(y)",
+        "drift(y)",
+        "lag(y)",
+        "nonlinearity(y)",
+        "saturation(y)",
+        "quantisation(y)",
+        "hysteresis(y)",
+        "constant(T)",
+        "loss(T)",
+        "step(T)",
+        "periodic(T)",
+        "hidden_state(T)",
+        "limit(T)",
+        "drift(k)",
+        "step(C)",
+        "varies_with(k,T)",
+        "varies_with(g,u)",
+    ] {
+        assert!(ids.contains(&wanted), "{wanted} of {ids:?}");
+    }
+    // The loss is the product of a parameter that stands nowhere else; both inputs are in the only balance.
+    for other in ["drift(loss)", "input_to(u,T)", "drift(T)"] {
+        assert!(!ids.contains(&other), "{other}");
+    }
+    let mut unique = ids.clone();
+    unique.sort_unstable();
+    unique.dedup();
+    assert_eq!(unique.len(), ids.len());
+    let tanks = Driven::all()[2].candidates();
+    assert!((40..=200).contains(&tanks.len()), "{}", tanks.len());
+    assert!(tanks.iter().any(|c| c.id == "coupling(h1,h2)"));
+    assert!(tanks.iter().any(|c| c.id == "input_to(u,h2)"));
+    // A position has no balance, but an end stop.
+    let spring = Driven::all()[1].candidates();
+    let has = |all: &[Candidate], id: &str| all.iter().any(|c| c.id == id);
+    assert!(has(&spring, "coulomb(v)") && !has(&spring, "coulomb(s)"));
+    assert!(has(&all, "radiation(T,Ta)") && !has(&tanks, "coulomb(h1)"));
+    assert!(has(&Driven::all()[3].candidates(), "second_rc(v,i)"));
+    assert!(!spring.iter().any(|c| c.id == "constant(s)"));
+    assert!(spring.iter().any(|c| c.id == "limit(s)"));
+}
+
+#[test]
+fn an_absent_effect_changes_nothing() {
+    for driven in Driven::all() {
+        let base = Model::new(driven.spec.clone());
+        let without = driven.run(&base, &base.parameters());
+        for candidate in driven.candidates() {
+            let mended = Model::new(apply(&driven.spec, &[&candidate]).unwrap());
+            let with = driven.run(&mended, &mended.parameters());
+            // Steps follow their error, to which new states and branches contribute.
+            let exact = [&base, &mended].map(|model| driven.method(model) == Method::Exact);
+            let allowed = if exact == [true, true] { 1e-12 } else { 1e-9 };
+            let difference = largest_difference(&with, &without) / range(&without);
+            assert!(difference <= allowed, "{}: {difference:e}", candidate.id);
+        }
+    }
+}
+
+#[test]
+fn a_present_effect_changes_the_outputs_and_the_text_reads_back() {
+    for driven in Driven::all() {
+        let base = Model::new(driven.spec.clone());
+        let without = driven.run(&base, &base.parameters());
+        for candidate in driven.candidates() {
+            let mut spec = apply(&driven.spec, &[&candidate]).unwrap();
+            for (own, value) in candidate.parameters.iter().zip(active(&candidate)) {
+                let known = spec
+                    .parameters
+                    .iter_mut()
+                    .find(|p| p.about.name == own.name);
+                known.unwrap().value = value;
+            }
+            let text = spec.to_string();
+            let read = ModelSpec::parse(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            assert_eq!(read.to_string(), text);
+            let warnings = unit_warnings(&spec);
+            assert!(
+                warnings.is_empty(),
+                "{}: {warnings:?}\n{text}",
+                candidate.id
+            );
+            let mended = Model::new(spec);
+            let with = driven.run(&mended, &mended.parameters());
+            let again = Model::new(read);
+            let difference = largest_difference(&with, &driven.run(&again, &again.parameters()));
+            assert!(
+                difference <= 1e-9 * range(&without),
+                "{}: {difference:e}\n{text}",
+                candidate.id
+            );
+            let difference = largest_difference(&with, &without);
+            assert!(
+                difference > 1e-6 * range(&without),
+                "{}\n{text}",
+                candidate.id
+            );
+        }
+    }
+}
+
+/// Derivatives by the parameters of the effect at a point against differences: central ones, or to one side at a bound.
+fn check_derivatives(driven: &Driven, candidate: &Candidate, at: &[f64], tolerance: f64) {
+    const LANES: usize = 4;
+    let model = Model::new(apply(&driven.spec, &[candidate]).unwrap());
+    let first = driven.spec.parameters.len();
+    let mut parameters = model.parameters();
+    parameters[first..first + at.len()].copy_from_slice(at);
+    let plain = driven.run(&model, &parameters);
+    let scale = range(&plain);
+    for (i, own) in candidate.parameters.iter().enumerate() {
+        if own.role == Role::Choice
+            || own.short == "step" && candidate.id.starts_with("quantisation")
+        {
+            continue;
+        }
+        let duals: Vec<Dual<LANES>> = parameters
+            .iter()
+            .enumerate()
+            .map(|(k, value)| {
+                if k == first + i {
+                    Dual::variable(*value, 0)
+                } else {
+                    Dual::constant(*value)
+                }
+            })
+            .collect();
+        let exact = driven.run(&model, &duals);
+        let typical = own.starts.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        // Of a limit a row may be near: a short step.
+        let share = if own.role == Role::Threshold {
+            1e-5
+        } else {
+            1e-4
+        };
+        let step = share * typical.max(at[i].abs());
+        let moved = |by: f64| {
+            let mut parameters = parameters.clone();
+            parameters[first + i] += by;
+            driven.run(&model, &parameters)
+        };
+        let one_sided = at[i] - 2.0 * step < own.bounds.0;
+        let near = [moved(step), moved(2.0 * step)];
+        let far = (!one_sided).then(|| [moved(-step), moved(-2.0 * step)]);
+        for (k, row) in exact.iter().enumerate() {
+            for (y, own_value) in row.iter().enumerate() {
+                let of = |rows: &Vec<Vec<f64>>| rows[k][y];
+                let difference = match &far {
+                    None => (4.0 * of(&near[0]) - of(&near[1]) - 3.0 * of(&plain)) / (2.0 * step),
+                    Some(far) => {
+                        let one = of(&near[0]) - of(&far[0]);
+                        let two = of(&near[1]) - of(&far[1]);
+                        (8.0 * one - two) / (12.0 * step)
+                    }
+                };
+                let error = (own_value.eps[0] - difference).abs() * typical;
+                assert!(
+                    error < tolerance * scale,
+                    "{} by {} at {at:?}, row {k}: {} against {difference}",
+                    candidate.id,
+                    own.short,
+                    own_value.eps[0]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_differences() {
+    for driven in Driven::all() {
+        for candidate in driven.candidates() {
+            check_derivatives(&driven, &candidate, &active(&candidate), 1e-4);
+        }
+    }
+}
+
+#[test]
+fn derivatives_where_the_effect_is_absent_are_those_of_differences() {
+    for driven in Driven::all() {
+        for candidate in driven.candidates().iter().filter(|c| c.is_smooth()) {
+            let absent: Vec<f64> = candidate.parameters.iter().map(|p| p.absent).collect();
+            check_derivatives(&driven, candidate, &absent, 1e-4);
+        }
+    }
+}
+
+/// Some of all pairs: those of the first candidates of every place with all others.
+#[test]
+fn effects_compose_in_any_order() {
+    for driven in Driven::all() {
+        let base = Model::new(driven.spec.clone());
+        let without = driven.run(&base, &base.parameters());
+        let all = driven.candidates();
+        for (i, one) in all.iter().enumerate() {
+            for other in all.iter().skip(i + 1).step_by(3) {
+                let spec = apply(&driven.spec, &[one, other]).unwrap();
+                assert_eq!(spec, apply(&driven.spec, &[other, one]).unwrap());
+                let text = spec.to_string();
+                let read = ModelSpec::parse(&text);
+                let read = read.unwrap_or_else(|error| panic!("{error}\n{text}"));
+                assert_eq!(read.to_string(), text);
+                let mended = Model::new(spec);
+                let with = driven.run(&mended, &mended.parameters());
+                let difference = largest_difference(&with, &without) / range(&without);
+                assert!(
+                    difference <= 1e-8,
+                    "{} {}: {difference:e}\n{text}",
+                    one.id,
+                    other.id
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_chain_is_in_its_order_and_readings_keep_their_name() {
+    let block = &Driven::all()[0];
+    let all = block.candidates();
+    let of = |id: &str| all.iter().find(|candidate| candidate.id == id).unwrap();
+    let ids = [
+        "quantisation(y)",
+        "lag(u)",
+        "offset(y)",
+        "dead_zone(u)",
+        "lag(y)",
+        "drift(g)",
+    ];
+    let chosen: Vec<&Candidate> = ids.iter().map(|id| of(id)).collect();
+    let text = apply(&block.spec, &chosen).unwrap().to_string();
+    for line in [
+        "output Real y(unit=\"degC\");",
+        "y = quantise(offset_y, quantisation_y_step);",
+        "offset_y = lag_y + offset_y_error;",
+        "lag_y = y_true + min(lag_y_tau/lag_y_shortest, 1)*(lag_y_x - y_true);",
+        "y_true = T;",
+        "C*der(T) = drift_g*lag_u - loss;",
+        "lag_u = dead_zone_u + min(lag_u_tau/lag_u_shortest, 1)*(lag_u_x - dead_zone_u);",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    let twice = apply(&block.spec, &[of("lag(u)"), of("lag(u)")]);
+    assert!(
+        twice
+            .unwrap_err()
+            .to_string()
+            .contains("lag(u) is given twice")
+    );
+    let other = Driven::all()[2].candidates();
+    let other = other.iter().find(|c| c.id == "coupling(h1,h2)").unwrap();
+    let error = apply(&block.spec, &[other]).unwrap_err().to_string();
+    assert!(error.contains("of another model"), "{error}");
+}
+
+/// Every model of the project, and every effect that can act in it.
+#[test]
+fn effects_of_the_projects_models_are_written_out_and_fit_in_their_units() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut models = 0;
+    for folder in ["examples/models", "crates/plants/models"] {
+        for entry in std::fs::read_dir(root.join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_none_or(|ending| ending != "mo") {
+                continue;
+            }
+            models += 1;
+            let spec = ModelSpec::parse(&std::fs::read_to_string(&path).unwrap()).unwrap();
+            let before = unit_warnings(&spec).len();
+            for candidate in candidates(&spec, &Visited::nominal(&spec)) {
+                let mended = apply(&spec, &[&candidate]).unwrap();
+                let text = mended.to_string();
+                let read = ModelSpec::parse(&text);
+                let read = read.unwrap_or_else(|error| panic!("{path:?} {error}\n{text}"));
+                assert_eq!(read.to_string(), text);
+                let warnings = unit_warnings(&mended);
+                assert!(warnings.len() <= before, "{path:?} {warnings:?}\n{text}");
+            }
+        }
+    }
+    assert!(models > 10, "{models}");
+}

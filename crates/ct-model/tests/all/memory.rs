@@ -1,0 +1,148 @@
+//! Plays, rounding, and states that the first row settles.
+
+use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation};
+
+fn model(text: &str) -> Model {
+    Model::new(ModelSpec::parse(text).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// The only output at every row.
+fn run<T: Scalar>(model: &Model, parameters: &[T], u: &[f64], lines: bool) -> (Vec<T>, Method) {
+    let initial = model.starts(parameters);
+    let mut simulation = Simulation::new(model, parameters, &initial, 0.0);
+    let mut y = [T::constant(0.0)];
+    let mut rows = Vec::new();
+    for (k, now) in u.iter().enumerate() {
+        simulation.read(&[*now], &mut y);
+        rows.push(y[0]);
+        if let Some(next) = u.get(k + 1) {
+            let to = if lines { *next } else { *now };
+            simulation.advance(&[*now], &[to], (k + 1) as f64).unwrap();
+        }
+    }
+    (rows, simulation.method())
+}
+
+#[test]
+fn a_play_follows_at_a_distance() {
+    let play = model(
+        "model Play
+           parameter Real b = 1;
+           input Real u;
+           output Real y = play(u, b);
+         end Play;",
+    );
+    let u = [2.0, 2.5, 4.0, 3.0, 2.0, 1.5, 6.0];
+    let (y, _) = run(&play, &[1.0], &u, false);
+    assert_eq!(y, [2.0, 2.0, 3.0, 3.0, 3.0, 2.5, 5.0]);
+    // Of no width it is not there, ...
+    assert_eq!(run(&play, &[0.0], &u, false).0, u);
+    // ... and the derivative says on which side it is in contact.
+    let (y, _) = run(&play, &[Dual::<1>::variable(1.0, 0)], &u, false);
+    let slopes: Vec<f64> = y.iter().map(|y| y.eps[0]).collect();
+    assert_eq!(slopes, [0.0, 0.0, -1.0, -1.0, -1.0, 1.0, -1.0]);
+}
+
+#[test]
+fn a_play_meets_its_contact_within_an_interval() {
+    let text = "model Wheel
+      parameter Real b = 1;
+      input Real u;
+      output Real x(start=0);
+    equation
+      der(x) = play(u, b) + 0*x^2;
+    end Wheel;";
+    // From 0 to 3 in a straight line: contact at u = 1, after a third of the interval; back to 0: at u = 1 again.
+    let u = [0.0, 3.0, 0.0];
+    let (x, method) = run(&model(text), &[1.0], &u, true);
+    assert_eq!(method, Method::Explicit);
+    let expected = [
+        0.0,
+        2.0 / 3.0 * 2.0 / 2.0,
+        2.0 / 3.0 + 2.0 * 2.0 / 3.0 + (2.0 + 1.0) / 2.0 / 3.0,
+    ];
+    for (x, expected) in x.iter().zip(expected) {
+        assert!((x - expected).abs() < 1e-9, "{x} {expected}");
+    }
+}
+
+#[test]
+fn rounding_goes_to_the_nearest_multiple() {
+    let text = "model Round
+      parameter Real d = 0.5;
+      input Real u;
+      output Real y = quantise(u, d);
+    end Round;";
+    let u = [0.2, 0.3, -0.8, 1.0];
+    assert_eq!(
+        run(&model(text), &[0.5], &u, false).0,
+        [0.0, 0.5, -1.0, 1.0]
+    );
+    assert_eq!(run(&model(text), &[0.0], &u, false).0, u);
+}
+
+#[test]
+fn an_initial_equation_settles_a_state_at_the_first_row() {
+    let text = "model Lag
+  parameter Real g = 3;
+  parameter Real tau = 2;
+  input Real u;
+  Real v;
+  output Real x;
+initial equation
+  x = v;
+equation
+  v = g*u;
+  tau*der(x) = v - x;
+end Lag;
+";
+    let spec = ModelSpec::parse(text).unwrap();
+    assert!(spec.states[0].fixed && spec.is_settled(0));
+    assert_eq!(
+        ModelSpec::parse(&spec.to_string()).unwrap().to_string(),
+        spec.to_string()
+    );
+    let own = Model::new(spec);
+    let (x, method) = run(&own, &[3.0, 2.0], &[5.0, 5.0, 5.0], false);
+    assert_eq!(method, Method::Exact);
+    for x in x {
+        assert!((x - 15.0).abs() < 1e-12, "{x}");
+    }
+    // It moves with the parameters that it is made of.
+    let parameters = [Dual::<1>::variable(3.0, 0), Dual::constant(2.0)];
+    let (x, _) = run(&own, &parameters, &[5.0, 5.0], false);
+    assert!((x[0].eps[0] - 5.0).abs() < 1e-12 && (x[1].eps[0] - 5.0).abs() < 1e-12);
+}
+
+#[test]
+fn initial_equations_are_of_states_alone() {
+    for (line, wanted) in [
+        ("q = 1;", "stands one state"),
+        ("2*x = 1;", "stands one state"),
+        ("x = 1; x = 2;", "two initial equations"),
+        ("x = qq;", "`qq` is not declared"),
+    ] {
+        let text = format!(
+            "model M\n output Real x;\n Real q = x;\ninitial equation\n {line}\nequation\n der(x) = q;\nend M;"
+        );
+        let error = ModelSpec::parse(&text).unwrap_err();
+        assert!(error.what.contains(wanted), "{error}");
+        assert_eq!(error.position.line, 5);
+    }
+    let text =
+        "model M output Real x(start=2); initial equation x = 1; equation der(x) = 1; end M;";
+    let error = ModelSpec::parse(text).unwrap_err().to_string();
+    assert!(error.contains("a start and an initial equation"), "{error}");
+}
+
+#[test]
+fn a_delay_of_nothing_is_there_at_once() {
+    let text = "model D
+      parameter Real d = 0;
+      input Real u;
+      output Real y = 2*delay(u, d);
+    end D;";
+    let u = [1.0, 3.0, 2.0];
+    assert_eq!(run(&model(text), &[0.0], &u, false).0, [2.0, 6.0, 4.0]);
+    assert_eq!(run(&model(text), &[0.5], &u, false).0, [2.0, 2.0, 6.0]);
+}

@@ -1,0 +1,105 @@
+//! `ctid export`: a fitted model as Modelica, and the curves of its fit as CSV.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{ArgGroup, Args};
+use greybox::FitOptions;
+use missing_effect::Options;
+
+use super::finish;
+use crate::Error;
+use crate::effort::EffortLevel;
+use crate::input::{self, Files, ReadArguments};
+use crate::interrupt;
+use crate::look::Look;
+use crate::output::{self, Kind};
+use crate::own_model::{self, AnyModelFile};
+use crate::progress::Bar;
+use crate::simulate;
+
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("target").required(true).multiple(true).args(["modelica", "csv"]))]
+pub(super) struct Export {
+    /// Model file
+    #[arg(value_name = "M.toml")]
+    model: PathBuf,
+    /// Records (CSV) that the model is fitted to; without one --modelica writes the values of the text and of [known]
+    #[arg(value_name = "DATA.csv")]
+    data: Vec<PathBuf>,
+    /// Write a model of your own with its fitted values as Modelica, standard errors in comments
+    #[arg(long, value_name = "F.mo")]
+    modelica: Option<PathBuf>,
+    /// Write record, time, inputs, and of each output what was measured, the model and the residual
+    #[arg(long, value_name = "F.csv", requires = "data")]
+    csv: Option<PathBuf>,
+    /// Limit on the time of the fit of a plant
+    #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
+    effort: EffortLevel,
+    #[command(flatten)]
+    reading: ReadArguments,
+}
+
+impl Export {
+    pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
+        let files = Files {
+            data: self.data.clone(),
+            test: Vec::new(),
+            model: self.model.clone(),
+            options: self.reading.options(),
+        };
+        files.check_repetition()?;
+        let model = AnyModelFile::read(&self.model)?;
+        let mut inputs = files.all();
+        if let AnyModelFile::Own(model) = &model {
+            inputs.push(&model.text);
+        }
+        let text = self.modelica.as_deref().map(|path| (Kind::Model, path));
+        let curves = self.csv.as_deref().map(|path| (Kind::Record, path));
+        let wanted: Vec<(Kind, &Path)> = text.into_iter().chain(curves).collect();
+        let outputs = output::plan(&wanted, &inputs)?;
+        let bar = Bar::new();
+        bar.phase("fitting the model");
+        let exported = match model {
+            AnyModelFile::Plant(model) => {
+                if self.modelica.is_some() {
+                    return Err(no_text(
+                        &self.model,
+                        !model.effects.is_empty() || !model.terms.is_empty(),
+                    ));
+                }
+                let options = Options {
+                    time_limit: Some(self.effort.limit()),
+                    interrupt: Some(interrupt::flag()),
+                    ..Options::default()
+                };
+                simulate::export_plant(*model, &files, &options)
+            }
+            AnyModelFile::Own(model) => {
+                let records = match self.data.is_empty() {
+                    true => None,
+                    false => Some((model.records(&files)?, &self.data[..])),
+                };
+                own_model::export(&model, records, &FitOptions::default())
+            }
+        };
+        bar.clear();
+        let (exported, summaries) = exported?;
+        let said = match &exported.fitted_to[..] {
+            [] => format!("{} as its text and [known] have it", exported.model),
+            records => format!("{} fitted to {}", exported.model, records.join(", ")),
+        };
+        let text = input::notes(&summaries, look) + &look.paragraph("", &said);
+        finish(&exported, &text, &outputs, out, look)
+    }
+}
+
+/// Why a plant has no text. Its place is here: a text of a plant with its fitted parameters is written as that of a model of one's own.
+fn no_text(model: &Path, effects: bool) -> Error {
+    let what = if effects {
+        "--modelica: a plant with effects cannot be written as Modelica yet; write its curves with --csv"
+    } else {
+        "--modelica: a plant cannot be written as Modelica yet; write its curves with --csv, or its equations as a model of your own"
+    };
+    Error::file(model, what)
+}

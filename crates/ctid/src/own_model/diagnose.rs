@@ -1,0 +1,267 @@
+//! What a model of its user's own is missing.
+
+use effect_search::{Diagnosis, Left, Options, Problem, Step, Verdict};
+
+use super::file::{OwnModelFile, Records};
+use crate::Error;
+use crate::look::{Look, Side, table};
+use crate::numbers;
+use crate::output::Found;
+
+impl Found for Diagnosis {}
+
+/// Single effects that are listed.
+const LISTED: usize = 8;
+
+/// Searches the candidates.
+///
+/// # Errors
+/// Where nothing can be fitted, with the file that is to blame.
+pub(crate) fn diagnose(
+    file: &OwnModelFile,
+    records: &Records,
+    options: &Options,
+    progress: &(dyn Fn(effect_search::Progress) + Sync),
+) -> Result<Diagnosis, Error> {
+    let problem = Problem {
+        spec: file.model.spec().clone(),
+        effects: Vec::new(),
+        records: records.records.clone(),
+        test: records.test.clone(),
+        known: file.known.clone(),
+        priors: file.priors.clone(),
+        candidates: file.candidates.clone(),
+        time_unit: records.time_unit,
+        time_unit_name: unit_of(records.time_unit).to_string(),
+    };
+    let names = || problem.records.iter().map(|record| record.name.as_str());
+    effect_search::diagnose(&problem, options, progress).map_err(|error| Error::File {
+        file: names().collect::<Vec<_>>().join(", "),
+        what: error.to_string(),
+    })
+}
+
+/// The unit of time of so many seconds.
+fn unit_of(seconds: f64) -> &'static str {
+    [(0.001, "ms"), (60.0, "min"), (3600.0, "h"), (86_400.0, "d")]
+        .into_iter()
+        .find(|(unit, _)| (seconds / unit - 1.0).abs() < 1e-9)
+        .map_or("s", |(_, name)| name)
+}
+
+/// What a person reads of a diagnosis.
+pub(crate) fn said(diagnosis: &Diagnosis, look: Look) -> String {
+    let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
+    text += &singles(diagnosis, look);
+    text += &errors(diagnosis, look);
+    if let Some(last) = diagnosis.steps.last() {
+        text += &estimates(last, look);
+    }
+    text += &format!("\n{}\n", look.heading(&heading(diagnosis)));
+    for sentence in sentences(diagnosis) {
+        text += &look.paragraph("  ", &sentence);
+    }
+    text
+}
+
+/// The finding in a few words.
+fn heading(diagnosis: &Diagnosis) -> String {
+    match diagnosis.verdict {
+        Verdict::Adequate => "Nothing is missing that these records would show".to_string(),
+        Verdict::Unexplained => "Nothing explains it".to_string(),
+        Verdict::Partial => format!("Mostly: {}", diagnosis.effects.join(", ")),
+        Verdict::Effect | Verdict::Undecided => {
+            format!("Missing: {}", diagnosis.effects.join(", "))
+        }
+    }
+}
+
+fn sentences(diagnosis: &Diagnosis) -> Vec<String> {
+    let mut all = Vec::new();
+    for group in &diagnosis.groups {
+        all.push(match group.as_slice() {
+            [one] => format!("It is {one}: {}.", size_of(diagnosis, one)),
+            [first, others @ ..] => format!(
+                "It is {first} ({}) or {}: these records cannot tell them apart.",
+                size_of(diagnosis, first),
+                others.join(" or ")
+            ),
+            [] => continue,
+        });
+    }
+    if let Some(share) = diagnosis.share {
+        all.push(format!(
+            "The effects explain {:.0} % of the squared error above the noise.",
+            100.0 * share
+        ));
+    }
+    match (&diagnosis.left, diagnosis.verdict) {
+        (Some(left), Verdict::Unexplained) => all.push(format!(
+            "What the model leaves is not noise: {}. No candidate explains it.",
+            said_of(left)
+        )),
+        (Some(left), _) => all.push(format!("What remains is not noise: {}.", said_of(left))),
+        (None, Verdict::Adequate) => {
+            all.push("What the model leaves looks like noise.".to_string())
+        }
+        (None, _) => all.push("What remains looks like noise.".to_string()),
+    }
+    if diagnosis.cut_short {
+        all.push(
+            "The limit on the time ended the search: --effort thorough goes on longer.".to_string(),
+        );
+    }
+    all
+}
+
+/// The sizes of an effect in the last model.
+fn size_of(diagnosis: &Diagnosis, effect: &str) -> String {
+    let stem: String = effect
+        .trim_end_matches(')')
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
+        .collect();
+    let Some(last) = diagnosis.steps.last() else {
+        return String::new();
+    };
+    let own = last
+        .parameters
+        .iter()
+        .filter(|p| p.name.starts_with(&stem) && !p.name.ends_with(')'));
+    let sizes: Vec<String> = own
+        .map(|p| {
+            let (value, error) = numbers::value_and_error(p.value, p.std_error);
+            let error = error.map_or(String::new(), |error| format!(" ± {error}"));
+            format!("{} = {value}{error} {}", p.name, p.unit)
+                .trim_end()
+                .to_string()
+        })
+        .collect();
+    if sizes.is_empty() {
+        "see its parameters above".to_string()
+    } else {
+        sizes.join(", ")
+    }
+}
+
+fn said_of(left: &Left) -> String {
+    match left {
+        Left::Input { input, output } => format!("the residual of {output} depends on {input}"),
+        Left::Period { output, period } => format!(
+            "the residual of {output} has a period of {}",
+            ct_signals::duration(*period)
+        ),
+        Left::Instant {
+            output,
+            record,
+            from,
+            to,
+        } => format!(
+            "abrupt change of {output} in {record} at {} to {} that noise does not explain",
+            ct_signals::duration(*from),
+            ct_signals::duration(*to)
+        ),
+        Left::Level { output } => {
+            format!("the residual of {output} depends on what the model gives there")
+        }
+    }
+}
+
+fn singles(diagnosis: &Diagnosis, look: Look) -> String {
+    let mut text = format!(
+        "{}\n",
+        look.heading(&format!(
+            "The best single effects of {} candidates, refitted",
+            diagnosis.candidates
+        ))
+    );
+    let mut rows = vec![vec!["effect".to_string(), "fall of BIC".to_string()]];
+    for single in diagnosis.singles.iter().take(LISTED) {
+        rows.push(vec![
+            single.effect.clone(),
+            numbers::significant(single.bic_gain, 3),
+        ]);
+    }
+    for line in table(&[Side::Left, Side::Right], &rows) {
+        text += &format!("  {}\n", line.trim_end());
+    }
+    text.push('\n');
+    text
+}
+
+/// The error of each step at each output.
+fn errors(diagnosis: &Diagnosis, look: Look) -> String {
+    let mut text = format!("{}\n", look.heading("Simulation error, root mean square"));
+    let Some(first) = diagnosis.steps.first() else {
+        return text;
+    };
+    let held_out = first.rmse_test_per_output.is_some();
+    let mut head = vec![String::new()];
+    for output in first.rmse_per_output.keys() {
+        head.push(output.clone());
+        if held_out {
+            head.push(format!("{output}, held out"));
+        }
+    }
+    let mut rows = vec![head];
+    for step in &diagnosis.steps {
+        let name = step
+            .added
+            .as_ref()
+            .map_or_else(|| diagnosis.model.clone(), |effect| format!("+ {effect}"));
+        let mut row = vec![name];
+        for (output, rmse) in &step.rmse_per_output {
+            row.push(numbers::significant(*rmse, 3));
+            if held_out {
+                let test = step.rmse_test_per_output.as_ref();
+                let value = test.and_then(|test| test.get(output));
+                row.push(value.map_or(String::new(), |v| numbers::significant(*v, 3)));
+            }
+        }
+        rows.push(row);
+    }
+    let noise: Vec<String> = diagnosis
+        .noise
+        .iter()
+        .flat_map(|noise| {
+            let own = numbers::significant(noise.level, 3);
+            if held_out {
+                vec![own, String::new()]
+            } else {
+                vec![own]
+            }
+        })
+        .collect();
+    rows.push(std::iter::once("noise".to_string()).chain(noise).collect());
+    let sides: Vec<Side> = (0..rows[0].len())
+        .map(|i| if i == 0 { Side::Left } else { Side::Right })
+        .collect();
+    for line in table(&sides, &rows) {
+        text += &format!("  {}\n", line.trim_end());
+    }
+    text
+}
+
+fn estimates(step: &Step, look: Look) -> String {
+    let mut text = format!(
+        "\n{}\n",
+        look.heading("Parameters and initial states, with standard errors")
+    );
+    let rows: Vec<Vec<String>> = step
+        .parameters
+        .iter()
+        .map(|parameter| {
+            let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
+            let error = match error {
+                Some(error) => format!("± {error}"),
+                None if parameter.known => "(known)".to_string(),
+                None => "(at a bound, or not determined)".to_string(),
+            };
+            vec![parameter.name.clone(), value, error, parameter.unit.clone()]
+        })
+        .collect();
+    for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
+        text += &format!("  {}\n", line.trim_end());
+    }
+    text
+}

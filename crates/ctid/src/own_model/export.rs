@@ -1,0 +1,166 @@
+//! A model of its user's own with its fitted values as text, and the curves of its fit.
+
+use std::path::PathBuf;
+
+use ct_model::{Expression, Given, ModelSpec};
+use ct_signals::{Heading, ReadSummary};
+use greybox::{FitOptions, FitUncertainty};
+use serde::Serialize;
+
+use super::file::{OwnModelFile, Records};
+use super::simulate::{Fitted, blame, fitted};
+use crate::Error;
+use crate::numbers;
+use crate::output::Found;
+use crate::simulate::{Curves, FittedRecord, TimeColumn};
+
+/// What `ctid export` writes.
+#[derive(Debug, Serialize)]
+pub(crate) struct Exported {
+    pub schema: u32,
+    /// The model's name.
+    pub model: String,
+    /// The records that it was fitted to; none where the values are those of its text.
+    pub fitted_to: Vec<String>,
+    /// The text.
+    #[serde(skip)]
+    pub text: Option<String>,
+    /// The curves.
+    #[serde(skip)]
+    pub curves: Option<Curves>,
+}
+
+impl Found for Exported {
+    fn record(&self) -> Option<String> {
+        self.curves.as_ref().map(Curves::csv)
+    }
+
+    fn model(&self) -> Option<String> {
+        self.text.clone()
+    }
+}
+
+/// The model with the values of its text and of `[known]` or, where there are records, those of a fit to them.
+///
+/// # Errors
+/// One line that names the file, the place and the mend.
+pub(crate) fn export(
+    file: &OwnModelFile,
+    records: Option<(Records, &[PathBuf])>,
+    options: &FitOptions,
+) -> Result<(Exported, Vec<ReadSummary>), Error> {
+    let mut spec = file.model.spec().clone();
+    for parameter in &mut spec.parameters {
+        if let Some(value) = file.known.get(&parameter.about.name) {
+            parameter.value = *value;
+        }
+    }
+    let mut exported = Exported {
+        schema: 1,
+        model: spec.name.clone(),
+        fitted_to: Vec::new(),
+        text: None,
+        curves: None,
+    };
+    let source = file.text.file_name().map_or_else(
+        || file.text.display().to_string(),
+        |name| name.to_string_lossy().into_owned(),
+    );
+    let Some((records, paths)) = records else {
+        let head = [format!(
+            "Written by ctid export from {source}; nothing was fitted."
+        )];
+        exported.text = Some(commented(&head, &spec));
+        return Ok((exported, Vec::new()));
+    };
+    let own = &records.records;
+    let count = spec.parameters.len();
+    let Fitted { setup, fit } = fitted(file, own, records.time_unit, options)?;
+    let known = FitUncertainty::of(&setup, &fit, count, options.noise_order);
+    let known = known.map_err(|error| blame(own, &error))?;
+    let Some(model) = setup.simulate(&fit.x) else {
+        return Err(blame(own, &greybox::Error::Stopped));
+    };
+    for (parameter, value) in spec.parameters.iter_mut().zip(&fit.x) {
+        parameter.value = *value;
+    }
+    // Where a simulation begins: as the first record does.
+    for (state, value) in spec.states.iter_mut().zip(&fit.x[count..]) {
+        if !state.fixed {
+            let size = Expression::Number(value.abs());
+            state.start = match value.is_sign_negative() && *value != 0.0 {
+                true => Expression::Negative(Box::new(size)),
+                false => size,
+            };
+        }
+    }
+    let mut names: Vec<String> = own.iter().map(|record| record.name.clone()).collect();
+    names.dedup();
+    let mut head = vec![format!(
+        "Written by ctid export from {source}, fitted to {}.",
+        names.join(", ")
+    )];
+    head.push("Standard errors (fitted values are below):".to_string());
+    for (i, parameter) in spec.parameters.iter().enumerate() {
+        let (name, unit) = (&parameter.about.name, &parameter.about.unit);
+        let error = known.as_ref().and_then(|known| {
+            let at = known.entries.iter().position(|entry| *entry == i)?;
+            Some(known.covariance[at][at].sqrt())
+        });
+        let said = match error {
+            Some(error) => format!("{} {unit}", numbers::significant(error, 3)),
+            None if parameter.given != Given::Fitted || file.known.contains_key(name) => {
+                "known, not fitted".to_string()
+            }
+            None => "none: at a bound, or not determined".to_string(),
+        };
+        head.push(format!("  {name}: {}", said.trim_end()));
+    }
+    if own.len() > 1 && !spec.states.is_empty() {
+        head.push(format!("Initial states are those of {}.", own[0].name));
+    }
+    exported.text = Some(commented(&head, &spec));
+    let outputs = spec.outputs.len();
+    let input_names = file
+        .columns
+        .inputs
+        .iter()
+        .map(|name| Heading::of(name).name);
+    let output_names = file
+        .columns
+        .outputs
+        .iter()
+        .map(|name| Heading::of(name).name);
+    let input_units = spec.inputs.iter().map(|input| input.about.unit.clone());
+    let output_units = spec.outputs.iter();
+    let output_units = output_units.map(|output| spec.about(output.variable).unit.clone());
+    let path = |name: &str| {
+        let own = paths.iter().find(|path| {
+            path.file_name()
+                .is_some_and(|file| file.to_string_lossy() == name)
+                || path.display().to_string() == name
+        });
+        own.unwrap_or(&paths[0]).clone()
+    };
+    let mut all = Vec::new();
+    for (record, model) in own.iter().zip(model.chunks(outputs.max(1))) {
+        all.push(FittedRecord {
+            time: TimeColumn::of(&path(&record.name), &file.columns, record)?,
+            record: record.clone(),
+            model: model.to_vec(),
+        });
+    }
+    exported.fitted_to = names;
+    exported.curves = Some(Curves {
+        inputs: input_names.zip(input_units).collect(),
+        outputs: output_names.zip(output_units).collect(),
+        records: all,
+    });
+    Ok((exported, records.summaries))
+}
+
+/// A model's text under comments.
+fn commented(head: &[String], spec: &ModelSpec) -> String {
+    let comments: String = head.iter().map(|line| format!("// {line}\n")).collect();
+    comments + &spec.to_string()
+}

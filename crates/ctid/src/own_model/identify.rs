@@ -1,0 +1,309 @@
+//! The linear model that `ctid identify` finds, beside the transfer function of a model of its user's own.
+
+use std::path::Path;
+
+use ct_model::{Linearity, TransferFunction, Variable};
+use ct_signals::{Columns, Hold, Record, quoted};
+use serde::Serialize;
+
+use super::file::OwnModelFile;
+use crate::Error;
+use crate::identify::Order;
+use crate::look::{Look, Side, table};
+use crate::numbers;
+use crate::output::Found;
+
+/// A zero this near to a pole, as a share of its size, cancels it.
+const CANCELS: f64 = 1e-8;
+
+/// One input and one output of a linear model.
+pub(crate) struct OneByOne<'f> {
+    file: &'f OwnModelFile,
+    input: usize,
+    output: usize,
+}
+
+/// The transfer function of the model's text, time in seconds: `A = 1 + a_1 s + ..` where `A(0)` is not zero.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct OwnTransferFunction {
+    /// The model's name.
+    pub model: String,
+    /// The input.
+    pub input: String,
+    /// The output.
+    pub output: String,
+    /// Of the input, by powers of s.
+    pub b: Vec<f64>,
+    /// Of the output, by powers of s.
+    pub a: Vec<f64>,
+    /// Inputs that are taken to stand still.
+    pub others: Vec<String>,
+}
+
+/// What was found, and the transfer function of the model.
+#[derive(Debug, Serialize)]
+pub(crate) struct Beside<'t, T> {
+    #[serde(flatten)]
+    pub found: &'t T,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own_model: Option<&'t OwnTransferFunction>,
+}
+
+impl<T: Found> Found for Beside<'_, T> {
+    fn page(&self) -> String {
+        self.found.page()
+    }
+}
+
+impl<'f> OneByOne<'f> {
+    /// The input and the output that were chosen, or the only ones.
+    ///
+    /// # Errors
+    /// Where the model is not linear, or there are several and none was chosen, or none has this name.
+    pub fn of(
+        path: &Path,
+        file: &'f OwnModelFile,
+        (input, output): (Option<&str>, Option<&str>),
+    ) -> Result<Self, Error> {
+        let spec = file.model.spec();
+        if let Linearity::Nonlinear { equations } = spec.linearity() {
+            let names = equations.iter().map(|&v| spec.about(v).name.as_str());
+            return Err(Error::file(
+                path,
+                format!(
+                    "{} is not linear in the equation of {}, and identify fits linear models: fit it with `ctid compare`, or give the columns by --columns",
+                    spec.name,
+                    names.collect::<Vec<_>>().join(", ")
+                ),
+            ));
+        }
+        let inputs: Vec<&str> = (0..spec.inputs.len())
+            .map(|i| spec.about(Variable::Input(i)).name.as_str())
+            .collect();
+        let outputs: Vec<&str> = spec
+            .outputs
+            .iter()
+            .map(|output| spec.about(output.variable).name.as_str())
+            .collect();
+        let chosen = |what: &str, names: &[&str], wanted: Option<&str>| match (wanted, names) {
+            (None, [_]) => Ok(0),
+            (None, _) => Err(Error::file(
+                path,
+                format!(
+                    "{} has {} {what}s, {}, and identify fits one input and one output at a time: choose with --{what} NAME",
+                    spec.name,
+                    names.len(),
+                    names.join(", ")
+                ),
+            )),
+            (Some(wanted), _) => {
+                let at = names.iter().position(|name| *name == wanted);
+                at.ok_or_else(|| {
+                    Error::file(
+                        path,
+                        format!(
+                            "{} has no {what} {}: it has {}{}",
+                            spec.name,
+                            quoted(wanted),
+                            names.join(", "),
+                            crate::names::suggestion(wanted, names.iter().copied())
+                        ),
+                    )
+                })
+            }
+        };
+        Ok(Self {
+            input: chosen("input", &inputs, input)?,
+            output: chosen("output", &outputs, output)?,
+            file,
+        })
+    }
+
+    /// The columns of the two, and what the input does between samples.
+    pub fn columns(&self) -> (Columns, Hold) {
+        let all = &self.file.columns;
+        let columns = Columns {
+            inputs: vec![all.inputs[self.input].clone()],
+            outputs: vec![all.outputs[self.output].clone()],
+            ..all.clone()
+        };
+        (columns, self.file.hold)
+    }
+
+    /// Puts a record of the two into the units of the model.
+    ///
+    /// # Errors
+    /// Where a unit is of another dimension.
+    pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
+        let spec = self.file.model.spec();
+        let output = spec.outputs[self.output].variable;
+        let signals = [&spec.inputs[self.input].about, spec.about(output)];
+        let channels = record.inputs.iter_mut().chain(&mut record.outputs);
+        for (channel, about) in channels.zip(signals) {
+            super::file::convert(&record.name, channel, about)?;
+        }
+        Ok(())
+    }
+
+    /// The transfer function with the values of the text and of `[known]`; `None` where something is delayed.
+    ///
+    /// `data`: a record, whose header says the unit of the time where the model file does not.
+    ///
+    /// # Errors
+    /// Where the record cannot be read.
+    pub fn transfer_function(&self, data: &Path) -> Result<Option<OwnTransferFunction>, Error> {
+        let spec = self.file.model.spec();
+        let mut parameters = self.file.model.parameters();
+        for (value, parameter) in parameters.iter_mut().zip(&spec.parameters) {
+            *value = *self.file.known.get(&parameter.about.name).unwrap_or(value);
+        }
+        let Some(linear) = self.file.model.linear(&parameters) else {
+            return Ok(None);
+        };
+        let second = self.file.time_unit(data)?;
+        let found = reduced(linear.transfer_function(self.input, self.output))?;
+        let in_seconds = |coefficients: Vec<f64>| -> Vec<f64> {
+            let powers = coefficients.into_iter().enumerate();
+            powers
+                .map(|(i, c)| c * second.powi(i32::try_from(i).unwrap_or(i32::MAX)))
+                .collect()
+        };
+        let (mut a, mut b) = (in_seconds(found.denominator), in_seconds(found.numerator));
+        let largest = a.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let scale = if a[0].abs() > 1e-12 * largest {
+            a[0]
+        } else {
+            // It integrates.
+            a[0] = 0.0;
+            a[1.min(a.len() - 1)]
+        };
+        a.iter_mut().chain(&mut b).for_each(|c| *c /= scale);
+        let output = spec.about(spec.outputs[self.output].variable);
+        let inputs = spec.inputs.iter().enumerate();
+        let others = inputs.filter(|(i, _)| *i != self.input);
+        Ok(Some(OwnTransferFunction {
+            model: spec.name.clone(),
+            input: spec.inputs[self.input].about.name.clone(),
+            output: output.name.clone(),
+            a,
+            b,
+            others: others.map(|(_, input)| input.about.name.clone()).collect(),
+        }))
+    }
+}
+
+/// Without the poles that zeros cancel, which this input does not move or this output does not see, and without leading zeros.
+fn reduced(mut found: TransferFunction) -> Result<TransferFunction, Error> {
+    let largest = found.numerator.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let rounding = 1e-14 * largest;
+    while found.numerator.len() > 1 && found.numerator.last().is_some_and(|c| c.abs() <= rounding) {
+        found.numerator.pop();
+    }
+    if largest == 0.0 || found.denominator.len() == 1 || found.numerator.len() == 1 {
+        return Ok(found);
+    }
+    let mut zeros = ct_lti::Polynomial::new(found.numerator.clone())?.roots()?;
+    let mut poles = ct_lti::Polynomial::new(found.denominator.clone())?.roots()?;
+    let gain = found.numerator.last().copied().unwrap_or(0.0);
+    let before = poles.len();
+    let size = poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
+    zeros.retain(|zero| {
+        let near = |pole: &ct_lti::Complex64| (pole - zero).norm() <= CANCELS * size;
+        match poles.iter().position(near) {
+            Some(at) => {
+                poles.swap_remove(at);
+                false
+            }
+            None => true,
+        }
+    });
+    if poles.len() == before {
+        return Ok(found);
+    }
+    let of = |roots: &[ct_lti::Complex64], scale: f64| -> Result<Vec<f64>, Error> {
+        let polynomial = ct_lti::Polynomial::from_roots(roots, scale)?;
+        Ok(polynomial.coefficients().to_vec())
+    };
+    Ok(TransferFunction {
+        numerator: of(&zeros, gain)?,
+        denominator: of(&poles, 1.0)?,
+    })
+}
+
+impl OwnTransferFunction {
+    /// n and m.
+    fn order(&self) -> (usize, usize) {
+        (self.a.len() - 1, self.b.len() - 1)
+    }
+
+    /// What a person reads of it beside what was identified: name, value and standard error of each coefficient.
+    pub fn said(&self, found: Option<(Order, &[missing_effect::Parameter])>, look: Look) -> String {
+        let title = format!(
+            "{}: its own transfer function from {} to {}, with the values of its text and [known]",
+            self.model, self.input, self.output
+        );
+        let mut text = format!("\n{}\n", look.heading(&title));
+        let (n, m) = self.order();
+        let integrates = self.a[0] == 0.0;
+        let a = self.a.iter().enumerate().skip(1);
+        let a = a.map(|(i, value)| (format!("a{i}"), *value));
+        let b = self
+            .b
+            .iter()
+            .enumerate()
+            .map(|(j, value)| (format!("b{j}"), *value));
+        let head = ["coefficient", "of the model", "identified", ""];
+        let mut rows = vec![head.map(|name| look.faint(name)).to_vec()];
+        for (name, value) in a.chain(b) {
+            let identified = found.and_then(|(_, all)| all.iter().find(|p| p.name == name));
+            let (found, unit) = match identified {
+                None => ("-".to_string(), String::new()),
+                Some(parameter) => {
+                    let (value, error) =
+                        numbers::value_and_error(parameter.value, parameter.std_error);
+                    let error = error.map_or(String::new(), |error| format!(" ± {error}"));
+                    (value + &error, parameter.unit.clone())
+                }
+            };
+            rows.push(vec![name, numbers::significant(value, 5), found, unit]);
+        }
+        let sides = [Side::Left, Side::Right, Side::Left, Side::Left];
+        for line in table(&sides, &rows) {
+            text += &format!("  {}\n", line.trim_end());
+        }
+        let mut notes = Vec::new();
+        if let Some((order, _)) = found
+            && (order.n, order.m) != (n, m)
+        {
+            notes.push(format!(
+                "the model is of order {n},{m}: --order {n},{m} compares coefficient by coefficient"
+            ));
+        }
+        if integrates {
+            notes.push(
+                "the model integrates: --method srivc --integrator identifies such a one"
+                    .to_string(),
+            );
+        }
+        if !self.others.is_empty() {
+            notes.push(format!(
+                "{} {} no part here: what is identified is right where {} still",
+                self.others.join(", "),
+                if self.others.len() == 1 {
+                    "has"
+                } else {
+                    "have"
+                },
+                if self.others.len() == 1 {
+                    "it stands"
+                } else {
+                    "they stand"
+                },
+            ));
+        }
+        for note in notes {
+            text += &look.paragraph("  ", &note);
+        }
+        text
+    }
+}

@@ -1,0 +1,107 @@
+//! What can act where in a model of its user's own.
+
+use ct_model::ModelSpec;
+use ct_model::effects::{Candidate, Place, Port, Visited, candidates, own_candidates};
+
+use super::OwnModelFile;
+use crate::Error;
+use crate::look::Look;
+
+/// Headings in the order in which candidates are listed.
+const HEADINGS: [&str; 6] = [
+    "inputs: between the command and the model",
+    "outputs: between the model and the reading",
+    "balances: in the equation of a state",
+    "parameters and named flows",
+    "between",
+    "of the model file",
+];
+
+/// Which of the headings a candidate stands under.
+fn group(candidate: &Candidate) -> usize {
+    match candidate.port {
+        Port::Input(_) => 0,
+        Port::Output(_) => 1,
+        Port::Balance(_) => 2,
+        Port::Value(_) | Port::Dependence(..) => 3,
+        Port::Between(..) | Port::InputAndBalance(..) => 4,
+        Port::BalanceAnd(..) => 2,
+        Port::OutputAnd(..) => 1,
+        Port::Own => 5,
+    }
+}
+
+/// `ctid effects --model M.toml`: every effect with the identifiers of its ports, by place.
+///
+/// # Errors
+/// As [`own_candidates`], which the model file has passed.
+pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
+    let spec = file.model.spec();
+    let mut all = candidates(spec, &Visited::nominal(spec));
+    let own = own_candidates(spec, &file.candidates);
+    all.extend(own.map_err(|error| Error::Columns(error.to_string()))?);
+    let mut text = String::new();
+    for (i, heading) in HEADINGS.into_iter().enumerate() {
+        let here: Vec<&Candidate> = all.iter().filter(|c| group(c) == i).collect();
+        if here.is_empty() {
+            continue;
+        }
+        text += &format!("{}\n", look.heading(heading));
+        let mut rest = &here[..];
+        while let Some(first) = rest.first() {
+            let same = |c: &&&Candidate| c.effect == first.effect && c.effect.is_some();
+            let count = rest.iter().take_while(same).count().max(1);
+            let ids: Vec<&str> = rest[..count].iter().map(|c| c.id.as_str()).collect();
+            text += &look.paragraph("  ", &look.strong(ids.join(", ")));
+            let own = "a term of the model file";
+            text += &look.paragraph("      ", first.effect.map_or(own, |effect| effect.physics));
+            rest = &rest[count..];
+        }
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+/// `ctid check`: the ports with the names of what can act there, a few lines.
+pub(crate) fn summary(spec: &ModelSpec, look: Look) -> String {
+    let all = candidates(spec, &Visited::nominal(spec));
+    let ports = [
+        ("inputs", Place::Input),
+        ("outputs", Place::Output),
+        ("balances", Place::Balance),
+        ("parameters", Place::Parameter),
+    ];
+    let mut text = format!("\n{}\n", look.heading("What can act where"));
+    let mut row = |kind: &str, what: &str| text += &look.paragraph(&format!("  {kind:<12}"), what);
+    for (kind, place) in ports {
+        let here = || {
+            all.iter()
+                .filter(|c| c.effect.is_some_and(|effect| effect.place == place))
+        };
+        let mut names: Vec<String> = here().map(|c| c.port.names(spec)).collect();
+        let mut seen = std::collections::BTreeSet::new();
+        names.retain(|name| seen.insert(name.clone()));
+        let mut effects: Vec<&str> = here().filter_map(|c| c.effect).map(|e| e.id).collect();
+        effects.dedup();
+        if place == Place::Parameter && all.iter().any(|c| matches!(c.port, Port::Dependence(..))) {
+            effects.push("varies_with(p,x)");
+        }
+        if !names.is_empty() {
+            row(
+                kind,
+                &format!("{}: {}", names.join(", "), effects.join(", ")),
+            );
+        }
+    }
+    let others = all.iter().filter(|c| {
+        let place = c.effect.map(|effect| effect.place);
+        place.is_some_and(|place| {
+            place != Place::ParameterAndSignal && ports.iter().all(|(_, other)| *other != place)
+        })
+    });
+    let ids: Vec<&str> = others.map(|c| c.id.as_str()).collect();
+    if !ids.is_empty() {
+        row("between", &ids.join(", "));
+    }
+    text
+}

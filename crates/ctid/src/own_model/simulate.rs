@@ -1,0 +1,263 @@
+//! A model of its user's own on new inputs.
+
+use std::path::Path;
+
+use ct_signals::{Heading, ReadSummary, Record};
+use greybox::{Fit, FitOptions, FitUncertainty, InitialStates, ModelSetup, output_errors};
+
+use super::file::{OwnModelFile, Records};
+use crate::Error;
+use crate::simulate::{
+    Band, Inputs, LEVEL, Simulated, SimulatedOutput, StateSource, begins_with_readings,
+    first_readings, read_inputs,
+};
+
+/// A fit and how well it is known.
+pub(super) struct Fitted<'a> {
+    pub setup: ModelSetup<'a>,
+    pub fit: Fit,
+}
+
+/// Fits the model to records.
+///
+/// # Errors
+/// Where nothing can be fitted, with the files that are to blame.
+pub(super) fn fitted<'a>(
+    file: &'a OwnModelFile,
+    records: &'a [Record],
+    time_unit: f64,
+    options: &FitOptions,
+) -> Result<Fitted<'a>, Error> {
+    let setup = ModelSetup::new(&file.model, records, &file.known, time_unit)
+        .and_then(|setup| setup.with_priors(&file.priors))
+        .map_err(|error| blame(records, &error))?;
+    ct_signals::require_samples(records, setup.free().len())?;
+    let fit = setup.fit(options).map_err(|error| blame(records, &error))?;
+    Ok(Fitted { setup, fit })
+}
+
+/// An error of the computation, with the records that it is of.
+pub(super) fn blame(records: &[Record], error: &greybox::Error) -> Error {
+    let mut names: Vec<&str> = records.iter().map(|r| r.name.as_str()).collect();
+    names.dedup();
+    Error::File {
+        file: names.join(", "),
+        what: error.to_string(),
+    }
+}
+
+/// Simulates the model on the inputs of a record, after a fit to others where there are any.
+///
+/// # Errors
+/// One line that names the file, the place and the mend.
+pub(crate) fn simulate(
+    file: &OwnModelFile,
+    mut records: Option<Records>,
+    inputs: &Inputs,
+    options: &FitOptions,
+) -> Result<(Simulated, Vec<ReadSummary>), Error> {
+    let read_options = ct_signals::ReadOptions {
+        hold: file.hold,
+        ..inputs.options.clone()
+    };
+    let mut read = read_inputs(&inputs.path, &file.columns, &read_options, |e| {
+        file.named(e)
+    })?;
+    file.convert(&mut read.record)?;
+    let mut summaries = Vec::new();
+    let time_unit = match &mut records {
+        None => file.time_unit(&inputs.path)?,
+        Some(records) => {
+            let mut all = std::mem::take(&mut records.records);
+            all.push(read.record);
+            crate::input::on_one_clock(&mut all);
+            read.record = all.pop().unwrap_or_default();
+            records.records = all;
+            summaries.append(&mut records.summaries);
+            records.time_unit
+        }
+    };
+    summaries.push(read.summary);
+    let record = &read.record;
+    let spec = file.model.spec();
+    let count = spec.parameters.len();
+    let fit = match &records {
+        None => None,
+        Some(records) => Some(fitted(file, &records.records, time_unit, options)?),
+    };
+    let own = std::slice::from_ref(record);
+    let wrong = |error: greybox::Error| Error::file(&inputs.path, error.to_string());
+    let setup = match &fit {
+        None => ModelSetup::new(&file.model, own, &file.known, time_unit),
+        Some(fit) => fit.setup.with_records(own),
+    };
+    let setup = setup.map_err(wrong)?;
+    let parameters = match &fit {
+        None => setup.start()[..count].to_vec(),
+        Some(fit) => fit.fit.x[..count].to_vec(),
+    };
+    let mut warnings = Vec::new();
+    let known = match &fit {
+        None => None,
+        Some(Fitted { setup, fit }) => {
+            let known = FitUncertainty::of(setup, fit, count, options.noise_order);
+            let known = known.map_err(|error| blame(own, &error))?;
+            if known.is_none() {
+                warnings.push(
+                    "the records do not determine all parameters, so there is no band: `ctid compare` says which; fix some of them under [known], or give a [prior]".to_string(),
+                );
+            }
+            known
+        }
+    };
+    let (initial, states_from) = states(
+        &setup,
+        &parameters,
+        (record, inputs.first),
+        known.as_ref(),
+        options,
+    )
+    .map_err(wrong)?;
+    if states_from == StateSource::Text && begins_with_readings(record) && !spec.states.is_empty() {
+        warnings.push(format!(
+            "the readings of {} do not determine the initial states, which begin as the text starts them",
+            record.name
+        ));
+    }
+    let mut x = parameters.clone();
+    x.extend(&initial.values);
+    let Some(mean) = setup.simulate(&x) else {
+        return Err(runs_away(&setup, record, &inputs.path, &x, &spec.name));
+    };
+    let errors = match &known {
+        None => None,
+        Some(known) => {
+            let errors = output_errors(&setup, &x, count, known, &initial);
+            Some(errors.ok_or_else(|| runs_away(&setup, record, &inputs.path, &x, &spec.name))?)
+        }
+    };
+    let names = file
+        .columns
+        .outputs
+        .iter()
+        .map(|name| Heading::of(name).name);
+    let outputs = spec.outputs.iter().zip(names).zip(mean).enumerate();
+    let outputs = outputs.map(|(o, ((output, name), mean))| {
+        let band = errors.as_ref().zip(known.as_ref());
+        SimulatedOutput {
+            name,
+            unit: spec.about(output.variable).unit.clone(),
+            band: band.map(|(errors, known)| Band::of(&errors[o], known, o)),
+            mean,
+            measured: record.outputs[o].values.clone(),
+        }
+    });
+    let std_errors = |i: usize| {
+        let known = known.as_ref()?;
+        let at = known.entries.iter().position(|entry| *entry == i)?;
+        Some(known.covariance[at][at].sqrt())
+    };
+    let mut fitted_to: Vec<String> = records.map_or_else(Vec::new, |records| {
+        records.records.iter().map(|r| r.name.clone()).collect()
+    });
+    fitted_to.dedup();
+    let names = spec.parameters.iter().map(|p| p.about.name.clone());
+    Ok((
+        Simulated {
+            schema: 1,
+            model: spec.name.clone(),
+            inputs: record.name.clone(),
+            fitted_to,
+            parameters: names
+                .zip(parameters)
+                .enumerate()
+                .map(|(i, (name, value))| (name, value, std_errors(i)))
+                .collect(),
+            states: spec
+                .states
+                .iter()
+                .map(|state| format!("{}(0)", state.about.name))
+                .zip(initial.values.iter().copied())
+                .collect(),
+            states_from,
+            level: LEVEL,
+            outputs: outputs.collect(),
+            warnings,
+            length: record.duration(),
+            time: read.time,
+            readings: false,
+        },
+        summaries,
+    ))
+}
+
+/// The initial states: fitted to the first readings, on more of them where these do not tell, or as the text has them.
+fn states(
+    setup: &ModelSetup,
+    parameters: &[f64],
+    (record, first): (&Record, usize),
+    known: Option<&FitUncertainty>,
+    options: &FitOptions,
+) -> Result<(InitialStates, StateSource), greybox::Error> {
+    let count = parameters.len();
+    let entries: &[usize] = known.map_or(&[], |known| &known.entries);
+    let mut rows = first;
+    while begins_with_readings(record) {
+        let begun = [first_readings(record, rows)];
+        let frozen = setup.held_out(&begun, parameters)?;
+        match known {
+            None => {
+                let x = frozen.fit_states(options)?;
+                let states = InitialStates::known(x[count..].to_vec(), 0);
+                return Ok((states, StateSource::Readings));
+            }
+            Some(known) => {
+                let model = setup.with_records(&begun)?;
+                let x: Vec<f64> = [parameters, &frozen.start()[count..]].concat();
+                let states = InitialStates::of_readings(
+                    &frozen,
+                    &model,
+                    &x,
+                    count,
+                    known,
+                    options.stopping,
+                )?;
+                if let Some(states) = states {
+                    return Ok((states, StateSource::Readings));
+                }
+            }
+        }
+        if begun[0].len() >= record.len() {
+            break;
+        }
+        rows *= 2;
+    }
+    let states = InitialStates::of_text(setup.model(), parameters, entries);
+    Ok((states, StateSource::Text))
+}
+
+/// When the simulation ends, and the mend.
+fn runs_away(setup: &ModelSetup, record: &Record, path: &Path, x: &[f64], model: &str) -> Error {
+    let goes = |rows: usize| {
+        let part = [record.rows(0..rows)];
+        let setup = setup.with_records(&part);
+        setup.is_ok_and(|setup| setup.simulate(x).is_some())
+    };
+    // The last row that is reached.
+    let (mut good, mut bad) = (0, record.len());
+    while bad - good > 1 {
+        let middle = usize::midpoint(good, bad);
+        if goes(middle) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+    }
+    let at = ct_signals::Clock::of([record]).at(record.time[good.saturating_sub(1)]);
+    Error::file(
+        path,
+        format!(
+            "the simulation of {model} does not go on behind {at}: a state grows without bound, or an equation has no value there; correct the inputs there, the parameters' values, or the model's text"
+        ),
+    )
+}

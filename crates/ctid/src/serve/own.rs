@@ -1,0 +1,525 @@
+//! A model of its user's own on the page: its text and its model file are kept for the tab, checked as they are typed, and fitted to the
+//! records of the tab by the function of `ctid compare`.
+//!
+//! Nothing of it reaches the file system: the `model` that a model file names is the text that the page holds, whatever name stands there.
+
+use std::path::Path;
+
+use axum::body::Bytes;
+use ct_model::{ModelSpec, TextError};
+use ct_signals::{Columns, ReadOptions, Reading};
+use greybox::FitOptions;
+use serde_json::{Value, json};
+
+use super::guard::Refusal;
+use super::session::Session;
+use super::upload::Upload;
+use crate::look::Look;
+use crate::model_file::read_text;
+use crate::own_model::{Comparison, OwnModelFile, Records, compare};
+use crate::report::{min_max, rounded};
+use crate::{Error, check, edit, numbers};
+
+/// Points of a curve that are drawn.
+const DRAWN: usize = 2000;
+/// How the model file is called in messages and downloads.
+pub(super) const FILE: &str = "model.toml";
+/// What the page begins with, where nobody has typed anything.
+const TEMPLATE: &str = include_str!("page/template.mo");
+
+/// An example: name, text, model file, record.
+type Example = (&'static str, &'static str, &'static str, &'static str);
+
+macro_rules! examples {
+    ($($name:literal),*) => {
+        [$((
+            $name,
+            include_str!(concat!("../../../../examples/models/", $name, ".mo")),
+            include_str!(concat!("../../../../examples/models/", $name, ".toml")),
+            include_str!(concat!("../../../../examples/models/", $name, ".csv")),
+        )),*]
+    };
+}
+
+const EXAMPLES: [Example; 8] = examples!(
+    "heated-block",
+    "coupled-heaters",
+    "quadruple-tank",
+    "house",
+    "dc-motor",
+    "mass-spring",
+    "battery",
+    "bioreactor"
+);
+
+/// The model of a tab.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Own {
+    /// The text of the model.
+    pub text: String,
+    /// The model file: columns, what is known, side measurements.
+    pub file: String,
+    /// What was fitted last.
+    pub fit: Option<Fit>,
+    /// Columns and what is held, as they were read last: a text that is being typed is no model for a while.
+    read: (Columns, ReadOptions),
+}
+
+/// A fit.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub id: u64,
+    /// Of which texts and records.
+    text: String,
+    file: String,
+    data: u64,
+    /// What the page shows, as JSON.
+    pub body: Bytes,
+}
+
+/// What is changed.
+#[derive(Debug, serde::Deserialize)]
+#[serde(tag = "do", rename_all = "lowercase")]
+pub(super) enum Change {
+    /// A model of one's own in place of a plant.
+    Begin,
+    /// One of the plants again.
+    End,
+    /// An example in place of all that is there.
+    Example { name: String },
+    /// Text, model file, or both.
+    Write {
+        text: Option<String>,
+        file: Option<String>,
+    },
+    /// Which column a signal is, or the time.
+    Column { signal: String, column: String },
+}
+
+impl Own {
+    /// The model file that the command line names, and the text that it names.
+    pub(super) fn read(path: &Path) -> Result<Self, Error> {
+        let file = read_text(path)?;
+        let table: toml::Table = file.parse().unwrap_or_default();
+        let named = table.get("model").and_then(toml::Value::as_str);
+        let beside = path.parent().unwrap_or(Path::new(""));
+        let beside = beside.join(named.unwrap_or_default());
+        let own = Self {
+            text: read_text(&beside)?,
+            file,
+            ..Self::default()
+        };
+        Ok(own.looked_at())
+    }
+
+    fn spec(&self) -> Result<ModelSpec, TextError> {
+        ModelSpec::parse(&self.text)
+    }
+
+    /// Text and file together.
+    ///
+    /// # Errors
+    /// One line that names the place and the mend.
+    pub(super) fn model(&self) -> Result<OwnModelFile, Error> {
+        OwnModelFile::parse_with(Path::new(FILE), &self.file, |named| {
+            self.spec().map_err(|source| Error::Text {
+                file: named.display().to_string(),
+                source,
+            })
+        })
+    }
+
+    /// Columns and what is held.
+    pub(super) fn layout(&self) -> (Columns, ReadOptions) {
+        self.read.clone()
+    }
+
+    /// The same with the columns of its texts, where these can be read.
+    fn looked_at(mut self) -> Self {
+        if let Ok(model) = self.model() {
+            self.read = (model.columns.clone(), model.hold.into());
+        }
+        self
+    }
+
+    pub(super) fn held(&self) -> usize {
+        let fit = self.fit.as_ref();
+        let of_fit = |fit: &Fit| fit.body.len() + fit.text.len() + fit.file.len();
+        self.text.len() + self.file.len() + fit.map_or(0, of_fit)
+    }
+
+    /// What the page shows of it.
+    pub(super) fn state(&self, data: u64) -> Value {
+        let spec = self.spec();
+        let model = self.model();
+        let columns = model.as_ref().ok().map(|model| &model.columns);
+        let signals = spec.as_ref().ok().map(|spec| {
+            let inputs = spec.inputs.iter().map(|input| ("input", &input.about));
+            let outputs = spec.outputs.iter();
+            let outputs = outputs.map(|output| ("output", spec.about(output.variable)));
+            let names = columns
+                .iter()
+                .flat_map(|c| c.inputs.iter().chain(&c.outputs));
+            let mut names = names.map(String::as_str);
+            let signals = inputs.chain(outputs).map(|(role, about)| {
+                json!({
+                    "role": role,
+                    "name": about.name,
+                    "unit": about.unit,
+                    "description": about.description,
+                    "column": names.next(),
+                })
+            });
+            signals.collect::<Vec<_>>()
+        });
+        // A mistake of the text is that of the file too, and said once.
+        let file_error = match (&spec, &model) {
+            (Ok(_), Err(error)) => Some(error.to_string()),
+            _ => None,
+        };
+        let unused = model.as_ref().ok().map(|model| model.unused.clone());
+        json!({
+            "text": self.text,
+            "file": self.file,
+            "text_error": spec.as_ref().err().map(ToString::to_string),
+            "file_error": file_error,
+            "check": spec.as_ref().ok().map(|spec| check::said(spec, Look::plain())),
+            "time": columns.and_then(|columns| columns.time.clone()),
+            "signals": signals,
+            "unused": unused,
+            "fit": self.fit.as_ref().map(|fit| fit.id),
+            "fitted": self.fit.as_ref().is_some_and(|fit| {
+                fit.text == self.text && fit.file == self.file && fit.data == data
+            }),
+        })
+    }
+}
+
+/// Names of the examples.
+pub(super) fn examples() -> Vec<&'static str> {
+    EXAMPLES.iter().map(|(name, ..)| *name).collect()
+}
+
+/// The model file that says no more than which text it goes with.
+fn bare_file(text: &str) -> String {
+    let name = ModelSpec::parse(text).map_or("model".to_string(), |spec| spec.name);
+    format!("model = \"{name}.mo\"\n\n[columns]\n")
+}
+
+/// Changes the model of a tab.
+///
+/// # Errors
+/// Where an example or a signal is not there, or the model file cannot be changed.
+pub(super) fn change(session: &mut Session, change: Change) -> Result<(), Refusal> {
+    session.stop();
+    match change {
+        Change::End => session.own = None,
+        Change::Begin => {
+            session.own.get_or_insert_with(|| Own {
+                text: TEMPLATE.to_string(),
+                file: bare_file(TEMPLATE),
+                ..Own::default()
+            });
+        }
+        Change::Example { name } => {
+            let example = EXAMPLES.iter().find(|(known, ..)| *known == name);
+            let (name, text, file, record) = example.ok_or_else(|| {
+                Refusal::input(format!(
+                    "there is no example of this name; there are {}",
+                    examples().join(", ")
+                ))
+            })?;
+            let upload = Upload::new(&format!("{name}.csv"), false, record.as_bytes().into())?;
+            session.own = Some(Own {
+                text: (*text).to_string(),
+                file: (*file).to_string(),
+                ..Own::default()
+            });
+            session.take_alone(upload);
+        }
+        Change::Write { text, file } => {
+            let own = session.own.get_or_insert_with(Own::default);
+            if let Some(text) = text {
+                own.text = text;
+            }
+            match file {
+                Some(file) => own.file = file,
+                None if own.file.trim().is_empty() => own.file = bare_file(&own.text),
+                None => {}
+            }
+        }
+        Change::Column { signal, column } => {
+            let own = session.own.as_mut();
+            let own = own.ok_or_else(|| Refusal::input("there is no model of your own yet"))?;
+            own.file = edit::with_column(FILE, &own.file, &signal, &column)?;
+        }
+    }
+    session.own = session.own.take().map(Own::looked_at);
+    session.failure = None;
+    session.version += 1;
+    Ok(())
+}
+
+/// What a fit works on.
+pub(super) struct Work {
+    own: Own,
+    model: OwnModelFile,
+    records: Records,
+    data: u64,
+}
+
+impl Work {
+    /// # Errors
+    /// Where text, file or records do not allow a fit.
+    pub(super) fn new(session: &mut Session) -> Result<Self, Refusal> {
+        let own = session.own.clone();
+        let own = own.ok_or_else(|| Refusal::input("there is no model of your own yet"))?;
+        let model = own.model()?;
+        let options = ReadOptions::from(model.hold);
+        let (mut fitted, mut held_out): (Vec<Reading>, Vec<Reading>) = Default::default();
+        let mut time_unit = None;
+        for upload in &mut session.records {
+            let reading = upload.reading(&model.columns, &options);
+            let reading = reading.map_err(Refusal::input)?;
+            if upload.held_out {
+                held_out.push(reading);
+            } else {
+                fitted.push(reading);
+                time_unit.get_or_insert_with(|| model.time_unit_of(&upload.headings));
+            }
+        }
+        let Some(time_unit) = time_unit else {
+            return Err(Refusal::input(
+                "there is no record to fit; drop a CSV file first",
+            ));
+        };
+        let count = fitted.len();
+        fitted.append(&mut held_out);
+        Ok(Self {
+            records: model.gathered(fitted, count, time_unit)?,
+            data: session.data,
+            own,
+            model,
+        })
+    }
+
+    pub(super) fn compute(&self) -> Result<Comparison, Error> {
+        compare(&self.model, &self.records, &FitOptions::default())
+    }
+
+    /// Puts what came out where the page finds it.
+    pub(super) fn settle(self, session: &mut Session, found: &Comparison) {
+        let id = session.number();
+        let fit = Fit {
+            id,
+            body: self.body(id, found).to_string().into(),
+            text: self.own.text,
+            file: self.own.file,
+            data: self.data,
+        };
+        if let Some(own) = &mut session.own {
+            own.fit = Some(fit);
+        }
+    }
+
+    fn body(&self, id: u64, found: &Comparison) -> Value {
+        let [step] = &found.steps;
+        let outputs = self
+            .model
+            .signals()
+            .skip(self.model.model.spec().inputs.len());
+        let outputs = outputs.map(|about| {
+            let test = step.rmse_test_per_output.as_ref();
+            let text = |rmse: &f64| numbers::significant(*rmse, 3);
+            json!({
+                "name": about.name,
+                "unit": about.unit,
+                "rmse": step.rmse_per_output.get(&about.name).map(text),
+                "test": test.and_then(|test| test.get(&about.name)).map(text),
+            })
+        });
+        let parameters = step.parameters.iter().map(|one| {
+            let (value, error) = numbers::value_and_error(one.value, one.std_error);
+            json!({ "name": one.name, "unit": one.unit, "value": value, "error": error, "known": one.known })
+        });
+        let times = self.records.records.iter();
+        let outputs_of_each = found.curves.len() / self.records.records.len().max(1);
+        let times = times.flat_map(|record| std::iter::repeat_n(&record.time, outputs_of_each));
+        let curves = found.curves.iter().zip(times).map(|(curves, time)| {
+            let series = |values: &[f64]| {
+                let kept = min_max(values, DRAWN);
+                let at = |from: &[f64]| -> Vec<f64> {
+                    kept.iter().map(|&k| rounded(from[k], 8)).collect()
+                };
+                json!({ "x": at(time), "y": at(values) })
+            };
+            let pairs = curves.measured.iter().zip(&curves.model);
+            let residual: Vec<f64> = pairs.map(|(y, m)| y - m).collect();
+            json!({
+                "record": curves.record,
+                "output": curves.output,
+                "unit": curves.unit,
+                "measured": series(&curves.measured),
+                "model": series(&curves.model),
+                "residual": series(&residual),
+            })
+        });
+        json!({
+            "id": id,
+            "model": found.model,
+            "outputs": outputs.collect::<Vec<_>>(),
+            "weighted": numbers::significant(step.weighted_rmse, 3),
+            "parameters": parameters.collect::<Vec<_>>(),
+            "starts": step.starts,
+            "starts_agree": step.starts_agree,
+            "not_determined": found.not_determined.iter().map(|of| of.join(", ")).collect::<Vec<_>>(),
+            "curves": curves.collect::<Vec<_>>(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::super::state::state;
+    use super::*;
+
+    fn write(session: &mut Session, text: Option<&str>, file: Option<&str>) {
+        let (text, file) = (text.map(str::to_string), file.map(str::to_string));
+        change(session, Change::Write { text, file }).unwrap();
+    }
+
+    /// Every example is a model with its record, and the columns are found.
+    #[test]
+    fn every_example_can_be_fitted() {
+        for name in examples() {
+            let mut session = Session::new(None, None, Vec::new());
+            let name = name.to_string();
+            change(&mut session, Change::Example { name }).unwrap();
+            let state = state(&mut session);
+            let own = &state["own"];
+            assert!(
+                own["text_error"].is_null() && own["file_error"].is_null(),
+                "{own}"
+            );
+            assert!(state["records"][0]["read"].is_object(), "{state}");
+            assert!(Work::new(&mut session).is_ok());
+        }
+        let mut session = Session::new(None, None, Vec::new());
+        let name = "../../etc/passwd".to_string();
+        let refused = change(&mut session, Change::Example { name }).unwrap_err();
+        assert!(refused.to_string().starts_with("there is no example"));
+    }
+
+    /// Whatever a model file names, the text is that of the page: no file of the machine is read.
+    #[test]
+    fn a_model_file_reads_no_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let secret = folder.path().join("secret.mo");
+        std::fs::write(&secret, "model Secret").unwrap();
+        for named in [
+            secret.display().to_string(),
+            "/etc/passwd".into(),
+            "../x.mo".into(),
+        ] {
+            let mut session = Session::new(None, None, Vec::new());
+            write(
+                &mut session,
+                Some(TEMPLATE),
+                Some(&format!("model = {named:?}\n")),
+            );
+            let state = state(&mut session);
+            assert!(state["own"]["file_error"].is_null(), "{state}");
+            assert!(
+                state["own"]["check"]
+                    .as_str()
+                    .unwrap()
+                    .starts_with("Block: ")
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_place_and_the_records_stay_read() {
+        let mut session = Session::new(None, None, Vec::new());
+        let name = "heated-block".to_string();
+        change(&mut session, Change::Example { name }).unwrap();
+        let text = session.own.clone().unwrap().text;
+        write(&mut session, Some(&text.replace("= g*u", "= gg*u")), None);
+        let wrong = state(&mut session);
+        let error = wrong["own"]["text_error"].as_str().unwrap();
+        assert!(error.contains(": `gg` is not declared") && error.as_bytes()[0].is_ascii_digit());
+        assert!(wrong["own"]["check"].is_null() && wrong["own"]["file_error"].is_null());
+        assert!(wrong["records"][0]["read"].is_object(), "{wrong}");
+        assert!(Work::new(&mut session).is_err());
+        // Of the model file the same.
+        write(
+            &mut session,
+            Some(&text),
+            Some("model = \"a.mo\"\n[known]\nzz = 1.0\n"),
+        );
+        let wrong = state(&mut session);
+        let error = wrong["own"]["file_error"].as_str().unwrap();
+        assert!(
+            error.starts_with("model.toml:3") && error.contains("\"zz\"") || error.contains("zz"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_column_is_written_into_the_file_and_its_comments_stay() {
+        let mut session = Session::new(None, None, Vec::new());
+        write(
+            &mut session,
+            Some(TEMPLATE),
+            Some("model = \"a.mo\"\n[columns]\nu = \"heater\" # the only one\n"),
+        );
+        let choose = |session: &mut Session, signal: &str, column: &str| {
+            let (signal, column) = (signal.to_string(), column.to_string());
+            change(session, Change::Column { signal, column }).unwrap();
+            session.own.clone().unwrap().file
+        };
+        choose(&mut session, "u", "heater [%]");
+        let file = choose(&mut session, "y", "block [degC]");
+        assert_eq!(
+            file,
+            "model = \"a.mo\"\n[columns]\nu = \"heater [%]\" # the only one\ny = \"block [degC]\"\n"
+        );
+        let file = choose(&mut session, "y", "");
+        assert!(!file.contains("block"));
+    }
+
+    #[test]
+    fn curves_errors_and_parameters_are_those_of_compare() {
+        let mut session = Session::new(None, None, Vec::new());
+        let name = "heated-block".to_string();
+        change(&mut session, Change::Example { name }).unwrap();
+        let work = Work::new(&mut session).unwrap();
+        let found = work.compute().unwrap();
+        let [step] = &found.steps;
+        let body = work.body(7, &found);
+        assert_eq!(
+            body["outputs"][0]["rmse"],
+            numbers::significant(step.rmse_per_output["y"], 3)
+        );
+        assert_eq!(
+            body["parameters"].as_array().unwrap().len(),
+            step.parameters.len()
+        );
+        let curve = &body["curves"][0];
+        for series in ["measured", "model", "residual"] {
+            let of = |axis: &str| curve[series][axis].as_array().unwrap().len();
+            assert!(of("x") == of("y") && of("x") > 100);
+        }
+        work.settle(&mut session, &found);
+        assert_eq!(state(&mut session)["own"]["fitted"], true);
+        // Of another text it is not.
+        write(&mut session, Some(TEMPLATE), None);
+        let state = state(&mut session);
+        assert_eq!(
+            (&state["own"]["fitted"], state["own"]["fit"].is_u64()),
+            (&false.into(), true)
+        );
+    }
+}

@@ -1,0 +1,250 @@
+// A model of one's own: its text and its model file as they are typed, what the text holds, and the fit to the records.
+import { $, button, fill, figure, make, plot, table, units } from "./dom.js";
+import * as server from "./server.js";
+
+/** So long after the last key what was typed is sent. */
+const PAUSE = 600;
+// What the plants have and a model of one's own has not.
+const PLANTS = ["model", "missing", "columns", "trail-part", "fit-part", "fails-part", "unknown-part", "parameters-part", "chains-part", "experiment-part"];
+const OWN = ["own", "own-fit-part", "own-parameters-part", "own-check-part"];
+// Box, key of the request, what is wrong with it.
+const TEXTS = [["own-text", "text", "own-text-error"], ["own-file", "file", "own-file-error"]];
+
+let fail = () => {};
+let timer = 0;
+let sending = Promise.resolve();
+let body = null;
+let shown = "";
+let drawn = "";
+
+const change = (what) => server.send("api/own", what);
+const complain = (error) => fail(error.message);
+export const is = (state) => Boolean(state.own);
+
+/** What was typed and is not sent yet. */
+function typed() {
+  const { own } = server.current();
+  const said = {};
+  for (const [box, key] of TEXTS) {
+    if (own && $(box).value !== own[key]) said[key] = $(box).value;
+  }
+  return said;
+}
+
+/** Sends what was typed, one after the other. */
+function flush() {
+  clearTimeout(timer);
+  sending = sending.catch(() => {}).then(() => {
+    const said = typed();
+    return Object.keys(said).length ? change({ do: "write", ...said }) : null;
+  });
+  return sending;
+}
+
+async function fit() {
+  try {
+    await flush();
+    await server.run("compare");
+  } catch (error) {
+    complain(error);
+  }
+}
+
+/** An example in place of what is there, and its fit. */
+export async function example(name) {
+  if (!name) return;
+  const state = server.current();
+  const there = state.records.length || (state.own && state.own.fit);
+  if (there && !confirm(`Put the example ${name} in place of the records and the model of this tab?`)) return;
+  try {
+    forget();
+    await change({ do: "example", name });
+    await server.run("compare");
+  } catch (error) {
+    complain(error);
+  }
+}
+
+/** A dropped text of a model, or the model file of one. */
+export const take = async (file) => {
+  const text = await file.text();
+  forget();
+  await change({ do: "write", [/\.mo$/i.test(file.name) ? "text" : "file"]: text });
+};
+export const isModelFile = (text) => /^\s*model\s*=/m.test(text);
+
+/** What was typed gives way to what comes. */
+function forget() {
+  clearTimeout(timer);
+  document.activeElement?.blur?.();
+  for (const [box] of TEXTS) $(box).dataset.typed = "";
+}
+
+/** Selects the place that a message names, line and column. */
+function find(box, message) {
+  const place = /^(\d+):(\d+):/.exec(message);
+  if (!place) return;
+  const lines = box.value.split("\n");
+  const at = lines.slice(0, Number(place[1]) - 1).reduce((sum, line) => sum + line.length + 1, 0) + Number(place[2]) - 1;
+  box.focus();
+  box.setSelectionRange(at, Math.min(at + 1, box.value.length));
+}
+
+function message(box, at, text) {
+  $(at).hidden = !text;
+  $(box).setAttribute("aria-invalid", String(Boolean(text)));
+  if (!text) return;
+  const place = /^(\d+):(\d+): ?/.exec(text);
+  const words = place ? [`Line ${place[1]}, column ${place[2]}: ${text.slice(place[0].length)} `, button("Show", { className: "quiet" }, () => find($(box), text))] : [text];
+  fill($(at), words);
+}
+
+function columns(state) {
+  const { own, headings } = state;
+  const signals = own.signals || [];
+  $("own-columns").hidden = !headings || !signals.length;
+  if ($("own-columns").hidden || $("own-column-fields").contains(document.activeElement)) return;
+  const split = (text) => (/^(.*?)\s*[[(][^\])]*[\])]$/.exec(text || "") || ["", text || ""])[1];
+  const select = (name, title, column) => {
+    const found = headings.find((h) => h.header === column) || headings.find((h) => h.name === split(column) || h.header === split(column));
+    const box = make("select", { id: `own-column-${name}` },
+      make("option", { value: "" }, "choose…"),
+      headings.map((h) => make("option", { value: h.header, selected: found === h }, h.header)));
+    box.addEventListener("change", () => change({ do: "column", signal: name, column: box.value }).catch(complain));
+    return [make("label", { htmlFor: box.id }, title), box];
+  };
+  const named = ({ role, name, unit, description }) => [role === "input" ? "Input " : "Output ", make("code", {}, name), ...(unit ? [" [", ...units(unit), "]"] : []), description ? make("small", {}, ` ${description}`) : null];
+  fill($("own-column-fields"), select("time", "Time", own.time || state.guessed.time), signals.flatMap((one) => select(one.name, named(one), one.column)));
+  if (state.records.some((one) => one.error)) $("own-columns").open = true;
+}
+
+/** What to do next. */
+export function next(state) {
+  const { own } = state;
+  if (own.text_error) return "mend the text of the model where the message says";
+  if (own.file_error) return "mend the model file where the message says";
+  if (!state.records.some((one) => !one.held_out)) return "drop a record";
+  if (state.records.some((one) => one.error)) return "say which column is what";
+  return own.fitted ? "" : "fit the model";
+}
+
+export async function show(state) {
+  const mine = is(state);
+  document.body.classList.toggle("own", mine);
+  if (!mine) {
+    for (const part of OWN) $(part).hidden = true;
+    $("columns").hidden = false;
+    shown = "";
+    return;
+  }
+  const { own } = state;
+  for (const part of PLANTS) $(part).hidden = true;
+  $("empty").hidden = true;
+  $("own").hidden = false;
+  for (const [box, key, at] of TEXTS) {
+    if (document.activeElement !== $(box) || !$(box).dataset.typed) $(box).value = own[key];
+    message(box, at, own[`${key}_error`]);
+  }
+  if (own.file_error) $("own-file-part").open = true;
+  columns(state);
+  $("own-check-part").hidden = !own.check;
+  $("own-check").textContent = own.check || "";
+  $("own-unused").hidden = !(own.unused || []).length;
+  $("own-unused").textContent = `No part in a fit has ${(own.unused || []).map((one) => `[${one}]`).join(", ")}.`;
+  const ready = !own.text_error && !own.file_error && !state.job && state.records.some((one) => !one.held_out) && state.records.every((one) => one.read);
+  $("own-fit").disabled = !ready;
+  document.querySelector(".see").classList.toggle("stale", own.fit !== null && !own.fitted);
+  const wanted = `${own.fit}`;
+  if (wanted !== shown) {
+    shown = wanted;
+    const found = own.fit === null ? null : await server.fit(own.fit);
+    if (shown !== wanted) return;
+    body = found;
+    words();
+    draw();
+  }
+  for (const part of ["own-fit-part", "own-parameters-part"]) $(part).hidden = !body;
+  fall(state);
+}
+
+/** The errors in the line at the top. */
+function fall({ own }) {
+  const there = body && own.fitted;
+  $("fall").hidden = !there;
+  if (!there) return;
+  const each = body.outputs.flatMap((one, k) => [k ? "; " : "", body.outputs.length > 1 ? `${one.name} ` : "", make("b", {}, one.rmse ?? "–"), " ", ...units(one.unit)]);
+  fill($("fall"), "Simulation error ", each, ".");
+}
+
+function words() {
+  if (!body) return;
+  const held = body.outputs.some((one) => one.test !== null);
+  table($("own-errors"), [["Output"], ["Simulation error", true], ...(held ? [["Held out", true]] : []), ["Unit"]],
+    body.outputs.map((one) => [make("code", {}, one.name), one.rmse ?? "–", ...(held ? [one.test ?? "–"] : []), units(one.unit)]));
+  $("own-weighted").textContent = `Root mean square; the model is simulated, and never corrected by a reading.${body.outputs.length > 1 ? ` Together ${body.weighted} times the noise's innovations.` : ""}`;
+  table($("own-parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
+    body.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? (one.known ? "known" : "–"), units(one.unit)]));
+  $("own-starts").textContent = `${body.starts_agree} of ${body.starts} starts ended in this minimum. –: the data do not determine it, or it sits at a bound.`;
+  fill($("own-untold"), body.not_determined.map((of) => make("p", { className: "warning" },
+    of.includes(",") ? `These records do not tell ${of} one without the other: give one of them under [known], or a [prior].` : `${of} leaves no trace in these records: give it under [known], or excite the plant more.`)));
+}
+
+const inUnit = (name, unit) => plots.named(plots.plain(name), plots.pretty(unit));
+
+function curves(one) {
+  const c = plots.theme();
+  const line = (of, name, color, width, axis = "y") => ({ x: of.x, y: of.y, name, yaxis: axis, mode: "lines", line: { color, width }, connectgaps: false });
+  const points = { ...line(one.measured, "measured", c.measured, 1), mode: "markers", marker: { color: c.measured, size: 3, opacity: 0.7 } };
+  return {
+    data: [points, line(one.model, "model", c.steps[0], 2), { ...line(one.residual, "measured minus model", c.steps[1], 1, "y2"), showlegend: false }],
+    layout: plots.layout(380, {
+      showlegend: true,
+      xaxis: plots.axis("time [s]", { anchor: "y2" }),
+      yaxis: plots.axis(inUnit(one.output, one.unit), { domain: [0.36, 1] }),
+      yaxis2: plots.axis("residual", { domain: [0, 0.27] }),
+    }),
+  };
+}
+
+export function draw() {
+  if (!body || !window.Plotly) return;
+  const wanted = `${body.id}`;
+  if (drawn !== wanted) {
+    drawn = wanted;
+    const several = new Set(body.curves.map((one) => one.record)).size > 1;
+    $("own-figures").replaceChildren(...body.curves.map((one, k) => figure(`own-${k}`, several ? `${one.output}, ${one.record}` : one.output)));
+  }
+  body.curves.forEach((one, k) => plot($(`plot-own-${k}`), `own-${k}`, curves(one)));
+}
+
+export function start(examples, told) {
+  fail = told;
+  for (const id of ["example", "own-example"]) {
+    fill($(id), make("option", { value: "" }, "try an example…"), examples.map((name) => make("option", { value: name }, name)));
+    $(id).addEventListener("change", async () => {
+      const name = $(id).value;
+      $(id).value = "";
+      await example(name);
+    });
+  }
+  for (const [box] of TEXTS) {
+    $(box).addEventListener("input", () => {
+      $(box).dataset.typed = "yes";
+      clearTimeout(timer);
+      timer = setTimeout(() => flush().catch(complain), PAUSE);
+    });
+    $(box).addEventListener("blur", () => flush().then(() => { $(box).dataset.typed = ""; }, complain));
+  }
+  $("own-load").addEventListener("change", async () => {
+    try {
+      for (const file of $("own-load").files) await take(file);
+    } catch (error) {
+      complain(error);
+    }
+    $("own-load").value = "";
+  });
+  $("own-fit").addEventListener("click", fit);
+  $("begin-own").addEventListener("click", () => change({ do: "begin" }).catch(complain));
+  $("begin-own-2").addEventListener("click", () => change({ do: "begin" }).catch(complain));
+  $("own-end").addEventListener("click", () => change({ do: "end" }).catch(complain));
+}

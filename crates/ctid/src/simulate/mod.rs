@@ -1,0 +1,177 @@
+//! `ctid simulate`: a model on inputs that nobody has measured its outputs for.
+//!
+//! | what | where |
+//! |---|---|
+//! | a model of the user's own | `own_model/simulate.rs` |
+//! | one of the plants | `plant.rs` |
+//! | the inputs, read and checked | `inputs.rs` |
+//! | what a person reads | `text.rs` |
+//!
+//! `ctid export` shares its time column and its fits: `curves.rs`, `plant_export.rs`, `own_model/export.rs`.
+
+mod curves;
+mod inputs;
+mod plant;
+mod plant_export;
+mod text;
+mod time_column;
+
+use greybox::FitUncertainty;
+use serde::Serialize;
+
+pub(crate) use self::curves::{Curves, FittedRecord};
+pub(crate) use self::inputs::{Inputs, begins_with_readings, first_readings, read_inputs};
+pub(crate) use self::plant::simulate as simulate_plant;
+pub(crate) use self::plant_export::export as export_plant;
+pub(crate) use self::text::said;
+pub(crate) use self::time_column::TimeColumn;
+use crate::output::Found;
+
+/// The band holds with this probability.
+pub(crate) const LEVEL: f64 = 0.95;
+/// Initial states are fitted to so many first readings of each output, as those of a held-out record are.
+pub(crate) const FIRST_READINGS: usize = 5;
+
+/// Half the widths of the bands of an output \[its unit\].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Band {
+    /// Of the model's output, from the uncertainty of parameters and initial states, row by row.
+    pub output: Vec<f64>,
+    /// Of a reading, whose noise comes to that.
+    pub reading: Vec<f64>,
+}
+
+/// A simulated output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct SimulatedOutput {
+    /// The column that holds it where it is measured, without its unit.
+    pub name: String,
+    /// Its unit; empty where nobody says.
+    pub unit: String,
+    /// Row by row.
+    pub mean: Vec<f64>,
+    /// Where the model was fitted, and the records determine its parameters.
+    pub band: Option<Band>,
+    /// What was measured, NaN where nothing was.
+    #[serde(skip)]
+    pub measured: Vec<f64>,
+}
+
+/// Where an initial state comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum StateSource {
+    /// Fitted to the first readings.
+    Readings,
+    /// The model's text.
+    Text,
+    /// The plant rests under the first inputs.
+    Rest,
+}
+
+/// What `ctid simulate` finds.
+#[derive(Debug, Serialize)]
+pub(crate) struct Simulated {
+    pub schema: u32,
+    /// The model.
+    pub model: String,
+    /// The record of its inputs.
+    pub inputs: String,
+    /// The records that it was fitted to; none where its values stand in its text.
+    pub fitted_to: Vec<String>,
+    /// The parameters' names, values and standard errors.
+    pub parameters: Vec<(String, f64, Option<f64>)>,
+    /// The initial states' names and values.
+    pub states: Vec<(String, f64)>,
+    /// Where they come from.
+    pub states_from: StateSource,
+    /// The probability with which each band holds.
+    pub level: f64,
+    pub outputs: Vec<SimulatedOutput>,
+    /// What should be known before it is used.
+    pub warnings: Vec<String>,
+    /// Length of the record \[s\].
+    #[serde(skip)]
+    pub length: f64,
+    #[serde(skip)]
+    pub time: TimeColumn,
+    /// The bands of readings are written too.
+    #[serde(skip)]
+    pub readings: bool,
+}
+
+impl Band {
+    /// Of one output, from the standard errors of its mean.
+    pub fn of(errors: &[f64], known: &FitUncertainty, output: usize) -> Self {
+        let quantile = known.quantile(LEVEL);
+        let noise = known.reading[output];
+        Self {
+            output: errors.iter().map(|error| quantile * error).collect(),
+            reading: errors
+                .iter()
+                .map(|error| quantile * error.hypot(noise))
+                .collect(),
+        }
+    }
+}
+
+/// A name with its unit, as a header has it.
+pub(crate) fn header(name: &str, unit: &str) -> String {
+    match unit {
+        "" => name.to_string(),
+        unit => format!("{name} [{unit}]"),
+    }
+}
+
+/// Rows of cells as CSV.
+pub(crate) fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        // Into memory nothing fails.
+        let _ = writer.write_record(&row);
+    }
+    let bytes = writer.into_inner().unwrap_or_default();
+    String::from_utf8(bytes).unwrap_or_default()
+}
+
+/// A number as a cell; nothing where there is none.
+pub(crate) fn cell(value: f64) -> String {
+    if value.is_nan() {
+        String::new()
+    } else {
+        format!("{value:?}")
+    }
+}
+
+impl Found for Simulated {
+    fn record(&self) -> Option<String> {
+        let mut head = vec![self.time.header.clone()];
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        for output in &self.outputs {
+            let mut column = |name: &str, values: Vec<f64>| {
+                let name = format!("{}{name}", output.name);
+                head.push(header(&name, &output.unit));
+                columns.push(values);
+            };
+            column("", output.mean.clone());
+            let Some(band) = &output.band else {
+                continue;
+            };
+            let around = |half: &[f64], sign: f64| {
+                let both = output.mean.iter().zip(half);
+                both.map(|(mean, half)| mean + sign * half).collect()
+            };
+            column(" lower", around(&band.output, -1.0));
+            column(" upper", around(&band.output, 1.0));
+            if self.readings {
+                column(" reading lower", around(&band.reading, -1.0));
+                column(" reading upper", around(&band.reading, 1.0));
+            }
+        }
+        let rows = self.time.cells.iter().enumerate().map(|(k, time)| {
+            let values = columns.iter().map(|column| cell(column[k]));
+            std::iter::once(time.clone()).chain(values).collect()
+        });
+        Some(csv_text(std::iter::once(head).chain(rows)))
+    }
+}

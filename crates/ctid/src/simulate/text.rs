@@ -1,0 +1,135 @@
+//! What a person reads of a simulation.
+
+use super::{Simulated, SimulatedOutput, StateSource, header};
+use crate::look::{Look, Side, table};
+use crate::numbers;
+use crate::plot::{self, Curve, plot};
+
+/// The whole of it.
+pub(crate) fn said(simulated: &Simulated, look: Look) -> String {
+    let title = format!("{} on the inputs of {}", simulated.model, simulated.inputs);
+    let mut text = format!("{}\n", look.heading(&title));
+    let values = match &simulated.fitted_to[..] {
+        [] => "with the values of its text, which are taken as they are: no band without --fit"
+            .to_string(),
+        records => format!("fitted to {}", records.join(", ")),
+    };
+    text += &look.paragraph("  ", &values);
+    text += &look.paragraph("  ", &states(simulated));
+    text.push('\n');
+    for output in &simulated.outputs {
+        text += &drawn(output, simulated.length, look);
+    }
+    text += &format!("{}\n", look.heading("Simulated outputs"));
+    let head = [
+        "",
+        "first",
+        "last",
+        "lowest",
+        "highest",
+        "95 % band, widest",
+    ];
+    let mut rows = vec![head.map(|name| look.faint(name)).to_vec()];
+    for output in &simulated.outputs {
+        let (low, high) = plot::limits([output.mean.as_slice()]);
+        let number = |value: f64| numbers::significant(value, 4);
+        let ends = [output.mean.first(), output.mean.last()];
+        let [first, last] = ends.map(|end| number(end.copied().unwrap_or(f64::NAN)));
+        let band = output.band.as_ref().map(|band| {
+            let widest = |half: &[f64]| {
+                numbers::significant(half.iter().fold(0.0, |m: f64, v| m.max(*v)), 2)
+            };
+            format!(
+                "± {}, of a reading ± {}",
+                widest(&band.output),
+                widest(&band.reading)
+            )
+        });
+        rows.push(vec![
+            header(&output.name, &output.unit),
+            first,
+            last,
+            number(low),
+            number(high),
+            band.unwrap_or_else(|| "none".to_string()),
+        ]);
+    }
+    let sides = [
+        Side::Left,
+        Side::Right,
+        Side::Right,
+        Side::Right,
+        Side::Right,
+        Side::Left,
+    ];
+    for line in table(&sides, &rows) {
+        text += &format!("  {}\n", line.trim_end());
+    }
+    if !simulated.fitted_to.is_empty() {
+        text += &format!("\n{}\n", look.heading("Parameters, with standard errors"));
+        let rows: Vec<Vec<String>> = simulated.parameters.iter().map(parameter).collect();
+        for line in table(&[Side::Left, Side::Right, Side::Left], &rows) {
+            text += &format!("  {}\n", line.trim_end());
+        }
+    }
+    for warning in &simulated.warnings {
+        let words = format!("warning: {warning}");
+        text += &(look.warning(look.paragraph("", &words).trim_end()) + "\n");
+    }
+    text
+}
+
+fn parameter((name, value, error): &(String, f64, Option<f64>)) -> Vec<String> {
+    let (value, error) = numbers::value_and_error(*value, *error);
+    let error = error.map_or("(known, at a bound, or not determined)".to_string(), |e| {
+        format!("± {e}")
+    });
+    vec![name.clone(), value, error]
+}
+
+fn states(simulated: &Simulated) -> String {
+    let each = simulated.states.iter();
+    let each: Vec<String> = each
+        .map(|(name, value)| format!("{name} = {}", numbers::significant(*value, 4)))
+        .collect();
+    let from = match simulated.states_from {
+        StateSource::Readings => "fitted to the first readings",
+        StateSource::Text => "as the text starts them",
+        StateSource::Rest => "at rest under the first inputs",
+    };
+    match &each[..] {
+        [] => "no states".to_string(),
+        [one] => format!("initial state {from}: {one}"),
+        several => format!("initial states {from}: {}", several.join(", ")),
+    }
+}
+
+fn drawn(output: &SimulatedOutput, length: f64, look: Look) -> String {
+    let mut curves = Vec::new();
+    let measured = output.measured.iter().any(|y| !y.is_nan());
+    if measured {
+        curves.push(Curve {
+            values: &output.measured,
+            colour: plot::MEASURED,
+        });
+    }
+    curves.push(Curve {
+        values: &output.mean,
+        colour: plot::MODEL,
+    });
+    let limits = if measured {
+        plot::limits([output.mean.as_slice(), &output.measured])
+    } else {
+        plot::limits([output.mean.as_slice()])
+    };
+    let what = if measured {
+        "measured and model"
+    } else {
+        "model"
+    };
+    format!(
+        "{} {what}\n{}\n",
+        look.heading(&format!("{}:", header(&output.name, &output.unit))),
+        plot(&curves, (0.0, length), limits, 9, look)
+    )
+}

@@ -1,0 +1,61 @@
+//! The time of rows as a file writes it that reads back as the same.
+
+use std::path::Path;
+
+use ct_signals::{Columns, Heading, LARGEST_RECORD, Record, csv_header, read_file};
+
+use crate::Error;
+
+/// A column of times.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct TimeColumn {
+    /// Its header.
+    pub header: String,
+    /// Its cells.
+    pub cells: Vec<String>,
+}
+
+impl TimeColumn {
+    /// The times of a record that was read from a file with such columns: dates with their offset from UTC, or numbers in the unit of the
+    /// column.
+    ///
+    /// # Errors
+    /// Where the file cannot be read any more.
+    pub fn of(path: &Path, columns: &Columns, record: &Record) -> Result<Self, Error> {
+        let named = match &columns.time {
+            Some(_) => columns.clone(),
+            None => {
+                let content = read_file(path, LARGEST_RECORD)?;
+                let headings = csv_header(&path.display().to_string(), &content)?;
+                Columns {
+                    time: Columns::guessed(&headings).time,
+                    ..Columns::default()
+                }
+            }
+        };
+        let (header, seconds) = named.time_header();
+        if let Some(calendar) = &record.calendar {
+            let date = |time: &f64| {
+                let instant = calendar.start.after(*time);
+                let ahead = calendar.zone.seconds_ahead(instant) / 60;
+                let sign = if ahead < 0 { '-' } else { '+' };
+                let (hours, minutes) = (ahead.abs() / 60, ahead.abs() % 60);
+                format!("{}{sign}{hours:02}:{minutes:02}", calendar.at(*time))
+            };
+            return Ok(Self {
+                header: Heading::of(&header).name,
+                cells: record.time.iter().map(date).collect(),
+            });
+        }
+        let number = |time: &f64| {
+            // Without the last digits, which are an accident of the conversion.
+            let value = time / seconds;
+            let value = format!("{value:.12e}").parse().unwrap_or(value);
+            format!("{value}")
+        };
+        Ok(Self {
+            header,
+            cells: record.time.iter().map(number).collect(),
+        })
+    }
+}

@@ -1,0 +1,80 @@
+//! The acceptance test: which effects of a set stay when the noise may explain what they explain.
+
+use estimation::{Fit, Noise, coloured};
+use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::Error;
+use crate::node::{Context, FINE, Node};
+
+/// Largest order of the noise model.
+pub(crate) const NOISE_ORDER: usize = 6;
+/// An effect is accepted where the criterion falls by more than this ...
+pub(crate) const BIC_MARGIN: f64 = 6.0;
+/// ... and where chance would let so large a fall happen less often than this, counted over all candidates and their starts.
+pub(crate) const FALSE_CLAIM: f64 = 0.003;
+
+impl Context<'_> {
+    /// Whether a set lowers the deviance by more than chance would against one that lacks some of its effects: chi-square, corrected
+    /// (Bonferroni) for all candidates and starts that were looked at.
+    pub fn beyond_chance(&self, gained: (&Node, &Fit), lacking: (&Node, &Fit)) -> bool {
+        let new = gained
+            .0
+            .added
+            .iter()
+            .filter(|i| !lacking.0.added.contains(i));
+        let mut freedom = 0;
+        let mut looks = 1.0;
+        for &i in new {
+            let candidate = &self.candidates[i];
+            freedom += candidate.fitted().max(1);
+            looks *= self.candidates.len() as f64 * (candidate.starts().len() as f64).max(1.0);
+        }
+        let freedom = freedom.max(gained.1.parameters.saturating_sub(lacking.1.parameters));
+        let fall = lacking.1.deviance - gained.1.deviance;
+        let chance =
+            ChiSquared::new(freedom.max(1) as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
+        chance * looks < FALSE_CLAIM
+    }
+
+    /// Takes out, one by one, what the noise explains as well, first what is worth least.
+    pub fn confirm(&self, mut node: Node, base: &Node, noise: &Noise) -> Result<Node, Error> {
+        loop {
+            let lacking = self.each_lacking(&node, base, noise);
+            let doubtful = lacking.into_iter().filter(|lacking| {
+                node.gain_over(lacking) <= BIC_MARGIN
+                    || !self.beyond_chance((&node, &node.fit), (lacking, &lacking.fit))
+            });
+            let Some(least) = doubtful.min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())) else {
+                return Ok(node);
+            };
+            node = least;
+        }
+    }
+
+    /// The set without each of the effects that the search added.
+    pub fn each_lacking(&self, node: &Node, base: &Node, noise: &Noise) -> Vec<Node> {
+        (base.added.len()..node.added.len())
+            .into_par_iter()
+            .filter_map(|position| self.without(node, position, noise, FINE).ok())
+            .collect()
+    }
+
+    /// The fit of a set with the noise model of its own residual.
+    pub fn in_own_noise(&self, node: &Node) -> Result<Fit, Error> {
+        let setup = self.setup(&node.model)?;
+        Ok(coloured(&setup, node.fit.clone(), NOISE_ORDER, FINE)?)
+    }
+
+    /// The noise model of a set's residual, with a memory of at most a part of the longest record: a root near one takes every slow effect
+    /// for noise.
+    pub fn noise_of(&self, node: &Node) -> Result<Noise, Error> {
+        /// Noise whose memory is longer has left fewer than some ten independent samples.
+        const LONGEST_MEMORY: f64 = 1.0 / 15.0;
+        let setup = self.setup(&node.model)?;
+        let longest = self.problem.records.iter().map(|r| r.len()).max();
+        let memory = LONGEST_MEMORY * longest.unwrap_or(1) as f64;
+        let noise = estimation::noise_of(&setup, &node.fit, NOISE_ORDER)?;
+        Ok(noise.with_memory_at_most(memory))
+    }
+}

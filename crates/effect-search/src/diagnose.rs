@@ -1,0 +1,392 @@
+//! From a model and records to a verdict.
+//!
+//! 1. The believed model is fitted in white noise, from many starts; the candidates follow from what it visits.
+//! 2. A search in white noise finds a rich set; the noise model is that of its residual. Where it is not white, the search is repeated in
+//!    its metric.
+//! 3. Of the best set the effects stay that the acceptance test asks for, in one metric and with the noise model of each model's own
+//!    residual.
+//! 4. Residual tests of what it leaves decide between the verdicts; groups hold what cannot be told apart.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ct_model::Model;
+use ct_model::effects::{Candidate, Visited, candidates, own_candidates};
+use ct_signals::ArModel;
+use estimation::{Fit, Noise};
+use greybox::{FitOptions, ModelSetup, Robust, weighted_rms};
+
+use crate::accept::{BIC_MARGIN, NOISE_ORDER};
+use crate::node::{Context, FINE, Node};
+use crate::problem::{Limit, Options, Problem};
+use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
+use crate::search::Grown;
+use crate::{Error, held_out};
+
+/// Shares of the time limit after which the phases end.
+const SEARCHED_WHITE: f64 = 0.35;
+const SEARCHED: f64 = 0.75;
+/// Effects that leave more than noise are a part of the answer where they explain this share of the error above the noise.
+const PART: f64 = 0.38;
+/// Noise models whose coefficients differ by less are one.
+const SAME_NOISE: f64 = 0.05;
+
+/// How far the computation is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// What is being done.
+    pub phase: &'static str,
+}
+
+/// Searches the candidates for what the believed model is missing.
+///
+/// # Errors
+/// Where the records, the model or the fit do not allow it.
+pub fn diagnose(
+    problem: &Problem,
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Diagnosis, Error> {
+    let tell = |phase| progress(Progress { phase });
+    tell("fitting the model");
+    let limit = Limit::new(options);
+    let (context, base) = begin(problem, options, limit)?;
+    tell("searching the effects");
+    let white = Noise::white(problem.spec.outputs.len());
+    let by_error = context.grow(base.clone(), &white, options.max_effects, SEARCHED_WHITE)?;
+    let noise = context.noise_of(&by_error.best)?;
+    let (grown, noise) = in_metric(&context, by_error, noise, options)?;
+    tell("confirming");
+    let mut confirmed = context.confirm(grown.best.clone(), &grown.base, &noise)?;
+    if confirmed.added.len() > grown.base.added.len() {
+        // Each model with the noise model of its own residual: what coloured noise explains needs no effect.
+        let own = context.in_own_noise(&confirmed)?;
+        let bare = context.in_own_noise(&grown.base)?;
+        let needed = bare.bic() - own.bic() > BIC_MARGIN
+            && context.beyond_chance((&confirmed, &own), (&grown.base, &bare));
+        if !needed {
+            confirmed = grown.base.clone();
+        }
+    }
+    let own = context.in_own_noise(&confirmed)?;
+    let left = context.left(&confirmed, &own)?;
+    tell("telling apart");
+    let found = confirmed.added.len() > grown.base.added.len();
+    let share = found.then(|| explained(&grown.base, &confirmed, &own));
+    let verdict_of = |groups: &[Vec<usize>]| match (found, &left, share) {
+        (false, None, _) => Verdict::Adequate,
+        (false, Some(_), _) => Verdict::Unexplained,
+        (true, Some(_), Some(share)) if share >= PART => Verdict::Partial,
+        (true, Some(_), _) => Verdict::Unexplained,
+        (true, None, _) if groups.iter().any(|group| group.len() > 1) => Verdict::Undecided,
+        (true, None, _) => Verdict::Effect,
+    };
+    if verdict_of(&[]) == Verdict::Unexplained {
+        confirmed = grown.base.clone();
+    }
+    let groups = context.groups(&confirmed, &grown.base, &noise)?;
+    let verdict = verdict_of(&groups);
+    let last = if verdict == Verdict::Unexplained {
+        context.in_own_noise(&base)?
+    } else {
+        own
+    };
+    report(
+        &context, &grown, &base, &confirmed, &last, verdict, groups, left, share,
+    )
+}
+
+/// The believed model fitted, and the candidates.
+fn begin<'a>(
+    problem: &'a Problem,
+    options: &Options<'a>,
+    limit: Limit<'a>,
+) -> Result<(Context<'a>, Node), Error> {
+    let mut context = Context {
+        problem,
+        candidates: Vec::new(),
+        limit,
+    };
+    let fit_options = FitOptions {
+        starts: options.starts,
+        seed: options.seed,
+        ..FitOptions::default()
+    };
+    let model = Arc::new(Model::new(problem.spec.clone()));
+    let (fit, visited) = {
+        let setup = context.setup(&model)?;
+        let fit = setup.fit(&fit_options)?;
+        let visited = visited(problem, &setup, &fit)?;
+        (fit, visited)
+    };
+    let mut all = candidates(&problem.spec, &visited);
+    let own: Vec<Candidate> = own_candidates(&problem.spec, &problem.candidates)?;
+    all.extend(own);
+    context.candidates = all;
+    let bare = Node {
+        added: Vec::new(),
+        model,
+        fit,
+    };
+    if problem.effects.is_empty() {
+        return Ok((context, bare));
+    }
+    // The effects of the model file, one after the other: each from its best start.
+    let white = Noise::white(problem.spec.outputs.len());
+    let mut node = bare;
+    for id in &problem.effects {
+        let Some(i) = context.candidates.iter().position(|c| c.id == *id) else {
+            return Err(Error::UnknownEffect {
+                id: id.clone(),
+                near: String::new(),
+            });
+        };
+        if let Some(trial) = context.trial(&node, i, &white)? {
+            let mut added = node.added.clone();
+            added.push(i);
+            node = context.fitted(added, trial.model, trial.starts, &white, FINE)?;
+        }
+    }
+    Ok((context, node))
+}
+
+/// What the fitted model visits in all records.
+fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
+    let (count, states) = (setup.parameter_count(), problem.spec.states.len());
+    let mut all: Option<Visited> = None;
+    for (r, record) in problem.records.iter().enumerate() {
+        let time = setup.model_time(r);
+        let inputs: Vec<Vec<f64>> = (0..record.len())
+            .map(|k| record.inputs.iter().map(|input| input.values[k]).collect())
+            .collect();
+        let initial = &fit.x[count + r * states..count + (r + 1) * states];
+        let own = Visited::of_simulation(
+            &problem.spec,
+            (&fit.x[..count], initial),
+            &time,
+            &inputs,
+            &problem.time_unit_name,
+        )?;
+        match &mut all {
+            None => all = Some(own),
+            Some(all) => all.join(&own),
+        }
+    }
+    all.ok_or_else(|| greybox::Error::NoRecord.into())
+}
+
+/// The search in the metric of a noise model, where that is not white.
+fn in_metric(
+    context: &Context,
+    by_error: Grown,
+    noise: Noise,
+    options: &Options,
+) -> Result<(Grown, Noise), Error> {
+    if noise.order() == 0 || context.limit.passed(SEARCHED_WHITE) {
+        return Ok((by_error, noise));
+    }
+    let begin = context.refitted(&by_error.base, &noise, FINE);
+    let Ok(begin) = begin else {
+        return Ok((by_error, Noise::white(noise.outputs())));
+    };
+    let grown = context.grow(begin, &noise, options.max_effects, SEARCHED)?;
+    // The rich set of white noise may be the better one here too.
+    let other = context.refitted(&by_error.best, &noise, FINE);
+    let mut grown = grown;
+    if let Ok(other) = other
+        && other.fit.bic() < grown.best.fit.bic()
+    {
+        grown.best = other;
+    }
+    let own = context.noise_of(&grown.best)?;
+    if own.order() > 0 && own.difference(&noise) > SAME_NOISE && !context.limit.passed(SEARCHED) {
+        let base = context.refitted(&grown.base, &own, FINE);
+        let best = context.refitted(&grown.best, &own, FINE);
+        if let (Ok(base), Ok(best)) = (base, best) {
+            (grown.base, grown.best) = (base, best);
+            return Ok((grown, own));
+        }
+    }
+    Ok((grown, noise))
+}
+
+/// The share of the mean squared error above the noise that a set explains, outputs in units of their noise.
+fn explained(base: &Node, last: &Node, own: &Fit) -> f64 {
+    let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+    let squares = |fit: &Fit| -> f64 {
+        let each = fit.rmse.iter().zip(&floors);
+        each.map(|(rmse, floor)| (rmse / floor.max(f64::MIN_POSITIVE)).powi(2))
+            .sum::<f64>()
+            / floors.len() as f64
+    };
+    let (before, after) = (squares(&base.fit), squares(&last.fit));
+    if before <= 1.0 {
+        return 0.0;
+    }
+    ((before - after.max(1.0)) / (before - 1.0)).clamp(0.0, 1.0)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn report(
+    context: &Context,
+    grown: &Grown,
+    base: &Node,
+    last: &Node,
+    own: &Fit,
+    verdict: Verdict,
+    groups: Vec<Vec<usize>>,
+    left: Option<crate::Left>,
+    share: Option<f64>,
+) -> Result<Diagnosis, Error> {
+    let problem = context.problem;
+    let outputs = &problem.records[0].outputs;
+    let floors: Vec<f64> = own.noise.iter().map(ArModel::stationary_std).collect();
+    // The noise that is known by now: the believed model in its metric, unless what remains is no noise.
+    let metric = if left.is_none() && own.noise.order() > 0 {
+        own.noise.clone()
+    } else {
+        Noise::white(outputs.len())
+    };
+    let ladder = ladder(context, base, last, &metric)?;
+    let steps = ladder
+        .iter()
+        .map(|node| step(context, base, node, &metric, &floors))
+        .collect::<Result<Vec<_>, Error>>()?;
+    let named = |values: &[f64]| -> BTreeMap<String, f64> {
+        let names = outputs.iter().map(|y| y.name.clone());
+        names.zip(values.iter().copied()).collect()
+    };
+    let singles: Vec<Single> = grown
+        .singles
+        .iter()
+        .filter_map(|node| {
+            let &i = node.added.last()?;
+            Some(Single {
+                effect: context.candidates[i].id.clone(),
+                bic_gain: node.gain_over(&grown.base),
+                rmse_per_output: named(&node.fit.rmse),
+            })
+        })
+        .collect();
+    let mut ranked: Vec<String> = Vec::new();
+    if verdict == Verdict::Adequate {
+        ranked.push("none".to_string());
+    }
+    ranked.extend(singles.iter().map(|single| single.effect.clone()));
+    let noise = outputs.iter().zip(own.noise.iter());
+    let noise = noise.map(|(output, noise)| NoiseFloor {
+        output: output.name.clone(),
+        level: noise.stationary_std(),
+        innovation: noise.sigma(),
+        coefficients: noise.coefficients().to_vec(),
+    });
+    // In the order of the ladder.
+    let order = &ladder.last().map_or(&last.added, |node| &node.added)[base.added.len()..];
+    let groups: Vec<Vec<String>> = order
+        .iter()
+        .filter_map(|own| groups.iter().find(|group| group.first() == Some(own)))
+        .map(|group| context.ids(group))
+        .collect();
+    Ok(Diagnosis {
+        schema: 2,
+        model: problem.spec.name.clone(),
+        verdict,
+        effects: context.ids(order),
+        groups,
+        ranked,
+        steps,
+        share: share.filter(|_| !order.is_empty()),
+        left,
+        noise: noise.collect(),
+        singles,
+        candidates: context.candidates.len(),
+        cut_short: context.limit.passed(SEARCHED),
+        seconds: context.limit.seconds(),
+    })
+}
+
+/// The believed model, then the effects one by one, each time the one that lowers the error most.
+fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<Vec<Node>, Error> {
+    let mut nodes = vec![context.subset(last, base.added.clone(), noise, FINE)?];
+    // From where the believed model was fitted, too.
+    if let Ok(again) = context.refitted(base, noise, FINE)
+        && again.fit.cost < nodes[0].fit.cost
+    {
+        nodes[0] = again;
+    }
+    nodes[0].fit = nodes[0].fit.clone().continuing(&base.fit);
+    let mut rest: Vec<usize> = last.added[base.added.len()..].to_vec();
+    while !rest.is_empty() {
+        let begun = nodes[nodes.len() - 1].added.clone();
+        let mut fits: Vec<Node> = rest
+            .iter()
+            .filter_map(|&i| {
+                let mut added = begun.clone();
+                added.push(i);
+                context.subset(last, added, noise, FINE).ok()
+            })
+            .collect();
+        fits.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+        if fits.is_empty() {
+            break;
+        }
+        let next = fits.swap_remove(0);
+        rest.retain(|i| !next.added[begun.len()..].contains(i));
+        nodes.push(next);
+    }
+    Ok(nodes)
+}
+
+fn step(
+    context: &Context,
+    base: &Node,
+    node: &Node,
+    metric: &Noise,
+    floors: &[f64],
+) -> Result<Step, Error> {
+    let problem = context.problem;
+    let setup = context.setup(&node.model)?;
+    let outputs = &problem.records[0].outputs;
+    let named = |values: &[f64]| -> BTreeMap<String, f64> {
+        let names = outputs.iter().map(|y| y.name.clone());
+        names.zip(values.iter().copied()).collect()
+    };
+    let errors = if metric.order() > 0 {
+        node.fit.std_errors()
+    } else {
+        let robust: Result<Robust, _> = estimation::robust(&setup, &node.fit, NOISE_ORDER);
+        robust.map_or_else(|_| node.fit.std_errors(), |robust| robust.std_errors)
+    };
+    let spec = node.spec();
+    let units = spec.parameters.iter().map(|p| p.about.unit.clone());
+    let states = problem
+        .records
+        .iter()
+        .flat_map(|_| spec.states.iter().map(|s| s.about.unit.clone()));
+    let entries = setup.names().iter().zip(units.chain(states)).enumerate();
+    let parameters = entries.map(|(i, (name, unit))| Estimate {
+        name: name.clone(),
+        value: node.fit.x[i],
+        std_error: errors[i],
+        unit,
+        known: !setup.free().contains(&i),
+    });
+    let test = held_out::errors(&setup, &node.fit, &problem.test)?;
+    let added = node.added.len() > base.added.len();
+    Ok(Step {
+        added: added.then(|| {
+            context.candidates[node.added[node.added.len() - 1]]
+                .id
+                .clone()
+        }),
+        rmse: (outputs.len() == 1).then(|| node.fit.rmse[0]),
+        rmse_per_output: named(&node.fit.rmse),
+        rmse_test_per_output: test.map(|rmse| named(&rmse)),
+        weighted_rmse: weighted_rms(&node.fit.rmse, floors, &node.fit.samples_per_output),
+        bic: node.fit.bic(),
+        starts: node.fit.starts,
+        starts_agree: node.fit.agree,
+        simulated: setup.simulate(&node.fit.x).unwrap_or_default(),
+        parameters: parameters.collect(),
+    })
+}

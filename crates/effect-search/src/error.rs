@@ -1,0 +1,33 @@
+//! What can go wrong in a search.
+
+/// What can go wrong in a search.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The data or the noise model.
+    #[error(transparent)]
+    Signals(#[from] ct_signals::Error),
+    /// The fit.
+    #[error(transparent)]
+    Fit(#[from] greybox::Error),
+    /// Least squares.
+    #[error(transparent)]
+    Estimation(#[from] estimation::Error),
+    /// A candidate of the user's own.
+    #[error("candidates.{0}")]
+    Own(#[from] ct_model::effects::OwnError),
+    /// Effects that do not go together.
+    #[error(transparent)]
+    Apply(#[from] ct_model::effects::ApplyError),
+    /// The simulation of the fitted model.
+    #[error(transparent)]
+    Simulation(#[from] ct_model::NoSolution),
+    /// An effect of the model file that the model cannot have.
+    #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can{near}")]
+    UnknownEffect {
+        /// Its identifier.
+        id: String,
+        /// A similar one, in words.
+        near: String,
+    },
+}

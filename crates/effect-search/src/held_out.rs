@@ -1,0 +1,45 @@
+//! Errors on held-out records: their initial states are fitted on the first samples, all else stays, and the rest is scored.
+
+use ct_signals::Record;
+use estimation::Fit;
+use greybox::{FitOptions, ModelSetup};
+
+use crate::Error;
+
+/// Samples on which the initial states of a held-out record are fitted, and which are not scored.
+const STATE_ROWS: usize = 5;
+
+/// Simulation error of each output on held-out records; `None` without any.
+pub(crate) fn errors(
+    setup: &ModelSetup,
+    fit: &Fit,
+    test: &[Record],
+) -> Result<Option<Vec<f64>>, Error> {
+    if test.is_empty() {
+        return Ok(None);
+    }
+    let outputs = fit.rmse.len();
+    let mut sums = vec![(0.0, 0_usize); outputs];
+    for record in test {
+        let whole = [record.clone()];
+        let first = [record.rows(0..STATE_ROWS.min(record.len()))];
+        let states = setup
+            .held_out(&first, &fit.x)?
+            .fit_states(&FitOptions::default())?;
+        let model = setup.held_out(&whole, &fit.x)?.simulate(&states);
+        for (o, sum) in sums.iter_mut().enumerate() {
+            let Some(model) = &model else {
+                sum.0 = f64::NAN;
+                continue;
+            };
+            let measured = record.outputs[o].values.iter();
+            let pairs = measured.zip(&model[o]).skip(STATE_ROWS);
+            for (y, m) in pairs.filter(|(y, _)| !y.is_nan()) {
+                sum.0 += (y - m).powi(2);
+                sum.1 += 1;
+            }
+        }
+    }
+    let rms = |(sum, n): (f64, usize)| (sum / n.max(1) as f64).sqrt();
+    Ok(Some(sums.into_iter().map(rms).collect()))
+}

@@ -1,0 +1,120 @@
+//! What the residual of a set shows that noise does not.
+
+use ct_signals::residual_tests::prewhitened_input_test;
+use estimation::Fit;
+use serde::Serialize;
+
+use crate::Error;
+use crate::node::{Context, Node};
+use crate::residual::{instant, level_p, of_command, period, standardised};
+
+/// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
+const NOT_NOISE: f64 = 1e-4;
+
+/// What a residual shows that noise does not.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Left {
+    /// It depends on an input.
+    Input {
+        /// The input.
+        input: String,
+        /// The output.
+        output: String,
+    },
+    /// It has a period.
+    Period {
+        /// The output.
+        output: String,
+        /// Its length \[s\].
+        period: f64,
+    },
+    /// Something that is there for a while.
+    Instant {
+        /// The output.
+        output: String,
+        /// The record.
+        record: String,
+        /// From when \[s, the record's clock\].
+        from: f64,
+        /// Until when \[s\].
+        to: f64,
+    },
+    /// It depends on what the model gives.
+    Level {
+        /// The output.
+        output: String,
+    },
+}
+
+impl Context<'_> {
+    /// What the residual of a set holds that is not noise; `own` is its fit with the noise model of its own residual. The first that was found.
+    pub fn left(&self, node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
+        let setup = self.setup(&node.model)?;
+        let Some(residuals) = estimation::residuals(&setup, &own.x) else {
+            return Ok(None);
+        };
+        let Some(models) = setup.simulate(&own.x) else {
+            return Ok(None);
+        };
+        let records = &self.problem.records;
+        let outputs = records[0].outputs.len();
+        let name = |i: usize| records[0].outputs[i % outputs].name.clone();
+        let samples = |residual: &[f64]| residual.iter().filter(|e| !e.is_nan()).count();
+        // Inputs first: each signal that is made of one, at each output.
+        let (mut least, mut place, mut count) = (1.0, None, 0.0);
+        for (i, residual) in residuals.iter().enumerate() {
+            let record = &records[i / outputs];
+            let lags = (samples(residual) / 10).clamp(2, 25);
+            for input in &record.inputs {
+                let (low, high) = input.range();
+                if high <= low {
+                    continue;
+                }
+                for signal in of_command(&input.values) {
+                    count += 1.0;
+                    match prewhitened_input_test(&signal, residual, lags) {
+                        Ok((_, p)) if p < least => {
+                            (least, place) = (p, Some((input.name.clone(), i)));
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+        if let Some((input, i)) = place.filter(|_| least * count < NOT_NOISE) {
+            return Ok(Some(Left::Input {
+                input,
+                output: name(i),
+            }));
+        }
+        let level = NOT_NOISE / residuals.len() as f64;
+        for (i, residual) in residuals.iter().enumerate() {
+            if samples(residual) < 8 {
+                continue;
+            }
+            let record = &records[i / outputs];
+            if samples(residual) == residual.len()
+                && let Some(cycles) = period(residual, level)?
+            {
+                return Ok(Some(Left::Period {
+                    output: name(i),
+                    period: record.duration() / cycles as f64,
+                }));
+            }
+            let white = standardised(own.noise.of_series(i), residual);
+            if let Some((from, to)) = instant(&white, level) {
+                return Ok(Some(Left::Instant {
+                    output: name(i),
+                    record: record.name.clone(),
+                    from: record.time[from],
+                    to: record.time[to],
+                }));
+            }
+            if level_p(&models[i], &white) < level {
+                return Ok(Some(Left::Level { output: name(i) }));
+            }
+        }
+        Ok(None)
+    }
+}

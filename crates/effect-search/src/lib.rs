@@ -1,0 +1,30 @@
+//! Finds the effect that a model written as text lacks.
+//!
+//! [`diagnose`] fits the believed model to records, scores all effects of the catalogue at all ports of the model and the candidates of the
+//! user's own, alone and in pairs, fits the promising ones, confirms what the noise does not explain, and groups what the data cannot tell
+//! apart. The result ([`Diagnosis`]) is plain values.
+//!
+//! The layers below: [`ct_model`] has the models, the effects and their simulation with exact derivatives, [`greybox::ModelSetup`] the
+//! fit, [`estimation`] least squares under a noise model.
+
+mod accept;
+mod diagnose;
+mod error;
+mod groups;
+mod held_out;
+mod left;
+mod node;
+mod pairs;
+mod problem;
+pub mod residual;
+mod result;
+mod score;
+mod search;
+mod spectral_line;
+
+pub use diagnose::{Progress, diagnose};
+pub use error::Error;
+pub use left::Left;
+pub use problem::{Options, Problem};
+pub use result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
+pub use spectral_line::{Line, strongest_line};

@@ -1,0 +1,181 @@
+//! A set of effects with its fit, and how vectors of one set become those of another.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ct_model::effects::{Candidate, apply};
+use ct_model::{Model, ModelSpec};
+use estimation::{Fit, Noise, Start, Stopping, fit_from};
+use greybox::ModelSetup;
+
+use crate::Error;
+use crate::problem::{Limit, Problem};
+
+/// A first fit: its rank is sought, not its digits.
+pub(crate) const ROUGH: Stopping = Stopping {
+    evaluations: 25,
+    cost: 1e-4,
+};
+/// The fit of what is reported or compared closely.
+pub(crate) const FINE: Stopping = Stopping {
+    evaluations: 120,
+    cost: 1e-9,
+};
+
+/// What all sets of one search share.
+pub(crate) struct Context<'a> {
+    pub problem: &'a Problem,
+    pub candidates: Vec<Candidate>,
+    pub limit: Limit<'a>,
+}
+
+/// A model with effects, and its fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Node {
+    /// Positions of the effects among the candidates, in the order in which they were added.
+    pub added: Vec<usize>,
+    pub model: Arc<Model>,
+    pub fit: Fit,
+}
+
+impl Node {
+    /// Fall of the criterion against another set in the same metric.
+    pub fn gain_over(&self, other: &Self) -> f64 {
+        other.fit.bic() - self.fit.bic()
+    }
+
+    pub fn spec(&self) -> &ModelSpec {
+        self.model.spec()
+    }
+
+    /// The value of a parameter by its name.
+    pub fn value(&self, name: &str) -> Option<f64> {
+        let parameters = &self.spec().parameters;
+        let at = parameters.iter().position(|p| p.about.name == name)?;
+        self.fit.x.get(at).copied()
+    }
+}
+
+impl Context<'_> {
+    /// The model with a set of effects.
+    pub fn model(&self, added: &[usize]) -> Result<Model, Error> {
+        let effects: Vec<&Candidate> = added.iter().map(|&i| &self.candidates[i]).collect();
+        Ok(Model::new(apply(&self.problem.spec, &effects)?))
+    }
+
+    /// A model against the fitted records.
+    pub fn setup<'b>(&'b self, model: &'b Model) -> Result<ModelSetup<'b>, Error> {
+        let problem = self.problem;
+        // Effects of the model file may be fixed too, but not all sets have them.
+        let names = &model.spec().parameters;
+        let known: BTreeMap<String, f64> = problem
+            .known
+            .iter()
+            .filter(|(name, _)| names.iter().any(|p| p.about.name == **name))
+            .map(|(name, value)| (name.clone(), *value))
+            .collect();
+        let setup = ModelSetup::new(model, &problem.records, &known, problem.time_unit)?;
+        Ok(setup.with_priors(&problem.priors)?)
+    }
+
+    /// The fit of a set from starts in a metric.
+    pub fn fitted(
+        &self,
+        added: Vec<usize>,
+        model: Arc<Model>,
+        starts: Vec<Vec<f64>>,
+        noise: &Noise,
+        stopping: Stopping,
+    ) -> Result<Node, Error> {
+        let setup = self.setup(&model)?;
+        let starts = starts.into_iter().map(Start::from).collect();
+        let fit = fit_from(&setup, starts, noise, stopping)?;
+        Ok(Node { added, model, fit })
+    }
+
+    /// A set fitted anew from where it is.
+    pub fn refitted(&self, node: &Node, noise: &Noise, stopping: Stopping) -> Result<Node, Error> {
+        let mut refitted = self.fitted(
+            node.added.clone(),
+            node.model.clone(),
+            vec![node.fit.x.clone()],
+            noise,
+            stopping,
+        )?;
+        refitted.fit = refitted.fit.continuing(&node.fit);
+        Ok(refitted)
+    }
+
+    /// The set without one of its effects, fitted from where it was.
+    pub fn without(
+        &self,
+        node: &Node,
+        position: usize,
+        noise: &Noise,
+        stopping: Stopping,
+    ) -> Result<Node, Error> {
+        let mut added = node.added.clone();
+        added.remove(position);
+        self.subset(node, added, noise, stopping)
+    }
+
+    /// A part of the set, fitted from where it was.
+    pub fn subset(
+        &self,
+        node: &Node,
+        added: Vec<usize>,
+        noise: &Noise,
+        stopping: Stopping,
+    ) -> Result<Node, Error> {
+        let model = Arc::new(self.model(&added)?);
+        let start = {
+            let setup = self.setup(&model)?;
+            self.transfer(node, &model, setup.start())
+        };
+        self.fitted(added, model, vec![start], noise, stopping)
+    }
+
+    /// The vector of a set as another set begins with it: what only the other one has is as it starts.
+    pub fn transfer(&self, from: &Node, to: &Model, start: &[f64]) -> Vec<f64> {
+        let (old, new) = (from.spec(), to.spec());
+        let mut x = start.to_vec();
+        for (value, parameter) in x.iter_mut().zip(&new.parameters) {
+            if let Some(known) = from.value(&parameter.about.name) {
+                *value = known;
+            }
+        }
+        let own = self.problem.spec.states.len();
+        let place = |i: usize| {
+            if i < own {
+                return Some(i);
+            }
+            let name = &new.states[i].about.name;
+            old.states
+                .iter()
+                .position(|state| state.about.name == *name)
+        };
+        let (first, old_first) = (new.parameters.len(), old.parameters.len());
+        for record in 0..self.problem.records.len() {
+            for i in 0..new.states.len() {
+                if let Some(at) = place(i) {
+                    x[first + record * new.states.len() + i] =
+                        from.fit.x[old_first + record * old.states.len() + at];
+                }
+            }
+        }
+        x
+    }
+
+    /// Identifiers of a set, in the order in which it was made.
+    pub fn ids(&self, added: &[usize]) -> Vec<String> {
+        added
+            .iter()
+            .map(|&i| self.candidates[i].id.clone())
+            .collect()
+    }
+
+    pub fn samples(&self) -> f64 {
+        let outputs = self.problem.records.iter().flat_map(|r| &r.outputs);
+        outputs.map(|y| y.values.len() - y.missing()).sum::<usize>() as f64
+    }
+}

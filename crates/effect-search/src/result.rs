@@ -1,0 +1,123 @@
+//! What a search found: plain values, written as JSON as they stand.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::left::Left;
+
+/// The finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Every added effect is singled out by the data.
+    Effect,
+    /// Something is missing, and at least one added effect has a stand-in that fits as well.
+    Undecided,
+    /// The added effects explain the larger part of the error, and something else remains that is not noise.
+    Partial,
+    /// What the model leaves is not noise, and no candidate explains it.
+    Unexplained,
+    /// Nothing is missing that these data would show.
+    Adequate,
+}
+
+/// A parameter or an initial state as it was fitted.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Its name.
+    pub name: String,
+    /// Its value \[unit\].
+    pub value: f64,
+    /// Its standard error; `None` where it is known, at a bound or not determined.
+    pub std_error: Option<f64>,
+    /// Its unit as the text has it.
+    pub unit: String,
+    /// It is not fitted.
+    pub known: bool,
+}
+
+/// A model on the way: the believed one, then with one effect more each.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Step {
+    /// The effect that was added; `None` of the believed model.
+    pub added: Option<String>,
+    /// Simulation error of an only output on the fitted records \[its unit\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse: Option<f64>,
+    /// Simulation error by output, on the fitted records \[unit of the output\].
+    pub rmse_per_output: BTreeMap<String, f64>,
+    /// The same on the held-out records.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse_test_per_output: Option<BTreeMap<String, f64>>,
+    /// Simulation error, each output divided by its noise: 1 is the noise.
+    pub weighted_rmse: f64,
+    /// Bayesian information criterion, in the metric in which the effects were confirmed.
+    pub bic: f64,
+    /// All parameters, then the initial states.
+    pub parameters: Vec<Estimate>,
+    /// Starts of the fit.
+    pub starts: usize,
+    /// How many of them ended in the best minimum.
+    pub starts_agree: usize,
+    /// What the model gives: a series for each fitted record and output.
+    #[serde(skip)]
+    pub simulated: Vec<Vec<f64>>,
+}
+
+/// A single effect beside the believed model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Single {
+    /// The effect.
+    pub effect: String,
+    /// Fall of the criterion; larger is better.
+    pub bic_gain: f64,
+    /// Simulation error by output \[unit of the output\].
+    pub rmse_per_output: BTreeMap<String, f64>,
+}
+
+/// The noise of an output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoiseFloor {
+    /// The output.
+    pub output: String,
+    /// Standard deviation \[unit of the output\].
+    pub level: f64,
+    /// Standard deviation of what its past does not predict.
+    pub innovation: f64,
+    /// Autoregressive coefficients; empty for white noise.
+    pub coefficients: Vec<f64>,
+}
+
+/// A diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Version of this layout.
+    pub schema: u32,
+    /// The model's name.
+    pub model: String,
+    /// The finding.
+    pub verdict: Verdict,
+    /// The effects that were added, in order.
+    pub effects: Vec<String>,
+    /// For each of them itself, then all that cannot be told from it on these data, best first.
+    pub groups: Vec<Vec<String>>,
+    /// The single effects, best first; `none` first where the model is adequate.
+    pub ranked: Vec<String>,
+    /// The believed model, and every model after it.
+    pub steps: Vec<Step>,
+    /// The share of the squared error above the noise that the effects explain; `None` without effects.
+    pub share: Option<f64>,
+    /// What the last model leaves that is not noise.
+    pub left: Option<Left>,
+    /// The noise of each output, of the last model's residual.
+    pub noise: Vec<NoiseFloor>,
+    /// Single effects that were fitted, best first.
+    pub singles: Vec<Single>,
+    /// How many candidates were scored.
+    pub candidates: usize,
+    /// The time limit ended the search.
+    pub cut_short: bool,
+    /// How long it took \[s\].
+    pub seconds: f64,
+}

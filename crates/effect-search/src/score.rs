@@ -1,0 +1,151 @@
+//! What each candidate would do to a set of effects: its predicted fall of the cost, in one step of Gauss-Newton from its best start.
+//!
+//! An effect whose outputs have a derivative where it is absent is linearised there, for each start of its shapes; a threshold at each
+//! of its starts. One linearisation in the metric of the noise gives the cost after the step, all parameters free: the score test, and its
+//! extension to thresholds.
+//!
+//! **Reference**: C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50-57 (score test); S. A. Billings, M. Korenberg, S. Chen, Int. J. Systems
+//! Science 19 (1988) 1559-1568 (orthogonal forward regression).
+
+use std::sync::Arc;
+
+use ct_model::Model;
+use ct_model::effects::Role;
+use estimation::{Noise, Residuals, linearise, within};
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::node::{Context, Node};
+
+/// More starts of a candidate than this are thinned out.
+const MOST_STARTS: usize = 24;
+/// Damping of the predicted step, against what the data do not determine.
+const DAMPING: f64 = 1e-9;
+
+/// A candidate beside a set of effects, before it is fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct Trial {
+    /// Position among the candidates.
+    pub candidate: usize,
+    pub model: Arc<Model>,
+    /// Starts of its fit, best first: where it was linearised, and one step from there.
+    pub starts: Vec<Vec<f64>>,
+    /// Predicted fall of the deviance.
+    pub fall: f64,
+    /// How many starts were looked at.
+    pub ways: usize,
+}
+
+impl Context<'_> {
+    /// Scores of all candidates that a set does not have, best first.
+    pub fn trials(&self, node: &Node, noise: &Noise) -> Vec<Trial> {
+        let others: Vec<usize> = (0..self.candidates.len())
+            .filter(|i| !node.added.contains(i))
+            .collect();
+        let mut trials: Vec<Trial> = others
+            .into_par_iter()
+            .filter(|_| !self.limit.passed(1.0))
+            .filter_map(|i| self.trial(node, i, noise).ok().flatten())
+            .collect();
+        trials.sort_by(|a, b| {
+            b.fall
+                .total_cmp(&a.fall)
+                .then(a.candidate.cmp(&b.candidate))
+        });
+        trials
+    }
+
+    /// A candidate at its best start; `None` where no start gives a simulation.
+    pub fn trial(&self, node: &Node, i: usize, noise: &Noise) -> Result<Option<Trial>, Error> {
+        let candidate = &self.candidates[i];
+        let mut added = node.added.clone();
+        added.push(i);
+        let model = Arc::new(self.model(&added)?);
+        let setup = self.setup(&model)?;
+        let begin = self.transfer(node, &model, setup.start());
+        let places: Vec<Option<usize>> = candidate
+            .parameters
+            .iter()
+            .map(|own| {
+                let all = model.spec().parameters.iter();
+                all.enumerate()
+                    .find(|(_, p)| p.about.name == own.name)
+                    .map(|(at, _)| at)
+            })
+            .collect();
+        let smooth = candidate.is_smooth();
+        let mut starts: Vec<Vec<f64>> = Vec::new();
+        for values in candidate.starts() {
+            let mut x = begin.clone();
+            for ((own, place), value) in candidate.parameters.iter().zip(&places).zip(values) {
+                let Some(place) = *place else { continue };
+                x[place] = if smooth && own.role == Role::Size {
+                    own.absent
+                } else {
+                    value
+                };
+            }
+            if !starts.contains(&x) {
+                starts.push(x);
+            }
+        }
+        let ways = starts.len();
+        if ways > MOST_STARTS {
+            let every = ways as f64 / MOST_STARTS as f64;
+            starts = (0..MOST_STARTS)
+                .map(|k| starts[(k as f64 * every) as usize].clone())
+                .collect();
+        }
+        let count = self.samples();
+        let mut scored: Vec<(f64, Vec<f64>, Vec<f64>)> = starts
+            .into_iter()
+            .filter_map(|x| {
+                let triangle = linearise(&setup, &x, noise)?;
+                let free: Vec<usize> = (0..setup.free().len()).collect();
+                let scale: Vec<f64> = free
+                    .iter()
+                    .map(|&j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
+                    .collect();
+                let step = triangle.solve(&free, &scale, DAMPING);
+                let predicted = triangle.predicted(&step);
+                let mut stepped = x.clone();
+                for (d, &at) in step.iter().zip(setup.free()) {
+                    stepped[at] = within(stepped[at] + d, setup.bounds()[at]);
+                }
+                // A size that its bound forbids explains nothing.
+                let forbidden = smooth
+                    && candidate
+                        .parameters
+                        .iter()
+                        .zip(&places)
+                        .any(|(own, place)| {
+                            let stays = |at: usize| stepped[at] == own.absent;
+                            own.role == Role::Size && place.is_some_and(stays)
+                        });
+                let predicted = if forbidden {
+                    triangle.cost()
+                } else {
+                    predicted
+                };
+                predicted.is_finite().then_some((predicted, x, stepped))
+            })
+            .collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((best, ..)) = scored.first() else {
+            return Ok(None);
+        };
+        let fall = count * (node.fit.cost / best.max(f64::MIN_POSITIVE)).ln();
+        let starts = scored
+            .into_iter()
+            .take(2)
+            .flat_map(|(_, x, stepped)| [x, stepped])
+            .collect();
+        Ok(Some(Trial {
+            candidate: i,
+            model: model.clone(),
+            starts,
+            fall,
+            ways,
+        }))
+    }
+}

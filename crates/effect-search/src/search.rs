@@ -1,0 +1,166 @@
+//! The search of sets of effects in the metric of one noise model: all single effects, pairs by their joint scores, and a beam of sets that
+//! grow by one effect at a time.
+//!
+//! Effects act together: a pair may explain what neither of its members does. So every set of the beam is scored anew with all candidates,
+//! and pairs are looked at before any single effect is chosen.
+
+use estimation::Noise;
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::node::{Context, FINE, Node, ROUGH};
+use crate::pairs::joint_scores;
+use crate::score::Trial;
+
+/// So many candidates beside a set are fitted, those with the best scores; beside the believed model this many.
+const REFITS: usize = 8;
+const FIRST_REFITS: usize = 28;
+/// So many pairs are fitted.
+const PAIRS: usize = 8;
+/// Sets that grow side by side.
+const BEAM: usize = 4;
+/// A larger set has to lower the criterion by this, or the search ends.
+const PAYS: f64 = 2.0;
+
+/// What a search in one metric found.
+pub(crate) struct Grown {
+    /// The model that the search began with.
+    pub base: Node,
+    /// Single effects, best first.
+    pub singles: Vec<Node>,
+    /// Scores of the single effects.
+    pub trials: Vec<Trial>,
+    /// The set with the least criterion.
+    pub best: Node,
+}
+
+impl Context<'_> {
+    /// Fits of candidates beside a set.
+    pub fn refits(&self, node: &Node, trials: &[Trial], noise: &Noise) -> Vec<Node> {
+        let fits = trials.par_iter().filter_map(|trial| {
+            let mut added = node.added.clone();
+            added.push(trial.candidate);
+            self.fitted(
+                added,
+                trial.model.clone(),
+                trial.starts.clone(),
+                noise,
+                ROUGH,
+            )
+            .ok()
+        });
+        best_first(fits.collect())
+    }
+
+    /// The search.
+    pub fn grow(
+        &self,
+        base: Node,
+        noise: &Noise,
+        max_effects: usize,
+        share: f64,
+    ) -> Result<Grown, Error> {
+        let trials = self.trials(&base, noise);
+        let promising = &trials[..trials.len().min(FIRST_REFITS)];
+        let singles = self.refits(&base, promising, noise);
+        let mut best = base.clone();
+        let mut beam: Vec<Node> = Vec::new();
+        if max_effects > 0 {
+            beam.extend(singles.iter().take(BEAM).cloned());
+        }
+        if max_effects > 1 && !self.limit.passed(share) {
+            let pairs = joint_scores(self, &base, &trials, noise, PAIRS);
+            let fits: Vec<Node> = pairs
+                .par_iter()
+                .filter_map(|&(a, b)| self.pair(&base, (a, b), &trials, noise).ok().flatten())
+                .collect();
+            beam.extend(fits);
+        }
+        let mut size = base.added.len() + 1;
+        loop {
+            beam = best_first(beam);
+            beam.truncate(BEAM);
+            let Some(first) = beam.first() else { break };
+            let gain = first.gain_over(&best);
+            if gain > 0.0 {
+                best = first.clone();
+            }
+            let grown = beam.iter().any(|node| node.added.len() >= size);
+            if gain < PAYS && grown && size > base.added.len() + 1
+                || size >= base.added.len() + max_effects
+                || self.limit.passed(share)
+            {
+                break;
+            }
+            size += 1;
+            let parents: Vec<Node> = beam
+                .iter()
+                .filter(|node| node.added.len() < base.added.len() + max_effects)
+                .cloned()
+                .collect();
+            for parent in &parents {
+                if self.limit.passed(share) {
+                    break;
+                }
+                let trials = self.trials(parent, noise);
+                let promising = &trials[..trials.len().min(REFITS)];
+                for child in self.refits(parent, promising, noise) {
+                    let same = |known: &Node| same_set(known, &child);
+                    if !beam.iter().any(same) {
+                        beam.push(child);
+                    }
+                }
+            }
+        }
+        best = self.refitted(&best, noise, FINE)?;
+        Ok(Grown {
+            base,
+            singles,
+            trials,
+            best,
+        })
+    }
+
+    /// A pair of candidates beside a set, from the best starts of each.
+    fn pair(
+        &self,
+        base: &Node,
+        (a, b): (usize, usize),
+        trials: &[Trial],
+        noise: &Noise,
+    ) -> Result<Option<Node>, Error> {
+        let (first, second) = (&trials[a], &trials[b]);
+        let mut added = base.added.clone();
+        added.push(first.candidate);
+        let quick = self.fitted(
+            added,
+            first.model.clone(),
+            first.starts.clone(),
+            noise,
+            ROUGH,
+        )?;
+        let Some(both) = self.trial(&quick, second.candidate, noise)? else {
+            return Ok(None);
+        };
+        let mut added = quick.added.clone();
+        added.push(second.candidate);
+        Ok(Some(self.fitted(
+            added,
+            both.model,
+            both.starts,
+            noise,
+            ROUGH,
+        )?))
+    }
+}
+
+/// The same effects in any order.
+pub(crate) fn same_set(a: &Node, b: &Node) -> bool {
+    a.added.len() == b.added.len() && a.added.iter().all(|i| b.added.contains(i))
+}
+
+/// By the criterion.
+pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
+    nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+    nodes
+}

@@ -1,0 +1,123 @@
+//! Where fits of a model of its user's text begin.
+//!
+//! What such a model is like nobody knows ahead, so starts are of three kinds: the values of the text; the best of many points around them, by
+//! a simulation of each without derivatives; and what fits of growing first parts of the records lead to, as a criterion over a long record
+//! has many local minima that one over a short record has not (L. Ljung, System Identification, 2nd ed., 1999, section 10.5).
+//!
+//! The points are a scrambled Sobol sequence (A. B. Owen, Journal of Complexity 14 (1998) 466-489), in the logarithm of what has a sign.
+
+use estimation::{Noise, Start, Stopping, fit_from, squares, within};
+use rayon::prelude::*;
+use sobol_burley::sample;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use crate::ModelSetup;
+
+/// Spread of the starts of parameters, of their logarithm: a guess is off by a factor of two as often as not ...
+const SPREAD: f64 = 0.8;
+/// ... and of the initial states that no output reads.
+const STATE_SPREAD: f64 = 0.5;
+/// So many points are simulated for every start that is fitted.
+const POINTS: usize = 16;
+/// The first parts of the records that are fitted one after the other, as shares of each.
+const HORIZONS: [f64; 3] = [0.03, 0.1, 0.3];
+/// The least samples of a first part for every fitted number.
+const LEAST: usize = 4;
+/// From so many starts the first parts are fitted.
+const GROWING: usize = 4;
+/// The sequence has so many dimensions; what comes after them stays at its start.
+const DIMENSIONS: usize = 256;
+
+impl ModelSetup<'_> {
+    /// `n` starts or a few more, the text's own first.
+    pub(crate) fn starts(&self, n: usize, seed: u64, stopping: Stopping) -> Vec<Start> {
+        let mut points = self.points(n * POINTS, seed);
+        let white = Noise::white(self.outputs());
+        let cost = |x: &Vec<f64>| {
+            let cost = squares(self, x, &white).map(|squares| squares.cost());
+            cost.filter(|cost| cost.is_finite())
+                .unwrap_or(f64::INFINITY)
+        };
+        let mut scored: Vec<(f64, Vec<f64>)> = points
+            .par_drain(..)
+            .map(|point| (cost(&point), point))
+            .collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut starts: Vec<Vec<f64>> = vec![self.start().to_vec()];
+        starts.extend(
+            scored
+                .into_iter()
+                .map(|(_, point)| point)
+                .take(n.max(1) - 1),
+        );
+        let grown: Vec<Vec<f64>> = starts[..starts.len().min(GROWING)]
+            .par_iter()
+            .filter_map(|start| self.grown(start, &white, stopping))
+            .collect();
+        starts.extend(grown);
+        starts.into_iter().map(Start::from).collect()
+    }
+
+    /// Where fits of growing first parts of the records lead from a start; `None` where these are too short.
+    fn grown(&self, start: &[f64], noise: &Noise, stopping: Stopping) -> Option<Vec<f64>> {
+        let mut x = None;
+        for share in HORIZONS {
+            let records = self.first_rows(share);
+            let short = self.against(&records);
+            let samples: usize = short.samples_per_output().iter().sum();
+            if samples < LEAST * self.free().len() {
+                continue;
+            }
+            let from = x.unwrap_or_else(|| start.to_vec());
+            x = match fit_from(&short, vec![from.clone().into()], noise, stopping) {
+                Ok(fit) => Some(fit.x),
+                Err(_) => Some(from),
+            };
+        }
+        x
+    }
+
+    /// Points around the start.
+    fn points(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
+        let Ok(normal) = Normal::new(0.0, 1.0) else {
+            return Vec::new();
+        };
+        // Every four dimensions of a seed are scrambled alike; the seed of the fit scrambles all.
+        let seed = (seed ^ (seed >> 32)) as u32;
+        let spread: Vec<usize> = self
+            .free()
+            .iter()
+            .copied()
+            .filter(|&i| !self.is_read(i))
+            .collect();
+        let point = |k: usize| {
+            let mut point = self.start().to_vec();
+            for (dimension, &i) in spread.iter().enumerate().take(DIMENSIONS) {
+                let uniform = f64::from(sample(k as u32, dimension as u32, seed));
+                let draw = normal.inverse_cdf(uniform.clamp(1e-6, 1.0 - 1e-6));
+                point[i] = within(self.moved(i, draw), self.bound(i));
+            }
+            point
+        };
+        (0..n).map(point).collect()
+    }
+
+    /// An entry so many deviations from its start.
+    fn moved(&self, i: usize, draw: f64) -> f64 {
+        let (value, (low, high)) = (self.start()[i], self.bound(i));
+        if i >= self.parameter_count() {
+            // A state may be near zero by chance: what it may reach says how far off it may be.
+            let reach = if value == 0.0 { 1.0 } else { value.abs() };
+            return value + STATE_SPREAD * draw * reach;
+        }
+        if value == 0.0 {
+            let reach = if high.is_finite() && low.is_finite() {
+                0.2 * (high - low)
+            } else {
+                1.0
+            };
+            return draw * reach;
+        }
+        value * (SPREAD * draw).exp()
+    }
+}

@@ -1,0 +1,92 @@
+//! How large the noise of each measured output is, whatever the model lacks.
+//!
+//! The residual of a model that lacks something holds more than noise, and more at one output than at another. What the noise is shows in a
+//! linear prediction of the reading from all that is known at its instant: the model's own output and its past, the readings before it,
+//! the readings of the other outputs before it, the inputs. Its error is close to the noise as long as what the model lacks follows
+//! from these (L. Ljung, System Identification, 2nd ed., 1999, section 10.4: long ARX models).
+
+use ct_signals::Record;
+use estimation::Triangle;
+
+/// Readings of the same output before the one that is predicted, and values of the model's output before.
+const PAST: usize = 24;
+/// Rows of inputs and readings of other outputs before.
+const PAST_OF_OTHERS: usize = 12;
+/// So many samples for every coefficient are needed at least; with fewer the prediction takes less of the past.
+const SAMPLES: usize = 5;
+
+/// The standard deviation of each output's noise \[its unit\]; `None` where there are too few samples to tell.
+///
+/// `model`: what a model of the records gives, a series for each record and output, as [`crate::ModelSetup::simulate`] has it.
+pub(crate) fn output_noise(records: &[Record], model: &[Vec<f64>]) -> Vec<Option<f64>> {
+    let outputs = records.first().map_or(0, |record| record.outputs.len());
+    let of = |output: usize| {
+        let mut past = PAST;
+        while past > 0 {
+            let (sum, samples, columns) = prediction(records, model, output, past);
+            if samples >= SAMPLES * columns {
+                let variance = sum / (samples - columns) as f64;
+                return (variance.is_finite() && variance > 0.0).then(|| variance.sqrt());
+            }
+            past /= 2;
+        }
+        None
+    };
+    (0..outputs).map(of).collect()
+}
+
+/// The sum of squares that the prediction of one output leaves, over how many samples, and its coefficients.
+fn prediction(
+    records: &[Record],
+    model: &[Vec<f64>],
+    output: usize,
+    past: usize,
+) -> (f64, usize, usize) {
+    let others = past.min(PAST_OF_OTHERS);
+    let (inputs, outputs) = records
+        .first()
+        .map_or((0, 0), |r| (r.inputs.len(), r.outputs.len()));
+    // The level; readings and model of this output; inputs; the other outputs; the reading.
+    let columns = 1 + past + past + 1 + inputs * (others + 1) + (outputs - 1) * others;
+    let mut triangle = Triangle::new(columns + 1);
+    let mut values = Vec::with_capacity(columns + 1);
+    let mut samples = 0;
+    for (r, record) in records.iter().enumerate() {
+        let series = |o: usize| &record.outputs[o].values;
+        // Outputs may be sampled at rates of their own: the past of each is its last readings that are there.
+        let there: Vec<Vec<usize>> = (0..outputs)
+            .map(|o| {
+                (0..record.len())
+                    .filter(|&k| !series(o)[k].is_nan())
+                    .collect()
+            })
+            .collect();
+        let own = &there[output];
+        for (i, &k) in own.iter().enumerate().skip(past) {
+            values.clear();
+            values.push(1.0);
+            let before = &own[i - past..i];
+            values.extend(before.iter().map(|&j| series(output)[j]));
+            let simulated = &model[r * outputs + output];
+            values.extend(before.iter().chain([&k]).map(|&j| simulated[j]));
+            for input in &record.inputs {
+                values.extend((0..=others).map(|lag| input.values[k.saturating_sub(lag)]));
+            }
+            for other in (0..outputs).filter(|o| *o != output) {
+                let read = there[other].partition_point(|&j| j < k);
+                values.extend(
+                    there[other][read.saturating_sub(others)..read]
+                        .iter()
+                        .map(|&j| series(other)[j]),
+                );
+            }
+            values.push(series(output)[k]);
+            if values.len() == columns + 1 {
+                triangle.push(&values);
+                samples += 1;
+            }
+        }
+    }
+    triangle.finish();
+    (triangle.at(columns, columns).powi(2), samples, columns)
+}

@@ -1,0 +1,67 @@
+//! The fitted model for those who go on with it: simulate it on other inputs, write its curves.
+
+use greybox::{Fit, FitUncertainty, Setup};
+
+use crate::{
+    ControlLoop, Error, Options, Problem,
+    closed_loop::other_metric,
+    compare::{Believed, believed},
+    gaps::Mended,
+    noise_floor::NOISE_ORDER,
+};
+
+/// What a fit of the believed model gives.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitted<'f, 'a> {
+    /// The plant with its effects against the records, cut where gaps are long.
+    pub setup: &'f Setup<'a>,
+    /// The fit.
+    pub fit: &'f Fit,
+    /// How well its parameters are known; `None` where the records do not determine them.
+    pub uncertainty: Option<&'f FitUncertainty>,
+    /// The model lacks something: its residual is more than noise.
+    pub lacking: bool,
+}
+
+/// Fits the believed model as [`crate::compare`] does, and hands the fit on.
+///
+/// # Errors
+/// Where the records, the plant or the fit do not allow it.
+pub fn fitted<R>(
+    problem: &Problem,
+    options: &Options,
+    then: impl FnOnce(Fitted<'_, '_>) -> R,
+) -> Result<R, Error> {
+    problem.check()?;
+    match Mended::of(problem, options)? {
+        None => of_whole(problem, options, then),
+        Some(mended) => of_whole(&mended.problem, options, then),
+    }
+}
+
+fn of_whole<R>(
+    problem: &Problem,
+    options: &Options,
+    then: impl FnOnce(Fitted<'_, '_>) -> R,
+) -> Result<R, Error> {
+    let Believed {
+        shown,
+        control_loop,
+        lacking,
+        ..
+    } = believed(problem, options)?;
+    let (setup, fit) = (&shown.setup, &shown.fit);
+    let parameters = setup.parameter_count();
+    let mut uncertainty = FitUncertainty::of(setup, fit, parameters, NOISE_ORDER)?;
+    if let (Some(known), true) = (&mut uncertainty, ControlLoop::widens(control_loop.as_ref())) {
+        let other = other_metric(setup, &shown)?;
+        let moved = fit.x.iter().zip(&other).map(|(own, other)| own - other);
+        known.widen(&moved.collect::<Vec<f64>>());
+    }
+    Ok(then(Fitted {
+        setup,
+        fit,
+        uncertainty: uncertainty.as_ref(),
+        lacking,
+    }))
+}

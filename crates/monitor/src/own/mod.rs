@@ -1,0 +1,220 @@
+//! A model of its user's own as it is watched.
+//!
+//! The parameters that are watched are those that the text declares as `parameter`, in its order; constants and `final parameter`s stay as
+//! they are. Those that the model file knows are not fitted, and watched all the same: they may change.
+
+mod learn;
+mod onset;
+mod simulation;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ct_model::{Expression, Given, Model, Variable};
+use ct_signals::Hold;
+use greybox::PriorValue;
+
+use self::simulation::running;
+use crate::{
+    Alarm, Each, Error, Refused, TimeAxis, Units, Watched,
+    fingerprint::{Fingerprint, TIME_UNIT},
+    intake::{Readings, Sample},
+    isolate::Kept,
+    learn::Learned,
+    sensitivity::Model as Running,
+    watched::{Believed, Raised},
+};
+
+/// A model of its user's own, and what is known of it.
+#[derive(Debug, Clone)]
+pub struct OwnModel<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// Parameters that are not fitted, by name.
+    pub known: BTreeMap<String, f64>,
+    /// What is known of parameters beside the rows, by name.
+    pub priors: BTreeMap<String, PriorValue>,
+    /// What the inputs do between rows.
+    pub hold: Hold,
+    /// Seconds in one unit of the model's time, above zero.
+    pub time_unit: f64,
+}
+
+impl<'a> OwnModel<'a> {
+    /// The model with nothing said of its parameters, its time in seconds, under inputs that are held between rows.
+    #[must_use]
+    pub fn new(model: &'a Model) -> Self {
+        Self {
+            model,
+            known: BTreeMap::new(),
+            priors: BTreeMap::new(),
+            hold: Hold::Zero,
+            time_unit: 1.0,
+        }
+    }
+
+    /// Positions of the parameters that are watched among all of the model.
+    fn watched(&self) -> Vec<usize> {
+        let parameters = self.model.spec().parameters.iter().enumerate();
+        let fitted = parameters.filter(|(_, parameter)| parameter.given == Given::Fitted);
+        fitted.map(|(i, _)| i).collect()
+    }
+
+    /// All parameters, the watched ones with these values.
+    fn parameters_with(&self, theta: &[f64]) -> Vec<f64> {
+        let mut all = self.model.parameters();
+        for (value, parameter) in all.iter_mut().zip(&self.model.spec().parameters) {
+            *value = *self.known.get(&parameter.about.name).unwrap_or(value);
+        }
+        for (i, value) in self.watched().into_iter().zip(theta) {
+            all[i] = *value;
+        }
+        all
+    }
+
+    fn output(&self, output: usize) -> &ct_model::About {
+        let spec = self.model.spec();
+        spec.about(spec.outputs[output].variable)
+    }
+}
+
+impl<'a> From<OwnModel<'a>> for Watched<'a> {
+    fn from(model: OwnModel<'a>) -> Self {
+        Self(Arc::new(model))
+    }
+}
+
+impl<'a> Believed<'a> for OwnModel<'a> {
+    fn check(&self) -> Result<(), Error> {
+        let mut expressions = self.model.spec().expressions();
+        if expressions.any(|e| e.any(&|part| matches!(part, Expression::Time))) {
+            return Err(Error::Time);
+        }
+        if self.watched().is_empty() {
+            return Err(Error::NoParameters);
+        }
+        Ok(())
+    }
+
+    fn inputs(&self) -> usize {
+        self.model.spec().inputs.len()
+    }
+
+    fn outputs(&self) -> usize {
+        self.model.spec().outputs.len()
+    }
+
+    fn states(&self) -> usize {
+        self.model.spec().states.len()
+    }
+
+    fn hold(&self) -> Hold {
+        self.hold
+    }
+
+    fn check_input(&self, _value: f64) -> Result<(), Refused> {
+        Ok(())
+    }
+
+    fn check_reading(&self, _value: f64) -> Result<(), Refused> {
+        Ok(())
+    }
+
+    fn fingerprint(&self) -> Fingerprint {
+        let mut all = Fingerprint::new();
+        let mut add = |key: String, value: String| drop(all.insert(key, value));
+        // As it is written: a comment or another layout is no other model.
+        add("model".into(), self.model.spec().to_string());
+        add("hold".into(), format!("{:?}", self.hold).to_lowercase());
+        add(TIME_UNIT.into(), self.time_unit.to_string());
+        for (name, value) in &self.known {
+            add(format!("known {name}"), value.to_string());
+        }
+        for (name, PriorValue { value, std_error }) in &self.priors {
+            add(
+                format!("prior of {name}"),
+                format!("{value} +- {std_error}"),
+            );
+        }
+        all
+    }
+
+    fn learn(&self, samples: &[Sample], hold: Hold) -> Result<(Learned, Vec<f64>), String> {
+        learn::learn(self, samples, hold)
+    }
+
+    fn parameters(
+        &self,
+        _learned: &Learned,
+        _units: &Units,
+    ) -> Result<Vec<(String, String)>, String> {
+        let named = |i: usize| {
+            let about = &self.model.spec().parameters[i].about;
+            (about.name.clone(), about.unit.clone())
+        };
+        Ok(self.watched().into_iter().map(named).collect())
+    }
+
+    fn lanes(&self, parameters: usize) -> usize {
+        parameters
+    }
+
+    fn run(
+        &self,
+        learned: &Learned,
+        states: &[f64],
+        _at_rest: f64,
+    ) -> Option<Box<dyn Running + 'a>> {
+        (states.len() == self.states()).then(|| running(self, &learned.theta, states))
+    }
+
+    fn put_readings(&self, states: &mut Each<f64>, readings: &Readings) {
+        for (output, reading) in self.model.spec().outputs.iter().zip(readings) {
+            if let (Variable::State(i), Some(reading)) = (output.variable, reading) {
+                states[i] = *reading;
+            }
+        }
+    }
+
+    fn output_name(&self, output: usize) -> Option<String> {
+        (self.outputs() > 1).then(|| self.output(output).name.clone())
+    }
+
+    fn output_words(&self, output: usize, _units: &Units) -> String {
+        format!("output {}", self.output(output).name)
+    }
+
+    fn output_unit(&self, output: usize, _units: &Units) -> String {
+        self.output(output).unit.clone()
+    }
+
+    fn look(
+        &self,
+        learned: &Learned,
+        hold: Hold,
+        rows: &[Kept],
+        growth: &Each<f64>,
+        raised: &Raised,
+        (units, axis): (&Units, &TimeAxis),
+    ) -> Alarm {
+        let name = self.output_name(raised.output);
+        let most = match &name {
+            Some(_) => format!(
+                "; it shows most at {}",
+                self.output_words(raised.output, units)
+            ),
+            None => String::new(),
+        };
+        let mut alarm = Alarm::unexplained(raised, name);
+        alarm.since = onset::onset(self, learned, hold, rows, growth, raised.since);
+        let since = match alarm.since {
+            Some(since) => format!("since about {}", axis.at(since)),
+            None => format!("since {} or before", axis.at(raised.since)),
+        };
+        alarm.sentence = format!(
+            "The model does not fit {since} (score {:.1}, threshold {:.1}){most}.",
+            raised.score, raised.threshold
+        );
+        alarm
+    }
+}

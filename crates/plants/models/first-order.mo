@@ -1,0 +1,9 @@
+model FirstOrder "one first-order lag"
+  // Units are those of the record.
+  parameter Real K = 2 "rise of the output for one unit of the command";
+  parameter Real tau(min=0) = 80 "time constant";
+  input Real u "command";
+  output Real level(start=10);
+equation
+  tau*der(level) = K*u - level;
+end FirstOrder;

@@ -501,12 +501,13 @@ impl Rows {
     }
 }
 
-/// Whether the cells of a first line are a row, and no names: numbers alone, or a time and what may stand for samples.
+/// Whether the cells of a first line are a row, and no names: numbers alone, or a time, whole or the end of one, and what may stand for samples.
 fn is_row(cells: &[String], columns: &Columns) -> bool {
     let format = columns.time_format.as_deref();
     let is_time = |cell: &str| {
         is_number(cell)
             || TimestampReader::understands(cell)
+            || is_end_of_time(cell)
             || format.is_some_and(|format| TimestampReader::new(Some(format), None, [cell]).is_ok())
     };
     let is_sample = |cell: &String| {
@@ -518,6 +519,12 @@ fn is_row(cells: &[String], columns: &Columns) -> bool {
         [time, samples @ ..] => is_time(time) && samples.iter().all(is_sample),
         [] => true,
     }
+}
+
+/// Whether a cell may be what is left of a date or a time where a stream was joined within a row.
+fn is_end_of_time(cell: &str) -> bool {
+    let part = |c: char| c.is_ascii_digit() || " -/.:+TZ".contains(c);
+    cell.chars().all(part) && cell.ends_with(|c: char| c.is_ascii_digit() || c == 'Z')
 }
 
 /// What so many readings of a row without a header are called.
@@ -740,6 +747,29 @@ mod tests {
             read(&mut clock, "00:00:01,4.5,12"),
             Ok(Line::Row([2.0, 4.5]))
         );
+    }
+
+    #[test]
+    fn the_end_of_a_date_is_no_header() {
+        for end in ["5:00", ":02", "-29 10:00:02", "9T10:00:02Z", "00+01:00"] {
+            let line = format!("{end},4.5,Bad");
+            let (mut rows, row) = rows(&line);
+            assert!(row, "{end}");
+            assert!(matches!(
+                rows.read(line.as_bytes()),
+                Err(BadLine::Time { .. })
+            ));
+            assert_eq!(
+                read(&mut rows, "2026-03-29 10:00:02,4,12"),
+                Ok(Line::Row([0.0, 4.0]))
+            );
+        }
+        for header in ["T1,y,u", "-,y,4.5"] {
+            assert!(!matches!(
+                Rows::begin("input", 1, header, &Columns::default()),
+                Ok((_, true))
+            ));
+        }
     }
 
     /// A file has more cells to look at; of a stream the first one has to do, also where day and month are the same on this day.

@@ -31,11 +31,13 @@ impl<'a> Session<'a> {
                 return Ok(());
             }
         };
-        if self.rows.is_none() && !self.first(line)? {
+        let begins = self.rows.is_none();
+        if begins && !self.first(line)? {
             return Ok(());
         }
         let mut read = self.read(line);
         if self.taken <= 1
+            && !begins
             && !self.restored
             && matches!(&read, Err(bad) if may_follow_a_part(bad))
             && self.rows.as_ref().is_some_and(|rows| !rows.has_header())

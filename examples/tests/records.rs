@@ -1,4 +1,5 @@
 //! The records that are in the repository are the ones that the simulator makes, byte for byte.
+#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::{Path, PathBuf};

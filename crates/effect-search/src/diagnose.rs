@@ -24,8 +24,8 @@ use crate::search::Grown;
 use crate::{Error, held_out};
 
 /// Shares of the time limit after which the phases end.
-const SEARCHED_WHITE: f64 = 0.35;
-const SEARCHED: f64 = 0.75;
+const SEARCHED_WHITE: f64 = 0.5;
+const SEARCHED: f64 = 0.8;
 /// Effects that leave more than noise are a part of the answer where they explain this share of the error above the noise.
 const PART: f64 = 0.38;
 /// Noise models whose coefficients differ by less are one.
@@ -72,7 +72,7 @@ pub fn diagnose(
     let left = context.left(&confirmed, &own)?;
     tell("telling apart");
     let found = confirmed.added.len() > grown.base.added.len();
-    let share = found.then(|| explained(&grown.base, &confirmed, &own));
+    let share = found.then(|| explained(&base, &confirmed, &own, left.is_none()));
     let verdict_of = |groups: &[Vec<usize>]| match (found, &left, share) {
         (false, None, _) => Verdict::Adequate,
         (false, Some(_), _) => Verdict::Unexplained,
@@ -105,6 +105,7 @@ fn begin<'a>(
     let mut context = Context {
         problem,
         candidates: Vec::new(),
+        scales: None,
         limit,
     };
     let fit_options = FitOptions {
@@ -210,9 +211,14 @@ fn in_metric(
     Ok((grown, noise))
 }
 
-/// The share of the mean squared error above the noise that a set explains, outputs in units of their noise.
-fn explained(base: &Node, last: &Node, own: &Fit) -> f64 {
-    let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+/// The share of the mean squared error above the noise that a set explains, outputs in units of their noise; `whole`: all that remains is noise,
+/// and otherwise what its past does not predict.
+fn explained(base: &Node, last: &Node, own: &Fit, whole: bool) -> f64 {
+    let floors: Vec<f64> = if whole {
+        own.noise.iter().map(ArModel::stationary_std).collect()
+    } else {
+        own.noise.iter().map(ArModel::sigma).collect()
+    };
     let squares = |fit: &Fit| -> f64 {
         let each = fit.rmse.iter().zip(&floors);
         each.map(|(rmse, floor)| (rmse / floor.max(f64::MIN_POSITIVE)).powi(2))
@@ -241,16 +247,23 @@ fn report(
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
     let floors: Vec<f64> = own.noise.iter().map(ArModel::stationary_std).collect();
-    // The noise that is known by now: the believed model in its metric, unless what remains is no noise.
-    let metric = if left.is_none() && own.noise.order() > 0 {
-        own.noise.clone()
-    } else {
-        Noise::white(outputs.len())
+    // Outputs count by their noise. Errors are compared in one metric, that of the simulation error; the last model has its own where it
+    // leaves noise.
+    let white = Noise::white(outputs.len());
+    let weighted = Context {
+        scales: (outputs.len() > 1).then(|| floors.clone()),
+        ..context.clone()
     };
-    let ladder = ladder(context, base, last, &metric)?;
+    let mut ladder = ladder(&weighted, base, last, &white)?;
+    if left.is_none()
+        && let Some(end) = ladder.last_mut()
+        && let Ok(shown) = context.refitted(end, &own.noise, FINE)
+    {
+        *end = shown;
+    }
     let steps = ladder
         .iter()
-        .map(|node| step(context, base, node, &metric, &floors))
+        .map(|node| step(context, base, node, &floors))
         .collect::<Result<Vec<_>, Error>>()?;
     let named = |values: &[f64]| -> BTreeMap<String, f64> {
         let names = outputs.iter().map(|y| y.name.clone());
@@ -337,13 +350,7 @@ fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<
     Ok(nodes)
 }
 
-fn step(
-    context: &Context,
-    base: &Node,
-    node: &Node,
-    metric: &Noise,
-    floors: &[f64],
-) -> Result<Step, Error> {
+fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<Step, Error> {
     let problem = context.problem;
     let setup = context.setup(&node.model)?;
     let outputs = &problem.records[0].outputs;
@@ -351,7 +358,7 @@ fn step(
         let names = outputs.iter().map(|y| y.name.clone());
         names.zip(values.iter().copied()).collect()
     };
-    let errors = if metric.order() > 0 {
+    let errors = if node.fit.noise.order() > 0 {
         node.fit.std_errors()
     } else {
         let robust: Result<Robust, _> = estimation::robust(&setup, &node.fit, NOISE_ORDER);

@@ -1,10 +1,12 @@
 //! What the residual of a set shows that noise does not.
 
+use ct_signals::ArModel;
 use ct_signals::residual_tests::prewhitened_input_test;
 use estimation::Fit;
 use serde::Serialize;
 
 use crate::Error;
+use crate::accept::NOISE_ORDER;
 use crate::node::{Context, Node};
 use crate::residual::{instant, level_p, of_command, period, standardised};
 
@@ -47,6 +49,18 @@ pub enum Left {
     },
 }
 
+/// A signal whose past predicts all but this share of its standard deviation has no innovations that a residual could depend on: what
+/// prewhitening leaves of it is its first samples and rounding.
+const PREDICTABLE: f64 = 0.01;
+
+fn is_predictable(signal: &[f64]) -> bool {
+    let mean = signal.iter().sum::<f64>() / signal.len().max(1) as f64;
+    let centred: Vec<f64> = signal.iter().map(|v| v - mean).collect();
+    let power = centred.iter().map(|v| v * v).sum::<f64>() / centred.len().max(1) as f64;
+    ArModel::fit(&[&centred], NOISE_ORDER)
+        .is_ok_and(|model| model.sigma() <= PREDICTABLE * power.sqrt())
+}
+
 impl Context<'_> {
     /// What the residual of a set holds that is not noise; `own` is its fit with the noise model of its own residual. The first that was found.
     pub fn left(&self, node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
@@ -72,6 +86,9 @@ impl Context<'_> {
                     continue;
                 }
                 for signal in of_command(&input.values) {
+                    if is_predictable(&signal) {
+                        continue;
+                    }
                     count += 1.0;
                     match prewhitened_input_test(&signal, residual, lags) {
                         Ok((_, p)) if p < least => {

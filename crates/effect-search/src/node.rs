@@ -23,8 +23,11 @@ pub(crate) const FINE: Stopping = Stopping {
 };
 
 /// What all sets of one search share.
+#[derive(Clone)]
 pub(crate) struct Context<'a> {
     pub problem: &'a Problem,
+    /// Standard deviation of each output's noise, where it is known by now.
+    pub scales: Option<Vec<f64>>,
     pub candidates: Vec<Candidate>,
     pub limit: Limit<'a>,
 }
@@ -75,7 +78,11 @@ impl Context<'_> {
             .map(|(name, value)| (name.clone(), *value))
             .collect();
         let setup = ModelSetup::new(model, &problem.records, &known, problem.time_unit)?;
-        Ok(setup.with_priors(&problem.priors)?)
+        let setup = setup.with_priors(&problem.priors)?;
+        Ok(match &self.scales {
+            Some(scales) => setup.with_scales(scales.clone()),
+            None => setup,
+        })
     }
 
     /// The fit of a set from starts in a metric.

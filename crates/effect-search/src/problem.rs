@@ -85,11 +85,6 @@ impl<'a> Limit<'a> {
                 .is_some_and(|limit| self.begun.elapsed() > limit.mul_f64(share))
     }
 
-    /// When this share of the time has passed; `None` without a limit.
-    pub fn until(&self, share: f64) -> Option<Instant> {
-        self.limit.map(|limit| self.begun + limit.mul_f64(share))
-    }
-
     pub fn seconds(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()
     }

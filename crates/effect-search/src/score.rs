@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use crate::Error;
 use crate::node::{Context, Node};
+use crate::spectral_line::strongest_line;
 
 /// More starts of a candidate than this are thinned out.
 const MOST_STARTS: usize = 24;
@@ -32,14 +33,45 @@ pub(crate) struct Trial {
     pub starts: Vec<Vec<f64>>,
     /// Predicted fall of the deviance.
     pub fall: f64,
-    /// How many starts were looked at.
-    pub ways: usize,
 }
 
+/// The effect whose starts follow from the spectrum of the residual.
+const PERIODIC: &str = "periodic";
+
 impl Context<'_> {
+    /// Periods of the strongest lines of a set's residuals, and half a line to either side \[unit of the model's time\].
+    fn periods(&self, node: &Node) -> Result<Vec<f64>, Error> {
+        let setup = self.setup(&node.model)?;
+        let Some(residuals) = estimation::residuals(&setup, &node.fit.x) else {
+            return Ok(Vec::new());
+        };
+        let records = &self.problem.records;
+        let outputs = records[0].outputs.len();
+        let mut periods = Vec::new();
+        for (i, residual) in residuals.iter().enumerate() {
+            if residual.len() < 16 || residual.iter().all(|e| e.is_nan()) {
+                continue;
+            }
+            let duration = records[i / outputs].duration() / self.problem.time_unit;
+            if let Some(line) = strongest_line(residual)? {
+                let cycles = line.cycles as f64;
+                periods.extend([-0.5, 0.0, 0.5].map(|part| duration / (cycles + part)));
+            }
+        }
+        Ok(periods)
+    }
+
     /// Scores of all candidates that a set does not have, best first.
     pub fn trials(&self, node: &Node, noise: &Noise) -> Vec<Trial> {
-        let others: Vec<usize> = (0..self.candidates.len())
+        let all: Vec<usize> = (0..self.candidates.len()).collect();
+        self.trials_among(node, &all, noise)
+    }
+
+    /// The same of some candidates, by their positions.
+    pub fn trials_among(&self, node: &Node, among: &[usize], noise: &Noise) -> Vec<Trial> {
+        let others: Vec<usize> = among
+            .iter()
+            .copied()
             .filter(|i| !node.added.contains(i))
             .collect();
         let mut trials: Vec<Trial> = others
@@ -87,6 +119,20 @@ impl Context<'_> {
             }
             if !starts.contains(&x) {
                 starts.push(x);
+            }
+        }
+        if candidate.effect.is_some_and(|effect| effect.id == PERIODIC) {
+            let at = candidate
+                .parameters
+                .iter()
+                .position(|own| own.short == "period");
+            if let (Some(Some(at)), Some(first)) = (at.map(|at| places[at]), starts.first()) {
+                let first = first.clone();
+                for period in self.periods(node)? {
+                    let mut x = first.clone();
+                    x[at] = within(period, setup.bounds()[at]);
+                    starts.insert(0, x);
+                }
             }
         }
         let ways = starts.len();
@@ -145,7 +191,6 @@ impl Context<'_> {
             model: model.clone(),
             starts,
             fall,
-            ways,
         }))
     }
 }

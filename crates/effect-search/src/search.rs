@@ -17,6 +17,8 @@ const REFITS: usize = 8;
 const FIRST_REFITS: usize = 28;
 /// So many pairs are fitted.
 const PAIRS: usize = 8;
+/// So many candidates, the best beside the believed model, are scored beside larger sets at least; half of all where there are more.
+const ALWAYS: usize = 40;
 /// Sets that grow side by side.
 const BEAM: usize = 4;
 /// A larger set has to lower the criterion by this, or the search ends.
@@ -28,8 +30,6 @@ pub(crate) struct Grown {
     pub base: Node,
     /// Single effects, best first.
     pub singles: Vec<Node>,
-    /// Scores of the single effects.
-    pub trials: Vec<Trial>,
     /// The set with the least criterion.
     pub best: Node,
 }
@@ -76,6 +76,9 @@ impl Context<'_> {
                 .collect();
             beam.extend(fits);
         }
+        // What does next to nothing beside the believed model is not scored again beside larger sets.
+        let many = (trials.len() / 2).max(ALWAYS).min(trials.len());
+        let among: Vec<usize> = trials[..many].iter().map(|t| t.candidate).collect();
         let mut size = base.added.len() + 1;
         loop {
             beam = best_first(beam);
@@ -102,7 +105,7 @@ impl Context<'_> {
                 if self.limit.passed(share) {
                     break;
                 }
-                let trials = self.trials(parent, noise);
+                let trials = self.trials_among(parent, &among, noise);
                 let promising = &trials[..trials.len().min(REFITS)];
                 for child in self.refits(parent, promising, noise) {
                     let same = |known: &Node| same_set(known, &child);
@@ -116,7 +119,6 @@ impl Context<'_> {
         Ok(Grown {
             base,
             singles,
-            trials,
             best,
         })
     }

@@ -249,6 +249,40 @@ impl<'a> ModelSetup<'a> {
         self.model
     }
 
+    /// The same with the standard deviation of each output's noise known: outputs count by them, and not by their residuals.
+    #[must_use]
+    pub fn with_scales(self, scales: Vec<f64>) -> Self {
+        Self {
+            known_scales: Some(scales),
+            ..self
+        }
+    }
+
+    /// Standard deviation of the noise of each output as a linear prediction from the past leaves it, which what the model lacks hardly enters;
+    /// that of the residual where there are too few samples. `None` where the simulation cannot go on.
+    #[must_use]
+    pub fn output_noise(&self, x: &[f64]) -> Option<Vec<f64>> {
+        let simulated = self.simulate(x)?;
+        let noise = output_noise(self.records, &simulated);
+        let residual = |o: usize| {
+            let outputs = self.records.iter().map(|record| &record.outputs[o]);
+            let series = simulated.iter().skip(o).step_by(self.outputs());
+            let pairs = outputs
+                .zip(series)
+                .flat_map(|(y, m)| y.values.iter().zip(m));
+            let squares: f64 = pairs
+                .filter(|(y, _)| !y.is_nan())
+                .map(|(y, m)| (y - m).powi(2))
+                .sum();
+            (squares / self.samples[o].max(1) as f64).sqrt()
+        };
+        let all = noise.into_iter().enumerate();
+        Some(
+            all.map(|(o, noise)| noise.unwrap_or_else(|| residual(o)))
+                .collect(),
+        )
+    }
+
     /// Instants of a record's rows on the clock of the model \[unit of the model's time\].
     #[must_use]
     pub fn model_time(&self, record: usize) -> Vec<f64> {
@@ -319,13 +353,7 @@ impl<'a> ModelSetup<'a> {
         }
         let mut weighted = self.clone();
         for round in 0..WEIGHTINGS {
-            let simulated = weighted.simulate(&fit.x).ok_or(Error::Stopped)?;
-            let noise = output_noise(self.records, &simulated);
-            let scales: Vec<f64> = noise
-                .into_iter()
-                .zip(&fit.rmse)
-                .map(|(noise, rmse)| noise.unwrap_or(*rmse))
-                .collect();
+            let scales = weighted.output_noise(&fit.x).ok_or(Error::Stopped)?;
             let settled = weighted.known_scales.as_ref().is_some_and(|known| {
                 known
                     .iter()

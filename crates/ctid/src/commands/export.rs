@@ -27,7 +27,7 @@ pub(super) struct Export {
     /// Records (CSV) that the model is fitted to; without one --modelica writes the values of the text and of [known]
     #[arg(value_name = "DATA.csv")]
     data: Vec<PathBuf>,
-    /// Write a model of your own with its fitted values as Modelica, standard errors in comments
+    /// Write the model with its fitted values as Modelica, standard errors in comments: one of your own, or a plant of one input and one output without effects
     #[arg(long, value_name = "F.mo")]
     modelica: Option<PathBuf>,
     /// Write record, time, inputs, and of each output what was measured, the model and the residual
@@ -58,16 +58,21 @@ impl Export {
         let curves = self.csv.as_deref().map(|path| (Kind::Record, path));
         let wanted: Vec<(Kind, &Path)> = text.into_iter().chain(curves).collect();
         let outputs = output::plan(&wanted, &inputs)?;
+        if let (AnyModelFile::Plant(model), Some(_)) = (&model, &self.modelica)
+            && let Some(why) = simulate::no_text(model)
+        {
+            return Err(Error::file(&self.model, why));
+        }
+        if let (AnyModelFile::Plant(_), []) = (&model, &self.data[..]) {
+            return Err(Error::file(
+                &self.model,
+                "a model file of a plant holds first guesses, no values: give the records that it is fitted to, DATA.csv",
+            ));
+        }
         let bar = Bar::new();
         bar.phase("fitting the model");
         let exported = match model {
             AnyModelFile::Plant(model) => {
-                if self.modelica.is_some() {
-                    return Err(no_text(
-                        &self.model,
-                        !model.effects.is_empty() || !model.terms.is_empty(),
-                    ));
-                }
                 let options = Options {
                     time_limit: Some(self.effort.limit()),
                     interrupt: Some(interrupt::flag()),
@@ -92,14 +97,4 @@ impl Export {
         let text = input::notes(&summaries, look) + &look.paragraph("", &said);
         finish(&exported, &text, &outputs, out, look)
     }
-}
-
-/// Why a plant has no text. Its place is here: a text of a plant with its fitted parameters is written as that of a model of one's own.
-fn no_text(model: &Path, effects: bool) -> Error {
-    let what = if effects {
-        "--modelica: a plant with effects cannot be written as Modelica yet; write its curves with --csv"
-    } else {
-        "--modelica: a plant cannot be written as Modelica yet; write its curves with --csv, or its equations as a model of your own"
-    };
-    Error::file(model, what)
 }

@@ -30,6 +30,9 @@ pub(super) struct Simulate {
     /// Write time, outputs and the limits of their 95 % bands
     #[arg(long, value_name = "Y.csv")]
     out: PathBuf,
+    /// Write the result as JSON
+    #[arg(long, value_name = "F")]
+    json: Option<PathBuf>,
     /// Fit the model to these records first; without it a model of your own takes the values of its text, without a band
     #[arg(long, value_name = "DATA.csv", num_args = 1..)]
     fit: Vec<PathBuf>,
@@ -94,17 +97,21 @@ impl Simulate {
         if let AnyModelFile::Own(model) = &model {
             all.push(&model.text);
         }
-        let outputs = output::plan(&[(Kind::Record, Path::new(&self.out))], &all)?;
+        let json = self.json.as_deref().map(|path| (Kind::Json, path));
+        let wanted: Vec<(Kind, &Path)> = std::iter::once((Kind::Record, self.out.as_path()))
+            .chain(json)
+            .collect();
+        let outputs = output::plan(&wanted, &all)?;
+        if let (AnyModelFile::Plant(_), []) = (&model, &self.fit[..]) {
+            return Err(Error::file(
+                &self.model,
+                "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
+            ));
+        }
         let bar = Bar::new();
         bar.phase("fitting the model");
         let found = match model {
             AnyModelFile::Plant(model) => {
-                if self.fit.is_empty() {
-                    return Err(Error::file(
-                        &self.model,
-                        "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
-                    ));
-                }
                 let options = Options {
                     time_limit: Some(self.effort.limit()),
                     interrupt: Some(interrupt::flag()),

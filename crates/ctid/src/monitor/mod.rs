@@ -112,7 +112,7 @@ impl From<Error> for Halt {
 /// What is watched.
 #[derive(Clone)]
 enum Believed<'a> {
-    Plant(Model),
+    Plant(Box<Model>),
     /// And the seconds in one unit of its time.
     Own(&'a OwnModelFile, f64),
 }
@@ -120,7 +120,7 @@ enum Believed<'a> {
 impl<'a> Believed<'a> {
     fn watched(&self) -> Watched<'a> {
         match self {
-            Self::Plant(model) => model.clone().into(),
+            Self::Plant(model) => Model::clone(model).into(),
             Self::Own(file, time_unit) => OwnModel {
                 model: &file.model,
                 known: file.known.clone(),
@@ -186,7 +186,10 @@ impl<'a> Session<'a> {
         };
         let restored = state.is_some();
         let (columns, model) = match file {
-            AnyModelFile::Plant(file) => (file.columns.clone(), Believed::Plant(believed(file))),
+            AnyModelFile::Plant(file) => (
+                file.columns.clone(),
+                Believed::Plant(Box::new(believed(file))),
+            ),
             AnyModelFile::Own(file) => {
                 // Where the model file does not say in which unit the time is, the header does.
                 let declared = file.columns.time.is_some();

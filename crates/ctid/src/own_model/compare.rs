@@ -44,7 +44,7 @@ pub(crate) struct Step {
     /// The same on the held-out records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse_test_per_output: Option<BTreeMap<String, f64>>,
-    /// Simulation error in multiples of the noise's innovations.
+    /// Simulation error, each output divided by its noise, which is what a linear prediction from the past leaves: 1 is the noise floor.
     pub weighted_rmse: f64,
     /// Bayesian information criterion.
     pub bic: f64,
@@ -120,6 +120,9 @@ pub(crate) fn compare(
         .simulate(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
     let test = held_out(&setup, &fit, &records.test, options).map_err(blame)?;
+    let noise = setup
+        .output_noise(&fit.x)
+        .ok_or_else(|| blame(greybox::Error::Stopped))?;
     let outputs: Vec<&ct_model::About> = spec
         .outputs
         .iter()
@@ -151,7 +154,7 @@ pub(crate) fn compare(
         rmse: (outputs.len() == 1).then(|| fit.rmse[0]),
         rmse_per_output: named(&fit.rmse),
         rmse_test_per_output: test.map(|rms| named(&rms)),
-        weighted_rmse: weighted_rms(&fit.rmse, &fit.scales(), &fit.samples_per_output),
+        weighted_rmse: weighted_rms(&fit.rmse, &noise, &fit.samples_per_output),
         bic: fit.bic(),
         parameters: estimates.collect(),
         starts: fit.starts,

@@ -87,11 +87,7 @@ pub(crate) fn export(
     // Where a simulation begins: as the first record does.
     for (state, value) in spec.states.iter_mut().zip(&fit.x[count..]) {
         if !state.fixed {
-            let size = Expression::Number(value.abs());
-            state.start = match value.is_sign_negative() && *value != 0.0 {
-                true => Expression::Negative(Box::new(size)),
-                false => size,
-            };
+            state.start = number(*value);
         }
     }
     let mut names: Vec<String> = own.iter().map(|record| record.name.clone()).collect();
@@ -159,8 +155,18 @@ pub(crate) fn export(
     Ok((exported, records.summaries))
 }
 
+/// A number as a text has it.
+pub(crate) fn number(value: f64) -> Expression {
+    let size = Expression::Number(value.abs());
+    if value < 0.0 {
+        Expression::Negative(Box::new(size))
+    } else {
+        size
+    }
+}
+
 /// A model's text under comments.
-fn commented(head: &[String], spec: &ModelSpec) -> String {
+pub(crate) fn commented(head: &[String], spec: &ModelSpec) -> String {
     let comments: String = head.iter().map(|line| format!("// {line}\n")).collect();
     comments + &spec.to_string()
 }

@@ -12,7 +12,7 @@ mod text;
 
 pub(crate) use self::compare::{Comparison, compare};
 pub(crate) use self::diagnose::{diagnose, said as diagnosis_said};
-pub(crate) use self::export::{Exported, export};
+pub(crate) use self::export::{Exported, commented, export, number};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
 pub(crate) use self::identify::{Beside, OneByOne};
 pub(crate) use self::simulate::simulate;

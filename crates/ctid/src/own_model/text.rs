@@ -43,7 +43,7 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     }
     if step.rmse_per_output.len() > 1 {
         text += &format!(
-            "  together {} times the noise's innovations\n",
+            "  together {} times the noise, which is what a linear prediction from the past leaves\n",
             numbers::significant(step.weighted_rmse, 3)
         );
     }

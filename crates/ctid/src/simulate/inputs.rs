@@ -95,7 +95,7 @@ pub(crate) fn first_readings(record: &Record, count: usize) -> Record {
     let end = |output: &Channel| {
         let present = output.values.iter().enumerate();
         let mut present = present.filter(|(_, value)| !value.is_nan()).map(|(k, _)| k);
-        let last = present.clone().last().map_or(0, |last| last + 1);
+        let last = present.clone().next_back().map_or(0, |last| last + 1);
         present.nth(count - 1).map_or(last, |k| k + 1)
     };
     let rows = record.outputs.iter().map(end).max().unwrap_or(0).max(1);

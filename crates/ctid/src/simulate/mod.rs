@@ -22,7 +22,7 @@ use serde::Serialize;
 pub(crate) use self::curves::{Curves, FittedRecord};
 pub(crate) use self::inputs::{Inputs, begins_with_readings, first_readings, read_inputs};
 pub(crate) use self::plant::simulate as simulate_plant;
-pub(crate) use self::plant_export::export as export_plant;
+pub(crate) use self::plant_export::{export as export_plant, no_text};
 pub(crate) use self::text::said;
 pub(crate) use self::time_column::TimeColumn;
 use crate::output::Found;
@@ -93,7 +93,7 @@ pub(crate) struct Simulated {
     /// Length of the record \[s\].
     #[serde(skip)]
     pub length: f64,
-    #[serde(skip)]
+    /// When each row is.
     pub time: TimeColumn,
     /// The bands of readings are written too.
     #[serde(skip)]

@@ -1,13 +1,64 @@
-//! The curves of a plant's fit.
+//! The curves of a plant's fit, and its text.
 
+use ct_model::ModelSpec;
 use ct_signals::{Heading, ReadSummary};
-use missing_effect::Options;
+use missing_effect::{Options, Problem};
 
 use super::{Curves, FittedRecord, TimeColumn};
 use crate::Error;
 use crate::input::{Files, Input};
 use crate::model_file::ModelFile;
-use crate::own_model::Exported;
+use crate::numbers;
+use crate::own_model::{Exported, commented, number};
+
+/// Why a plant cannot be written as Modelica; `None` where it can.
+pub(crate) fn no_text(model: &ModelFile) -> Option<&'static str> {
+    let known = model.known.outputs(model.plant);
+    if !model.effects.is_empty() || !model.terms.is_empty() {
+        return Some(
+            "--modelica: a plant with effects cannot be written as Modelica yet; write its curves with --csv",
+        );
+    }
+    let one = model.columns.inputs.len() < 2 && known == [model.plant.vessels() - 1];
+    (!one || model.plant.joined()).then_some(
+        "--modelica: a plant with several inputs or outputs, or whose upper level alone is read, cannot be written as Modelica yet; write its curves with --csv, or its equations as a model of your own",
+    )
+}
+
+/// The text of a plant of one input and one output with fitted values: names and values of its parameters, then of its levels.
+fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> Option<String> {
+    let mut spec = ModelSpec::parse(problem.plant.text()).ok()?;
+    let names: Vec<String> = problem.records.iter().map(|r| r.name.clone()).collect();
+    let mut head = vec![format!(
+        "Written by ctid export from plant {}, fitted to {}.",
+        problem.plant.id(),
+        names.join(", ")
+    )];
+    head.push("Standard errors (fitted values are below):".to_string());
+    for parameter in &mut spec.parameters {
+        let name = &parameter.about.name;
+        if let Some(at) = values.iter().position(|(own, _)| own == name) {
+            parameter.value = values[at].1;
+            let error = errors[at].map(|error| numbers::significant(error, 3));
+            let error = error.unwrap_or_else(|| "none: at a bound, or not determined".to_string());
+            head.push(format!("  {name}: {error}"));
+        }
+        let vessel = match name.as_str() {
+            "area" | "area_upper" => 0,
+            "area_lower" => 1,
+            _ => continue,
+        };
+        parameter.value = problem.known.area[vessel].unwrap_or(parameter.value);
+    }
+    let levels = &values[errors.len()..];
+    for (state, (_, value)) in spec.states.iter_mut().zip(levels) {
+        state.start = number(*value);
+    }
+    if names.len() > 1 {
+        head.push(format!("Initial states are those of {}.", names[0]));
+    }
+    Some(commented(&head, &spec))
+}
 
 /// Fits a plant with its effects to records.
 ///
@@ -36,9 +87,21 @@ pub(crate) fn export(
     let (inputs, outputs): (Vec<_>, Vec<_>) = (inputs.collect(), outputs.collect());
     let fitted = missing_effect::fitted(&problem, options, |fitted| {
         let model = fitted.setup.simulate(&fitted.fit.x)?.output;
-        Ok((fitted.setup.records.to_vec(), model))
+        let names = fitted.setup.names().iter().cloned();
+        let values: Vec<_> = names.zip(fitted.fit.x.iter().copied()).collect();
+        let errors = (0..fitted.setup.parameter_count()).map(|i| {
+            let known = fitted.uncertainty?;
+            let at = known.entries.iter().position(|entry| *entry == i)?;
+            Some(known.covariance[at][at].sqrt())
+        });
+        let errors: Vec<Option<f64>> = errors.collect();
+        Ok((
+            fitted.setup.records.to_vec(),
+            model,
+            text(&problem, &values, &errors),
+        ))
     });
-    let (records, model) = fitted
+    let (records, model, text) = fitted
         .map_err(|error| files.blame(error))?
         .map_err(|error: greybox::Error| files.blame(error.into()))?;
     let mut all = Vec::new();
@@ -58,7 +121,7 @@ pub(crate) fn export(
         schema: 1,
         model: name,
         fitted_to: problem.records.iter().map(|r| r.name.clone()).collect(),
-        text: None,
+        text,
         curves: Some(Curves {
             inputs,
             outputs,

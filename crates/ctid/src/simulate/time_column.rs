@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use ct_signals::{Columns, Heading, LARGEST_RECORD, Record, csv_header, read_file};
+use serde::Serialize;
 
 use crate::Error;
 
 /// A column of times.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct TimeColumn {
     /// Its header.
     pub header: String,

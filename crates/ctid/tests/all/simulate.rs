@@ -133,9 +133,16 @@ fn new_inputs_are_simulated_with_a_band() {
     assert!((0.08..0.13).contains(&wide), "{wide}");
     // Where the first row is known exactly nothing is uncertain.
     assert_eq!(low[0], high[0]);
-    // What was written is a record that the same model file reads.
-    let record = place.read("y.csv").replace("t [s],", "t [s],no,");
-    assert!(record.starts_with("t [s],no,block [degC],"));
+    // The same as JSON.
+    place.succeeds("simulate m.toml in.csv --fit a.csv b.csv --out y2.csv --json y.json");
+    let json = place.json("y.json");
+    assert_eq!(json["outputs"][0]["mean"][149].as_f64(), Some(mean[149]));
+    let half = json["outputs"][0]["band"]["output"][149].as_f64().unwrap();
+    assert!((half - (high[149] - mean[149])).abs() < 1e-12);
+    assert_eq!(
+        (&json["states_from"], &json["written_by"]),
+        (&"text".into(), &"ctid".into())
+    );
 }
 
 #[test]
@@ -316,7 +323,7 @@ fn what_is_exported_reads_back() {
         "{text}"
     );
     assert!(
-        text.contains("//   C: known, not fitted") && text.contains("//   k: 0.000"),
+        text.contains("//   C: known, not fitted") && text.contains("//   k: "),
         "{text}"
     );
     place.succeeds("check fitted.mo");
@@ -377,6 +384,17 @@ fn what_cannot_be_exported_is_refused_in_one_line() {
     place.write("tank.toml", "plant = \"single-tank\"\n");
     place.refuses(
         "export tank.toml --modelica t.mo",
+        &[
+            "tank.toml: a model file of a plant holds first guesses",
+            "DATA.csv",
+        ],
+    );
+    place.write(
+        "tank.toml",
+        "plant = \"three-tank\"\n[known]\nmeasured = \"T3\"\n",
+    );
+    place.refuses(
+        "export tank.toml --modelica t.mo",
         &["tank.toml: --modelica", "--csv"],
     );
     place.write(
@@ -415,6 +433,29 @@ fn the_curves_of_a_plant_are_exported() {
     let compared = place.result("compare tour.csv --model tour.toml");
     let rmse = compared["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rms / rmse - 1.0).abs() < 1e-6, "{rms} {rmse}");
+}
+
+#[test]
+fn a_plant_is_exported_as_modelica_and_reads_back() {
+    let place = Place::new();
+    place.succeeds("export tour.toml tour.csv --modelica tank.mo --csv curves.csv");
+    place.succeeds("check tank.mo");
+    place.write(
+        "own.toml",
+        "model = \"tank.mo\"\n[columns]\ntime = \"t [s]\"\nu = \"u [V]\"\nlevel = \"y [cm]\"\n",
+    );
+    let record = place.read("tour.csv");
+    let inputs = record
+        .lines()
+        .map(|line| line.rsplit_once(',').unwrap().0.to_string() + "\n");
+    place.write("in.csv", inputs.collect::<String>());
+    place.succeeds("simulate own.toml in.csv --out y.csv");
+    let own = column(&place.read("y.csv"), "y");
+    let model = column(&place.read("curves.csv"), "y model [cm]");
+    assert_eq!(own.len(), model.len());
+    for (own, model) in own.iter().zip(&model) {
+        assert!((own - model).abs() < 1e-5, "{own} {model}");
+    }
 }
 
 /// A block in a room that keeps its warmth.

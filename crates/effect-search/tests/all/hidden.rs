@@ -1,0 +1,266 @@
+//! Records of models in which something is hidden, and what is said of them.
+
+use std::collections::BTreeMap;
+
+use ct_model::effects::{OwnCandidate, OwnParameter};
+use ct_model::{Model, ModelSpec, Simulation};
+use ct_signals::{Channel, Record, noise};
+use effect_search::{Diagnosis, Error, Options, Problem, Verdict, diagnose};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// A block with a heater, in a room; what the user believes.
+const BLOCK: &str = r#"model Block
+  parameter Real k(unit="W/K", min=0) = 0.8;
+  parameter Real g(unit="W/%", min=0) = 1.6;
+  final parameter Real C(unit="J/K") = 50;
+  input Real u(unit="%");
+  input Real Ta(unit="degC");
+  output Real y(unit="degC") = T;
+  Real T(unit="degC", start=20);
+equation
+  C*der(T) = g*u - k*(T - Ta);
+end Block;"#;
+
+/// Two blocks side by side, both read.
+const PAIR: &str = r#"model Pair
+  parameter Real k1(unit="W/K", min=0) = 0.8;
+  parameter Real k2(unit="W/K", min=0) = 0.5;
+  parameter Real g(unit="W/%", min=0) = 1.6;
+  final parameter Real C(unit="J/K") = 50;
+  input Real u(unit="%");
+  input Real w(unit="%");
+  output Real y1(unit="degC") = T1;
+  output Real y2(unit="degC") = T2;
+  Real T1(unit="degC", start=20);
+  Real T2(unit="degC", start=20);
+equation
+  C*der(T1) = g*u - k1*(T1 - 20);
+  C*der(T2) = g*w - k2*(T2 - 20);
+end Pair;"#;
+
+const ROWS: usize = 500;
+const STEP: f64 = 5.0;
+
+/// Levels that look random and are the same for all.
+fn level(k: usize, of: usize) -> f64 {
+    ((k / (17 + 6 * of) + of) * 7919 % 13) as f64 * 3.0
+}
+
+/// A record of a model with its own parameters, the noise of each output of first order.
+fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Record {
+    let spec = ModelSpec::parse(text).unwrap();
+    let model = Model::new(spec);
+    let parameters = model.parameters();
+    let mut simulation =
+        Simulation::<f64>::new(&model, &parameters, &model.starts(&parameters), 0.0);
+    let spec = model.spec();
+    let inputs: Vec<Vec<f64>> = (0..spec.inputs.len())
+        .map(|i| {
+            let ambient = spec.inputs[i].about.name == "Ta";
+            let value = |k: usize| {
+                if ambient {
+                    15.0 + 4.0 * (0.013 * k as f64).sin()
+                } else {
+                    level(k, i)
+                }
+            };
+            (0..ROWS).map(value).collect()
+        })
+        .collect();
+    let mut outputs = vec![Vec::new(); spec.outputs.len()];
+    let mut row = vec![0.0; outputs.len()];
+    for k in 0..ROWS {
+        let now: Vec<f64> = inputs.iter().map(|input| input[k]).collect();
+        simulation.read(&now, &mut row);
+        for (output, value) in outputs.iter_mut().zip(&row) {
+            output.push(*value);
+        }
+        simulation
+            .advance(&now, &now, STEP * (k + 1) as f64)
+            .unwrap();
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for output in &mut outputs {
+        let noise = noise::ar1(ROWS, sigma, correlation, &mut rng);
+        output.iter_mut().zip(noise).for_each(|(y, e)| *y += e);
+    }
+    let channel = |(about, values): (&ct_model::About, Vec<f64>)| {
+        Channel::new(&about.name, &about.unit, values)
+    };
+    Record {
+        name: "record".to_string(),
+        time: (0..ROWS).map(|k| STEP * k as f64).collect(),
+        inputs: spec
+            .inputs
+            .iter()
+            .map(|i| &i.about)
+            .zip(inputs)
+            .map(channel)
+            .collect(),
+        outputs: spec
+            .outputs
+            .iter()
+            .map(|o| spec.about(o.variable))
+            .zip(outputs)
+            .map(channel)
+            .collect(),
+        references: Vec::new(),
+        calendar: None,
+    }
+}
+
+fn problem(believed: &str, record: Record) -> Problem {
+    Problem {
+        spec: ModelSpec::parse(believed).unwrap(),
+        effects: Vec::new(),
+        records: vec![record],
+        test: Vec::new(),
+        known: BTreeMap::new(),
+        priors: BTreeMap::new(),
+        candidates: BTreeMap::new(),
+        time_unit: 1.0,
+        time_unit_name: "s".to_string(),
+    }
+}
+
+fn found(problem: &Problem) -> Diagnosis {
+    diagnose(problem, &Options::default(), &|_| {}).unwrap()
+}
+
+fn names(diagnosis: &Diagnosis, effect: &str) -> bool {
+    let claims = matches!(
+        diagnosis.verdict,
+        Verdict::Effect | Verdict::Undecided | Verdict::Partial
+    );
+    claims && diagnosis.groups.iter().flatten().any(|id| id == effect)
+}
+
+/// The block with another equation and other parameters than the user believes.
+fn block(equation: &str) -> String {
+    BLOCK
+        .replace("= 0.8;", "= 0.6;")
+        .replace("= 1.6;", "= 2.0;")
+        .replace("g*u - k*(T - Ta)", equation)
+}
+
+#[test]
+fn what_is_hidden_is_named() {
+    let lagging = block("g*u - k*(T - Ta)")
+        .replace(
+            "output Real y(unit=\"degC\") = T;",
+            "output Real y(unit=\"degC\") = s;\n  Real s(start=20);",
+        )
+        .replace("end Block", "  25*der(s) = T - s;\nend Block");
+    for (hidden, text) in [
+        ("lag(y)", lagging),
+        ("saturation(u)", block("g*min(u, 27) - k*(T - Ta)")),
+        ("dead_zone(u)", block("g*max(u - 5, 0) - k*(T - Ta)")),
+        (
+            "varies_with(k,T)",
+            block("g*u - k*(1 + 0.01*(T - 50))*(T - Ta)"),
+        ),
+        ("periodic(T)", block("g*u - k*(T - Ta) + 2*sin(0.021*time)")),
+        ("delay(u)", block("g*delay(u, 11) - k*(T - Ta)")),
+    ] {
+        let diagnosis = found(&problem(BLOCK, record(&text, 0.0, 0.2, 3)));
+        assert!(
+            names(&diagnosis, hidden),
+            "{hidden}: {:?} {:?}, {:?}, {:?}",
+            diagnosis.verdict,
+            diagnosis.groups,
+            diagnosis.left,
+            &diagnosis.singles[..3]
+        );
+        let (first, last) = (
+            &diagnosis.steps[0],
+            &diagnosis.steps[diagnosis.steps.len() - 1],
+        );
+        assert!(last.weighted_rmse < 1.1 && first.weighted_rmse > last.weighted_rmse);
+    }
+}
+
+#[test]
+fn a_flow_between_two_states_is_named_beside_coloured_noise() {
+    let coupled = PAIR
+        .replace("k1*(T1 - 20)", "k1*(T1 - 20) - 0.2*(T1 - T2)")
+        .replace("k2*(T2 - 20)", "k2*(T2 - 20) + 0.2*(T1 - T2)");
+    let diagnosis = found(&problem(PAIR, record(&coupled, 0.8, 0.3, 5)));
+    assert!(
+        names(&diagnosis, "coupling(T1,T2)"),
+        "{:?}",
+        diagnosis.groups
+    );
+    assert!(diagnosis.effects.len() == 1, "{:?}", diagnosis.effects);
+    assert!(diagnosis.steps[0].rmse_per_output.len() == 2 && diagnosis.steps[0].rmse.is_none());
+}
+
+#[test]
+fn nothing_is_named_where_nothing_is_missing() {
+    for seed in 0..4 {
+        let correlation = if seed % 2 == 0 { 0.0 } else { 0.85 };
+        let text = block("g*u - k*(T - Ta)");
+        let diagnosis = found(&problem(BLOCK, record(&text, correlation, 0.3, seed)));
+        assert_eq!(
+            diagnosis.verdict,
+            Verdict::Adequate,
+            "{:?} {:?} {:?}",
+            diagnosis.groups,
+            diagnosis.left,
+            diagnosis.noise
+        );
+        assert_eq!(diagnosis.ranked[0], "none");
+    }
+}
+
+#[test]
+fn a_candidate_of_the_users_own_is_judged_beside_the_others() {
+    let text = block("g*u - k*(T - Ta) - 0.004*max(T - Ta, 0)^1.7");
+    let mut problem = problem(BLOCK, record(&text, 0.0, 0.1, 9));
+    let candidate = OwnCandidate {
+        parameters: BTreeMap::from([(
+            "c".to_string(),
+            OwnParameter {
+                min: Some(0.0),
+                start: 0.01,
+                ..OwnParameter::default()
+            },
+        )]),
+        terms: BTreeMap::from([("T".to_string(), "-c*max(T - Ta, 0)^1.7".to_string())]),
+        ..OwnCandidate::default()
+    };
+    problem
+        .candidates
+        .insert("draught".to_string(), candidate.clone());
+    let diagnosis = found(&problem);
+    assert!(names(&diagnosis, "draught"), "{:?}", diagnosis.groups);
+    // One that equals another is refused.
+    problem.candidates.insert("wind".to_string(), candidate);
+    let refused = diagnose(&problem, &Options::default(), &|_| {});
+    assert!(matches!(refused, Err(Error::Own(_))));
+}
+
+#[test]
+fn what_no_candidate_holds_is_not_called_noise() {
+    // A heat that comes and goes as it likes.
+    let text = block(
+        "g*u - k*(T - Ta) + (if time > 700 and time < 1000 then 12 else if time > 1500 and time < 1650 then -15 else 0)",
+    );
+    let diagnosis = found(&problem(BLOCK, record(&text, 0.0, 0.1, 2)));
+    assert!(
+        matches!(diagnosis.verdict, Verdict::Unexplained | Verdict::Partial),
+        "{:?} {:?}",
+        diagnosis.verdict,
+        diagnosis.groups
+    );
+    assert!(diagnosis.left.is_some());
+}
+
+#[test]
+fn an_effect_that_the_model_cannot_have_is_refused() {
+    let text = block("g*u - k*(T - Ta)");
+    let mut problem = problem(BLOCK, record(&text, 0.0, 0.3, 1));
+    problem.effects.push("lag(q)".to_string());
+    let refused = diagnose(&problem, &Options::default(), &|_| {});
+    assert!(matches!(refused, Err(Error::UnknownEffect { id, .. }) if id == "lag(q)"));
+}

@@ -1,0 +1,4 @@
+//! One program for all tests.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod hidden;

@@ -816,7 +816,7 @@ fn a_state_of_a_model_of_ones_own_goes_on() {
     assert!(!whole.out.is_empty());
     assert_eq!(first.out + &second.out, whole.out);
     // Another model is said, with what differs.
-    place.write("block.mo", &BLOCK.replace("= 15", "= 16"));
+    place.write("block.mo", BLOCK.replace("= 15", "= 16"));
     let refused = fed(&place, "--state s.json", &all);
     assert_eq!(refused.code, Some(2));
     assert_says(&refused, "the state belongs to another model: model");
@@ -829,7 +829,7 @@ fn a_state_of_a_model_of_ones_own_goes_on() {
         "\"block [bar]\" is in bar, but y of the model is in degC",
     );
     let timed = own_place();
-    timed.write("block.mo", &BLOCK.replace("g*u - k", "g*u + sin(time) - k"));
+    timed.write("block.mo", BLOCK.replace("g*u - k", "g*u + sin(time) - k"));
     let refused = fed(&timed, "", &all);
     assert_eq!(refused.code, Some(2));
     assert_says(&refused, "m.toml: the model uses `time`");
@@ -861,7 +861,7 @@ fn dates_are_read_and_said_for_a_model_of_ones_own() {
     }
     place.write(
         "m.toml",
-        &(OWN.to_string() + "time_zone = \"Europe/Berlin\"\n"),
+        OWN.to_string() + "time_zone = \"Europe/Berlin\"\n",
     );
     let dated = fed(&place, "", lines.concat());
     assert_eq!(dated.code, Some(0), "{}", dated.err);

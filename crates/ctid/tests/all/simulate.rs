@@ -94,7 +94,8 @@ fn table(text: &str) -> (Vec<String>, Vec<Vec<String>>) {
 fn column(text: &str, name: &str) -> Vec<f64> {
     let (head, rows) = table(text);
     let at = head.iter().position(|own| own == name);
-    let at = at.unwrap_or_else(|| panic!("{name} is not in {head:?}"));
+    assert!(at.is_some(), "{name} is not in {head:?}");
+    let at = at.unwrap();
     let number = |row: &Vec<String>| row[at].parse().unwrap_or(f64::NAN);
     rows.iter().map(number).collect()
 }

@@ -1,9 +1,11 @@
 //! When a record began, and times for people: dates, or numbers in the unit that fits their length.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{Record, Timestamp, Zone};
 
 /// The date and time at which the clock of a record stands at zero, and the zone in which people read it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calendar {
     /// When `time` is zero.
     pub start: Timestamp,
@@ -16,6 +18,12 @@ impl Calendar {
     #[must_use]
     pub fn at(&self, seconds: f64) -> String {
         self.zone.format(self.start.after(seconds))
+    }
+
+    /// The same for programs, with the offset from UTC: `2026-01-31T14:25:00+01:00`.
+    #[must_use]
+    pub fn rfc3339(&self, seconds: f64) -> String {
+        self.zone.rfc3339(self.start.after(seconds))
     }
 }
 

@@ -70,6 +70,13 @@ impl ColumnFault {
                 column,
                 first,
                 second,
+            } if first == second => {
+                format!(", column \"{column}\": it is named twice as {first}; {mend}")
+            }
+            Self::Shared {
+                column,
+                first,
+                second,
             } => format!(
                 ", column \"{column}\": it is named both as {first} and as {second}; {mend}"
             ),

@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{ColumnFault, Error, quoted, unit, unit::Conversion};
+use crate::{ColumnFault, Error, Zone, quoted, unit, unit::Conversion};
 
 /// The names of the columns, as `[columns]` of a model file gives them; what is absent is guessed.
 ///
@@ -48,10 +48,19 @@ struct Named {
     reference: Option<Names>,
     #[serde(skip_serializing_if = "Option::is_none")]
     time_format: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "zone")]
     time_zone: Option<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     missing: Vec<String>,
+}
+
+/// The name of a zone that there is.
+fn zone<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    let name = Option::<String>::deserialize(deserializer)?;
+    if let Some(name) = &name {
+        Zone::named(name).map_err(serde::de::Error::custom)?;
+    }
+    Ok(name)
 }
 
 #[derive(Deserialize, Serialize)]
@@ -226,6 +235,13 @@ struct Header<'a> {
 }
 
 impl Columns {
+    /// Whether a column is named.
+    #[must_use]
+    pub fn names_any(&self) -> bool {
+        let lists = [&self.inputs, &self.outputs, &self.references];
+        self.time.is_some() || lists.iter().any(|names| !names.is_empty())
+    }
+
     /// The unit that is given for the first output; empty where none is.
     #[must_use]
     pub fn output_unit(&self) -> &str {

@@ -95,7 +95,7 @@ pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};
 pub use record::{Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, require_samples};
 pub use stationary_noise::{CovarianceSum, StationaryNoise};
-pub use stream::{BadLine, Line, Rows};
+pub use stream::{BadLine, Line, RowTimes, Rows};
 pub use student::student_half_width;
 pub use timestamp::{Timestamp, TimestampError, TimestampReader, Zone};
 pub use unit::{Conversion, Dimension, Unit};

@@ -1,21 +1,44 @@
-//! Rows of numbers as they come on a stream, a line at a time: what a CSV file may hold, but without looking ahead.
+//! Rows as they come on a stream, a line at a time: what a CSV file may hold, but without looking ahead.
 //!
 //! The first line that is neither blank nor a comment decides: where it holds names, [`Columns`] says which column is what, as
-//! in a file; where it holds numbers, they are time, reference, command and readings, or time, command and readings.
+//! in a file; where it holds a time and numbers, they are time, reference, command and readings, or time, command and readings.
 //! Understood as in a file: commas, semicolons or tabs, a decimal comma where commas do not separate, a byte-order mark, CRLF,
-//! blank lines and comments, quotes. A line that cannot be used is refused by itself, and the next one is read on.
+//! blank lines and comments, quotes, words where a sample is missing, times as numbers in a unit or as dates. The first row's time says how
+//! they are written. A line that cannot be used is refused by itself, and the next one is read on.
 
 use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
 use crate::columns::{Found, Layout, Purpose};
-use crate::csv::{check_width, delimiter, is_number};
-use crate::{Columns, Conversion, Error, escaped, quoted, unit};
+use crate::csv::{
+    Cell, CellFault, Numbers, THOUSANDS, TIME_AS_NUMBER, Times, check_width, delimiter,
+    delimiter_name, is_number, says_missing,
+};
+use crate::{
+    Calendar, Columns, Conversion, Error, Timestamp, TimestampError, TimestampReader, escaped,
+    quoted, unit,
+};
 
 /// The names of the columns in use, where they have no header.
 const ROLES: [&str; 3] = ["time", "input", "output"];
 
-/// How rows are read.
+/// How the times of rows are written.
 #[derive(Debug, Clone, PartialEq)]
+pub enum RowTimes {
+    /// As numbers.
+    Numbers,
+    /// As times of day, which say no day; they count from the first row.
+    TimesOfDay,
+    /// As dates.
+    Dates {
+        /// Where the times count from.
+        calendar: Calendar,
+        /// The first cell has no offset from UTC: what it means follows from the zone.
+        civil: bool,
+    },
+}
+
+/// How rows are read.
+#[derive(Debug, Clone)]
 pub struct Rows {
     delimiter: u8,
     /// The header, where there is one: it may come again.
@@ -34,17 +57,22 @@ pub struct Rows {
     conversions: Vec<Option<Conversion>>,
     /// The cells of the latest row: time, inputs, outputs.
     values: Vec<Result<f64, BadLine>>,
-    /// Seconds in one unit of the time.
+    /// Seconds in one unit of the time, where it is a number.
     seconds: f64,
-    /// The decimal mark seen so far.
-    mark: Option<u8>,
-    scratch: String,
+    columns: Columns,
+    /// How the time is written; `None` until a row has been read.
+    times: Option<Times>,
+    /// Where dates count from and what they follow, where this is known beforehand.
+    start: Option<(Timestamp, Timestamp)>,
+    /// Dates of this stream have no offset.
+    civil: bool,
+    numbers: Numbers,
 }
 
 /// What a line holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Line {
-    /// Time \[s\] and the first input, finite or not; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
+    /// Time \[s\] and the first input; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
     Row([f64; 2]),
     /// Nothing: it is blank, a comment, or the header again.
     Nothing,
@@ -71,6 +99,38 @@ pub enum BadLine {
     Empty {
         /// The column's header.
         column: String,
+    },
+    /// A cell that says that its sample is missing.
+    #[error("column \"{column}\": \"{text}\" stands for a missing sample")]
+    Missing {
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// A number too large to be one.
+    #[error("column \"{column}\": \"{text}\" is not a finite number; check what writes the rows")]
+    NotFinite {
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// A time that is no number, where those before are.
+    #[error("column \"{column}\": \"{text}\" is not a number; {TIME_AS_NUMBER}")]
+    NoNumber {
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// A date or a time that is not understood.
+    #[error("column \"{column}\": {error}")]
+    Time {
+        /// The column's header.
+        column: String,
+        /// Why.
+        error: Box<TimestampError>,
     },
     /// A cell that holds no number.
     #[error("column \"{column}\": \"{text}\" is not a number; {mend}")]
@@ -124,10 +184,13 @@ impl Rows {
             conversions: Vec::new(),
             values: Vec::new(),
             seconds: 1.0,
-            mark: None,
-            scratch: String::new(),
+            columns: columns.clone(),
+            times: None,
+            start: None,
+            civil: false,
+            numbers: Numbers::new(delimiter != b',', false, &columns.missing),
         };
-        if cells.iter().all(|cell| is_number(cell)) {
+        if is_row(&cells, columns) {
             let outputs = columns.outputs.len().max(1);
             let input = match cells.len().checked_sub(outputs) {
                 Some(2) => 1,
@@ -218,7 +281,7 @@ impl Rows {
         self.units.iter().map(String::as_str)
     }
 
-    /// The outputs of the row that was read last, finite or not, or why there is none: its cell is empty or holds no number.
+    /// The outputs of the row that was read last, or why there is none: its cell says that the sample is missing, or holds no number.
     pub fn outputs(&self) -> &[Result<f64, BadLine>] {
         &self.values[1 + self.inputs..]
     }
@@ -229,10 +292,40 @@ impl Rows {
         inputs.map(|value| *value.as_ref().unwrap_or(&f64::NAN))
     }
 
-    /// Seconds in one unit of the time.
+    /// Seconds in one unit of the time, as its header has it.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         self.seconds
+    }
+
+    /// How the times are written, once a row has been read.
+    #[must_use]
+    pub fn times(&self) -> Option<RowTimes> {
+        let times = self.times.as_ref()?;
+        Some(match (times, times.calendar()) {
+            (_, Some(calendar)) => RowTimes::Dates {
+                calendar,
+                civil: self.civil,
+            },
+            (Times::Dates { .. }, None) => RowTimes::TimesOfDay,
+            (Times::Numbers(_), None) => RowTimes::Numbers,
+        })
+    }
+
+    /// Dates count from the zero of a calendar, and not from the first row; the latest row before was at `last` \[s\].
+    pub fn count_from(&mut self, calendar: &Calendar, last: f64) {
+        self.start = Some((calendar.start, calendar.start.after(last)));
+    }
+
+    /// The times go on as those of other rows of the same stream, which came before: dates count from the same zero, and what was a number
+    /// stays one.
+    pub fn go_on(&mut self, before: &Self) {
+        self.times = match &before.times {
+            Some(Times::Numbers(_)) => Some(Times::Numbers(self.seconds)),
+            times => times.clone(),
+        };
+        self.civil = before.civil;
+        self.start = before.start;
     }
 
     /// In which order a row's fields are read, in words.
@@ -290,19 +383,18 @@ impl Rows {
             self.check_count(cells.len())?;
             for role in 0..self.at.len() {
                 let cell = cells.get(self.at[role]).map_or("", String::as_str);
-                self.values[role] = self.number(role, cell);
+                self.values[role] = self.value(role, cell);
             }
         } else {
-            let mut found = 0;
+            let fields = || line.split(char::from(self.delimiter));
+            // A row that is not whole has wrong cells too.
+            self.check_count(fields().count())?;
             for (i, cell) in line.split(char::from(self.delimiter)).enumerate() {
-                found += 1;
                 let Some(role) = self.at.iter().position(|at| *at == i) else {
                     continue;
                 };
-                self.values[role] = self.number(role, cell.trim());
+                self.values[role] = self.value(role, cell.trim());
             }
-            // A row that is not whole has wrong cells too.
-            self.check_count(found)?;
         }
         for (value, conversion) in self.values[1..].iter_mut().zip(&self.conversions) {
             if let (Ok(value), Some(conversion)) = (value, conversion) {
@@ -314,7 +406,7 @@ impl Rows {
         for role in 2..=self.inputs {
             value(role)?;
         }
-        Ok(Line::Row([value(0)? * self.seconds, value(1)?]))
+        Ok(Line::Row([value(0)?, value(1)?]))
     }
 
     fn check_count(&self, found: usize) -> Result<(), BadLine> {
@@ -324,59 +416,115 @@ impl Rows {
         Err(BadLine::Fields {
             expected: self.fields,
             found,
-            delimiter: match self.delimiter {
-                b';' => "semicolon",
-                b'\t' => "tab",
-                _ => "comma",
-            },
+            delimiter: delimiter_name(self.delimiter),
         })
     }
 
-    fn number(&mut self, role: usize, cell: &str) -> Result<f64, BadLine> {
-        let column = || quoted(&self.names[role]);
-        if cell.is_empty() {
-            return Err(BadLine::Empty { column: column() });
-        }
-        let commas = cell.bytes().filter(|byte| *byte == b',').count();
-        let point = cell.contains('.');
-        let comma = commas == 1 && !point && self.delimiter != b',';
-        let value = if comma {
-            self.scratch.clear();
-            self.scratch
-                .extend(cell.chars().map(|c| if c == ',' { '.' } else { c }));
-            self.scratch.parse::<f64>()
-        } else {
-            cell.parse::<f64>()
+    /// The cell of a role: the time \[s\], or a sample.
+    fn value(&mut self, role: usize, cell: &str) -> Result<f64, BadLine> {
+        let sample = match role {
+            0 if says_missing(cell) => Ok(Cell::Missing),
+            0 => self.time(cell).map(Cell::Number),
+            _ => self.numbers.sample(cell),
         };
-        let Ok(value) = value else {
-            return Err(BadLine::Text {
-                column: column(),
-                text: quoted(cell),
-                mend: if commas > 0 {
-                    "write decimals with a point and without separators for thousands"
-                } else if role == 0 && cell.contains(|c: char| c.is_ascii_digit()) {
-                    "give the time as a number, such as seconds from the start"
-                } else {
-                    "check what writes the rows"
-                },
-            });
+        let (column, text) = (|| quoted(&self.names[role]), || quoted(cell));
+        let mend = match sample {
+            Ok(Cell::Number(value)) => return Ok(value),
+            Err(CellFault::Empty) => return Err(BadLine::Empty { column: column() }),
+            Ok(Cell::Missing) if cell.is_empty() => {
+                return Err(BadLine::Empty { column: column() });
+            }
+            Ok(Cell::Missing) => {
+                return Err(BadLine::Missing {
+                    column: column(),
+                    text: text(),
+                });
+            }
+            Err(CellFault::NotFinite) => {
+                return Err(BadLine::NotFinite {
+                    column: column(),
+                    text: text(),
+                });
+            }
+            Err(CellFault::DecimalMark { .. }) => {
+                return Err(BadLine::DecimalMark {
+                    column: column(),
+                    text: text(),
+                });
+            }
+            Err(CellFault::Time(error)) => {
+                return Err(BadLine::Time {
+                    column: column(),
+                    error,
+                });
+            }
+            Err(CellFault::Thousands) => THOUSANDS,
+            Err(CellFault::NoNumber) => {
+                return Err(BadLine::NoNumber {
+                    column: column(),
+                    text: text(),
+                });
+            }
+            Err(CellFault::Word | CellFault::Strict) => {
+                "check what writes the rows, or list the word under [columns] where it says that the sample is missing"
+            }
         };
-        let mark = if comma {
-            Some(b',')
-        } else {
-            point.then_some(b'.')
-        };
-        if let (Some(here), Some(before)) = (mark, self.mark)
-            && here != before
-        {
-            return Err(BadLine::DecimalMark {
-                column: column(),
-                text: quoted(cell),
-            });
-        }
-        self.mark = self.mark.or(mark);
-        Ok(value)
+        Err(BadLine::Text {
+            column: column(),
+            text: text(),
+            mend,
+        })
     }
+
+    /// The time of a row \[s\]; the first one says how times are written.
+    fn time(&mut self, cell: &str) -> Result<f64, CellFault> {
+        if let Some(times) = &mut self.times {
+            return times.read(cell, &mut self.numbers);
+        }
+        // There is no more of the column to look at.
+        let all = || vec![cell.to_string()];
+        let mut times = Times::of(cell, all, self.seconds, &self.columns)?;
+        if let Times::Dates { reader, first } = &mut times {
+            let order = reader.require_order(cell);
+            order.map_err(|error| CellFault::Time(Box::new(error)))?;
+            self.civil = reader.is_civil(cell);
+            if let Some((start, last)) = self.start
+                && reader.has_dates()
+            {
+                *first = start;
+                reader.follow(last);
+            }
+        }
+        let time = times.read(cell, &mut self.numbers)?;
+        self.times = Some(times);
+        Ok(time)
+    }
+}
+
+/// Whether the cells of a first line are a row, and no names: numbers alone, or a time, whole or the end of one, and what may stand for samples.
+fn is_row(cells: &[String], columns: &Columns) -> bool {
+    let format = columns.time_format.as_deref();
+    let is_time = |cell: &str| {
+        is_number(cell)
+            || TimestampReader::understands(cell)
+            || is_end_of_time(cell)
+            || format.is_some_and(|format| TimestampReader::new(Some(format), None, [cell]).is_ok())
+    };
+    let is_sample = |cell: &String| {
+        is_number(cell)
+            || says_missing(cell)
+            || columns.missing.iter().any(|own| own.trim() == cell)
+    };
+    match cells {
+        [time, samples @ ..] => is_time(time) && samples.iter().all(is_sample),
+        [] => true,
+    }
+}
+
+/// Whether a cell may be what is left of a date or a time where a stream was joined within a row.
+fn is_end_of_time(cell: &str) -> bool {
+    let part = |c: char| c.is_ascii_digit() || " -/.:+TZ".contains(c);
+    cell.chars().all(part) && cell.ends_with(|c: char| c.is_ascii_digit() || c == 'Z')
 }
 
 /// What so many readings of a row without a header are called.
@@ -477,7 +625,7 @@ mod tests {
             "column \"input\": the cell is empty; check what writes the rows"
         );
         let message = read(&mut three, "12:30\t5\t1").unwrap_err();
-        assert!(message.contains("give the time as a number"), "{message}");
+        assert!(message.contains("write it so throughout"), "{message}");
         let error = Rows::begin("input", 3, "1,2", &Columns::default()).unwrap_err();
         assert!(
             error
@@ -518,6 +666,131 @@ mod tests {
         let message = begin("0,4.5,14.8").unwrap_err().to_string();
         assert!(message.contains("3 numbers and no header"), "{message}");
         assert!(message.contains("t,u,y1,y2"), "{message}");
+    }
+
+    #[test]
+    fn times_may_be_dates_and_words_stand_for_missing_samples() {
+        let columns = Columns {
+            time_zone: Some("Europe/Berlin".into()),
+            missing: vec!["-999".into()],
+            ..Columns::default()
+        };
+        let (mut rows, _) = Rows::begin("input", 1, "t;u;y", &columns).unwrap();
+        assert_eq!(rows.times(), None);
+        // Over the hour that is left out in spring.
+        for (line, time, reading) in [
+            ("29.03.2026 01:59:58,5;4;12,5", 0.0, Some(12.5)),
+            ("29.03.2026 03:00:00;4;Bad", 1.5, None),
+            ("29.03.2026 03:00:01;4;-999", 2.5, None),
+        ] {
+            assert_eq!(read(&mut rows, line), Ok(Line::Row([time, 4.0])), "{line}");
+            assert_eq!(rows.outputs()[0].clone().ok(), reading, "{line}");
+        }
+        let message = read(&mut rows, "29.03.2026 02:30:00;4;12").unwrap_err();
+        assert!(
+            message.contains("does not exist in Europe/Berlin"),
+            "{message}"
+        );
+        let message = read(&mut rows, "I/O Timeout;4;12").unwrap_err();
+        assert!(message.contains("stands for a missing sample"), "{message}");
+        let Some(RowTimes::Dates { calendar, civil }) = rows.times() else {
+            panic!("{:?}", rows.times());
+        };
+        assert!(civil);
+        assert_eq!(calendar.at(0.0), "2026-03-29 01:59:58.5");
+
+        // Other rows of the same stream count from the same zero.
+        let again = || Rows::begin("input", 9, "y;t;u", &columns).unwrap().0;
+        let mut on = again();
+        on.go_on(&rows);
+        assert_eq!(
+            read(&mut on, "1;29.03.2026 03:00:08;4"),
+            Ok(Line::Row([9.5, 4.0]))
+        );
+        let mut restored = again();
+        restored.count_from(&calendar, 9.5);
+        assert_eq!(
+            read(&mut restored, "1;29.03.2026 03:00:09;4"),
+            Ok(Line::Row([10.5, 4.0]))
+        );
+        // The hour that comes twice: where the rows stood tells which.
+        let october = 210.0 * 86_400.0;
+        let mut second = again();
+        second.count_from(&calendar, october + 3.0 * 3600.0);
+        read(&mut second, "1;25.10.2026 02:30:00;4").unwrap();
+        let mut first = again();
+        first.count_from(&calendar, october - 7200.0);
+        read(&mut first, "1;25.10.2026 02:30:00;4").unwrap();
+        let time = |rows: &Rows| *rows.values[0].as_ref().unwrap();
+        assert_eq!(time(&second) - time(&first), 3600.0);
+    }
+
+    #[test]
+    fn dates_need_no_header() {
+        let (mut rows, row) = rows("2026-01-31T14:25:00+01:00,15,4.5,Bad");
+        assert!(row);
+        let line = "2026-01-31T14:26:00+01:00,15,4.5,12";
+        read(&mut rows, "2026-01-31T14:25:00+01:00,15,4.5,Bad").unwrap();
+        assert_eq!(read(&mut rows, line), Ok(Line::Row([60.0, 4.5])));
+        let Some(RowTimes::Dates { calendar, civil }) = rows.times() else {
+            panic!("{:?}", rows.times());
+        };
+        assert!(!civil);
+        assert_eq!(calendar.rfc3339(60.0), "2026-01-31T14:26:00+01:00");
+        let message = read(&mut rows, "12,15,4.5,12").unwrap_err();
+        assert!(message.contains("write all times alike"), "{message}");
+
+        let (mut clock, _) = super::tests::rows("23:59:59,4.5,12");
+        read(&mut clock, "23:59:59,4.5,12").unwrap();
+        assert_eq!(clock.times(), Some(RowTimes::TimesOfDay));
+        assert_eq!(
+            read(&mut clock, "00:00:01,4.5,12"),
+            Ok(Line::Row([2.0, 4.5]))
+        );
+    }
+
+    #[test]
+    fn the_end_of_a_date_is_no_header() {
+        for end in ["5:00", ":02", "-29 10:00:02", "9T10:00:02Z", "00+01:00"] {
+            let line = format!("{end},4.5,Bad");
+            let (mut rows, row) = rows(&line);
+            assert!(row, "{end}");
+            assert!(matches!(
+                rows.read(line.as_bytes()),
+                Err(BadLine::Time { .. })
+            ));
+            assert_eq!(
+                read(&mut rows, "2026-03-29 10:00:02,4,12"),
+                Ok(Line::Row([0.0, 4.0]))
+            );
+        }
+        for header in ["T1,y,u", "-,y,4.5"] {
+            assert!(!matches!(
+                Rows::begin("input", 1, header, &Columns::default()),
+                Ok((_, true))
+            ));
+        }
+    }
+
+    /// A file has more cells to look at; of a stream the first one has to do, also where day and month are the same on this day.
+    #[test]
+    fn a_stream_does_not_wait_for_a_day_above_12() {
+        for cell in ["03/04/2026 10:00", "04/04/2026 10:00"] {
+            let line = format!("{cell},4,12");
+            let (mut rows, _) = rows(&line);
+            let message = read(&mut rows, &line).unwrap_err();
+            assert!(
+                message.contains("set time_format = \"%d/%m/%Y %H:%M\""),
+                "{message}"
+            );
+            assert_eq!(rows.times(), None);
+        }
+        let (mut rows, _) = rows("31/03/2026 10:00,4,12");
+        read(&mut rows, "31/03/2026 10:00,4,12").unwrap();
+        assert_eq!(
+            read(&mut rows, "01/04/2026 10:00,4,12"),
+            Ok(Line::Row([86_400.0, 4.0]))
+        );
     }
 
     #[test]

@@ -25,6 +25,7 @@ mod form;
 mod zone;
 
 use jiff::fmt::strtime::BrokenDownTime;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::quoted;
@@ -38,7 +39,8 @@ const HALF_DAY: i64 = 12 * 3600;
 const DAY: i64 = 24 * 3600;
 
 /// An instant, to the nanosecond.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "(i64, u32)", into = "(i64, u32)")]
 pub struct Timestamp {
     /// Whole seconds since 1970-01-01 00:00 UTC, rounded down.
     seconds: i64,
@@ -93,6 +95,23 @@ impl Timestamp {
                 .saturating_add(i64::from(micros / 1_000_000)),
             nanoseconds: micros % 1_000_000 * 1000,
         }
+    }
+}
+
+impl From<Timestamp> for (i64, u32) {
+    fn from(instant: Timestamp) -> Self {
+        (instant.seconds, instant.nanoseconds)
+    }
+}
+
+impl TryFrom<(i64, u32)> for Timestamp {
+    type Error = &'static str;
+
+    fn try_from((seconds, nanoseconds): (i64, u32)) -> Result<Self, Self::Error> {
+        if nanoseconds >= 1_000_000_000 {
+            return Err("a second has fewer nanoseconds");
+        }
+        Ok(Self::new(seconds, nanoseconds))
     }
 }
 
@@ -273,6 +292,28 @@ impl TimestampReader {
     #[must_use]
     pub fn has_dates(&self) -> bool {
         self.dated
+    }
+
+    /// That the cells that were shown tell day and month apart: of a stream no later cell will, before it is read.
+    ///
+    /// # Errors
+    /// [`TimestampError::DayOrMonth`].
+    pub(crate) fn require_order(&self, cell: &str) -> Result<(), TimestampError> {
+        match &self.written {
+            Written::Symmetric(form) => Err(undecided(cell.trim(), form)),
+            Written::Form(_) | Written::Format(_) => Ok(()),
+        }
+    }
+
+    /// Whether a cell has no offset, so that its instant follows from the zone.
+    pub(crate) fn is_civil(&self, cell: &str) -> bool {
+        let fields = self.fields(cell.trim());
+        fields.is_ok_and(|fields| fields.offset.is_none())
+    }
+
+    /// The next cell follows this instant: of an hour that occurs twice it tells which one is meant.
+    pub(crate) fn follow(&mut self, instant: Timestamp) {
+        self.previous = Some(instant);
     }
 
     /// The instant of the next cell.

@@ -4,7 +4,7 @@ use missing_effect::numbers::significant;
 use plants::{Domain, Place, Structure};
 use serde::{Deserialize, Serialize};
 
-use crate::{isolate::Suspect, watched::Raised};
+use crate::{TimeAxis, isolate::Suspect, watched::Raised};
 
 /// The number of the schema of [`Alarm`]; it rises when a key changes its meaning.
 pub const SCHEMA: u32 = 1;
@@ -123,7 +123,7 @@ pub(crate) fn alarm(
     raised: &Raised,
     suspects: &[Suspect],
     structure: &Structure,
-    units: &Units,
+    (units, axis): (&Units, &TimeAxis),
 ) -> Alarm {
     let best = suspects
         .first()
@@ -161,28 +161,20 @@ pub(crate) fn alarm(
         });
         place = best.placed.effect.place;
     }
-    alarm.sentence = sentence(&alarm, raised.since, place, structure.domain);
+    alarm.sentence = sentence(&alarm, raised.since, place, structure.domain, axis);
     alarm
 }
 
-/// An instant \[s\] as it is written, to the millisecond.
-#[must_use]
-pub fn instant(time: f64) -> String {
-    // An instant of more than 1e12 s has no milliseconds left.
-    let rounded = (time * 1e3).round() / 1e3;
-    if time.abs() < 1e12 { rounded } else { time }.to_string()
-}
-
 /// `place`: of the best effect.
-fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain) -> String {
+fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain, axis: &TimeAxis) -> String {
     let (Some(since), Some(evidence), Some(size)) = (alarm.since, alarm.evidence, &alarm.size)
     else {
         let most = alarm.output.as_ref().map_or(String::new(), |output| {
             format!("; it shows most at the {}", domain.sensor_words(output))
         });
         return format!(
-            "The model does not fit since about t = {} s or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
-            instant(raised),
+            "The model does not fit since about {} or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
+            axis.at(raised),
             alarm.score,
             alarm.threshold
         );
@@ -212,10 +204,10 @@ fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain) -> String 
         _ => String::new(),
     };
     format!(
-        "Consistent with {} ({} = {}{unit}{vessel}) since t = {} s{against}{group}.",
+        "Consistent with {} ({} = {}{unit}{vessel}) since {}{against}{group}.",
         alarm.effects.first().map_or("", String::as_str),
         size.name,
         significant(size.value, 3),
-        instant(since),
+        axis.at(since),
     )
 }

@@ -69,11 +69,12 @@ mod scatter;
 mod sensitivity;
 mod settings;
 mod threshold;
+mod time_axis;
 mod tracker;
 mod watch;
 mod watched;
 
-pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict, instant};
+pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict};
 pub use error::{Error, Refused};
 pub use learn::Model;
 pub use monitor::{
@@ -82,4 +83,5 @@ pub use monitor::{
 pub use own::OwnModel;
 pub use scatter::{ScatterAlarm, ScatterEvent};
 pub use settings::Settings;
+pub use time_axis::TimeAxis;
 pub use watched::Watched;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
 use crate::{
-    Alarm, Error, Refused, ScatterAlarm, Settings, Units, Watched,
+    Alarm, Error, Refused, ScatterAlarm, Settings, TimeAxis, Units, Watched,
     core::{Checkpoint, Core, Phase},
     fingerprint::{Fingerprint, TIME_UNIT, differences},
     intake::{Intake, Readings, Sample, usable},
@@ -196,6 +196,8 @@ pub struct State {
     version: u32,
     model: Fingerprint,
     units: Units,
+    #[serde(default, skip_serializing_if = "TimeAxis::is_seconds")]
+    axis: TimeAxis,
     intake: Intake,
     checkpoint: Checkpoint,
     since: Vec<Sample>,
@@ -278,8 +280,20 @@ impl<'a> Monitor<'a> {
         }
         monitor.core = Core::restore(model, settings, state.units, state.checkpoint, &state.since)
             .map_err(|what| Error::Damaged { what })?;
+        monitor.core.axis = state.axis;
         monitor.intake = state.intake;
         Ok(monitor)
+    }
+
+    /// How times are said in sentences; a restored monitor goes on as before.
+    #[must_use]
+    pub fn axis(&self) -> &TimeAxis {
+        &self.core.axis
+    }
+
+    /// Says when the times of the rows are zero: to be known before the first row.
+    pub fn set_axis(&mut self, axis: TimeAxis) {
+        self.core.axis = axis;
     }
 
     /// All of it, to be saved.
@@ -290,6 +304,7 @@ impl<'a> Monitor<'a> {
             version: VERSION,
             model: self.fingerprint.clone(),
             units: self.units.clone(),
+            axis: self.core.axis.clone(),
             intake: self.intake.clone(),
             checkpoint: checkpoint.clone(),
             since: since.to_vec(),

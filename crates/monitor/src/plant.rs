@@ -6,7 +6,7 @@ use ct_signals::Hold;
 use plants::{Domain, MAX_VESSELS, Scales, Structure};
 
 use crate::{
-    Alarm, Each, Error, Model, Refused, Units, Watched,
+    Alarm, Each, Error, Model, Refused, TimeAxis, Units, Watched,
     alarm::alarm,
     fingerprint::{Fingerprint, fingerprint},
     intake::{Readings, Sample},
@@ -161,12 +161,12 @@ impl<'a> Believed<'a> for Model {
         rows: &[Kept],
         growth: &Each<f64>,
         raised: &Raised,
-        units: &Units,
+        said_in: (&Units, &TimeAxis),
     ) -> Alarm {
-        let Ok(structure) = self.learned_structure(learned, units) else {
+        let Ok(structure) = self.learned_structure(learned, said_in.0) else {
             return Alarm::unexplained(raised, self.output_name(raised.output));
         };
         let suspects = isolate(&structure, learned, hold, rows, growth);
-        alarm(raised, &suspects, &structure, units)
+        alarm(raised, &suspects, &structure, said_in)
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ct_signals::Hold;
 
 use crate::{
-    Alarm, Each, Error, Refused, Stage, Units,
+    Alarm, Each, Error, Refused, Stage, TimeAxis, Units,
     fingerprint::Fingerprint,
     intake::{Readings, Sample},
     isolate::Kept,
@@ -65,7 +65,7 @@ pub(crate) trait Believed<'a>: Send + Sync {
     fn output_words(&self, output: usize, units: &Units) -> String;
     /// The unit of an output.
     fn output_unit(&self, output: usize, units: &Units) -> String;
-    /// What the latest rows say of what began.
+    /// What the latest rows say of what began; units and times of its sentence are those of `said_in`.
     fn look(
         &self,
         learned: &Learned,
@@ -73,6 +73,6 @@ pub(crate) trait Believed<'a>: Send + Sync {
         rows: &[Kept],
         growth: &Each<f64>,
         raised: &Raised,
-        units: &Units,
+        said_in: (&Units, &TimeAxis),
     ) -> Alarm;
 }

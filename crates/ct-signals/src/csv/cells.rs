@@ -1,7 +1,7 @@
 //! Cells of a CSV file: numbers, and what stands there where a sample is missing.
 
 use super::place::Place;
-use crate::{Error, quoted};
+use crate::{Error, TimestampError, quoted};
 
 /// What historians, loggers and spreadsheets write where there is no sample, in small letters. A cell that begins with one of them and goes
 /// on with a blank or a colon is meant too (`Bad: sensor failure`).
@@ -52,7 +52,7 @@ const MISSING: &[&str] = &[
 const BEGINNINGS: &[&str] = &["no", "scan", "i/o", "comm", "under", "over", "calc", "pt"];
 
 /// Whether a cell says that its sample is missing.
-pub(super) fn says_missing(cell: &str) -> bool {
+pub(crate) fn says_missing(cell: &str) -> bool {
     if cell.is_empty() {
         return true;
     }
@@ -78,40 +78,127 @@ pub(super) fn is_word(cell: &str) -> bool {
 
 /// What a cell holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Cell {
+pub(crate) enum Cell {
     Number(f64),
     /// Its sample is missing.
     Missing,
 }
 
+/// Why a cell is refused; the caller knows its row and its column.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum CellFault {
+    Empty,
+    /// A number that is not finite.
+    NotFinite,
+    /// A word that says nothing of a missing sample.
+    Word,
+    /// Commas that are no decimal mark.
+    Thousands,
+    /// It says that its sample is missing, and none may be.
+    Strict,
+    /// The time is a number in the rows before, and no number here.
+    NoNumber,
+    /// Another decimal mark than in the cells before.
+    DecimalMark {
+        here: char,
+        before: char,
+    },
+    /// A date or a time that is not understood.
+    Time(Box<TimestampError>),
+}
+
+impl CellFault {
+    /// As an error of the file; `strict`: a missing sample is refused.
+    pub(super) fn at(self, place: Place, cell: &str, strict: bool) -> Error {
+        let (file, row, column) = (place.file(), place.row(), place.column());
+        let mend = match self {
+            Self::Empty => return Error::EmptyCell { file, row, column },
+            Self::NotFinite => {
+                return Error::NotFinite {
+                    file,
+                    row,
+                    column,
+                    text: quoted(cell),
+                };
+            }
+            Self::DecimalMark { here, before } => {
+                let word = |mark| if mark == ',' { "comma" } else { "point" };
+                return Error::MixedDecimalMarks {
+                    file,
+                    row,
+                    column,
+                    text: quoted(cell),
+                    here: word(here),
+                    before: word(before),
+                };
+            }
+            Self::Time(error) => {
+                return Error::Timestamp {
+                    file,
+                    row,
+                    column,
+                    error,
+                };
+            }
+            Self::Thousands => THOUSANDS,
+            Self::NoNumber => TIME_AS_NUMBER,
+            Self::Strict => {
+                "[columns] says that it stands for a missing sample; leave out --strict to read on over it"
+            }
+            Self::Word if strict => {
+                "correct the cell, or leave out --strict where it says that the sample is missing"
+            }
+            Self::Word => {
+                "correct the cell, or list the word under [columns] where it says that the sample is missing: missing = [\"...\"]"
+            }
+        };
+        Error::TextInCell {
+            file,
+            row,
+            column,
+            text: quoted(cell),
+            mend,
+        }
+    }
+}
+
+/// The mend of [`CellFault::Thousands`].
+pub(crate) const THOUSANDS: &str =
+    "write decimals with a point and without separators for thousands";
+/// The mend of [`CellFault::NoNumber`].
+pub(crate) const TIME_AS_NUMBER: &str =
+    "the rows before have the time as a number: write it so throughout";
+
 /// Turns cells into numbers.
-pub(super) struct Numbers<'a> {
+#[derive(Debug, Clone)]
+pub(crate) struct Numbers {
     decimal_comma_allowed: bool,
     /// The decimal mark seen so far.
     mark: Option<char>,
     /// A missing sample is refused.
     strict: bool,
     /// What stands for a missing sample beside the usual words: as text, and as a number where it is one.
-    own: Vec<(&'a str, Option<f64>)>,
+    own: Vec<(String, Option<f64>)>,
     scratch: String,
 }
 
-impl<'a> Numbers<'a> {
-    pub fn new(decimal_comma_allowed: bool, strict: bool, missing: &'a [String]) -> Self {
+impl Numbers {
+    pub fn new(decimal_comma_allowed: bool, strict: bool, missing: &[String]) -> Self {
+        let own = missing.iter().map(|word| {
+            let word = word.trim();
+            (word.to_string(), word.replace(',', ".").parse().ok())
+        });
         Self {
             decimal_comma_allowed,
             mark: None,
             strict,
-            own: missing
-                .iter()
-                .map(|word| (word.trim(), word.trim().replace(',', ".").parse().ok()))
-                .collect(),
+            own: own.collect(),
             scratch: String::new(),
         }
     }
 
     /// A cell of a column whose samples may be missing.
-    pub fn sample(&mut self, place: Place, cell: &str) -> Result<Cell, Error> {
+    pub fn sample(&mut self, cell: &str) -> Result<Cell, CellFault> {
         let value = self.value(cell);
         let own = |value: Option<f64>| {
             self.own
@@ -120,75 +207,34 @@ impl<'a> Numbers<'a> {
         };
         match value {
             Ok(value) if own(Some(value)) && !self.strict => Ok(Cell::Missing),
-            Ok(value) if value.is_finite() && own(Some(value)) => Err(Error::TextInCell {
-                file: place.file(),
-                row: place.row(),
-                column: place.column(),
-                text: quoted(cell),
-                mend: "[columns] says that it stands for a missing sample; leave out --strict to read on over it",
-            }),
+            Ok(value) if value.is_finite() && own(Some(value)) => Err(CellFault::Strict),
             Ok(value) if value.is_finite() => {
-                self.check_mark(place, cell)?;
+                self.check_mark(cell)?;
                 Ok(Cell::Number(value))
             }
             // A number too large to be one is no word.
             Ok(_) if self.strict || cell.contains(|c: char| c.is_ascii_digit()) => {
-                Err(Error::NotFinite {
-                    file: place.file(),
-                    row: place.row(),
-                    column: place.column(),
-                    text: quoted(cell),
-                })
+                Err(CellFault::NotFinite)
             }
             Ok(_) => Ok(Cell::Missing),
             Err(()) if own(None) && !self.strict => Ok(Cell::Missing),
-            Err(()) if self.strict && cell.is_empty() => Err(Error::EmptyCell {
-                file: place.file(),
-                row: place.row(),
-                column: place.column(),
-            }),
+            Err(()) if self.strict && cell.is_empty() => Err(CellFault::Empty),
             Err(()) if !self.strict && says_missing(cell) => Ok(Cell::Missing),
-            Err(()) => Err(Error::TextInCell {
-                file: place.file(),
-                row: place.row(),
-                column: place.column(),
-                text: quoted(cell),
-                mend: if cell.contains(',') {
-                    "write decimals with a point and without separators for thousands"
-                } else if self.strict {
-                    "correct the cell, or leave out --strict where it says that the sample is missing"
-                } else {
-                    "correct the cell, or list the word under [columns] where it says that the sample is missing: missing = [\"...\"]"
-                },
-            }),
+            Err(()) if cell.contains(',') => Err(CellFault::Thousands),
+            Err(()) => Err(CellFault::Word),
         }
     }
 
     /// A cell of the time's column, which holds a number.
-    pub fn time(&mut self, place: Place, cell: &str) -> Result<f64, Error> {
+    pub fn time(&mut self, cell: &str) -> Result<f64, CellFault> {
         match self.value(cell) {
             Ok(value) if value.is_finite() => {
-                self.check_mark(place, cell)?;
+                self.check_mark(cell)?;
                 Ok(value)
             }
-            Ok(_) => Err(Error::NotFinite {
-                file: place.file(),
-                row: place.row(),
-                column: place.column(),
-                text: quoted(cell),
-            }),
-            Err(()) if cell.is_empty() => Err(Error::EmptyCell {
-                file: place.file(),
-                row: place.row(),
-                column: place.column(),
-            }),
-            Err(()) => Err(Error::TextInCell {
-                file: place.file(),
-                row: place.row(),
-                column: place.column(),
-                text: quoted(cell),
-                mend: "the rows before have the time as a number: write it so throughout",
-            }),
+            Ok(_) => Err(CellFault::NotFinite),
+            Err(()) if cell.is_empty() => Err(CellFault::Empty),
+            Err(()) => Err(CellFault::NoNumber),
         }
     }
 
@@ -210,7 +256,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// A comma may separate thousands where other cells have a decimal point.
-    fn check_mark(&mut self, place: Place, cell: &str) -> Result<(), Error> {
+    fn check_mark(&mut self, cell: &str) -> Result<(), CellFault> {
         let mark = if self.has_comma(cell) {
             Some(',')
         } else {
@@ -219,15 +265,7 @@ impl<'a> Numbers<'a> {
         if let (Some(here), Some(before)) = (mark, self.mark)
             && here != before
         {
-            let word = |mark| if mark == ',' { "comma" } else { "point" };
-            return Err(Error::MixedDecimalMarks {
-                file: place.file(),
-                row: place.row(),
-                column: place.column(),
-                text: quoted(cell),
-                here: word(here),
-                before: word(before),
-            });
+            return Err(CellFault::DecimalMark { here, before });
         }
         self.mark = self.mark.or(mark);
         Ok(())

@@ -27,6 +27,16 @@ impl Table {
         (options, purpose): (&ReadOptions, Purpose),
     ) -> Result<(), Error> {
         let rows = self.time.len();
+        if rows + self.outside == 0 && self.without_time > 0 {
+            let (end, words) = &self.untimed;
+            return Err(Error::NoSample {
+                file: file.into(),
+                row: line_number(text, *end),
+                column: quoted(&layout.time.header),
+                rows: self.without_time,
+                words: listed(words),
+            });
+        }
         let needed = fewest_rows(purpose);
         if rows < needed {
             let why = match self.outside {
@@ -52,13 +62,12 @@ impl Table {
         };
         for ((column, values), words) in channels().take(needed) {
             if values.iter().all(|value| value.is_nan()) {
-                let words = words.iter().map(|(word, _)| format!("\"{word}\""));
                 return Err(Error::NoSample {
                     file: file.into(),
                     row: line_number(text, self.ends[0]),
                     column: quoted(&column.header),
                     rows,
-                    words: words.collect::<Vec<_>>().join(", "),
+                    words: listed(words),
                 });
             }
         }
@@ -151,6 +160,15 @@ impl Table {
             }
         }
     }
+}
+
+/// What stands in cells whose sample is missing.
+fn listed(words: &[(String, usize)]) -> String {
+    let word = |(word, _): &(String, usize)| match word.as_str() {
+        "" => "empty cells".to_string(),
+        word => format!("\"{}\"", quoted(word)),
+    };
+    words.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
 fn check_saturation(file: &str, column: &Found, values: &[f64]) -> Result<(), Error> {

@@ -20,14 +20,16 @@ use serde::{Deserialize, Serialize};
 
 pub use self::summary::{Converted, MissingSamples, ReadSummary};
 use self::{
-    cells::{Cell, Numbers, is_word, says_missing},
+    cells::is_word,
     place::Place,
-    text::{check_header, decode, delimiter_name, line_number, read as next_row, reader},
-    time::{Bounds, Times},
+    text::{check_header, decode, line_number, read as next_row, reader},
+    time::Bounds,
 };
 pub(crate) use self::{
+    cells::{Cell, CellFault, Numbers, THOUSANDS, TIME_AS_NUMBER, says_missing},
     checks::constant,
-    text::{check_width, delimiter, is_number},
+    text::{check_width, delimiter, delimiter_name, is_number},
+    time::Times,
 };
 use crate::columns::{Columns, Found, Heading, Layout, Purpose};
 use crate::{
@@ -137,7 +139,7 @@ fn parse(
     let text = decode(file, content)?;
     let (layout, table) = read_table(file, text, columns, (options, purpose))?;
     table.check(file, text, &layout, (options, purpose))?;
-    table.into_reading(file, layout, (options, purpose))
+    table.into_reading(file, text, layout, (options, purpose))
 }
 
 /// The header of a file: what there is to choose from, before anything is read.
@@ -184,6 +186,8 @@ struct Table {
     outside: usize,
     /// Rows without a time.
     without_time: usize,
+    /// Where the first of them ends, and what stands in their cells.
+    untimed: (usize, Vec<(String, usize)>),
 }
 
 fn read_table(
@@ -243,18 +247,26 @@ fn read_table(
             header: &layout.time.header,
         };
         if !options.strict && says_missing(cell) {
+            if table.without_time == 0 {
+                table.untimed.0 = end;
+            }
             table.without_time += 1;
+            count_word(&mut table.untimed.1, cell);
             continue;
         }
         let (times, bounds) = match &mut times {
             Some(known) => known,
             none => {
-                let found = Times::of(place, cell, &layout.time, layout.seconds, columns)?;
+                let all = || time::cells(place, layout.time.index);
+                let found = Times::of(cell, all, layout.seconds, columns)
+                    .map_err(|fault| fault.at(place, cell, options.strict))?;
                 let bounds = Bounds::of(&found, layout.seconds, options)?;
                 none.insert((found, bounds))
             }
         };
-        let time = times.read(place, cell, &mut numbers)?;
+        let time = times
+            .read(cell, &mut numbers)
+            .map_err(|fault| fault.at(place, cell, options.strict))?;
         if !bounds.contain(time) {
             table.outside += 1;
             continue;
@@ -270,7 +282,8 @@ fn read_table(
                 header: &column.header,
                 ..place
             };
-            let value = match numbers.sample(place, cell)? {
+            let sample = numbers.sample(cell);
+            let value = match sample.map_err(|fault| fault.at(place, cell, options.strict))? {
                 Cell::Number(value) => match &column.converted {
                     Some((_, conversion)) => conversion.apply(value),
                     None => value,
@@ -321,6 +334,7 @@ impl Table {
     fn into_reading(
         mut self,
         file: &str,
+        text: &str,
         layout: Layout,
         (options, purpose): (&ReadOptions, Purpose),
     ) -> Result<Reading, Error> {
@@ -376,6 +390,8 @@ impl Table {
         let summary = ReadSummary {
             file: file.into(),
             rows: record.len(),
+            first_row: self.ends.first().map_or(0, |&end| line_number(text, end)),
+            time_header: printable(&layout.time.header),
             outside: self.outside,
             without_time: self.without_time,
             missing_rows: record.missing_rows(),

@@ -35,6 +35,12 @@ pub struct ReadSummary {
     pub file: String,
     /// Rows in use.
     pub rows: usize,
+    /// Line number of the first row in use.
+    #[serde(skip)]
+    pub first_row: u64,
+    /// The header of the time.
+    #[serde(skip)]
+    pub time_header: String,
     /// Rows before or behind what is wanted.
     pub outside: usize,
     /// Rows without a time, which are not used.

@@ -120,7 +120,7 @@ pub(crate) fn delimiter(text: &str) -> u8 {
 }
 
 /// What a delimiter is called.
-pub(super) fn delimiter_name(delimiter: u8) -> &'static str {
+pub(crate) fn delimiter_name(delimiter: u8) -> &'static str {
     match delimiter {
         b';' => "semicolon",
         b'\t' => "tab",

@@ -4,19 +4,20 @@ use csv::StringRecord;
 
 use super::{
     ReadOptions,
-    cells::Numbers,
+    cells::{CellFault, Numbers},
     checks::rounded,
     place::Place,
     text::{read, reader},
 };
-use crate::columns::{Columns, Found};
+use crate::columns::Columns;
 use crate::{Calendar, Error, Timestamp, TimestampError, TimestampReader, Zone, quoted};
 
 /// How a column writes the time.
-pub(super) enum Times {
+#[derive(Debug, Clone)]
+pub(crate) enum Times {
     /// Numbers, so many seconds for one.
     Numbers(f64),
-    /// Dates and times, counted from the first row of the file.
+    /// Dates and times, counted from the first row.
     Dates {
         reader: Box<TimestampReader>,
         first: Timestamp,
@@ -24,14 +25,13 @@ pub(super) enum Times {
 }
 
 impl Times {
-    /// From the first cell.
+    /// From the first cell; `all`: the cells of the whole column, which may tell day and month apart. A number is so many `seconds`.
     pub fn of(
-        place: Place,
         cell: &str,
-        column: &Found,
+        all: impl FnOnce() -> Vec<String>,
         seconds: f64,
         columns: &Columns,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, CellFault> {
         let format = columns.time_format.as_deref();
         if format.is_none() && !TimestampReader::understands(cell) && cell_is_number(cell) {
             return Ok(Self::Numbers(seconds));
@@ -41,17 +41,14 @@ impl Times {
         let reader = match TimestampReader::new(format, zone, [cell]) {
             // The rest of the column tells day and month apart.
             Err(TimestampError::DayOrMonth { .. }) => {
-                let cells = cells(place, column.index);
+                let cells = all();
                 TimestampReader::new(format, zone, cells.iter().map(String::as_str))
             }
             reader => reader,
         };
-        let reader = reader.map_err(|error| refused(place, error))?;
+        let reader = reader.map_err(refused)?;
         // It is read once more with its row.
-        let first = reader
-            .clone()
-            .read(cell)
-            .map_err(|error| refused(place, error))?;
+        let first = reader.clone().read(cell).map_err(refused)?;
         Ok(Self::Dates {
             reader: Box::new(reader),
             first,
@@ -59,17 +56,17 @@ impl Times {
     }
 
     /// The time of a row \[s\].
-    pub fn read(&mut self, place: Place, cell: &str, numbers: &mut Numbers) -> Result<f64, Error> {
+    pub fn read(&mut self, cell: &str, numbers: &mut Numbers) -> Result<f64, CellFault> {
         match self {
-            Self::Numbers(seconds) => Ok(numbers.time(place, cell)? * *seconds),
+            Self::Numbers(seconds) => Ok(numbers.time(cell)? * *seconds),
             Self::Dates { reader, first } => reader
                 .read(cell)
                 .map(|instant| instant.seconds_since(*first))
-                .map_err(|error| refused(place, error)),
+                .map_err(refused),
         }
     }
 
-    /// The calendar whose zero the times count from; `None` where these are numbers.
+    /// The calendar whose zero the times count from; `None` where these are numbers or times of day.
     pub fn calendar(&self) -> Option<Calendar> {
         match self {
             Self::Dates { reader, first } if reader.has_dates() => Some(Calendar {
@@ -88,7 +85,7 @@ impl Times {
         }
     }
 
-    pub fn check_order(&self, place: Place, previous: f64, time: f64) -> Result<(), Error> {
+    pub(super) fn check_order(&self, place: Place, previous: f64, time: f64) -> Result<(), Error> {
         if time > previous {
             return Ok(());
         }
@@ -133,17 +130,12 @@ fn cell_is_number(cell: &str) -> bool {
     cell.replace(',', ".").parse::<f64>().is_ok()
 }
 
-fn refused(place: Place, error: TimestampError) -> Error {
-    Error::Timestamp {
-        file: place.file(),
-        row: place.row(),
-        column: place.column(),
-        error: Box::new(error),
-    }
+fn refused(error: TimestampError) -> CellFault {
+    CellFault::Time(Box::new(error))
 }
 
 /// The cells of a column.
-fn cells(place: Place, column: usize) -> Vec<String> {
+pub(super) fn cells(place: Place, column: usize) -> Vec<String> {
     let mut reader = reader(place.text);
     let mut row = StringRecord::new();
     let mut cells = Vec::new();

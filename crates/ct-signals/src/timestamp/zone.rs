@@ -2,6 +2,7 @@
 
 use jiff::Timestamp as Instant;
 use jiff::tz::{AmbiguousOffset, Offset, TimeZone, TimeZoneDatabase};
+use serde::{Deserialize, Serialize};
 
 use super::form::{self, Form};
 use super::{Timestamp, TimestampError};
@@ -20,7 +21,8 @@ use crate::quoted;
 /// assert_eq!(zone.format(begin), "2026-01-31 14:25");
 /// # Ok::<(), ct_signals::TimestampError>(())
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Zone {
     name: String,
     rules: Rules,
@@ -32,6 +34,20 @@ enum Rules {
     Fixed(i32),
     /// With daylight saving time, now or at some time.
     Changing(TimeZone),
+}
+
+impl From<Zone> for String {
+    fn from(zone: Zone) -> Self {
+        zone.name
+    }
+}
+
+impl TryFrom<String> for Zone {
+    type Error = TimestampError;
+
+    fn try_from(name: String) -> Result<Self, Self::Error> {
+        Self::named(&name)
+    }
 }
 
 /// Civil times, as seconds since 1970-01-01 00:00 on the same clock, that have one offset in common.
@@ -145,6 +161,33 @@ impl Zone {
         );
         text += &seconds_text(civil.second().unsigned_abs(), instant.nanoseconds());
         text
+    }
+
+    /// An instant for programs, with the offset from UTC (RFC 3339): `2026-01-31T14:25:00+01:00`.
+    #[must_use]
+    pub fn rfc3339(&self, instant: Timestamp) -> String {
+        let offset = self.seconds_ahead(instant);
+        let Ok(utc) = Instant::from_second(instant.seconds()) else {
+            return format!("{} s since 1970", instant.seconds());
+        };
+        let civil = Offset::from_seconds(offset)
+            .unwrap_or(Offset::UTC)
+            .to_datetime(utc);
+        let mut text = format!(
+            "{:04}-{:02}-{:02}T{:02}:{:02}:{:02}",
+            civil.year(),
+            civil.month(),
+            civil.day(),
+            civil.hour(),
+            civil.minute(),
+            civil.second()
+        );
+        if instant.nanoseconds() != 0 {
+            text += format!(".{:09}", instant.nanoseconds()).trim_end_matches('0');
+        }
+        let sign = if offset < 0 { '-' } else { '+' };
+        let minutes = offset.unsigned_abs() / 60;
+        text + &format!("{sign}{:02}:{:02}", minutes / 60, minutes % 60)
     }
 
     /// An instant that a person gives: `2026-01-31`, `2026-01-31 14:25`, or any date that [`TimestampReader`](super::TimestampReader)

@@ -267,7 +267,7 @@ fn any_number_of_inputs_and_outputs_is_read() {
         &text,
         &twice,
         &ReadOptions::default(),
-        &["\"a\"", "both as output and as output"],
+        &["\"a\"", "named twice as output"],
     );
 }
 

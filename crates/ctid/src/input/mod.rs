@@ -6,7 +6,7 @@ pub mod excitation;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use ct_signals::{Hold, ReadOptions, ReadSummary, Reading, Record, escaped, read_csv};
+use ct_signals::{Hold, ReadOptions, ReadSummary, Reading, Record, escaped, quoted, read_csv};
 use missing_effect::Problem;
 
 use self::checks::{
@@ -150,6 +150,7 @@ impl Files {
             .map(|reading| (reading.record, reading.summary))
             .unzip();
         on_one_clock(&mut records);
+        check_clocks(&records[..self.data.len()], &summaries)?;
         let test = records.split_off(self.data.len());
         Ok(Input {
             problem: problem(&self.model.display().to_string(), model, records, test)?,
@@ -238,9 +239,9 @@ pub(crate) fn on_one_clock(records: &mut [Record]) {
 }
 
 /// Fitted records with dates are given in the order of their dates, and do not overlap: a clock that runs backwards between files tells
-/// nothing of drifts.
-fn check_clocks(records: &[Record]) -> Result<(), Error> {
-    for pair in records.windows(2) {
+/// nothing of drifts. `summaries`: how the records were read, where this is known.
+pub(crate) fn check_clocks(records: &[Record], summaries: &[ReadSummary]) -> Result<(), Error> {
+    for (k, pair) in records.windows(2).enumerate() {
         let [before, after] = pair else { continue };
         let (Some(calendar), Some(_)) = (&before.calendar, &after.calendar) else {
             continue;
@@ -249,15 +250,20 @@ fn check_clocks(records: &[Record]) -> Result<(), Error> {
             continue;
         };
         if begin <= end {
-            return Err(Error::File {
-                file: after.name.clone(),
-                what: format!(
-                    "the first row, column of the time: it begins at {}, before {} ends at {}; give the files in the order of their dates, and once what they share (--from, --to), or correct time_zone under [columns]",
-                    calendar.at(begin),
-                    before.name,
-                    calendar.at(end)
-                ),
-            });
+            let place = summaries.get(k + 1).map_or_else(
+                || ": the first row, column of the time".to_string(),
+                |s| {
+                    let column = quoted(&s.time_header);
+                    format!(", row {}, column \"{column}\"", s.first_row)
+                },
+            );
+            return Err(Error::Usage(format!(
+                "{}{place}: it begins at {}, before {} ends at {}; give the files in the order of their dates, and once what they share (--from, --to), or correct time_zone under [columns]",
+                after.name,
+                calendar.at(begin),
+                before.name,
+                calendar.at(end)
+            )));
         }
     }
     Ok(())
@@ -273,7 +279,7 @@ pub fn problem(
     records: Vec<Record>,
     test: Vec<Record>,
 ) -> Result<Problem, Error> {
-    check_clocks(&records)?;
+    check_clocks(&records, &[])?;
     check_units(model.plant.pumps(), &records, &test)?;
     check_movement(&records)?;
     check_height(model_name, &model, records.iter().chain(&test))?;

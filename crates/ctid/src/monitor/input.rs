@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use ::monitor::{Monitor, Refused, Row, Units, instant};
-use ct_signals::{BadLine, Columns, LONGEST_LINE, Line, Rows, quoted};
+use ::monitor::{Monitor, Refused, Row, TimeAxis, Units};
+use ct_signals::{BadLine, LONGEST_LINE, Line, RowTimes, Rows, TimestampError, quoted};
 
 use super::{Believed, Halt, INPUT, Session, blame, lines::Cut};
 use crate::own_model::{OwnModelFile, conversion};
@@ -31,18 +31,21 @@ impl<'a> Session<'a> {
                 return Ok(());
             }
         };
-        if self.rows.is_none() && !self.first(line)? {
+        let begins = self.rows.is_none();
+        if begins && !self.first(line)? {
             return Ok(());
         }
         let mut read = self.read(line);
         if self.taken <= 1
+            && !begins
             && !self.restored
-            && matches!(read, Err(BadLine::Fields { .. }))
+            && matches!(&read, Err(bad) if may_follow_a_part(bad))
             && self.rows.as_ref().is_some_and(|rows| !rows.has_header())
         {
             // Who listens to a running line hears the end of a row first.
             self.bad(|| "the row before was not whole".to_string());
             self.rows = None;
+            self.timed = false;
             self.taken = 0;
             if !self.first(line)? {
                 return Ok(());
@@ -52,10 +55,24 @@ impl<'a> Session<'a> {
         match read {
             Ok(Line::Nothing) => Ok(()),
             Ok(Line::Row([time, _])) => {
+                self.times()?;
                 let (row, bad) = self.readings(time);
                 self.row(&row, bad)
             }
-            Err(bad @ (BadLine::Text { .. } | BadLine::Fields { .. })) => {
+            Err(BadLine::Time { error, .. }) if never_understood(&error) => {
+                Err(Error::Usage(format!(
+                    "{INPUT}, row {}, column \"{}\": {error}",
+                    self.line,
+                    self.time_name()
+                ))
+                .into())
+            }
+            Err(
+                bad @ (BadLine::Text { .. }
+                | BadLine::Time { .. }
+                | BadLine::NoNumber { .. }
+                | BadLine::Fields { .. }),
+            ) => {
                 if !self.header_again(line)? {
                     self.bad(|| bad.to_string());
                 }
@@ -104,12 +121,13 @@ impl<'a> Session<'a> {
         let (Some(known), Ok(text)) = (&self.rows, std::str::from_utf8(line)) else {
             return Ok(false);
         };
-        let rows = match Rows::begin(INPUT, self.line, text, &self.columns) {
+        let mut rows = match Rows::begin(INPUT, self.line, text, &self.columns) {
             Ok((rows, false)) => rows,
             // The rows behind it are in units that are not those of the model.
             Err(error) if error.of_units() => return Err(error.into()),
             _ => return Ok(false),
         };
+        rows.go_on(known);
         // Who does not say a unit does not change it.
         let pairs = known.units().zip(rows.units());
         for (before, now) in pairs {
@@ -144,8 +162,8 @@ impl<'a> Session<'a> {
         if said.is_empty() || said.starts_with('#') {
             return Ok(false);
         }
-        let named = self.columns != Columns::default();
-        let (rows, is_row) = match Rows::begin(INPUT, self.line, text, &self.columns) {
+        let named = self.columns.names_any();
+        let (mut rows, is_row) = match Rows::begin(INPUT, self.line, text, &self.columns) {
             Err(ct_signals::Error::NoOrder { found, .. }) if self.parts < PARTS => {
                 self.parts += 1;
                 let y = match self.columns.outputs.len() {
@@ -182,6 +200,11 @@ impl<'a> Session<'a> {
         };
         if self.restored {
             self.resumed(&units)?;
+            if let (Some(calendar), Some(last)) =
+                (&self.monitor.axis().calendar, self.monitor.last_time())
+            {
+                rows.count_from(calendar, last);
+            }
         } else {
             self.monitor = Monitor::new(self.model.watched(), self.settings, units.clone())
                 .map_err(|error| blame(error, self.arguments))?;
@@ -290,6 +313,61 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
+    /// After the first row: how it writes the time, which has to go on as the saved state has it.
+    fn times(&mut self) -> Result<(), Error> {
+        let known = self.rows.as_ref().filter(|_| !self.timed);
+        let Some(times) = known.and_then(Rows::times) else {
+            return Ok(());
+        };
+        self.timed = true;
+        let refused = |session: &Self, what: String| {
+            Err(Error::Usage(format!(
+                "{INPUT}, row {}, column \"{}\": {what}",
+                session.line,
+                session.time_name()
+            )))
+        };
+        if times == RowTimes::TimesOfDay && self.arguments.state.is_some() {
+            return refused(
+                self,
+                "times of day do not say where a saved state goes on; give dates, or leave out --state".into(),
+            );
+        }
+        let saved = self.monitor.axis().calendar.as_ref();
+        if !self.restored {
+            if let RowTimes::Dates { calendar, .. } = times {
+                self.monitor.set_axis(TimeAxis {
+                    calendar: Some(calendar),
+                });
+            }
+            return Ok(());
+        }
+        let (then, now) = match (saved, times) {
+            (Some(saved), RowTimes::Dates { calendar, civil }) => {
+                if !civil || saved.zone == calendar.zone {
+                    return Ok(());
+                }
+                let dates = |name: &str| format!("dates of {}", quoted(name));
+                (dates(saved.zone.name()), dates(calendar.zone.name()))
+            }
+            (None, RowTimes::Numbers) => return Ok(()),
+            (Some(_), _) => ("dates".to_string(), "numbers".to_string()),
+            (None, _) => ("numbers".to_string(), "dates".to_string()),
+        };
+        refused(
+            self,
+            format!(
+                "the times are {now}, and the saved state has {then}; write them as before, or name another --state"
+            ),
+        )
+    }
+
+    /// The header of the time.
+    fn time_name(&self) -> String {
+        let rows = self.rows.as_ref();
+        rows.map_or(String::new(), |rows| quoted(rows.name("time", 0)))
+    }
+
     /// A row; `bad`: why it lacks a reading, where the line says so.
     fn row(&mut self, row: &Row, bad: Option<BadLine>) -> Result<(), Halt> {
         if self.restored
@@ -299,8 +377,8 @@ impl<'a> Session<'a> {
         {
             if self.seen_before == 0 {
                 self.screen.say(&format!(
-                    "rows up to t = {} s were seen before the state was saved, and are skipped; if the clock began anew since, name another --state",
-                    instant(last)
+                    "rows up to {} were seen before the state was saved, and are skipped; if the clock began anew since, name another --state",
+                    self.monitor.axis().at(last)
                 ));
             }
             self.seen_before += 1;
@@ -343,17 +421,22 @@ impl<'a> Session<'a> {
         }
         self.screen.innovations(row.time, &step.innovations);
         for scatter in &step.scatter {
-            self.screen.warn(scatter.time, &scatter.sentence);
-            self.print(scatter)?;
+            self.warn(scatter.time, &scatter.sentence);
+            self.print(scatter, scatter.time, None)?;
         }
         if let Some(alarm) = &step.alarm {
-            self.screen.warn(alarm.time, &alarm.sentence);
-            self.print(alarm)?;
+            self.warn(alarm.time, &alarm.sentence);
+            self.print(alarm, alarm.time, alarm.since)?;
         }
         if row.time >= self.next_estimate {
             self.estimate(row.time)?;
         }
         Ok(())
+    }
+
+    fn warn(&mut self, time: f64, sentence: &str) {
+        let at = self.monitor.axis().at(time);
+        self.screen.warn(&at, sentence);
     }
 
     /// A row that is not used.
@@ -393,6 +476,37 @@ impl<'a> Session<'a> {
             Refused::TooLarge { .. } => "correct it, or give the column in a larger unit",
             _ => "rows have to come in the order of time: check the clock",
         };
-        format!("column \"{column}\": {refused}; {mend}")
+        let axis = self.monitor.axis();
+        let what = match refused {
+            Refused::Repeated { time } => {
+                format!(
+                    "the time {} is repeated from the row before",
+                    axis.value(*time)
+                )
+            }
+            Refused::Backward { time, previous } => format!(
+                "the time goes back from {} to {}",
+                axis.value(*previous),
+                axis.value(*time)
+            ),
+            _ => refused.to_string(),
+        };
+        format!("column \"{column}\": {what}; {mend}")
     }
+}
+
+/// Whether a row may be refused because the one before, by which the stream was understood, was only the end of one.
+fn may_follow_a_part(bad: &BadLine) -> bool {
+    matches!(
+        bad,
+        BadLine::Fields { .. } | BadLine::Time { .. } | BadLine::NoNumber { .. }
+    )
+}
+
+/// Whether no later row will be understood either, until the model file says more.
+fn never_understood(error: &TimestampError) -> bool {
+    matches!(
+        error,
+        TimestampError::DayOrMonth { .. } | TimestampError::UnknownZone { .. }
+    )
 }

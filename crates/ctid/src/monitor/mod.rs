@@ -150,6 +150,8 @@ struct Session<'a> {
     parts: usize,
     line: u64,
     trouble: Trouble,
+    /// The rows' way to write times has been looked at.
+    timed: bool,
     /// Rows that a restored monitor has seen before, at the beginning.
     seen_before: u64,
     taken: u64,
@@ -217,6 +219,7 @@ impl<'a> Session<'a> {
             parts: 0,
             line: 0,
             trouble: Trouble::default(),
+            timed: false,
             seen_before: 0,
             taken: 0,
             screen: Screen::new(Look::of_stderr()),
@@ -254,8 +257,9 @@ impl<'a> Session<'a> {
         let estimates = self.monitor.estimates();
         self.screen.clear();
         if !estimates.is_empty() {
+            let at = self.monitor.axis().at(self.last_time);
             self.screen
-                .estimates(self.last_time, &estimates, self.monitor.progress());
+                .estimates(&at, &estimates, self.monitor.progress());
         }
         let bad = match self.trouble.bad {
             0 => String::new(),

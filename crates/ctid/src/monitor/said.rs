@@ -2,7 +2,7 @@
 
 use std::io;
 
-use ::monitor::{Notice, instant};
+use ::monitor::Notice;
 use ct_signals::quoted;
 
 use super::{Halt, INPUT, Session};
@@ -14,6 +14,7 @@ const DEAF: f64 = 10.0;
 
 impl Session<'_> {
     pub(super) fn notice(&mut self, notice: &Notice) -> Result<(), Halt> {
+        let axis = self.monitor.axis().clone();
         let text = match notice {
             Notice::Gap {
                 from,
@@ -21,7 +22,7 @@ impl Session<'_> {
                 missing,
                 bridged,
             } => {
-                let (line, from, to) = (self.line, instant(*from), instant(*to));
+                let (line, span) = (self.line, axis.span(*from, *to));
                 let what = if *bridged {
                     self.words(
                         "the command is taken to have been held",
@@ -43,7 +44,7 @@ impl Session<'_> {
                 };
                 match self.trouble.bad(|| {
                     format!(
-                        "{INPUT}, row {line}, column \"{name}\": {rows} missing (the time steps from {from} to {to} s); {what}"
+                        "{INPUT}, row {line}, column \"{name}\": {rows} missing (the time steps {span}); {what}"
                     )
                 }) {
                     Some(text) => text,
@@ -53,9 +54,8 @@ impl Session<'_> {
             Notice::ClockSetBack { from, to } => {
                 self.next_estimate = *to;
                 format!(
-                    "the time goes back from {} to {} s and stays there: the rows are followed from here on; what the {} are is waited for",
-                    instant(*from),
-                    instant(*to),
+                    "the time goes back {} and stays there: the rows are followed from here on; what the {} are is waited for",
+                    axis.span(*from, *to),
                     self.words("levels", "states")
                 )
             }
@@ -67,24 +67,25 @@ impl Session<'_> {
                     time: f64,
                     since: f64,
                 }
-                self.print(&FitsAgain {
+                let line = FitsAgain {
                     schema: ::monitor::SCHEMA,
                     event: "fits_again",
                     time: *time,
                     since: *since,
-                })?;
+                };
+                self.print(&line, *time, Some(*since))?;
                 format!(
-                    "t = {} s: the model fits again, after the alarm of t = {} s",
-                    instant(*time),
-                    instant(*since)
+                    "{}: the model fits again, after the alarm of {}",
+                    axis.at(*time),
+                    axis.at(*since)
                 )
             }
             Notice::LearnsAnew { why } => format!("learns anew: {why}"),
             Notice::IntervalChanged { time, from, to } => format!(
-                "the time steps by {} s instead of {} s since about t = {} s: the noise is another then, and is learned anew",
+                "the time steps by {} s instead of {} s since about {}: the noise is another then, and is learned anew",
                 significant(*to, 4),
                 significant(*from, 4),
-                instant(*time)
+                axis.at(*time)
             ),
             Notice::Learned {
                 rows,
@@ -147,8 +148,9 @@ impl Session<'_> {
         };
         self.next_estimate = time + self.arguments.interval.unwrap_or(10.0 * time_constant);
         let estimates = self.monitor.estimates();
+        let at = self.monitor.axis().at(time);
         self.screen
-            .estimates(time, &estimates, self.monitor.progress());
+            .estimates(&at, &estimates, self.monitor.progress());
         if self.arguments.estimates {
             #[derive(serde::Serialize)]
             struct Estimates<'a> {
@@ -157,20 +159,41 @@ impl Session<'_> {
                 time: f64,
                 parameters: &'a [::monitor::Estimate],
             }
-            self.print(&Estimates {
+            let line = Estimates {
                 schema: ::monitor::SCHEMA,
                 event: "estimates",
                 time,
                 parameters: &estimates,
-            })?;
+            };
+            self.print(&line, time, None)?;
         }
         Ok(())
     }
 
-    /// A JSON line.
-    pub(super) fn print(&mut self, value: &impl serde::Serialize) -> Result<(), Halt> {
-        let line =
-            serde_json::to_string(value).map_err(|error| Error::Output(io::Error::other(error)))?;
+    /// A JSON line; where the rows have dates, with those of its `time` and of its `since`.
+    pub(super) fn print(
+        &mut self,
+        value: &impl serde::Serialize,
+        time: f64,
+        since: Option<f64>,
+    ) -> Result<(), Halt> {
+        #[derive(serde::Serialize)]
+        struct Dated<'a, T> {
+            #[serde(flatten)]
+            line: &'a T,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            date: Option<String>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            since_date: Option<String>,
+        }
+        let axis = self.monitor.axis();
+        let dated = Dated {
+            line: value,
+            date: axis.date(time),
+            since_date: since.and_then(|since| axis.date(since)),
+        };
+        let line = serde_json::to_string(&dated)
+            .map_err(|error| Error::Output(io::Error::other(error)))?;
         match writeln!(self.out, "{line}").and_then(|()| self.out.flush()) {
             Ok(()) => Ok(()),
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Err(Halt::Closed),

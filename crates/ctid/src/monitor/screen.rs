@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use ::monitor::{Estimate, Innovation, Monitor, Progress, instant};
+use ::monitor::{Estimate, Innovation, Monitor, Progress};
 use console::{Term, truncate_str};
 use ct_signals::quoted;
 
@@ -76,14 +76,14 @@ impl Screen {
         let _ = writeln!(io::stderr(), "{text}");
     }
 
-    /// The sentence of an alarm.
-    pub(super) fn warn(&mut self, time: f64, sentence: &str) {
-        let text = format!("t = {} s: {sentence}", instant(time));
+    /// The sentence of an alarm; `at`: when.
+    pub(super) fn warn(&mut self, at: &str, sentence: &str) {
+        let text = format!("{at}: {sentence}");
         let text = self.look.warning(text);
         self.say(&text);
     }
 
-    pub(super) fn estimates(&mut self, time: f64, estimates: &[Estimate], progress: Progress) {
+    pub(super) fn estimates(&mut self, at: &str, estimates: &[Estimate], progress: Progress) {
         let parameters: Vec<String> = estimates
             .iter()
             .filter(|estimate| estimate.half_width.is_some())
@@ -105,8 +105,7 @@ impl Screen {
             }
         };
         self.say(&format!(
-            "t = {} s: {}; the model {state}",
-            instant(time),
+            "{at}: {}; the model {state}",
             parameters.join(", ")
         ));
     }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use ct_model::effects::OwnCandidate;
 use ct_model::{About, Model, ModelSpec, Variable};
 use ct_signals::{
-    Channel, ColumnFault, Columns, Conversion, Heading, Hold, Reading, Record, Unit, csv_header,
-    quoted, read_csv, read_file,
+    Channel, ColumnFault, Columns, Conversion, Heading, Hold, Reading, Record, Unit, Zone,
+    csv_header, quoted, read_csv, read_file,
 };
 use greybox::PriorValue;
 use serde::Deserialize;
@@ -237,6 +237,7 @@ impl OwnModelFile {
             .map(|reading| (reading.record, reading.summary))
             .unzip();
         crate::input::on_one_clock(&mut all);
+        crate::input::check_clocks(&all[..fitted], &summaries)?;
         let test = all.split_off(fitted);
         // An input that is missing is held for a row; a longer gap parts the record.
         let whole = |records: Vec<Record>| -> Vec<Record> {
@@ -418,6 +419,10 @@ fn columns(spec: &ModelSpec, raw: &Raw, source: &Source) -> Result<Columns, Erro
             .map(|name| Ok(one(name)?.unwrap_or_else(|| (*name).to_string())));
         all.collect()
     };
+    let time_zone = one("time_zone")?;
+    if let (Some(name), Some((_, column))) = (&time_zone, given("time_zone")) {
+        Zone::named(name).map_err(|error| source.at(column.span().start, error.to_string()))?;
+    }
     let missing = match given("missing").map(|(_, column)| column.as_ref()) {
         None => Vec::new(),
         Some(Column::Name(word)) => vec![word.clone()],
@@ -429,7 +434,7 @@ fn columns(spec: &ModelSpec, raw: &Raw, source: &Source) -> Result<Columns, Erro
         outputs: signals(&outputs)?,
         references: Vec::new(),
         time_format: one("time_format")?,
-        time_zone: one("time_zone")?,
+        time_zone,
         missing,
     })
 }

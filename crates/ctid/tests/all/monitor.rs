@@ -284,8 +284,14 @@ fn a_row_without_a_reading_is_said_and_its_command_used() {
         &outcome,
         "column \"y [cm]\": the cell is empty; check what writes the rows; the reading is lost, the command of the row is used",
     );
-    assert_says(&outcome, "column \"y [cm]\": NaN is not a finite number");
-    assert_says(&outcome, "column \"y [cm]\": \"missing\" is not a number");
+    assert_says(
+        &outcome,
+        "column \"y [cm]\": \"NaN\" stands for a missing sample; the reading is lost",
+    );
+    assert_says(
+        &outcome,
+        "column \"y [cm]\": \"missing\" stands for a missing sample; the reading is lost",
+    );
     assert_says(&outcome, &format!("{lost} of them with something wrong"));
 }
 
@@ -604,6 +610,111 @@ fn names_without_a_header_are_refused() {
     assert!(!outcome.err.contains(hint), "{}", outcome.err);
 }
 
+/// The same rows with dates of Berlin, from shortly before its clocks go forward.
+fn dated(rows: &[[f64; 3]]) -> String {
+    let mut text = "time,u [V],y [cm]\n".to_string();
+    for [t, u, y] in rows {
+        let mut second = 3600 + 1800 + *t as u64;
+        if second >= 2 * 3600 {
+            second += 3600;
+        }
+        let (h, m, s) = (second / 3600, second / 60 % 60, second % 60);
+        text += &format!("2026-03-29 {h:02}:{m:02}:{s:02},{u},{y:.4}\n");
+    }
+    text
+}
+
+const BERLIN: &str =
+    "plant = \"single-tank\"\n[columns]\ntime_zone = \"Europe/Berlin\"\n[known]\narea = 154.0\n";
+
+/// The monitor sees what it sees of times in seconds, says dates, and goes on with the same clock.
+#[test]
+fn dates_are_read_and_said_also_after_a_restart() {
+    let rows = rows(2200, 1600);
+    let place = place();
+    let plain = fed(&place, "", text(HEADER, &rows));
+    place.write("m.toml", BERLIN);
+    let whole = fed(&place, "", dated(&rows));
+    assert_eq!(whole.code, Some(0), "{}", whole.err);
+    let pairs = || events(&plain.out).into_iter().zip(events(&whole.out));
+    assert!(pairs().count() > 0 && plain.out.lines().count() == whole.out.lines().count());
+    for (seconds, dates) in pairs() {
+        for key in ["event", "time", "since", "effects", "evidence", "score"] {
+            assert_eq!(seconds[key], dates[key], "{key}");
+        }
+        let of_day = |time: &Value| {
+            let second = 2 * 3600 + 1800 + time.as_f64().unwrap() as u64;
+            let (h, m, s) = (second / 3600, second / 60 % 60, second % 60);
+            format!("{h:02}:{m:02}:{s:02}")
+        };
+        let at = of_day(&dates["time"]);
+        assert_eq!(dates["date"], format!("2026-03-29T{at}+02:00"));
+        let since = of_day(&dates["since"]);
+        assert_eq!(dates["since_date"], format!("2026-03-29T{since}+02:00"));
+        let sentence = dates["sentence"].as_str().unwrap();
+        let said = format!(" since 2026-03-29 {since}");
+        assert!(
+            sentence.contains(said.trim_end_matches(":00")),
+            "{sentence}"
+        );
+        assert!(seconds.get("date").is_none());
+    }
+    assert!(!whole.err.contains("t = "), "{}", whole.err);
+
+    let mut parts = String::new();
+    for (from, to) in [(0, 500), (490, 1300), (0, 1640), (1640, 2200)] {
+        let outcome = fed(&place, "--state s.json", dated(&rows[from..to]));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+        parts += &outcome.out;
+    }
+    assert_eq!(parts, whole.out);
+
+    let refused = |bytes: &str, says: &str| {
+        let kept = place.snapshot();
+        let outcome = fed(&place, "--state s.json", bytes);
+        assert_eq!(outcome.code, Some(2), "{}", outcome.err);
+        assert!(outcome.err.contains(says), "{}", outcome.err);
+        assert_eq!(place.snapshot(), kept);
+    };
+    let header = "time,u [V],y [cm]\n";
+    refused(
+        &format!("{header}9999,4,12\n"),
+        "row 2, column \"time\": the times are numbers, and the saved state has dates",
+    );
+    refused(
+        &format!("{header}23:59:59,4,12\n"),
+        "times of day do not say where a saved state goes on; give dates, or leave out --state",
+    );
+    place.write("m.toml", BERLIN.replace("Berlin", "London"));
+    refused(
+        &dated(&rows),
+        "the times are dates of Europe/London, and the saved state has dates of Europe/Berlin",
+    );
+}
+
+#[test]
+fn dates_that_no_row_can_make_plain_end_it() {
+    let place = place();
+    let outcome = fed(&place, "", "time,u [V],y [cm]\n03/04/2026 10:00,4,12\n");
+    assert_eq!(outcome.code, Some(2), "{}", outcome.err);
+    assert_says(
+        &outcome,
+        "standard input, row 2, column \"time\": \"03/04/2026 10:00\" has two meanings",
+    );
+    // A row that begins in the middle says no form.
+    let lines = "5:00,4.5,14.8\n2026-03-29 10:00:02,4,12\n2026-03-29 10:00:04,4,12\n";
+    let outcome = fed(&place, "", lines);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+    assert_says(&outcome, "1 of them with something wrong");
+    // The times go back, and what comes is said as it is written.
+    let lines = "2026-03-29 10:00:02,4,12\n2026-03-29 10:00:04,4,12\n2026-03-29 10:00:03,4,12\n";
+    let outcome = fed(&place, "", lines);
+    assert_says(
+        &outcome,
+        "row 3: column \"time\": the time goes back from 2026-03-29 10:00:04 to 2026-03-29 10:00:03; rows have to come in the order of time",
+    );
+}
+
 /// A block with a heater, in a room: per hour, as its time column is.
 const BLOCK: &str = r#"model Block
   constant Real C(unit="W.h/K") = 15;
@@ -722,4 +833,70 @@ fn a_state_of_a_model_of_ones_own_goes_on() {
     let refused = fed(&timed, "", &all);
     assert_eq!(refused.code, Some(2));
     assert_says(&refused, "m.toml: the model uses `time`");
+}
+
+/// Dates of the rows of [`block_rows`] in January and February of 2026, whose weeks have no change of the clocks.
+fn block_date(row: usize) -> String {
+    let (mut day, minute) = (row / 48, row % 48 * 30);
+    let mut month = 1;
+    if day >= 31 {
+        (day, month) = (day - 31, 2);
+    }
+    let (h, m) = (minute / 60, minute % 60);
+    format!("2026-{month:02}-{:02} {h:02}:{m:02}", day + 1)
+}
+
+#[test]
+fn dates_are_read_and_said_for_a_model_of_ones_own() {
+    let place = own_place();
+    let plain = fed(&place, "", block_rows(2600, 2000));
+    let mut lines = vec!["t,heater [%],room [degC],block [degC],power [W]\n".to_string()];
+    for (j, line) in block_rows(2600, 2000).lines().skip(1).enumerate() {
+        let (_, cells) = line.split_once(',').unwrap();
+        let mut line = block_date(j) + "," + cells;
+        if line.ends_with(',') {
+            line += "Bad";
+        }
+        lines.push(line + "\n");
+    }
+    place.write(
+        "m.toml",
+        OWN.to_string() + "time_zone = \"Europe/Berlin\"\n",
+    );
+    let dated = fed(&place, "", lines.concat());
+    assert_eq!(dated.code, Some(0), "{}", dated.err);
+    let (seconds, dates) = (events(&plain.out), events(&dated.out));
+    assert!(!dates.is_empty() && seconds.len() == dates.len());
+    let rfc3339 = |time: &Value| {
+        let row = (time.as_f64().unwrap() / 1800.0).round() as usize;
+        block_date(row).replace(' ', "T") + ":00+01:00"
+    };
+    for (seconds, dates) in seconds.iter().zip(&dates) {
+        for key in ["event", "time", "since", "score"] {
+            assert_eq!(seconds[key], dates[key], "{key}");
+        }
+        assert_eq!(dates["date"], rfc3339(&dates["time"]));
+        let sentence = dates["sentence"].as_str().unwrap();
+        assert!(sentence.contains(" 2026-02-"), "{sentence}");
+        assert!(seconds.get("date").is_none());
+    }
+    let last = dates.last().unwrap();
+    assert!(last["since_date"].as_str().unwrap().starts_with("2026-02-"));
+    assert!(!dated.err.contains("t = "), "{}", dated.err);
+
+    // After a restart too; numbers in place of dates are refused.
+    let first = fed(&place, "--state s.json", lines[..1800].concat());
+    let rest = lines[0].clone() + &lines[1700..].concat();
+    let second = fed(&place, "--state s.json", rest);
+    assert_eq!(first.out + &second.out, dated.out);
+    let refused = fed(
+        &place,
+        "--state s.json",
+        lines[0].clone() + "9e9,50,20,40,30\n",
+    );
+    assert_eq!(refused.code, Some(2));
+    assert_says(
+        &refused,
+        "row 2, column \"t\": the times are numbers, and the saved state has dates",
+    );
 }

@@ -91,8 +91,8 @@ impl Search<'_, '_> {
         let [a, b] = self.nodes;
         let imagined = [imagined(a)?, imagined(b)?];
         let misfit = [
-            misfit_before(&imagined[0], b, self.metric)?,
-            misfit_before(&imagined[1], a, self.metric)?,
+            misfit_before(&imagined[0], a, b, self.metric)?,
+            misfit_before(&imagined[1], b, a, self.metric)?,
         ];
         let levels = [
             a.setup.simulate(&a.fit.x)?.level,
@@ -207,7 +207,7 @@ impl Search<'_, '_> {
             refitted(
                 &before.imagined[truth],
                 &played[truth],
-                &self.nodes[1 - truth],
+                (&self.nodes[truth], &self.nodes[1 - truth]),
                 before.misfit[truth],
                 self.metric,
             )

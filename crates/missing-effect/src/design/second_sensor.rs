@@ -6,7 +6,7 @@ use plants::{Outlet, OutputScales, Structure};
 
 use super::{
     play::Played,
-    separation::{Metric, imagined, least, unlooped, vector},
+    separation::{Metric, imagined, imagined_priors, least, unlooped, vector},
 };
 use crate::{Error, node::Node};
 
@@ -100,7 +100,21 @@ fn rows(stand_in: &Node, x: &[f64], records: &[Record], metric: &Metric) -> Opti
 pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Option<f64> {
     let records = imagined(truth).ok()?;
     let records = shown(truth, &records, &unlooped(truth))?;
-    let rows = rows(stand_in, &unlooped(stand_in), &records, metric)?;
+    let mut rows = rows(stand_in, &unlooped(stand_in), &records, metric)?;
+    let last = rows.columns() - 1;
+    for (name, prior) in imagined_priors(truth, stand_in) {
+        let setup = &stand_in.setup;
+        let column = |free: &usize| setup.names()[*free] == name;
+        // The parameters that are fitted come first, here as there.
+        if let Some(column) = setup.free().iter().position(column) {
+            let scale = metric.scales[0] / prior.std_error;
+            let mut row = vec![0.0; last + 1];
+            row[column] = scale;
+            row[last] = scale * (prior.value - stand_in.fit.x[setup.free()[column]]);
+            rows.push(&row);
+        }
+    }
+    rows.finish();
     Some(least(&rows, &Triangle::new(0)) / metric.variance())
 }
 

@@ -20,10 +20,13 @@
 //! `y_B = P_B C (r - y_B)` and `u_A = C (r - y_A)`.
 //!
 //! **The refit** does without the straight line: B is fitted to A's simulation of the existing records and of the experiment, both free of
-//! noise; from its misfit the one to the existing records alone is taken off.
+//! noise; from its misfit the one to the existing records alone is taken off. A side measurement (a prior) is there in both, as A would have
+//! it read.
+
+use std::collections::BTreeMap;
 
 use ct_signals::Record;
-use greybox::{Noise, Setup, Triangle, fit_from, starts_around};
+use greybox::{Noise, PriorValue, Setup, Triangle, fit_from, starts_around};
 
 use super::play::Played;
 use crate::{
@@ -160,13 +163,28 @@ pub(crate) fn unlooped(node: &Node) -> Vec<f64> {
     x
 }
 
+/// What is known of a model's parameters beside the records, free of noise as the simulation of another model is: that one's values.
+pub(crate) fn imagined_priors(truth: &Node, stand_in: &Node) -> BTreeMap<String, PriorValue> {
+    let mut priors = stand_in.setup.prior_values();
+    let names = truth.setup.names()[..truth.setup.parameter_count()].iter();
+    for (name, value) in names.zip(&truth.fit.x) {
+        if let Some(prior) = priors.get_mut(name) {
+            prior.value = *value;
+        }
+    }
+    priors
+}
+
 /// The misfit of a model to another's simulation of the existing records, refitted \[output unit squared\].
 pub(crate) fn misfit_before(
     existing: &[Record],
+    truth: &Node,
     stand_in: &Node,
     metric: &Metric,
 ) -> Result<f64, Error> {
-    let setup = metric.with_records(&stand_in.setup, existing)?;
+    let setup = metric
+        .with_records(&stand_in.setup, existing)?
+        .with_priors(&imagined_priors(truth, stand_in))?;
     Ok(fit_from(&setup, &[unlooped(stand_in)], &metric.noise, FINE)?.cost)
 }
 
@@ -174,13 +192,15 @@ pub(crate) fn misfit_before(
 pub(crate) fn refitted(
     existing: &[Record],
     played: &Played,
-    stand_in: &Node,
+    (truth, stand_in): (&Node, &Node),
     before: f64,
     metric: &Metric,
 ) -> Result<f64, Error> {
     let mut records = existing.to_vec();
     records.push(played.record.clone());
-    let setup = metric.with_records(&stand_in.setup, &records)?;
+    let setup = metric
+        .with_records(&stand_in.setup, &records)?
+        .with_priors(&imagined_priors(truth, stand_in))?;
     let mut own = unlooped(stand_in);
     own.extend(&played.initial);
     own.resize(setup.names().len(), 0.0);

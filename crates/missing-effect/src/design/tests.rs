@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use ct_signals::{Record, excitation, noise};
-use greybox::{Noise, Triangle, fit_from};
+use greybox::{Noise, PriorValue, Setup, Triangle, fit_from, starts_around};
 use plants::{EffectInfo, Known, Placed, Plant, Scales, Structure};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
@@ -126,6 +126,57 @@ fn noisy(records: &[Record], seed: u64) -> Vec<Record> {
     records
 }
 
+/// Side measurements are part of the refits: beside such that are all but exact they agree with fits in which their parameters are fixed at
+/// the values of the model that is taken to be true.
+#[test]
+fn a_side_measurement_counts_in_the_refits() {
+    let mut problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);
+    let plant = [("pump_gain", 10.0), ("alpha", 12.5)];
+    for (name, value) in plant {
+        let std_error = 1e-3;
+        let exact = PriorValue { value, std_error };
+        problem.priors.insert(name.into(), exact);
+    }
+    let fitted = leak_or_curve(&problem);
+    let (a, b, metric) = (&fitted.nodes[0], &fitted.nodes[1], &fitted.metric);
+    let cost = |records: &[Record], mut x: Vec<f64>, held: bool| {
+        let mut fixed = b.setup.fixed.clone();
+        if held {
+            for (i, (name, _)) in plant.into_iter().enumerate() {
+                assert!(a.setup.names()[i] == name && b.setup.names()[i] == name);
+                x[i] = a.fit.x[i];
+                fixed.insert(name.into(), x[i]);
+            }
+        }
+        let mut setup = Setup::new(b.setup.structure.clone(), records, fixed).unwrap();
+        setup.substeps = b.setup.substeps;
+        setup.known_scales = Some(metric.scales.clone());
+        let starts = starts_around(&setup, &x, 4, 1);
+        let starts: Vec<Vec<f64>> = starts.into_iter().chain([x]).collect();
+        fit_from(&setup, &starts, &metric.noise, FINE).unwrap().cost
+    };
+    let existing = imagined(a).unwrap();
+    let before = misfit_before(&existing, a, b, metric).unwrap();
+    let held = cost(&existing, unlooped(b), true);
+    let free = cost(&existing, unlooped(b), false);
+    assert!(free < 0.9 * held, "{free}, {held}");
+    assert!((before / held - 1.0).abs() < 0.02, "{before}, {held}");
+
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let values = excitation::steps(300, 30..=60, 3.9, 6.1, &mut rng).unwrap();
+    let played = play(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
+    let confirmed = refitted(&existing, &played, (a, b), before, metric).unwrap();
+    let mut both = existing;
+    both.push(played.record.clone());
+    let mut x = unlooped(b);
+    x.extend(&played.initial);
+    let held = cost(&both, x.clone(), true);
+    let free = cost(&both, x, false);
+    let with = before + confirmed * metric.variance();
+    assert!(free < 0.9 * held, "{free}, {held}");
+    assert!((with / held - 1.0).abs() < 0.02, "{with}, {held}");
+}
+
 /// The mean of the likelihood ratio over records with noise, both models refitted each time, is the power.
 #[test]
 fn the_power_is_the_mean_of_the_likelihood_ratio() {
@@ -139,8 +190,8 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
         let played = play(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
         let promised = linear(&played, b, &information(b, metric), metric).unwrap();
         let existing = imagined(a).unwrap();
-        let before = misfit_before(&existing, b, metric).unwrap();
-        let confirmed = refitted(&existing, &played, b, before, metric).unwrap();
+        let before = misfit_before(&existing, a, b, metric).unwrap();
+        let confirmed = refitted(&existing, &played, (a, b), before, metric).unwrap();
 
         let cost = |node: &crate::node::Node, records: &[Record]| {
             let setup = node.setup.with_records(records).unwrap();

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use ct_signals::ArModel;
-use greybox::{Setup, at_rest, commands};
+use greybox::{PriorValue, Setup, at_rest, commands};
 use nalgebra::{DMatrix, DVector};
 use plants::{Fitted, Simulator, Term, Variable};
 
@@ -179,7 +179,13 @@ pub(super) fn shape(
     let inflation = slowness_of(&ArModel::fit(&[&series], crate::noise_floor::NOISE_ORDER)?);
     let variance = inflation * residual.norm_squared() / freedom;
     let mut information = mine.tr_mul(&mine);
-    if let Some(factor) = regularised(theirs.tr_mul(&theirs)).cholesky() {
+    let mut nuisance = theirs.tr_mul(&theirs);
+    for (column, prior) in priors(&setup) {
+        if let Some(i) = others.iter().position(|&other| other == column) {
+            nuisance[(i, i)] += variance / prior.std_error.powi(2);
+        }
+    }
+    if let Some(factor) = regularised(nuisance).cholesky() {
         let cross = theirs.tr_mul(&mine);
         information -= cross.tr_mul(&factor.solve(&cross));
     }
@@ -224,26 +230,36 @@ fn x_free(setup: &Setup, x: &[f64]) -> DVector<f64> {
     DVector::from_iterator(setup.free().len(), setup.free().iter().map(|&i| x[i]))
 }
 
+/// What is known of the free entries beside the records, each with its column.
+fn priors(setup: &Setup) -> Vec<(usize, PriorValue)> {
+    let known = setup.prior_values();
+    let column = |(column, &entry): (usize, &usize)| {
+        let prior = known.get(&setup.names()[entry])?;
+        Some((column, *prior))
+    };
+    setup.free().iter().enumerate().filter_map(column).collect()
+}
+
 /// A fit with its derivatives.
-struct Fit {
-    x: Vec<f64>,
+pub(super) struct Fit {
+    pub x: Vec<f64>,
     j: DMatrix<f64>,
     residual: DVector<f64>,
     /// Mean and weights of what is known of the free entries before: an ordinate is near zero and nearer to its neighbours,
-    /// a parameter of the plant near the believed model's fit.
+    /// a parameter of the plant near the believed model's fit, and near its side measurement where there is one.
     prior: (DVector<f64>, DMatrix<f64>),
 }
 
 /// Least squares with a prior, by Levenberg and Marquardt's steps. Without a prior the plant's parameters and the ordinates
 /// would run off together, since the ones imitate the others. `None` too where the time limit passes.
-fn fit(
+pub(super) fn fit(
     setup: &Setup,
     start: Vec<f64>,
     ordinates: Range<usize>,
     size: f64,
     weights: &[f64],
 ) -> Option<Fit> {
-    let mean = x_free(setup, &start);
+    let mut mean = x_free(setup, &start);
     let of_outputs = weights;
     let rows = |x: &[f64]| {
         let rows = setup.rows(x)?;
@@ -275,6 +291,12 @@ fn fit(
             } else if position < count {
                 known[(column, column)] += inverse(LOOSE * mean[column].abs());
             }
+        }
+        // Two Gaussian readings of an entry are one, at their weighted mean.
+        for (column, prior) in priors(setup) {
+            let (loose, weight) = (known[(column, column)], inverse(prior.std_error));
+            mean[column] = (loose * mean[column] + weight * prior.value) / (loose + weight);
+            known[(column, column)] = loose + weight;
         }
         known
     };

@@ -4,14 +4,14 @@
 use std::ops::RangeInclusive;
 
 use ct_signals::{Channel, Record, noise};
-use greybox::{Noise, Setup, Stopping, fit_from};
+use greybox::{Noise, PriorValue, Setup, Stopping, fit_from};
 use nalgebra::{Matrix3, Vector3};
 use plants::{Command, Known, Place, Plant, Simulator, Term, Variable};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    shape::shape,
+    shape::{fit, shape},
     smooth::{Spot, carrier, smooth},
 };
 use crate::node::Node;
@@ -295,4 +295,48 @@ fn the_band_of_a_shape_holds_the_truth_as_often_as_it_says() {
     );
     assert!(share > 0.9, "{share}");
     assert!(named >= 22, "{named}");
+}
+
+/// A side measurement counts in the fit of a polyline too: an ordinate of an unknown in the balance imitates the offset, which only the side
+/// measurement tells.
+#[test]
+fn a_side_measurement_holds_its_parameter_in_the_fit_of_a_shape() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let records = [record(&[0.0; INSTANTS], &mut rng)];
+    let node = node(&records);
+    let own = node.setup.parameter_count();
+    let term = Term {
+        name: "unknown".to_string(),
+        place: VESSEL.place,
+        vessel: VESSEL.vessel,
+        variable: Variable::Level,
+        knots: vec![10.0, 14.0, 18.0],
+        ordinates: vec![0.0; 3],
+        fitted: plants::Fitted::Ordinates,
+    };
+    let offset = node.setup.names()[..own]
+        .iter()
+        .position(|name| name == "offset")
+        .unwrap();
+    let fitted = |prior: Option<PriorValue>| {
+        let priors = prior.map(|prior| ("offset".to_string(), prior));
+        let setup = node
+            .setup
+            .clone()
+            .with_priors(&priors.into_iter().collect());
+        let setup = setup.unwrap();
+        let structure = setup.structure.with_term(term.clone()).unwrap();
+        let setup = setup.with_structure(structure).unwrap();
+        let mut start = node.fit.x.clone();
+        start.splice(own..own, [0.0; 3]);
+        let fit = fit(&setup, start, own..own + 3, 1.0, &node.fit.weights).unwrap();
+        fit.x[offset]
+    };
+    let read = PriorValue {
+        value: THETA[2] + 0.5,
+        std_error: 0.01,
+    };
+    let (without, with) = (fitted(None), fitted(Some(read)));
+    assert!((without - THETA[2]).abs() < 0.3, "{without}");
+    assert!((with - read.value).abs() < 0.02, "{with}");
 }

@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Alarm, Estimate, Notice, ScatterAlarm, Settings, Units, Watched,
+    Alarm, Estimate, Notice, ScatterAlarm, Settings, TimeAxis, Units, Watched,
     bank::Bank,
     intake::{Follows, LONGEST_BLOCK, Sample},
     isolate::Kept,
@@ -103,6 +103,7 @@ pub(crate) struct Core<'a> {
     model: Watched<'a>,
     settings: Settings,
     units: Units,
+    pub(crate) axis: TimeAxis,
     /// The present state, but for the tracker, which is as of the last checkpoint.
     now: Checkpoint,
     running: Option<Running<'a>>,
@@ -131,6 +132,7 @@ impl<'a> Core<'a> {
             model,
             settings,
             units,
+            axis: TimeAxis::default(),
             checkpoint: now.clone(),
             now,
             running: None,

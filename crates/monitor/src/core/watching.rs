@@ -236,8 +236,8 @@ impl Core<'_> {
             output: following.output,
         };
         let (hold, growth) = (self.hold(), self.growth());
-        let model = &self.model.0;
-        let alarm = model.look(learned, hold, &rows, &growth, &raised, &self.units);
+        let (model, said_in) = (&self.model.0, (&self.units, &self.axis));
+        let alarm = model.look(learned, hold, &rows, &growth, &raised, said_in);
         self.now.phase = Phase::Alarmed(Following {
             explained: alarm.verdict != Verdict::Unexplained,
             ..following

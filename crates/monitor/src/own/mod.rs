@@ -16,8 +16,7 @@ use greybox::PriorValue;
 
 use self::simulation::running;
 use crate::{
-    Alarm, Each, Error, Refused, Units, Watched,
-    alarm::instant,
+    Alarm, Each, Error, Refused, TimeAxis, Units, Watched,
     fingerprint::{Fingerprint, TIME_UNIT},
     intake::{Readings, Sample},
     isolate::Kept,
@@ -196,7 +195,7 @@ impl<'a> Believed<'a> for OwnModel<'a> {
         rows: &[Kept],
         growth: &Each<f64>,
         raised: &Raised,
-        units: &Units,
+        (units, axis): (&Units, &TimeAxis),
     ) -> Alarm {
         let name = self.output_name(raised.output);
         let most = match &name {
@@ -209,8 +208,8 @@ impl<'a> Believed<'a> for OwnModel<'a> {
         let mut alarm = Alarm::unexplained(raised, name);
         alarm.since = onset::onset(self, learned, hold, rows, growth, raised.since);
         let since = match alarm.since {
-            Some(since) => format!("since about t = {} s", instant(since)),
-            None => format!("since t = {} s or before", instant(raised.since)),
+            Some(since) => format!("since about {}", axis.at(since)),
+            None => format!("since {} or before", axis.at(raised.since)),
         };
         alarm.sentence = format!(
             "The model does not fit {since} (score {:.1}, threshold {:.1}){most}.",

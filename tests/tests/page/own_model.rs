@@ -134,11 +134,11 @@ fn what_is_not_there_yet_is_refused() {
         json!({ "what": "chain", "effects": [] }),
     ] {
         let refused = posted("/api/run", what);
-        assert_eq!(refused.status, 400);
+        assert_eq!(refused.status, 422);
         assert!(
             refused
                 .error()
-                .contains("not there for models of your own yet")
+                .contains("not on the page for models of your own yet")
         );
     }
     let file = "model = \"/etc/passwd\"\n[known]\nC = 52.0\n";

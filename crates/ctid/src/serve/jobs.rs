@@ -146,7 +146,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
         (Task::Compare, Some(_)) => Input::Own(Box::new(own::Work::new(&mut session)?)),
         (_, Some(_)) => {
             return Err(Refusal::input(
-                "this is not there for models of your own yet: write what is missing into the text, and fit it again",
+                "this is not on the page for models of your own yet: `ctid diagnose` in a terminal says what is missing; write it into the text, and fit it again",
             ));
         }
         (task, None) => {

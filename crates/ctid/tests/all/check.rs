@@ -111,7 +111,7 @@ fn effects_of_a_model_of_ones_own_are_listed_with_its_candidates() {
         "effects --model m.toml",
         &[
             "m.toml",
-            "line 5",
+            "m.toml:5: ",
             "candidates.radiation.terms.T: 1:5: `Tb` is not declared",
             "did you mean `Ta`?",
         ],

@@ -149,7 +149,7 @@ fn what_is_not_there_yet_is_refused() {
         "/api/own",
         json!({ "do": "example", "name": "../../../etc/passwd" }),
     );
-    assert_eq!(refused.status, 400);
+    assert_eq!(refused.status, 422);
     // A text of the largest request is looked at, and one beyond it is not.
     let deep = format!(
         "model M\n output Real y = {}1{};\nend M;",

@@ -37,7 +37,7 @@ fn an_example_is_fitted_and_its_text_is_changed() {
     assert!(
         browser
             .text("#own")
-            .contains("is not asked for models of your own yet")
+            .contains("is not asked here for models of your own yet")
     );
     for part in ["missing", "chains-part", "trail-part", "model"] {
         assert_eq!(

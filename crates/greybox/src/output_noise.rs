@@ -47,7 +47,7 @@ fn prediction(
         .first()
         .map_or((0, 0), |r| (r.inputs.len(), r.outputs.len()));
     // The level; readings and model of this output; inputs; the other outputs; the reading.
-    let columns = 1 + past + past + 1 + inputs * (others + 1) + (outputs - 1) * others;
+    let columns = 1 + past + past + 1 + inputs * others + (outputs - 1) * others;
     let mut triangle = Triangle::new(columns + 1);
     let mut values = Vec::with_capacity(columns + 1);
     let mut samples = 0;
@@ -70,7 +70,8 @@ fn prediction(
             let simulated = &model[r * outputs + output];
             values.extend(before.iter().chain([&k]).map(|&j| simulated[j]));
             for input in &record.inputs {
-                values.extend((0..=others).map(|lag| input.values[k.saturating_sub(lag)]));
+                // Before this row alone: in a loop the input of a row answers to the reading of that row.
+                values.extend((1..=others).map(|lag| input.values[k.saturating_sub(lag)]));
             }
             for other in (0..outputs).filter(|o| *o != output) {
                 let read = there[other].partition_point(|&j| j < k);

@@ -21,7 +21,7 @@ use crate::node::{Context, FINE, Node};
 use crate::problem::{Limit, Options, Problem};
 use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
-use crate::{Error, held_out};
+use crate::{Error, held_out_errors};
 
 /// Shares of the time limit after which the phases end.
 const SEARCHED_WHITE: f64 = 0.5;
@@ -378,7 +378,7 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
         unit,
         known: !setup.free().contains(&i),
     });
-    let test = held_out::errors(&setup, &node.fit, &problem.test)?;
+    let test = held_out_errors(&setup, &node.fit, &problem.test)?;
     let added = node.added.len() > base.added.len();
     Ok(Step {
         added: added.then(|| {

@@ -9,8 +9,11 @@ use crate::Error;
 /// Samples on which the initial states of a held-out record are fitted, and which are not scored.
 const STATE_ROWS: usize = 5;
 
-/// Simulation error of each output on held-out records; `None` without any.
-pub(crate) fn errors(
+/// Simulation error of each output on held-out records \[its unit\]; `None` without any. `fit`: of the model that `setup` has.
+///
+/// # Errors
+/// Where a record is not one of this model, or its initial states cannot be fitted.
+pub fn held_out_errors(
     setup: &ModelSetup,
     fit: &Fit,
     test: &[Record],

@@ -24,6 +24,7 @@ mod spectral_line;
 
 pub use diagnose::{Progress, diagnose};
 pub use error::Error;
+pub use held_out::held_out_errors;
 pub use left::Left;
 pub use problem::{Options, Problem};
 pub use result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};

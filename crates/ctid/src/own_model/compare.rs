@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use ct_signals::Record;
+use effect_search::{Estimate, Step, held_out_errors};
 use greybox::{Fit, FitOptions, ModelSetup, weighted_rms};
 use serde::Serialize;
 
@@ -11,50 +11,8 @@ use super::file::{OwnModelFile, Records};
 use crate::Error;
 use crate::output::Found;
 
-/// A held-out record's initial states are fitted on so many samples, and it is scored from there on.
-const STATE_ROWS: usize = 5;
 /// Estimates whose correlation is above this are not known one without the other.
 const TOGETHER: f64 = 0.999;
-
-/// A parameter or an initial state as it was fitted.
-#[derive(Debug, Serialize)]
-pub(crate) struct Estimate {
-    /// Its name.
-    pub name: String,
-    /// Its value \[unit\].
-    pub value: f64,
-    /// Its standard error; `None` where it is known, at a bound or not determined.
-    pub std_error: Option<f64>,
-    /// Its unit as the text has it.
-    pub unit: String,
-    /// It is not fitted.
-    pub known: bool,
-}
-
-/// The model and how far it is off, as each step of a diagnosis has it.
-#[derive(Debug, Serialize)]
-pub(crate) struct Step {
-    /// The effect that was added: none.
-    pub added: Option<String>,
-    /// Simulation error of an only output \[its unit\].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rmse: Option<f64>,
-    /// Simulation error by output, on the fitted records \[unit of the output\].
-    pub rmse_per_output: BTreeMap<String, f64>,
-    /// The same on the held-out records.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rmse_test_per_output: Option<BTreeMap<String, f64>>,
-    /// Simulation error, each output divided by its noise, which is what a linear prediction from the past leaves: 1 is the noise floor.
-    pub weighted_rmse: f64,
-    /// Bayesian information criterion.
-    pub bic: f64,
-    /// All parameters, then the initial states.
-    pub parameters: Vec<Estimate>,
-    /// Starts of the fit.
-    pub starts: usize,
-    /// How many of them ended in the best minimum.
-    pub starts_agree: usize,
-}
 
 /// Measured and model, of one output of one record.
 #[derive(Debug)]
@@ -119,7 +77,10 @@ pub(crate) fn compare(
     let simulated = setup
         .simulate(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
-    let test = held_out(&setup, &fit, &records.test, options).map_err(blame)?;
+    let test = held_out_errors(&setup, &fit, &records.test).map_err(|error| match error {
+        effect_search::Error::Fit(error) => blame(error),
+        other => Error::Columns(other.to_string()),
+    })?;
     let noise = setup
         .output_noise(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
@@ -159,6 +120,8 @@ pub(crate) fn compare(
         parameters: estimates.collect(),
         starts: fit.starts,
         starts_agree: fit.agree,
+        // The curves have them with what was measured.
+        simulated: Vec::new(),
     };
     let measured = records.records.iter().flat_map(|record| {
         let channels = record.outputs.iter().zip(&outputs);
@@ -183,47 +146,6 @@ pub(crate) fn compare(
         steps: [step],
         seconds: began.elapsed().as_secs_f64(),
     })
-}
-
-/// Simulation error of each output on held-out records.
-fn held_out(
-    setup: &ModelSetup,
-    fit: &Fit,
-    test: &[Record],
-    options: &FitOptions,
-) -> Result<Option<Vec<f64>>, greybox::Error> {
-    if test.is_empty() {
-        return Ok(None);
-    }
-    let outputs = fit.rmse.len();
-    let mut sums = vec![(0.0, 0_usize); outputs];
-    for record in test {
-        let whole = [record.clone()];
-        let first = [record.rows(0..STATE_ROWS)];
-        let states = setup.held_out(&first, &fit.x)?.fit_states(options)?;
-        let model = setup.held_out(&whole, &fit.x)?.simulate(&states);
-        for (o, sum) in sums.iter_mut().enumerate() {
-            let measured = &record.outputs[o].values;
-            let Some(model) = &model else {
-                sum.0 = f64::NAN;
-                continue;
-            };
-            for (y, m) in measured
-                .iter()
-                .zip(&model[o])
-                .skip(STATE_ROWS)
-                .filter(|(y, _)| !y.is_nan())
-            {
-                sum.0 += (y - m).powi(2);
-                sum.1 += 1;
-            }
-        }
-    }
-    Ok(Some(
-        sums.into_iter()
-            .map(|(sum, n)| (sum / n.max(1) as f64).sqrt())
-            .collect(),
-    ))
 }
 
 /// Entries that the records do not determine: alone, or pairs of which they tell one combination only.

@@ -166,6 +166,34 @@ impl ArModel {
         Ok(best.map_or_else(|| ArModel::white(0.0), |(_, model)| model))
     }
 
+    /// The autoregression behind a system that is known, of which samples may be missing (NaN): at the maximum of the exact likelihood of those that are there, its
+    /// order by the criterion of [`ArModel::fit`].
+    ///
+    /// `process` makes the process of both, from an autoregression whose innovations have variance 1 and the segment's number.
+    ///
+    /// # Errors
+    /// As of [`ArModel::fit`].
+    pub fn fit_behind(
+        segments: &[&[f64]],
+        max_order: usize,
+        process: impl Fn(&ArModel, usize) -> crate::StationaryNoise,
+    ) -> Result<Self, Error> {
+        for segment in segments {
+            check_not_infinite("autoregressive fit", "v", segment)?;
+        }
+        let there = segments.iter().copied().flatten().filter(|v| !v.is_nan());
+        let n = there.count();
+        if n == 0 {
+            return Err(Error::TooFewSamples {
+                task: "autoregressive fit",
+                found: 0,
+                needed: 1,
+            });
+        }
+        let max_order = max_order.min(n / SAMPLES_PER_COEFFICIENT);
+        Ok(ar_missing::fit_behind(segments, n, max_order, process))
+    }
+
     /// A process with known partial correlations `k_1..k_p`, within -1..1, and innovations of standard deviation
     /// `sigma` (the signal's unit, `>= 0`).
     ///

@@ -75,6 +75,7 @@ mod record;
 mod resample;
 pub mod residual_tests;
 mod stationary_noise;
+mod stationary_whitener;
 mod stream;
 mod student;
 mod timestamp;
@@ -93,8 +94,11 @@ pub use error::Error;
 pub use gaps::Gaps;
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};
-pub use record::{Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, require_samples};
+pub use record::{
+    Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, interpolated, require_samples,
+};
 pub use stationary_noise::{CovarianceSum, StationaryNoise};
+pub use stationary_whitener::StationaryWhitener;
 pub use stream::{BadLine, Line, RowTimes, Rows};
 pub use student::student_half_width;
 pub use timestamp::{Timestamp, TimestampError, TimestampReader, Zone};

@@ -85,29 +85,10 @@ impl Channel {
         self.values.iter().filter(|value| value.is_nan()).count()
     }
 
-    /// The values with straight lines in place of missing samples, and the nearest one before the first and behind the last that is
-    /// there; as they are where none is.
+    /// The values with straight lines in place of missing samples ([`interpolated`]).
     #[must_use]
     pub fn interpolated(&self) -> Vec<f64> {
-        let mut values = self.values.clone();
-        let mut from = 0;
-        while let Some(gap) = values[from..].iter().position(|value| value.is_nan()) {
-            let begin = from + gap;
-            let end = values[begin..].iter().position(|value| !value.is_nan());
-            let end = end.map_or(values.len(), |length| begin + length);
-            let before = begin.checked_sub(1).map(|k| values[k]);
-            let after = values.get(end).copied();
-            let Some(start) = before.or(after) else {
-                break;
-            };
-            let stop = after.unwrap_or(start);
-            let steps = (end - begin + 1) as f64;
-            for (i, value) in values[begin..end].iter_mut().enumerate() {
-                *value = start + (stop - start) * (i + 1) as f64 / steps;
-            }
-            from = end;
-        }
-        values
+        interpolated(&self.values)
     }
 
     /// The name with the unit in brackets, as a header has it; the name alone where there is no unit.
@@ -118,6 +99,31 @@ impl Channel {
             unit => format!("{} [{unit}]", self.name),
         }
     }
+}
+
+/// A series with straight lines, by rows, in place of missing samples (NaN), and the nearest one before the first and behind the last that is
+/// there; as it is where none is.
+#[must_use]
+pub fn interpolated(values: &[f64]) -> Vec<f64> {
+    let mut values = values.to_vec();
+    let mut from = 0;
+    while let Some(gap) = values[from..].iter().position(|value| value.is_nan()) {
+        let begin = from + gap;
+        let end = values[begin..].iter().position(|value| !value.is_nan());
+        let end = end.map_or(values.len(), |length| begin + length);
+        let before = begin.checked_sub(1).map(|k| values[k]);
+        let after = values.get(end).copied();
+        let Some(start) = before.or(after) else {
+            break;
+        };
+        let stop = after.unwrap_or(start);
+        let steps = (end - begin + 1) as f64;
+        for (i, value) in values[begin..end].iter_mut().enumerate() {
+            *value = start + (stop - start) * (i + 1) as f64 / steps;
+        }
+        from = end;
+    }
+    values
 }
 
 /// One experiment: its instants and any number of inputs, outputs and references, on one clock.

@@ -9,7 +9,7 @@
 //!
 //! Cost: `q nu^2` products a row, for q columns and nu states.
 
-use crate::ArModel;
+use crate::{ArModel, StationaryWhitener};
 
 /// A stationary process, for sums over its autocovariance.
 #[derive(Debug, Clone)]
@@ -54,6 +54,32 @@ impl StationaryNoise {
             a[i * o + i - 1] = 1.0;
         }
         Self::new(a, &b, ar.to_vec(), 1.0)
+    }
+
+    /// A filter that whitens `lanes` signals at once, row by row, missing rows among them.
+    pub fn whitener(&self, lanes: usize) -> StationaryWhitener<'_> {
+        StationaryWhitener::new(self, lanes)
+    }
+
+    pub(crate) fn order(&self) -> usize {
+        self.nu
+    }
+
+    pub(crate) fn a(&self) -> &[f64] {
+        &self.a
+    }
+
+    pub(crate) fn c(&self) -> &[f64] {
+        &self.c
+    }
+
+    pub(crate) fn g(&self) -> &[f64] {
+        &self.g
+    }
+
+    /// `R(0)`, in the variance of the innovations.
+    pub fn variance(&self) -> f64 {
+        self.r0
     }
 
     /// An empty sum over rows of q numbers.

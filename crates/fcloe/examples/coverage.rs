@@ -26,6 +26,7 @@ fn main() {
         show(Rig::first_order(in_loop));
         show(Rig::second_order(in_loop));
         show(Rig::second_order(in_loop).with_unknown_levels());
+        show(Rig::second_order(in_loop).with_missing_readings());
         show(Rig::filtered_pid(in_loop));
         show(Rig::direct_term(in_loop));
     }
@@ -41,7 +42,11 @@ fn show(rig: &Rig, runs: u64) {
             .map(|h| format!("{:6.3}", *h as f64 / runs as f64));
         share.collect::<Vec<_>>().join(" ")
     };
-    println!("  {}", rig.name);
+    let missing = match rig.missing {
+        true => ", 30 % of the readings and a block of 10 rows missing",
+        false => "",
+    };
+    println!("  {}{missing}", rig.name);
     println!("    with the residual's colour {}", share(&found.hits));
     println!("    as if it were white        {}", share(&found.white));
     println!(

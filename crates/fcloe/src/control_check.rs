@@ -7,7 +7,8 @@
 //! explains, filtered by a ladder of lags `1/(1 + T p)`, less what noise of that colour would show. A wrong gain, sign
 //! or unit of time shows there; noise does not, because r knows nothing of it.
 //!
-//! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better.
+//! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better. Where readings of y are missing it runs in lines between
+//! those that are there: what the controller did with the readings that the record lacks adds to the mismatch, and is little beside 10 % of u unless gaps are long and many.
 //!
 //! Limits: what is wrong only at frequencies below lambda is not seen; a controller that is sampled much more slowly than the record's dynamics is not the continuous one, and shows.
 
@@ -91,9 +92,10 @@ pub fn controller_mismatch(
         .iter()
         .map(|column| residual(&free, column))
         .collect();
+    let y = record.y_on_lines();
     let mut best: Option<Mismatch> = None;
     for hold in [Hold::First, Hold::Zero] {
-        let of_y = response(&law, hold, record.y.iter().map(|y| y - y0), record.step)?;
+        let of_y = response(&law, hold, y.iter().map(|y| y - y0), record.step)?;
         let missed: Vec<f64> = (0..u.len()).map(|k| u[k] - (of_r[k] - of_y[k])).collect();
         let missed = residual(&free, &missed);
         let rms = (missed.iter().map(|v| v * v).sum::<f64>() / n).sqrt();

@@ -144,13 +144,55 @@ pub enum Error {
         /// The median step \[s\].
         expected: f64,
     },
+    /// An output without readings, or without those that say its level.
+    #[error(
+        "{record}: no reading of y is there{}; give a part of the record that has some",
+        match all {
+            true => String::new(),
+            false => format!(" in the first {rows} rows, which say its level"),
+        }
+    )]
+    NoReading {
+        /// The record's name.
+        record: String,
+        /// Rows without readings.
+        rows: usize,
+        /// Whether these are all.
+        all: bool,
+    },
+    /// Gaps in y that the filters of a regression do not forget.
+    #[error(
+        "{record}: {:.0} % of the readings of y are missing, and only {left} of the {rows} rows are far enough behind long gaps for filters on y; output error needs no such filters",
+        100.0 * missing
+    )]
+    Gaps {
+        /// The record's name.
+        record: String,
+        /// The share of y that is missing, 0 to 1.
+        missing: f64,
+        /// Rows that are left.
+        left: usize,
+        /// Rows in the record.
+        rows: usize,
+    },
+    /// Instruments with a filter that is not the plant's own, and readings that are missing.
+    #[error(
+        "readings of y are missing, and the filter of the instruments did not come to rest at A^: their errors are not known then"
+    )]
+    ErrorsOfOtherFilter,
     /// Too few samples for the parameters.
     #[error(
-        "{samples} samples in all, but {needed} are needed for {parameters} parameters; give a longer record"
+        "{samples} samples in all{}, but {needed} are needed for {parameters} parameters; give a longer record",
+        match missing {
+            0 => String::new(),
+            missing => format!(", besides {missing} whose reading is missing"),
+        }
     )]
     TooShort {
-        /// Samples in all records.
+        /// Samples in all records, missing readings aside.
         samples: usize,
+        /// Readings that are missing.
+        missing: usize,
         /// Samples that are needed.
         needed: usize,
         /// Parameters, estimated offsets included.

@@ -18,6 +18,10 @@
 //! so that the double sum is one filter of the sensitivities, `f_k = sum_{l<k} R(k-l) s_l`, and J'VJ = sum
 //! `R(0) s s' + s f' + f s'`: no more memory for a longer record.
 //!
+//! Missing readings: the residual is NaN there, and F cannot be inverted from sample to sample. The autoregression of either path is then the one whose
+//! process, behind F or not, has the largest likelihood of the residuals that are there ([`ArModel::fit_behind`], [`ct_signals::StationaryWhitener`]), and the paths are compared by the
+//! marginal likelihood of these.
+//!
 //! Cost: `q nu^2` products a sample, for q columns and nu states of H.
 //!
 //! [`estimation::robust`] knows autoregressions alone: F has zeros, and which path it is has to be compared by one criterion for both.
@@ -68,6 +72,12 @@ impl NoiseModel {
         path: Option<NoisePath>,
         max_order: usize,
     ) -> Result<Self, Error> {
+        if residuals
+            .iter()
+            .any(|r| r.values.iter().any(|v| v.is_nan()))
+        {
+            return Self::of_some(residuals, closed, path, max_order);
+        }
         let of_w = closed.disturbance()?;
         // A gain of 0 at frequency 0.
         let blind = of_w.numerator().coefficient(0) == 0.0;
@@ -130,6 +140,91 @@ impl NoiseModel {
     }
 }
 
+impl NoiseModel {
+    /// The same where readings are missing: residuals are NaN there.
+    fn of_some(
+        residuals: &[Residual],
+        closed: &ClosedLoop,
+        path: Option<NoisePath>,
+        max_order: usize,
+    ) -> Result<Self, Error> {
+        let of_w = closed.disturbance()?;
+        let blind = of_w.numerator().coefficient(0) == 0.0;
+        let system = StateSpace::controllable(&of_w)?;
+        let mut all = Vec::with_capacity(residuals.len());
+        let mut bounded = true;
+        for residual in residuals {
+            let sampled = system.sampled(Hold::Zero, residual.step)?;
+            let ones = vec![1.0; residual.values.len()];
+            let mut beside = Vec::new();
+            if blind {
+                beside.push(filtered(&system, &sampled, &ones));
+            }
+            if residual.free_level {
+                beside.push(ones);
+            }
+            let size = |s: &[f64]| s.iter().map(|s| s * s).sum::<f64>();
+            let whole = ct_signals::interpolated(&residual.values);
+            bounded &= size(&unfiltered(&system, &sampled, &whole)) <= 1e8 * size(&whole);
+            all.push(
+                Series {
+                    values: residual.values.clone(),
+                    beside,
+                }
+                .without_others(),
+            );
+        }
+        let segments: Vec<&[f64]> = all.iter().map(|s| &s.values[..]).collect();
+        let none = StateSpace::new(vec![], vec![], vec![], 1.0)?;
+        let of = |system: &StateSpace| -> Result<(f64, ArModel), Error> {
+            // What cannot be sampled is refused here once.
+            let known: Vec<Sampled> = residuals
+                .iter()
+                .map(|residual| system.sampled(Hold::Zero, residual.step))
+                .collect::<Result<_, _>>()?;
+            let process = |ar: &ArModel, index: usize| of_sampled(ar, system, &known[index]);
+            let ar = match system.order() {
+                0 => ArModel::fit(&segments, max_order)?,
+                _ => ArModel::fit_behind(&segments, max_order, process)?,
+            };
+            let (mut squares, mut volume, mut left, mut samples) = (0.0, 0.0, 0.0, 0.0_f64);
+            for (index, series) in all.iter().enumerate() {
+                let (whitened, log_det) = series.whitened(&process(&ar, index));
+                let (triangle, x) = whitened.regression();
+                squares += triangle.predicted(&x);
+                volume += log_det;
+                samples += whitened.values.len() as f64;
+                if triangle.determined() {
+                    volume += triangle.log_det();
+                    left -= x.len() as f64;
+                }
+            }
+            left += samples;
+            let variance = (squares / left).max(f64::MIN_POSITIVE);
+            let penalty = ar.order() as f64 * samples.ln();
+            Ok((left * variance.ln() + volume + penalty, ar))
+        };
+        let on_record = of(&none)?;
+        let apart = system.order() > 0 && of_w.numerator() != of_w.denominator();
+        let in_loop = match path {
+            Some(NoisePath::Record) => None,
+            Some(NoisePath::Loop) => Some(of(&system)?),
+            None if bounded && apart => Some(of(&system)?),
+            None => None,
+        };
+        Ok(match in_loop {
+            Some((criterion, ar)) if path.is_some() || criterion < on_record.0 => Self {
+                path: NoisePath::Loop,
+                ar,
+            },
+            _ => Self {
+                path: NoisePath::Record,
+                ar: on_record.1,
+            },
+        })
+    }
+}
+
 /// A series, and the signals in it that are no noise.
 struct Series {
     values: Vec<f64>,
@@ -139,16 +234,7 @@ struct Series {
 /// The autoregression of what is left of all series, and minus twice the logarithm of its marginal likelihood, with
 /// the penalty of Bayes' information criterion for its coefficients.
 fn autoregression(mut all: Vec<Series>, max_order: usize) -> Result<(f64, ArModel), Error> {
-    for series in &mut all {
-        let (triangle, x) = series.regression();
-        if triangle.cost() > 0.0 {
-            for (x, beside) in x.iter().zip(&series.beside) {
-                for (v, b) in series.values.iter_mut().zip(beside) {
-                    *v -= x * b;
-                }
-            }
-        }
-    }
+    all = all.into_iter().map(Series::without_others).collect();
     let segments: Vec<&[f64]> = all.iter().map(|s| &s.values[..]).collect();
     let ar = ArModel::fit(&segments, max_order)?;
     let n: usize = segments.iter().map(|s| s.len()).sum();
@@ -172,6 +258,60 @@ fn autoregression(mut all: Vec<Series>, max_order: usize) -> Result<(f64, ArMode
 }
 
 impl Series {
+    /// The values less what they hold of the signals beside the noise.
+    fn without_others(mut self) -> Self {
+        let (triangle, x) = match self.values.iter().any(|v| v.is_nan()) {
+            true => self.there().regression(),
+            false => self.regression(),
+        };
+        if triangle.cost() > 0.0 {
+            for (x, beside) in x.iter().zip(&self.beside) {
+                for (v, b) in self.values.iter_mut().zip(beside) {
+                    *v -= x * b;
+                }
+            }
+        }
+        self
+    }
+
+    /// The rows whose value is there.
+    fn there(&self) -> Self {
+        let only = |signal: &Vec<f64>| {
+            let rows = signal.iter().zip(&self.values);
+            let there = rows.filter(|(_, value)| !value.is_nan());
+            there.map(|(signal, _)| *signal).collect()
+        };
+        Self {
+            values: only(&self.values),
+            beside: self.beside.iter().map(only).collect(),
+        }
+    }
+
+    /// The rows whose value is there, whitened as those of a process, and `log|R|` of them.
+    fn whitened(&self, process: &StationaryNoise) -> (Self, f64) {
+        let mut whitener = process.whitener(1 + self.beside.len());
+        let mut whitened = self.there();
+        let (mut log_det, mut k) = (0.0, 0);
+        let mut row = vec![0.0; 1 + self.beside.len()];
+        for value in &self.values {
+            if value.is_nan() {
+                whitener.skip();
+                continue;
+            }
+            let signals = std::iter::once(&mut whitened.values).chain(&mut whitened.beside);
+            let mut columns: Vec<&mut f64> = signals.map(|signal| &mut signal[k]).collect();
+            for (row, column) in row.iter_mut().zip(&columns) {
+                *row = **column;
+            }
+            log_det += whitener.push(&mut row).ln();
+            for (row, column) in row.iter().zip(&mut columns) {
+                **column = *row;
+            }
+            k += 1;
+        }
+        (whitened, log_det)
+    }
+
     /// Least squares of the values on what is beside the noise; 0 where that is not determined.
     fn regression(&self) -> (Triangle, Vec<f64>) {
         let q = self.beside.len();
@@ -228,9 +368,12 @@ pub(crate) fn behind(
     system: &StateSpace,
     step: f64,
 ) -> Result<StationaryNoise, Error> {
+    Ok(of_sampled(ar, system, &system.sampled(Hold::Zero, step)?))
+}
+
+fn of_sampled(ar: &ArModel, system: &StateSpace, sampled: &Sampled) -> StationaryNoise {
     let ar = ar.coefficients();
     let o = ar.len();
-    let sampled = system.sampled(Hold::Zero, step)?;
     let n = system.order();
     let nu = o + n;
     // States: the last o values of w, then those of F. w = ar' history + e.
@@ -256,7 +399,7 @@ pub(crate) fn behind(
         *c = system.d() * ar;
     }
     c[o..].copy_from_slice(system.c());
-    Ok(StationaryNoise::new(a, &b, c, system.d()))
+    StationaryNoise::new(a, &b, c, system.d())
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@
 //! The sums are held as the triangle R of [`estimation::Triangle`]: `J'' = 2 R'R`, `J' = -2 R'z`, z its last column, so that the condition of
 //! the sensitivities is not squared; [`Problem`] is one of [`estimation::Residuals`].
 //!
+//! Readings of y may be missing: the simulation runs on, and their rows have no residual and do not count.
+//!
 //! Cost per sample with p parameters: the simulation, and `2 (p + 1)^2` operations for the triangle.
 
 use ct_lti::Hold;
@@ -41,9 +43,10 @@ struct Prepared {
     name: String,
     step: f64,
     hold: Hold,
-    /// Less the operating point.
+    /// Less the operating point; y is NaN where its reading is missing.
     drive: Vec<f64>,
     y: Vec<f64>,
+    lacks_readings: bool,
     /// The operating point of the two.
     levels: Levels,
     /// Where its two columns begin, if its offsets are estimated.
@@ -117,6 +120,7 @@ impl Problem {
                 hold,
                 drive: less(drive, levels.drive),
                 y: less(&record.y, levels.y),
+                lacks_readings: record.lacks_readings(),
                 levels,
                 column: estimated.then_some(columns),
                 spread: [spread(drive), spread(&record.y)],
@@ -126,11 +130,13 @@ impl Problem {
             }
             mismatches.push(controller_mismatch(record, controller)?);
         }
-        let samples = prepared.iter().map(|record| record.y.len()).sum();
+        let samples = records.iter().map(LoopRecord::readings).sum();
+        let rows: usize = records.iter().map(LoopRecord::len).sum();
         let needed = MIN_SAMPLES.max(SAMPLES_PER_PARAMETER * columns);
         if samples < needed {
             return Err(Error::TooShort {
                 samples,
+                missing: rows - samples,
                 needed,
                 parameters: columns,
             });
@@ -246,13 +252,25 @@ impl Problem {
         let mut all = Triangle::new(if sensitivities { self.columns() + 1 } else { 1 });
         let mut own = of_record(0);
         let limit = limit * (1.0 + ROUNDING);
-        let seen = self.visit(&closed, &plant, x, sensitivities, |index, columns| {
+        let mut there: Vec<Vec<f64>> = Vec::new();
+        let seen = self.visit(&closed, &plant, x, sensitivities, |index, y, columns| {
             if index != own.0 {
                 let (_, mut record, places) = std::mem::replace(&mut own, of_record(index));
                 record.finish();
                 all.append(&record, &places);
             }
-            own.1.push_columns(columns);
+            if self.records[index].lacks_readings {
+                there.resize(columns.len(), Vec::new());
+                for (there, column) in there.iter_mut().zip(columns) {
+                    there.clear();
+                    let rows = column.iter().zip(y).filter(|(_, y)| !y.is_nan());
+                    there.extend(rows.map(|(value, _)| value));
+                }
+                let there: Vec<&[f64]> = there.iter().map(Vec::as_slice).collect();
+                own.1.push_columns(&there);
+            } else {
+                own.1.push_columns(columns);
+            }
             // A cost that is no number is found out below.
             let cost = all.cost() + own.1.cost();
             !(cost > limit && cost.is_finite())
@@ -284,7 +302,7 @@ impl Problem {
         places
     }
 
-    /// Simulates all records at x and shows the index of the record and, if asked for, the columns of its sensitivities (theta, then its
+    /// Simulates all records at x and shows the index of the record, its readings (NaN where they are missing) and, if asked for, the columns of its sensitivities (theta, then its
     /// levels), the residual's last, up to [`BLOCK`] samples at a time, until `see` has seen enough; whether it has seen all.
     fn visit(
         &self,
@@ -292,7 +310,7 @@ impl Problem {
         plant: &PlantModel,
         x: &[f64],
         sensitivities: bool,
-        mut see: impl FnMut(usize, &[&[f64]]) -> bool,
+        mut see: impl FnMut(usize, &[f64], &[&[f64]]) -> bool,
     ) -> Result<bool, Error> {
         let mut last: Option<(f64, Hold, LoopSimulator)> = None;
         let parameters = self.orders.parameters();
@@ -332,7 +350,7 @@ impl Problem {
                 };
                 if !sensitivities {
                     error(&simulator.outputs(&drive[..len]));
-                    if !see(index, &[&e[..len]]) {
+                    if !see(index, y, &[&e[..len]]) {
                         return Ok(false);
                     }
                     continue;
@@ -348,7 +366,7 @@ impl Problem {
                     columns.extend([&step_response[..len], &ONES[..len]]);
                 }
                 columns.push(&e[..len]);
-                if !see(index, &columns) {
+                if !see(index, y, &columns) {
                     return Ok(false);
                 }
             }
@@ -372,7 +390,7 @@ impl Problem {
         let mut row = vec![0.0; if sensitivities { self.columns() + 1 } else { 1 }];
         let mut places = Vec::new();
         let mut present = None;
-        let seen = self.visit(&closed, &plant, x, sensitivities, |index, columns| {
+        let seen = self.visit(&closed, &plant, x, sensitivities, |index, y, columns| {
             let mut first = present != Some(index);
             if first {
                 present = Some(index);
@@ -388,16 +406,17 @@ impl Problem {
                 let sample = Sample {
                     output: 0,
                     first: std::mem::take(&mut first),
-                    missing: false,
+                    missing: y[k].is_nan(),
                 };
-                row.iter().all(|value| value.is_finite()) && each(sample, &mut row)
+                let shown = row.len() - usize::from(sample.missing);
+                row[..shown].iter().all(|value| value.is_finite()) && each(sample, &mut row)
             })
         });
         seen.ok()?.then_some(())
     }
 }
 
-/// The residual `y - y^` of all records as one output, no sample missing; its entries are theta, and each estimated level's distance from where it started (drive, then y,
+/// The residual `y - y^` of all records as one output, NaN where the reading is missing; its entries are theta, and each estimated level's distance from where it started (drive, then y,
 /// record by record). It is not finite where the loop is not stable.
 impl Residuals for Problem {
     fn free(&self) -> &[usize] {
@@ -427,9 +446,10 @@ fn constant(values: &[f64]) -> bool {
     values.iter().all(|v| Some(v) == values.first())
 }
 
-/// Standard deviation.
+/// Standard deviation of the values that are there.
 fn spread(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+    let there = values.iter().filter(|v| !v.is_nan());
+    let n = there.clone().count().max(1) as f64;
+    let mean = there.clone().sum::<f64>() / n;
+    (there.map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
 }

@@ -1,5 +1,7 @@
 //! A record of a loop: r, u and y on an even grid, what r and u do between samples, and where zero is.
 
+use std::borrow::Cow;
+
 use ct_lti::Hold;
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +48,7 @@ pub struct LoopRecord {
     pub r: Option<Vec<f64>>,
     /// Input of the plant, the controller's output; needed in open loop.
     pub u: Option<Vec<f64>>,
-    /// Output as the controller sees it, at the sampling instants.
+    /// Output as the controller sees it, at the sampling instants; NaN where the reading is missing.
     pub y: Vec<f64>,
     /// What r does between samples.
     pub r_hold: Hold,
@@ -136,10 +138,29 @@ impl LoopRecord {
         self.y.is_empty()
     }
 
-    /// Checks the step, the lengths and that all numbers are finite.
+    /// Number of readings of the output that are there.
+    pub fn readings(&self) -> usize {
+        self.y.iter().filter(|y| !y.is_nan()).count()
+    }
+
+    /// Whether readings are missing.
+    pub(crate) fn lacks_readings(&self) -> bool {
+        self.readings() < self.len()
+    }
+
+    /// y on straight lines where readings are missing.
+    pub(crate) fn y_on_lines(&self) -> Cow<'_, [f64]> {
+        match self.lacks_readings() {
+            true => Cow::Owned(ct_signals::interpolated(&self.y)),
+            false => Cow::Borrowed(&self.y),
+        }
+    }
+
+    /// Checks the step, the lengths and that all numbers are finite; readings of y may be missing (NaN), but not all of them, nor all of those that say where
+    /// zero is.
     ///
     /// # Errors
-    /// [`Error::Setting`], [`Error::SignalLength`], [`Error::NotFinite`].
+    /// [`Error::Setting`], [`Error::SignalLength`], [`Error::NotFinite`], [`Error::NoReading`].
     pub fn validate(&self) -> Result<(), Error> {
         crate::controller::positive("the sampling interval", self.step)?;
         if let Offsets::FirstRows(0) = self.offsets {
@@ -164,7 +185,11 @@ impl LoopRecord {
                     found: values.len(),
                 });
             }
-            if let Some(index) = values.iter().position(|v| !v.is_finite()) {
+            let refused = |v: &f64| match signal {
+                "y" => v.is_infinite(),
+                _ => !v.is_finite(),
+            };
+            if let Some(index) = values.iter().position(refused) {
                 return Err(Error::NotFinite {
                     record: self.name.clone(),
                     signal,
@@ -172,6 +197,17 @@ impl LoopRecord {
                     value: values[index],
                 });
             }
+        }
+        let first = match self.offsets {
+            Offsets::FirstRows(rows) => rows.min(self.len()),
+            _ => self.len(),
+        };
+        if first > 0 && self.y[..first].iter().all(|y| y.is_nan()) {
+            return Err(Error::NoReading {
+                record: self.name.clone(),
+                rows: first,
+                all: first == self.len(),
+            });
         }
         Ok(())
     }
@@ -192,18 +228,22 @@ impl LoopRecord {
         Ok((r, self.r_hold))
     }
 
-    /// The levels that are subtracted: where [`Offsets::Estimated`], those of the first row, as a start. 0 for a
-    /// signal that is not there.
+    /// The levels that are subtracted: where [`Offsets::Estimated`], those of the first row (of y of the first reading), as a start. 0 for a
+    /// signal that is not there. Missing readings are left out of means.
     pub fn operating_point(&self) -> OperatingPoint {
         let level = |signal: Option<&[f64]>| {
             let signal = signal.unwrap_or_default();
+            if self.offsets == Offsets::Estimated {
+                let first = signal.iter().find(|v| !v.is_nan());
+                return first.copied().unwrap_or(0.0);
+            }
             let rows = match self.offsets {
                 Offsets::Deviations | Offsets::Known(_) => 0,
                 Offsets::FirstRows(rows) => rows.min(signal.len()),
-                Offsets::Means => signal.len(),
-                Offsets::Estimated => 1.min(signal.len()),
+                Offsets::Means | Offsets::Estimated => signal.len(),
             };
-            signal[..rows].iter().sum::<f64>() / rows.max(1) as f64
+            let there = signal[..rows].iter().filter(|v| !v.is_nan());
+            there.clone().sum::<f64>() / there.count().max(1) as f64
         };
         match self.offsets {
             Offsets::Known(point) => point,

@@ -31,6 +31,14 @@ pub struct MendedGaps {
     pub limit: f64,
 }
 
+impl MendedGaps {
+    /// In a sentence; nothing where there is nothing to say.
+    #[must_use]
+    pub fn sentence(&self) -> Option<String> {
+        of_gaps(self)
+    }
+}
+
 /// A problem whose records have no gaps.
 pub(crate) struct Mended {
     pub problem: Problem,

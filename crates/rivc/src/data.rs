@@ -27,11 +27,14 @@ pub struct Data {
     pub time: Vec<f64>,
     /// The inputs, in the order of the structure.
     pub inputs: Vec<Input>,
-    /// The output at the sampling instants, output unit.
+    /// The output at the sampling instants, output unit; NaN where its reading is missing.
     pub output: Vec<f64>,
     /// The reference of a loop whose controller moves the first input; nothing in open loop. In a loop the instruments come from it,
     /// whatever the controller.
     pub reference: Option<Vec<f64>>,
+    /// It is a part of the record before it in the list, behind a time in which the inputs are not known: it begins with a state of its own, and shares that record's offset and
+    /// noise.
+    pub continues: bool,
 }
 
 impl Data {
@@ -46,6 +49,7 @@ impl Data {
             }],
             output: y,
             reference: None,
+            continues: false,
         }
     }
 
@@ -57,6 +61,11 @@ impl Data {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
+    }
+
+    /// Number of readings of the output that are there.
+    pub fn readings(&self) -> usize {
+        self.output.iter().filter(|y| !y.is_nan()).count()
     }
 
     /// Checks lengths, numbers and times, for so many inputs.
@@ -77,10 +86,19 @@ impl Data {
         length("the list of inputs".into(), inputs, self.inputs.len())?;
         let named = |j: usize| format!("input {}", j + 1);
         let inputs = self.inputs.iter().enumerate();
+        let output = "the output".to_owned();
+        length(output.clone(), self.len(), self.output.len())?;
+        if let Some(index) = self.output.iter().position(|y| y.is_infinite()) {
+            return Err(Error::NotFinite {
+                record: record(),
+                what: output,
+                index,
+                value: self.output[index],
+            });
+        }
         let mut signals: Vec<(String, &[f64])> = inputs
             .map(|(j, input)| (named(j), &input.values[..]))
             .collect();
-        signals.push(("the output".into(), &self.output));
         if let Some(reference) = &self.reference {
             signals.push(("the reference".into(), reference));
         }
@@ -100,8 +118,12 @@ impl Data {
             return Err(Error::TooShortRecord {
                 record: record(),
                 samples: self.len(),
+                missing: 0,
                 needed: 2,
             });
+        }
+        if self.readings() == 0 {
+            return Err(Error::NoReading { record: record() });
         }
         let falls = self.time.windows(2).position(|pair| pair[1] <= pair[0]);
         if let Some(k) = falls {

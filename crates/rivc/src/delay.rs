@@ -41,7 +41,9 @@ pub(crate) fn beginnings(records: &[Prepared]) -> Option<Vec<Prepared>> {
     let mut pairs = beginnings.iter().zip(records);
     let alike = pairs.all(|(part, all)| {
         let mut inputs = part.inputs.iter().zip(&all.inputs);
-        inputs.all(|(part, all)| Scale::of(part).size >= LIKE_ALL * Scale::of(all).size)
+        let share = |record: &Prepared| record.readings_from(0) as f64 / record.len() as f64;
+        share(part) >= LIKE_ALL * share(all)
+            && inputs.all(|(part, all)| Scale::of(part).size >= LIKE_ALL * Scale::of(all).size)
     });
     alike.then_some(beginnings)
 }

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::Error;
 use crate::bank::Bank;
+use crate::layout::Layout;
 use crate::pass::{Instruments, Pass};
 
 /// Equations whose smallest singular value, scaled, is below this share of the largest do not determine the parameters.
@@ -17,30 +18,28 @@ const LEAST_NOISE: f64 = 1e-9;
 /// Sums over all records. Columns: what all records share, then of each record its own.
 #[derive(Debug)]
 pub(crate) struct Equations {
-    shared: usize,
-    own: usize,
+    pub(crate) layout: Layout,
     /// `sum z phi'`, `sum z z'`, `sum z p^n y_f`.
     zphi: DMatrix<f64>,
     zz: DMatrix<f64>,
     zy: DVector<f64>,
     /// Squares of phi, to scale the columns with.
     sizes: DVector<f64>,
-    /// Rows.
+    /// Rows whose reading is there.
     pub(crate) samples: usize,
     /// Squares of the measured output, in the same unit.
     measured_squares: f64,
     /// Squares of the residual, whitened where there is a model of the noise.
     residual_squares: f64,
-    /// The residual of each record; where the filter is that of the model `y - y^` on the measured inputs.
+    /// The residual of each record, NaN where the reading is missing; where the filter is that of the model `y - y^` on the measured inputs.
     pub(crate) residuals: Vec<Vec<f64>>,
 }
 
 impl Equations {
-    pub(crate) fn new(shared: usize, own: usize, records: usize) -> Self {
-        let p = shared + own * records;
+    pub(crate) fn new(layout: Layout, records: usize) -> Self {
+        let p = layout.unknowns();
         Self {
-            shared,
-            own,
+            layout,
             zphi: DMatrix::zeros(p, p),
             zz: DMatrix::zeros(p, p),
             zy: DVector::zeros(p),
@@ -49,15 +48,6 @@ impl Equations {
             measured_squares: 0.0,
             residual_squares: 0.0,
             residuals: Vec::with_capacity(records),
-        }
-    }
-
-    /// Where column i of a record is.
-    fn place(&self, index: usize, i: usize) -> usize {
-        if i < self.shared {
-            i
-        } else {
-            index * self.own + i
         }
     }
 
@@ -81,7 +71,16 @@ impl Equations {
             target - phi.iter().zip(&x).map(|(phi, x)| phi * x).sum::<f64>()
         };
         let (mut squares, mut measured) = (0.0, 0.0);
+        let mut missing = 0;
         pass.rows(bank, instruments, |row| {
+            if row.missing {
+                missing += 1;
+                residuals.push(f64::NAN);
+                if let Some(whitener) = &mut whitener {
+                    whitener.skip();
+                }
+                return;
+            }
             let mut residual = error(row.phi, row.target);
             residuals.push(residual);
             measured += (row.y * weight).powi(2);
@@ -110,16 +109,16 @@ impl Equations {
             }
         });
         for i in 0..p {
-            let row = self.place(pass.index, i);
+            let row = self.layout.place(pass.index, i);
             self.zy[row] += zy[i];
             self.sizes[row] += sizes[i];
             for j in 0..p {
-                let column = self.place(pass.index, j);
+                let column = self.layout.place(pass.index, j);
                 self.zphi[(row, column)] += zphi[i * p + j];
                 self.zz[(row, column)] += zz[i * p + j];
             }
         }
-        self.samples += residuals.len();
+        self.samples += residuals.len() - missing;
         self.measured_squares += measured;
         self.residual_squares += squares;
         self.residuals.push(residuals);
@@ -127,18 +126,23 @@ impl Equations {
 
     /// Adds a matrix of one record's columns, p by p, to one of all columns.
     pub(crate) fn add_block(&self, of_record: &[f64], index: usize, to: &mut DMatrix<f64>) {
-        let p = self.shared + self.own;
+        let p = self.layout.columns();
         for i in 0..p {
             for j in 0..p {
-                to[(self.place(index, i), self.place(index, j))] += of_record[i * p + j];
+                to[(self.layout.place(index, i), self.layout.place(index, j))] +=
+                    of_record[i * p + j];
             }
         }
     }
 
-    /// An autoregression of each record's residual, of at most this order; one without noise counts as one with a billionth of the largest.
+    /// An autoregression of each record's residual, of at most this order, one for the parts of a record; one without noise counts as one with a billionth of the largest.
     pub(crate) fn residual_noise(&self, order: usize) -> Result<Vec<ArModel>, Error> {
-        let models = self.residuals.iter().map(|e| ArModel::fit(&[e], order));
-        let models: Vec<ArModel> = models.collect::<Result<_, _>>()?;
+        let mut models = Vec::with_capacity(self.residuals.len());
+        for group in self.layout.groups() {
+            let parts: Vec<&[f64]> = self.residuals[group].iter().map(Vec::as_slice).collect();
+            let model = ArModel::fit(&parts, order)?;
+            models.resize(models.len() + parts.len(), model);
+        }
         let largest = models.iter().map(ArModel::sigma).fold(0.0, f64::max);
         let least = (LEAST_NOISE * largest).max(f64::MIN_POSITIVE.sqrt());
         let at_least = |model: ArModel| match model.sigma() < least {
@@ -165,6 +169,7 @@ impl Equations {
             sizes: self.sizes.clone().remove_rows_at(places),
             // As long as the records, and not needed to solve.
             residuals: Vec::new(),
+            layout: self.layout.clone(),
             ..*self
         }
     }

@@ -56,6 +56,14 @@ pub enum Error {
         /// What was found.
         value: f64,
     },
+    /// An output without any reading.
+    #[error(
+        "{record}: no reading of the output is there; give a part of the record that has some, or leave it out"
+    )]
+    NoReading {
+        /// Name of the record.
+        record: String,
+    },
     /// Times that do not rise.
     #[error("{record}: time goes from {before} to {after} at sample {index}; times have to rise")]
     Time {
@@ -98,13 +106,16 @@ pub enum Error {
     },
     /// A record that is too short by itself.
     #[error(
-        "{record}: {samples} samples are too few, and at least {needed} are needed; leave the record out, or lower the orders"
+        "{record}: {samples} samples{} are too few, and at least {needed} are needed; leave the record out, or lower the orders",
+        without(*.missing)
     )]
     TooShortRecord {
         /// Name of the record.
         record: String,
-        /// Samples in it.
+        /// Samples in it, missing readings of the output aside.
         samples: usize,
+        /// Readings that are missing.
+        missing: usize,
         /// Samples that are needed.
         needed: usize,
     },
@@ -116,11 +127,14 @@ pub enum Error {
     },
     /// Too few samples.
     #[error(
-        "{samples} samples are too few for {parameters} parameters: at least {needed} are needed; lower the orders, or give more"
+        "{samples} samples{} are too few for {parameters} parameters: at least {needed} are needed; lower the orders, or give more",
+        without(*.missing)
     )]
     TooShort {
-        /// Samples in all records.
+        /// Samples in all records, missing readings of the output aside.
         samples: usize,
+        /// Readings that are missing.
+        missing: usize,
         /// Samples that are needed.
         needed: usize,
         /// Number of parameters.
@@ -212,4 +226,13 @@ pub enum Error {
         /// How many were tried.
         tried: usize,
     },
+}
+
+/// Said where readings are missing.
+fn without(missing: usize) -> String {
+    match missing {
+        0 => String::new(),
+        1 => " besides one whose reading is missing".to_owned(),
+        missing => format!(" besides {missing} whose reading is missing"),
+    }
 }

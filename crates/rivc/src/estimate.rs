@@ -11,6 +11,10 @@
 //! and filter, instruments and L are computed again until the estimates have converged. A delay that is estimated takes part by its derivative. Of several
 //! records each has a model of its noise, or a variance, of its own, and counts accordingly.
 //!
+//! Readings of the output may be missing, anywhere: their rows do not count, what the model says stands for them in the filters of y (`pass.rs`), L and R are those of
+//! autoregressions over the readings that are there, exactly ([`ArModel::fit`], [`ct_signals::Whitener`]). The limit is that of maximum likelihood from these readings. Where an input is not known for a while,
+//! the parts of the record are [`Data`] that continue: they share offset and noise, and begin with states of their own.
+//!
 //! Assumptions: the plant is stable, but for an integrator; the noise owes nothing to the inputs, in a loop nothing to the reference; in a loop the input is what its hold says, as of a
 //! controller that is sampled: behind a continuous one it is not, and the estimates are biased by what u does between the samples
 //! (closed-loop output error has no need of u). The starts find the right minimum; with noise of more power than the output they may not.
@@ -22,6 +26,7 @@
 //!
 //! References: P. C. Young, A. Jakeman, International Journal of Control 31 (1980) 741-764; M. Gilson, H. Garnier, P. C. Young, P. Van den
 //! Hof, in H. Garnier, L. Wang (eds.), Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 5, for the loop;
+//! A. J. Isaksson, IEEE Transactions on Automatic Control 38 (1993) 813-819, for readings that are missing;
 //! F. Chen, H. Garnier, M. Gilson, Journal of Process Control 25 (2015) 19-27, for the delay.
 
 use ct_signals::ArModel;
@@ -102,7 +107,7 @@ pub enum Kind {
     },
     /// Offset of a record: output unit, with an integrator output unit/time.
     Offset {
-        /// Which record, from 0.
+        /// Which record, from 0; the parts of one count as one.
         record: usize,
     },
 }
@@ -132,11 +137,11 @@ pub struct Estimate {
     /// In a loop, the share of the first input's power about its mean that the reference explains, the least of all records: instruments
     /// are weak where it is small.
     pub explained: Option<f64>,
-    /// Autoregression of each record's residual, counted in its samples.
+    /// Autoregression of each record's residual, counted in its samples; one for the parts of a record.
     pub noise: Vec<ArModel>,
-    /// Root mean square of measured less simulated output, on the measured inputs; output unit.
+    /// Root mean square of measured less simulated output over the readings that are there, on the measured inputs; output unit.
     pub residual_rms: f64,
-    /// Samples whose residual counts.
+    /// Samples whose residual counts: those without a reading do not.
     pub samples: usize,
     /// Iterations from the last start.
     pub iterations: usize,
@@ -245,7 +250,7 @@ pub fn estimate(
     let order = match settings.noise {
         Noise::Autoregressive => Some(settings.noise_order),
         // One variance needs no weights, several do.
-        Noise::White if records.len() > 1 => Some(0),
+        Noise::White if records.iter().filter(|r| !r.continues).count() > 1 => Some(0),
         Noise::White => None,
     };
     if let Some(order) = order {
@@ -275,7 +280,10 @@ fn innovations(found: &Refined) -> f64 {
     let models = found.noise.iter().flatten();
     let pairs = models.zip(&found.equations.residuals);
     pairs
-        .map(|(model, e)| e.len() as f64 * model.sigma().ln())
+        .map(|(model, e)| {
+            let readings = e.iter().filter(|e| !e.is_nan()).count();
+            readings as f64 * model.sigma().ln()
+        })
         .sum()
 }
 

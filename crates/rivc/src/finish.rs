@@ -10,7 +10,7 @@ use crate::model::Model;
 use crate::pass::Instruments;
 use crate::plant::Plant;
 use crate::prepared::Prepared;
-use crate::problem::Problem;
+use crate::problem::{Delayed, Problem};
 use crate::{Data, Error};
 
 pub(crate) fn finish(
@@ -35,7 +35,11 @@ pub(crate) fn finish(
                 let pass = problem.pass(&delayed, model, index, with_delays);
                 let bank = pass.bank(&model.alpha)?;
                 let mut sum = process.sum(pass.columns());
-                pass.rows(&bank, Instruments::Model, |row| sum.push(row.z));
+                let nothing = vec![0.0; pass.columns()];
+                pass.rows(&bank, Instruments::Model, |row| match row.missing {
+                    true => sum.push(&nothing),
+                    false => sum.push(row.z),
+                });
                 // The equations' rows are over the record's standard deviation, both factors of them.
                 let weight = found
                     .noise
@@ -47,7 +51,10 @@ pub(crate) fn finish(
                 equations.add_block(&block, index, &mut middle);
             }
             // The innovations' variances are over the samples less their orders.
-            let orders: usize = noise.iter().map(ArModel::order).sum();
+            let orders: usize = noise_of_groups(&equations, &noise)
+                .iter()
+                .map(ArModel::order)
+                .sum();
             let samples = (equations.samples - orders.min(equations.samples)) as f64;
             Some(middle * (samples / (samples - p as f64).max(1.0)))
         }
@@ -91,7 +98,7 @@ pub(crate) fn finish(
             (Noise::White, true) => "CLSRIVC",
             (Noise::Autoregressive, true) => "CLRIVC",
         },
-        simulated: simulated(&equations, &delayed.first, records),
+        simulated: simulated(problem, &equations, (&delayed, model), records)?,
         residual_rms: rms(&equations),
         samples: equations.samples,
         parameters,
@@ -106,24 +113,46 @@ pub(crate) fn finish(
             .iter()
             .filter_map(Prepared::explained)
             .min_by(f64::total_cmp),
-        noise,
+        noise: noise_of_groups(&equations, &noise),
         iterations: found.iterations,
         converged: found.converged,
         first: delayed.first.clone(),
     })
 }
 
+/// One model for the parts of a record.
+fn noise_of_groups(equations: &Equations, noise: &[ArModel]) -> Vec<ArModel> {
+    let groups = equations.layout.groups().into_iter();
+    groups.map(|group| noise[group.start].clone()).collect()
+}
+
 fn rms(equations: &Equations) -> f64 {
-    let squares: f64 = equations.residuals.iter().flatten().map(|e| e * e).sum();
+    let all = equations.residuals.iter().flatten();
+    let squares: f64 = all.filter(|e| !e.is_nan()).map(|e| e * e).sum();
     (squares / equations.samples as f64).sqrt()
 }
 
-/// Measured outputs less residuals.
-fn simulated(equations: &Equations, first: &[usize], records: &[Data]) -> Vec<Vec<f64>> {
+/// Measured outputs less residuals; where a reading is missing, what the model says.
+fn simulated(
+    problem: &Problem,
+    equations: &Equations,
+    (delayed, model): (&Delayed, &Model),
+    records: &[Data],
+) -> Result<Vec<Vec<f64>>, Error> {
     let of_record = |(i, record): (usize, &Data)| {
-        let measured = record.output[first[i]..].iter();
-        let residuals = measured.zip(&equations.residuals[i]);
-        residuals.map(|(y, e)| y - e).collect()
+        let mut said = Vec::new();
+        if problem.records[i].lacks_readings() {
+            let pass = problem.pass(delayed, model, i, false);
+            let bank = pass.bank(&model.alpha)?;
+            pass.rows(&bank, Instruments::Model, |row| {
+                said.push(row.y + problem.records[i].y_mean);
+            });
+        }
+        let measured = record.output[delayed.first[i]..].iter();
+        let residuals = measured.zip(&equations.residuals[i]).enumerate();
+        Ok(residuals
+            .map(|(k, (y, e))| if y.is_nan() { said[k] } else { y - e })
+            .collect())
     };
     records.iter().enumerate().map(of_record).collect()
 }
@@ -182,10 +211,12 @@ fn normalised(
     let delays_at = column;
     column += structure.estimated_delays().count();
     if structure.offset {
-        for (record, of_record) in model.of_records.iter().enumerate() {
-            let prepared = &problem.records[record];
-            let mut offset = of_record[0] + model.alpha[0] * prepared.y_mean;
-            let mut terms = vec![(column + record * structure.of_record(), 1.0)];
+        let layout = problem.layout(true);
+        for (record, parts) in layout.groups().into_iter().enumerate() {
+            let first = parts.start;
+            let prepared = &problem.records[first];
+            let mut offset = model.of_records[first][0] + model.alpha[0] * prepared.y_mean;
+            let mut terms = vec![(layout.place(first, column), 1.0)];
             if lowest == 0 {
                 terms.push((0, prepared.y_mean));
             }
@@ -197,12 +228,8 @@ fn normalised(
         }
     }
     // Delays are what they are, whatever the scale; they stand before the offsets.
-    let offsets = if structure.offset {
-        model.of_records.len()
-    } else {
-        0
-    };
-    let before = kinds.len() - offsets;
+    let offsets = |kind: &&Kind| matches!(kind, Kind::Offset { .. });
+    let before = kinds.len() - kinds.iter().filter(offsets).count();
     for (i, (input, _)) in structure.estimated_delays().enumerate() {
         let mut row = vec![0.0; columns];
         row[delays_at + i] = 1.0;

@@ -117,7 +117,7 @@ impl Problem<'_> {
                 }
             }
         }
-        let next = Model::from_solution(structure, &x, &model.delays, with_delays);
+        let next = self.model(&x, &model.delays, with_delays);
         let zeros = vec![0.0; at_limit.len()];
         let covariance = equations.with_fixed(&at_limit, &zeros).covariance(None)?;
         let errors = expanded(&covariance, &at_limit, x.len());

@@ -17,12 +17,12 @@ pub(crate) struct Model {
 }
 
 impl Model {
-    /// From `[alpha, beta, change of each estimated delay, of each record]`.
+    /// From `[alpha, beta, change of each estimated delay, ..]` and what is each record's own.
     pub(crate) fn from_solution(
         structure: &Structure,
         x: &[f64],
-        delays: &[f64],
-        estimate_delays: bool,
+        (delays, estimate_delays): (&[f64], bool),
+        of_records: Vec<Vec<f64>>,
     ) -> Self {
         let lowest = structure.lowest();
         let mut alpha = vec![0.0; lowest];
@@ -37,10 +37,6 @@ impl Model {
                 x = &x[1..];
             }
         }
-        let of_records = match structure.of_record() {
-            0 => Vec::new(),
-            size => x.chunks(size).map(<[f64]>::to_vec).collect(),
-        };
         Self {
             alpha,
             beta: beta.to_vec(),

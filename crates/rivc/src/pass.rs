@@ -6,7 +6,11 @@
 //! phi = [-p^i y_f, p^i u_f(t - d), change of the delays, 1_f, p^i pulse_f]
 //! ```
 //! The column of a delay is `-sum_i beta_i p^{i+1} u_f(t - d)`, the derivative of the equation. y runs on lines between samples. The
-//! instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A of
+//! Where a reading is missing, what the model says on the measured inputs stands for it in `y_f`, in a first regression, that has no model, the line between its neighbours, and the row
+//! does not count. At `E = A` the residual of every other row is `y - y^` whatever stands there, so that the equations hold where they are those of the readings that are
+//! there: those of output error (for white noise) or of generalised least squares over these readings, to which a missing one adds nothing.
+//!
+//! The instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A of
 //! that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates have converged.
 
 use crate::bank::Bank;
@@ -34,8 +38,10 @@ pub(crate) struct Row<'a> {
     pub(crate) target: f64,
     /// Of [`Instruments::Model`]: the simulated output.
     pub(crate) simulated: f64,
-    /// The measured output.
+    /// The measured output, or what stands for it.
     pub(crate) y: f64,
+    /// The reading is missing: the row does not count.
+    pub(crate) missing: bool,
 }
 
 /// A record with everything that a pass needs.
@@ -108,15 +114,15 @@ impl Pass<'_> {
         let mut of_instrument = zero;
         let mut pulse = zero;
         pulse[N - 1] = 1.0;
-        let mut last_simulated = 0.0;
+        let (mut last_simulated, mut last_y) = (0.0, 0.0);
         for k in self.first..self.record.len() {
-            let y = self.record.y[k];
-            if k > self.first {
-                let length = paths.steps[k - 1];
-                let line = |state: &mut [f64; N], from: f64, to: f64| {
+            let line = |state: &mut [f64; N], from: f64, to: f64| {
+                if k > self.first {
+                    let length = paths.steps[k - 1];
                     bank.advance(state, &Stretch { length, from, to });
-                };
-                line(&mut of_y, self.record.y[k - 1], y);
+                }
+            };
+            if k > self.first {
                 if structure.offset {
                     line(&mut of_one, 1.0, 1.0);
                 }
@@ -140,6 +146,16 @@ impl Pass<'_> {
                 _ => (&of_inputs[j], &paths.inputs[j]),
             };
             let measured = |j: usize| (&of_inputs[j], &paths.inputs[j]);
+            let missing = self.record.is_missing(k);
+            let y = match instruments {
+                Instruments::Model if missing => {
+                    self.fill(&mut z, bank, (&zero, measured, &of_one, &pulse), k);
+                    self.output(&z)
+                }
+                _ => self.record.y[k],
+            };
+            line(&mut of_y, last_y, y);
+            last_y = y;
             self.fill(&mut phi, bank, (&of_y, measured, &of_one, &pulse), k);
             let mut simulated = f64::NAN;
             match instruments {
@@ -172,6 +188,7 @@ impl Pass<'_> {
                 target: bank.highest(&of_y, y),
                 simulated,
                 y,
+                missing,
             });
         }
     }

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::model::Model;
 use crate::pass::{Instruments, Pass};
-use crate::prepared::Prepared;
+use crate::prepared::{Means, Prepared};
 use crate::{Data, Delay, Error, Structure};
 
 /// Singular values below this share of the largest belong to nothing that the record shows.
@@ -33,10 +33,10 @@ impl Plant {
     }
 
     /// The simulated output of a record, from its inputs alone: offset and initial states are those that fit the measured output best
-    /// (least squares). Before the first sample the inputs are taken to have stood.
+    /// (least squares over the readings that are there). Before the first sample the inputs are taken to have stood.
     ///
     /// # Errors
-    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::Time`]; [`Error::Diverges`] where the
+    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::NoReading`], [`Error::Time`]; [`Error::Diverges`] where the
     /// output is not finite.
     pub fn fitted(&self, record: &Data) -> Result<Vec<f64>, Error> {
         let n = self.a.len().saturating_sub(1);
@@ -53,7 +53,8 @@ impl Plant {
             return Err(Error::NoNumerator { input: j + 1 });
         }
         record.validate(self.b.len())?;
-        let prepared = Prepared::new(record, true, None);
+        let means = Means::of(std::slice::from_ref(record), true);
+        let prepared = Prepared::new(record, means, None);
         let leading = self.a[n];
         let model = Model {
             alpha: self.a[..n].iter().map(|a| a / leading).collect(),
@@ -95,9 +96,19 @@ impl Plant {
         if !free.iter().chain(&left).all(|v| v.is_finite()) {
             return Err(diverges());
         }
-        let normal = free.tr_mul(&free);
-        let inverse = normal.pseudo_inverse(UNSEEN).map_err(|_| diverges())?;
-        let fitted = &free * (inverse * free.tr_mul(&left));
+        let fit = |free: &DMatrix<f64>, left: &DVector<f64>| {
+            let inverse = free.tr_mul(free).pseudo_inverse(UNSEEN);
+            inverse.map(|inverse| inverse * free.tr_mul(left))
+        };
+        let own = match prepared.lacks_readings() {
+            false => fit(&free, &left),
+            true => {
+                let there = (0..record.len()).filter(|k| !prepared.is_missing(*k));
+                let there: Vec<usize> = there.collect();
+                fit(&free.select_rows(&there), &left.select_rows(&there))
+            }
+        };
+        let fitted = &free * own.map_err(|_| diverges())?;
         let pairs = forced.iter().zip(&fitted);
         let simulated: Vec<f64> = pairs.map(|(a, b)| a + b + prepared.y_mean).collect();
         match simulated.iter().all(|y| y.is_finite()) {

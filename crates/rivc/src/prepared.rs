@@ -1,8 +1,10 @@
 //! Records made ready: checked, centred, with the input of the loop as the reference explains it.
 
 use ct_lti::Hold;
+use ct_signals::interpolated;
 
 use crate::grid::{Held, Lengths, Path};
+use crate::layout::Layout;
 use crate::loop_model::LoopModel;
 use crate::{Data, Error, Structure};
 
@@ -15,14 +17,44 @@ pub(crate) struct Prepared {
     pub(crate) time: Vec<f64>,
     /// Where the steps are even.
     pub(crate) step: Option<f64>,
-    /// About its mean where an offset is estimated and the record need not begin at rest.
+    /// About its mean where an offset is estimated and the record need not begin at rest; on lines where readings are missing.
     pub(crate) y: Vec<f64>,
+    /// Of each sample whether its reading is missing; empty where none is.
+    missing: Vec<bool>,
     pub(crate) inputs: Vec<Vec<f64>>,
     holds: Vec<Hold>,
     /// In a loop the first input as the reference explains it: free of the record's noise.
     instrument: Option<Vec<f64>>,
     pub(crate) y_mean: f64,
     pub(crate) u_means: Vec<f64>,
+    /// It is a part of the record before.
+    pub(crate) continues: bool,
+}
+
+/// What is subtracted from a record, or from the parts of one.
+pub(crate) struct Means {
+    y: f64,
+    inputs: Vec<f64>,
+}
+
+impl Means {
+    /// Of all parts together; 0 where they are not asked for.
+    pub(crate) fn of(parts: &[Data], centre: bool) -> Self {
+        let mean = |values: &mut dyn Iterator<Item = f64>| {
+            let (sum, count) = values.fold((0.0, 0_usize), |(sum, n), v| (sum + v, n + 1));
+            match centre {
+                true => sum / count as f64,
+                false => 0.0,
+            }
+        };
+        let readings = parts.iter().flat_map(|part| &part.output);
+        let inputs = parts.first().map_or(0, |part| part.inputs.len());
+        let input = |j: usize| parts.iter().flat_map(move |part| &part.inputs[j].values);
+        Self {
+            y: mean(&mut readings.copied().filter(|y| !y.is_nan())),
+            inputs: (0..inputs).map(|j| mean(&mut input(j).copied())).collect(),
+        }
+    }
 }
 
 /// The inputs with their delays.
@@ -36,35 +68,59 @@ pub(crate) struct Paths {
 }
 
 impl Prepared {
-    /// A valid record, about its means where asked for, with the first input as the reference explains it.
-    pub(crate) fn new(record: &Data, centre: bool, instrument: Option<Vec<f64>>) -> Self {
-        let mean = |values: &[f64]| match centre {
-            true => values.iter().sum::<f64>() / values.len() as f64,
-            false => 0.0,
-        };
+    /// A valid record about these means, with the first input as the reference explains it.
+    pub(crate) fn new(record: &Data, means: Means, instrument: Option<Vec<f64>>) -> Self {
         let less = |values: &[f64], mean: f64| values.iter().map(|v| v - mean).collect();
-        let y_mean = mean(&record.output);
-        let u_means: Vec<f64> = record.inputs.iter().map(|u| mean(&u.values)).collect();
+        let Means {
+            y: y_mean,
+            inputs: u_means,
+        } = means;
         let inputs = record.inputs.iter().zip(&u_means);
+        let (y, missing) = match record.readings() == record.len() {
+            true => (less(&record.output, y_mean), Vec::new()),
+            false => (
+                less(&interpolated(&record.output), y_mean),
+                record.output.iter().map(|y| y.is_nan()).collect(),
+            ),
+        };
         Self {
             time: record.time.clone(),
             step: record.even_step(),
-            y: less(&record.output, y_mean),
+            y,
+            missing,
             inputs: inputs.map(|(u, mean)| less(&u.values, *mean)).collect(),
             holds: record.inputs.iter().map(|u| u.hold).collect(),
             instrument: instrument.map(|u| less(&u, u_means[0])),
             y_mean,
             u_means,
+            continues: record.continues,
         }
+    }
+
+    /// Whether the reading of a sample is missing.
+    pub(crate) fn is_missing(&self, k: usize) -> bool {
+        self.missing.get(k).copied().unwrap_or(false)
+    }
+
+    /// Whether any is.
+    pub(crate) fn lacks_readings(&self) -> bool {
+        !self.missing.is_empty()
+    }
+
+    /// Readings from a sample on that are there.
+    pub(crate) fn readings_from(&self, first: usize) -> usize {
+        (first..self.len()).filter(|k| !self.is_missing(*k)).count()
     }
 
     /// So many rows from the first one on.
     pub(crate) fn first_rows(&self, rows: usize) -> Self {
         let rows = rows.min(self.len());
         let part = |values: &Vec<f64>| values[..rows].to_vec();
+        let missing = self.missing.iter().take(rows).copied();
         Self {
             time: part(&self.time),
             y: part(&self.y),
+            missing: missing.collect(),
             inputs: self.inputs.iter().map(part).collect(),
             instrument: self.instrument.as_ref().map(part),
             ..self.clone()
@@ -137,7 +193,7 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
     let in_loop = first.reference.is_some();
     let core = structure.parameters();
     let own = structure.of_record();
-    let mut samples = 0;
+    let (mut samples, mut missing) = (0, 0);
     for record in records {
         record.validate(structure.m.len())?;
         if record.reference.is_some() != in_loop {
@@ -151,24 +207,29 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
                 first: if in_loop { "one" } else { "none" },
             });
         }
-        let needed = SAMPLES_PER_PARAMETER * own.max(1);
-        if record.len() < needed {
+        let needed = needed_alone(structure);
+        let readings = record.readings();
+        if readings < needed {
             return Err(Error::TooShortRecord {
                 record: record.name.clone(),
-                samples: record.len(),
+                samples: readings,
+                missing: record.len() - readings,
                 needed,
             });
         }
         if in_loop {
             record.require_even("the model of the loop")?;
         }
-        samples += record.len();
+        samples += readings;
+        missing += record.len() - readings;
     }
-    let parameters = core + own * records.len();
+    let continues = records.iter().map(|record| record.continues);
+    let parameters = Layout::new(core, structure, continues).unknowns();
     let needed = SAMPLES_PER_PARAMETER * parameters;
     if samples < needed {
         return Err(Error::TooShort {
             samples,
+            missing,
             needed,
             parameters,
         });
@@ -179,7 +240,14 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
     }
     moves(
         records,
-        |record| record.output.clone(),
+        |record| {
+            record
+                .output
+                .iter()
+                .copied()
+                .filter(|y| !y.is_nan())
+                .collect()
+        },
         || "the output".into(),
     )?;
     if in_loop {
@@ -187,25 +255,38 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
         moves(records, reference, || "the reference".into())?;
     }
     let centre = structure.offset && structure.initial_states;
-    let prepared: Vec<Prepared> = records
-        .iter()
-        .map(|record| {
-            let u = &record.inputs[0].values;
-            let explained = |r: &[f64]| match LoopModel::fit(r, u) {
-                Some(model) => Ok(model.simulate(r, u[0])),
-                None => Err(Error::NoLoopModel {
-                    record: record.name.clone(),
-                    samples: u.len(),
-                    needed: LoopModel::NEEDED,
-                }),
-            };
-            let instrument = record.reference.as_deref().map(explained).transpose()?;
-            Ok(Prepared::new(record, centre, instrument))
-        })
-        .collect::<Result<_, Error>>()?;
+    let explained = |record: &Data| match (&record.reference, &record.inputs[0].values) {
+        (None, _) => Ok(None),
+        (Some(r), u) => match LoopModel::fit(r, u) {
+            Some(model) => Ok(Some(model.simulate(r, u[0]))),
+            None => Err(Error::NoLoopModel {
+                record: record.name.clone(),
+                samples: u.len(),
+                needed: LoopModel::NEEDED,
+            }),
+        },
+    };
+    let mut prepared: Vec<Prepared> = Vec::with_capacity(records.len());
+    let mut rest = records;
+    while !rest.is_empty() {
+        let parts = 1 + rest
+            .iter()
+            .skip(1)
+            .take_while(|part| part.continues)
+            .count();
+        let (group, behind) = rest.split_at(parts);
+        for record in group {
+            prepared.push(Prepared::new(
+                record,
+                Means::of(group, centre),
+                explained(record)?,
+            ));
+        }
+        rest = behind;
+    }
     let largest = structure.largest_delay();
     for (record, data) in prepared.iter().zip(records) {
-        let left = record.len() - record.first_known(largest).min(record.len());
+        let left = record.readings_from(record.first_known(largest));
         let needed = SAMPLES_PER_PARAMETER * (core + own);
         if largest > 0.0 && left < needed {
             return Err(Error::DelayTooLong {
@@ -219,6 +300,27 @@ pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Pre
         }
     }
     Ok(prepared)
+}
+
+/// Readings that a record needs for what is its own.
+fn needed_alone(structure: &Structure) -> usize {
+    SAMPLES_PER_PARAMETER * structure.of_record().max(1)
+}
+
+impl Data {
+    /// Whether a record has readings enough for an offset and initial states of its own beside the largest delay, and, in a loop, samples enough for a model of
+    /// its input: a shorter part of a record is refused by [`estimate`](crate::estimate()), and says little.
+    pub fn is_long_enough(&self, structure: &Structure) -> bool {
+        let largest = structure.largest_delay();
+        let from = |t: f64| self.time.first().is_some_and(|first| t >= first + largest);
+        let late = self.time.iter().zip(&self.output);
+        let readings = late.filter(|(t, y)| from(**t) && !y.is_nan()).count();
+        let needed = match largest > 0.0 {
+            true => SAMPLES_PER_PARAMETER * (structure.parameters() + structure.of_record()),
+            false => needed_alone(structure),
+        };
+        readings >= needed && (self.reference.is_none() || self.len() >= LoopModel::NEEDED)
+    }
 }
 
 /// Refuses a signal that stands still in all records.

@@ -4,6 +4,7 @@ use ct_lti::Polynomial;
 use ct_signals::ArModel;
 
 use crate::equations::Equations;
+use crate::layout::Layout;
 use crate::model::Model;
 use crate::pass::{Instruments, Pass};
 use crate::prepared::{Paths, Prepared};
@@ -60,10 +61,22 @@ impl Problem<'_> {
         }
     }
 
-    fn empty(&self, with_delays: bool) -> Equations {
+    /// The unknowns, changes of the delays among them or not.
+    pub(crate) fn layout(&self, with_delays: bool) -> Layout {
         let delays = self.structure.estimated_delays().count();
         let shared = self.structure.parameters() - if with_delays { 0 } else { delays };
-        Equations::new(shared, self.structure.of_record(), self.records.len())
+        let continues = self.records.iter().map(|record| record.continues);
+        Layout::new(shared, self.structure, continues)
+    }
+
+    /// The model of a solution of equations with this layout.
+    pub(crate) fn model(&self, x: &[f64], delays: &[f64], with_delays: bool) -> Model {
+        let of_records = self.layout(with_delays).of_records(x);
+        Model::from_solution(self.structure, x, (delays, with_delays), of_records)
+    }
+
+    fn empty(&self, with_delays: bool) -> Equations {
+        Equations::new(self.layout(with_delays), self.records.len())
     }
 
     /// Equations whose filter and instruments are the model's.
@@ -119,7 +132,7 @@ impl Problem<'_> {
             }
         }
         let x = equations.solve()?;
-        Ok(Model::from_solution(structure, &x, &delayed.delays, false))
+        Ok(self.model(&x, &delayed.delays, false))
     }
 
     /// A few iterations at fixed delays, with models of the noise that stay: the best model on the way, with the mean square of its
@@ -147,7 +160,7 @@ impl Problem<'_> {
             let Ok(x) = equations.solve() else {
                 break;
             };
-            let mut next = Model::from_solution(self.structure, &x, &model.delays, false);
+            let mut next = self.model(&x, &model.delays, false);
             let mut halvings = 0;
             while !next.is_stable(self.structure) && halvings < HALVINGS {
                 next = next.half_way_from(&model);

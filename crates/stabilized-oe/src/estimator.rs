@@ -387,6 +387,9 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
             self.failure = Some(Error::ModelDiverged { value, dt: since });
             return Self::unused(Outcome::Stopped);
         }
+        if y.is_nan() {
+            self.derivatives.missed(self.model.state[0], &slopes);
+        }
         let e = y - self.model.state[0];
         let e1 = SVector::from(self.derivatives.error(e, &slopes));
         let epsilon = e + self.gain.filter().dot(&e1);

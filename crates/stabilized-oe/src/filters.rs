@@ -4,6 +4,10 @@
 //! `A y_f = B u_f`, and the filters have the derivatives as their states. The parallel model is driven by `u_f`, so that
 //! `e^(i) = y_f^(i) - y_m^(i)` for `i = 0..n`.
 //!
+//! A reading that is missing is replaced by that of the model, `sum_i e_i y_m^(i)/e_0` with E the filter's polynomial, and no step is made: `e` and its
+//! derivatives are then those of readings whose residual is 0 where there is none. The readings that are there owe nothing to it where
+//! the model is right, so that no bias comes of it; where it is not, the error that shows is smaller, and convergence slower.
+//!
 //! Assumption: the input is held between samples or runs on lines, the output runs on lines. Noise passes the filter: it no longer is white, and
 //! `c^` goes elsewhere; bounds on it matter all the same.
 //!
@@ -20,7 +24,8 @@ use crate::{Derivatives, Error, IoSample};
 pub struct StateVariableFilters<const N: usize> {
     u: StateVariableFilter,
     y: StateVariableFilter,
-    last_y: f64,
+    /// Since the filter of the output was moved last.
+    since: f64,
 }
 
 impl<const N: usize> StateVariableFilters<N> {
@@ -42,7 +47,7 @@ impl<const N: usize> StateVariableFilters<N> {
         Ok(Self {
             u: filter(input)?.starting(Start::Rest),
             y: filter(Hold::First)?.starting(Start::Rest),
-            last_y: 0.0,
+            since: 0.0,
         })
     }
 }
@@ -55,19 +60,23 @@ impl<const N: usize> Derivatives<N> for StateVariableFilters<N> {
             return None;
         }
         self.u.update(sample.u, since).ok()?;
-        // the filter of the output runs through gaps on the value before
-        let measured = plausible(sample.y);
-        let y = if measured { sample.y } else { self.last_y };
-        let measured = self.y.update(y, since).is_ok() && measured;
-        self.last_y = y;
         for (i, input) in inputs.iter_mut().enumerate() {
             *input = self.u.derivatives().get(i).copied().unwrap_or(0.0);
         }
-        Some(if measured {
-            self.y.derivatives()[0]
-        } else {
-            f64::NAN
-        })
+        self.since += since;
+        if !(plausible(sample.y) && self.y.update(sample.y, self.since).is_ok()) {
+            return Some(f64::NAN);
+        }
+        self.since = 0.0;
+        Some(self.y.derivatives()[0])
+    }
+
+    fn missed(&mut self, y_m: f64, model: &[f64; N]) {
+        let e = self.y.denominator().coefficients();
+        let others = e[1..].iter().zip(model).map(|(e, y)| e * y).sum::<f64>();
+        if self.y.update(y_m + others / e[0], self.since).is_ok() {
+            self.since = 0.0;
+        }
     }
 
     fn error(&mut self, _: f64, model: &[f64; N]) -> [f64; N] {

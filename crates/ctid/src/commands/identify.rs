@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use ct_signals::{Channel, Clock, Columns, Hold, ReadOptions, Reading, Record, quoted, read_csv};
+use ct_signals::{Columns, Hold, ReadOptions, Reading, Record, quoted, read_csv};
 use missing_effect::Progress;
 
 use super::{Results, finish};
@@ -111,13 +111,6 @@ enum InputHold {
     Zero,
     /// It runs on a line to the next sample: a measured input
     First,
-}
-
-/// The time of the first sample that a channel lacks \[s\].
-fn first_missing(record: &Record, channel: &Channel) -> f64 {
-    let mut samples = record.time.iter().zip(&channel.values);
-    let lacks = samples.find(|(_, value)| value.is_nan());
-    lacks.map_or(f64::NAN, |(time, _)| *time)
 }
 
 /// Which columns are read and how, and the model of the user's own that they are of.
@@ -289,7 +282,7 @@ impl Identify {
         record
     }
 
-    /// A record as `--columns` and `--model` say. The methods take whole records: what is missing is refused.
+    /// A record as `--columns` and `--model` say.
     fn read(&self, path: &Path, (columns, hold, own): Layout) -> Result<Reading, Error> {
         let options = ReadOptions {
             hold,
@@ -302,32 +295,7 @@ impl Identify {
             record.references.clear();
             own.convert(&mut record)?;
         }
-        let missing = record.channels().find(|channel| channel.missing() > 0);
-        let rows = record.missing_rows();
-        let clock = Clock::of([&record]);
-        let what = match missing {
-            Some(channel) => format!(
-                "column \"{}\": {} of {} samples are missing, the first at {}",
-                quoted(&channel.header()),
-                channel.missing(),
-                record.len(),
-                clock.at(first_missing(&record, channel))
-            ),
-            None if rows > 0 && !self.methods().iter().all(|method| method.is_refined()) => {
-                let behind = clock.at(record.before_missing_row().unwrap_or(f64::NAN));
-                match rows {
-                    1 => format!("1 row is missing behind {behind}"),
-                    rows => format!("{rows} rows are missing, the first behind {behind}"),
-                }
-            }
-            None => return Ok(Reading { record, summary }),
-        };
-        Err(Error::file(
-            path,
-            format!(
-                "{what}, and the methods of identify need whole records; choose a part with --from and --to, put the record on a coarser grid with --resample, or use compare, which leaves missing readings out"
-            ),
-        ))
+        Ok(Reading { record, summary })
     }
 
     /// A record that is simulated only, in the units of the one that is fitted.
@@ -424,15 +392,14 @@ impl Identify {
             None => None,
         };
         let notes = input::notes(&summaries, look);
+        let highest = self.order.0.iter().copied().max_by_key(|order| order.n);
+        let highest = highest.unwrap_or(self.order.0[0]);
+        let fitted = std::iter::once(record).chain(more).collect();
+        let (fitted, test) = identify::mend(fitted, test, highest, self.integrator)?;
         let bar = Bar::new();
         if let ([request], [_], []) = (&requests[..], &self.order.0[..], &test[..]) {
             bar.phase("identifying");
-            let found = if more.is_empty() {
-                identify::identify(&record, request)
-            } else {
-                let records: Vec<Record> = std::iter::once(record).chain(more).collect();
-                identify::identify_together(&records, request)
-            };
+            let found = identify::identify_mended(&fitted, request);
             bar.clear();
             let found = found?;
             let mut text = notes + &identify::text::text(&found, look);
@@ -454,11 +421,11 @@ impl Identify {
                 total,
             });
         };
-        let moves = record.references.first().is_some_and(|reference| {
+        let moves = fitted[0].whole.references.first().is_some_and(|reference| {
             let (low, high) = reference.range();
             high > low
         });
-        let records = (&record, &test[..], controller.is_some() || moves);
+        let records = (&fitted[0], &test[..], controller.is_some() || moves);
         let found = side_by_side::compare(records, &requests, &self.order.0, &tell);
         bar.clear();
         let found = found?;

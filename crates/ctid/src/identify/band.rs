@@ -8,6 +8,8 @@
 //! ```text
 //! cov theta^ = P S P,   S = sum_b e^{-2 eta (t - t_b)} z_b z_b'
 //! ```
+//! Where readings are missing nothing is learnt and nothing forgotten: t is the time in which there were readings.
+//!
 //! For the output error it holds as far as the filter C^ resembles A: the regressor then is the gradient.
 
 use nalgebra::{DMatrix, DVector};

@@ -166,6 +166,10 @@ fn remembered(scaled: &Scaled) -> Vec<f64> {
     let (mut level, mut length) = (0.0, 0.0);
     let mut levels = Vec::with_capacity(scaled.y.len());
     for (y, step) in scaled.y.iter().zip(scaled.steps()) {
+        if y.is_nan() {
+            levels.push(level);
+            continue;
+        }
         let faded = (-scaled.eta * step).exp();
         // in units of the memory: the whole past comes to 1
         let new = 1.0 - faded;

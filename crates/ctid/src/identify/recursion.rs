@@ -22,6 +22,9 @@ const P_OUTPUT_ERROR: f64 = 10.0;
 const PLAUSIBLE: [f64; 4] = [2.0, 1.5, 1.25, 1.1];
 const BOUNDS: [f64; 4] = [2.0, 1.5, 1.2, 1.05];
 
+/// The share of the readings that has to be left for the equation error where readings are missing.
+const LEAST_LEFT: f64 = 0.3;
+
 /// The output error keeps every lag above this part of the sampling interval, where the others are those of the start. Less cannot be
 /// seen, and `y_m^(n)`, which is divided by `a_n`, would be so large that the recursion takes itself for sure.
 const SHORTEST_LAG: f64 = 0.05;
@@ -31,7 +34,7 @@ const SHORTEST_LAG: f64 = 0.05;
 pub(super) struct Point {
     /// Which sample.
     pub sample: usize,
-    /// Scaled.
+    /// In which there were readings, scaled.
     pub time: f64,
     pub theta: DVector<f64>,
     /// `P^-1`
@@ -125,7 +128,8 @@ fn lags(n: usize) -> Vec<f64> {
     a
 }
 
-/// Least squares on `y_f = -a_1 y_f' - .. + b_0 u_f + .. + d`.
+/// Least squares on `y_f = -a_1 y_f' - .. + b_0 u_f + .. + d`. Rows count where the reading is there and the filter of y has forgotten what long gaps were
+/// bridged with; in the others nothing is learnt and nothing forgotten.
 pub(super) fn equation_error(scaled: &Scaled, order: Order) -> Result<Path, Error> {
     let p = order.parameters();
     let start = DVector::from_vec(start(scaled, order));
@@ -135,29 +139,41 @@ pub(super) fn equation_error(scaled: &Scaled, order: Order) -> Result<Path, Erro
         &(DMatrix::identity(p, p) * P_EQUATION_ERROR),
         weights,
     )?;
-    let [mut of_u, mut of_y] = scaled.filters(order.n)?;
+    let (mut of_u, mut of_y) = scaled.filters(order.n)?;
     let mut phi = vec![1.0; p];
     let mut path = Path::new(order);
     let count = scaled.time.len();
     let following = scaled.steps().skip(1).chain([0.0]);
+    let mut learnt = Learnt::of(scaled);
     for (k, (step, next)) in scaled.steps().zip(following).enumerate() {
         let y = of_y.update(scaled.y[k], step)?;
-        for (phi, slope) in phi.iter_mut().zip(&y[1..]) {
-            *phi = -slope;
-        }
         let u = of_u.update(scaled.u[k], step)?;
-        phi[order.n..=order.n + order.m].copy_from_slice(&u[..=order.m]);
         // the last sample is not held
-        if next > 0.0 {
-            rls.update_with(&phi, y[0], next, &weights);
+        if let Some(y) = y {
+            for (phi, slope) in phi.iter_mut().zip(&y[1..]) {
+                *phi = -slope;
+            }
+            phi[order.n..=order.n + order.m].copy_from_slice(&u[..=order.m]);
+            if next > 0.0 {
+                rls.update_with(&phi, y[0], next, &weights);
+            }
         }
         if is_kept(k, count) {
             path.keep(
-                (k, scaled.time[k]),
+                (k, learnt.time(k, scaled)),
                 rls.theta().as_slice(),
                 rls.covariance(),
             )?;
         }
+        learnt.after(y.is_some(), next);
+    }
+    let readings = scaled.y.iter().filter(|y| !y.is_nan()).count();
+    if (learnt.rows as f64) < LEAST_LEFT * readings as f64 {
+        return Err(Error::Usage(format!(
+            "{:.0} % of the readings are missing, and only {} of {count} rows are far enough behind long gaps for the filters of --method ct-rls; --method srivc and fcloe leave single readings out",
+            100.0 * (1.0 - readings as f64 / count as f64),
+            learnt.rows
+        )));
     }
     rls.health()?;
     let end = path.last()?;
@@ -170,6 +186,41 @@ pub(super) fn equation_error(scaled: &Scaled, order: Order) -> Result<Path, Erro
         )));
     }
     Ok(path)
+}
+
+/// The time of the rows that were learnt from, and how many these are.
+struct Learnt {
+    time: f64,
+    rows: usize,
+    /// Whether all readings are there: then the time is the record's own, to the last digit.
+    whole: bool,
+}
+
+impl Learnt {
+    fn of(scaled: &Scaled) -> Self {
+        Self {
+            time: 0.0,
+            rows: 0,
+            whole: scaled.y.iter().all(|y| !y.is_nan()),
+        }
+    }
+
+    /// At a sample.
+    fn time(&self, k: usize, scaled: &Scaled) -> f64 {
+        if self.whole {
+            scaled.time[k]
+        } else {
+            self.time
+        }
+    }
+
+    /// A row that was held for a time, and whether it was learnt from.
+    fn after(&mut self, learnt: bool, held: f64) {
+        if learnt {
+            self.time += held;
+            self.rows += 1;
+        }
+    }
 }
 
 /// Output error of a model in parallel.
@@ -221,6 +272,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
         .with_model_state(at_rest(scaled))?;
     let count = scaled.time.len();
     let mut held_early = 0;
+    let mut learnt = Learnt::of(scaled);
     let following = scaled.steps().skip(1).chain([0.0]);
     for (k, next) in following.enumerate() {
         if 2 * k <= count {
@@ -237,11 +289,12 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
         if is_kept(k, count) {
             let covariance = estimator.covariance();
             path.keep(
-                (k, scaled.time[k]),
+                (k, learnt.time(k, scaled)),
                 estimator.theta().as_slice(),
                 DMatrix::from_column_slice(P, P, covariance.as_slice()),
             )?;
         }
+        learnt.after(!scaled.y[k].is_nan(), next);
     }
     estimator.health()?;
     let held = estimator.bounded().theta - held_early;
@@ -284,8 +337,9 @@ fn theta_bounds<const P: usize>(scaled: &Scaled, n: usize) -> Result<Bounds<P>, 
 /// `y` and its derivatives at rest on the first sample.
 fn at_rest<const N: usize>(scaled: &Scaled) -> [f64; N] {
     let mut state = [0.0; N];
-    if let (Some(first), Some(y)) = (state.first_mut(), scaled.y.first()) {
-        *first = *y;
+    let first = scaled.y.iter().find(|y| !y.is_nan());
+    if let (Some(state), Some(y)) = (state.first_mut(), first) {
+        *state = *y;
     }
     state
 }

@@ -1,5 +1,7 @@
 //! SRIVC and RIVC: refined instruments, with a delay, an integrator, a second input, several records.
 //!
+//! A record that is cut at gaps of its input is fitted as parts that share the offset and the noise.
+//!
 //! A reference that moves says that the record comes from a loop: the instruments then come from it, and the controller need not be known.
 
 use ct_signals::{Record, quoted, residual_tests};
@@ -7,7 +9,7 @@ use missing_effect::Parameter;
 use rivc::{Data, Delay, Kind, Noise, Structure};
 use serde::Serialize;
 
-use super::{Identification, Method, Order, Request, Shown, poles, rms};
+use super::{Identification, Mended, Method, Order, Request, Shown, poles, rms};
 use crate::Error;
 use crate::numbers;
 
@@ -15,6 +17,8 @@ use crate::numbers;
 const PART: f64 = 0.1;
 /// Instruments from a reference that explains less of the input are weak.
 const EXPLAINED: f64 = 0.2;
+/// Lags of the test that the error has nothing of a signal, at most.
+const MOST_LAGS: usize = 25;
 /// A signal that shows in the error with less than this probability by chance is said.
 const UNLIKELY: f64 = 0.01;
 
@@ -92,15 +96,43 @@ pub struct RecordNoise {
 
 /// A record as the crate takes it; its reference only where it moves.
 pub(super) fn data(record: &Record) -> Data {
+    let moves = record.references.first().is_some_and(|reference| {
+        let (low, high) = reference.range();
+        high > low
+    });
+    part(record, moves, false)
+}
+
+/// The parts of records that are long enough, and how many rows the others have.
+fn parts(records: &[Mended], structure: &Structure) -> (Vec<(Record, Data)>, usize) {
+    let (mut all, mut unused) = (Vec::new(), 0);
+    for mended in records {
+        let in_loop = data(&mended.whole).reference.is_some();
+        let mut first = true;
+        for record in &mended.parts {
+            let data = part(record, in_loop, !first);
+            // A record that is not cut is refused with what it lacks.
+            if mended.parts.len() == 1 || data.is_long_enough(structure) {
+                all.push((record.clone(), data));
+                first = false;
+            } else {
+                unused += record.len();
+            }
+        }
+        if let (true, Some(record)) = (first, mended.parts.first()) {
+            all.push((record.clone(), part(record, in_loop, false)));
+        }
+    }
+    (all, unused)
+}
+
+fn part(record: &Record, in_loop: bool, continues: bool) -> Data {
     let hold = match record.hold() {
         ct_signals::Hold::Zero => ct_lti::Hold::Zero,
         ct_signals::Hold::First => ct_lti::Hold::First,
     };
     let inputs = record.inputs.iter();
-    let reference = record.references.first().filter(|reference| {
-        let (low, high) = reference.range();
-        high > low
-    });
+    let reference = record.references.first().filter(|_| in_loop);
     Data {
         name: record.name.clone(),
         time: record.time.clone(),
@@ -112,20 +144,33 @@ pub(super) fn data(record: &Record) -> Data {
             .collect(),
         output: record.outputs[0].values.clone(),
         reference: reference.map(|reference| reference.values.clone()),
+        continues,
     }
 }
 
-/// Identifies from all records together.
-pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identification, Error> {
-    super::positive("--bandwidth", "1/s", request.bandwidth)?;
-    let first = records
-        .first()
-        .ok_or_else(|| Error::Usage("no record is given".to_owned()))?;
+/// The plant alone, of one order, without a delay, and whether it is determined: the iteration has converged, and the highest coefficient of A differs from zero.
+pub(super) fn plant(records: &[Mended], request: &Request) -> Result<(rivc::Plant, bool), Error> {
+    let (structure, settings) = asked(records, request);
+    let (parts, _) = parts(records, &structure);
+    let data: Vec<Data> = parts.into_iter().map(|(_, data)| data).collect();
+    let found = rivc::estimate(&data, &structure, &settings)
+        .map_err(|error| Error::Usage(error.to_string()))?;
+    let highest = found.parameter(Kind::A {
+        power: request.order.n,
+    });
+    let known =
+        highest.is_none_or(|a| a.std_error.is_some_and(|error| a.value.abs() > 2.0 * error));
+    Ok((found.plant, found.converged && known))
+}
+
+/// Structure and settings that a request comes to.
+fn asked(records: &[Mended], request: &Request) -> (Structure, rivc::Settings) {
     let Order { n, m } = request.order;
-    let data: Vec<Data> = records.iter().map(data).collect();
-    let inputs = data[0].inputs.len();
-    let shortest = records.iter().map(Record::duration);
-    let shortest = shortest.fold(f64::INFINITY, f64::min);
+    let inputs = records
+        .first()
+        .map_or(1, |mended| mended.whole.inputs.len());
+    let lengths = records.iter().map(|mended| mended.whole.duration());
+    let shortest = lengths.fold(f64::INFINITY, f64::min);
     let delay = match request.delay {
         None => Delay::Known(0.0),
         Some(DelayChoice::Known(value)) => Delay::Known(value),
@@ -146,8 +191,28 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             _ => Noise::White,
         })
     };
+    (structure, settings)
+}
+
+/// Identifies from all records together.
+pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identification, Error> {
+    super::positive("--bandwidth", "1/s", request.bandwidth)?;
+    let first = all
+        .first()
+        .map(|mended| &mended.whole)
+        .ok_or_else(|| Error::Usage("no record is given".to_owned()))?;
+    let (structure, settings) = asked(all, request);
+    let (parts, unused) = parts(all, &structure);
+    let (records, data): (Vec<Record>, Vec<Data>) = parts.into_iter().unzip();
+    let inputs = data[0].inputs.len();
+    let shortest = all.iter().map(|mended| mended.whole.duration());
+    let shortest = shortest.fold(f64::INFINITY, f64::min);
+    let estimates_delay = structure
+        .delays
+        .iter()
+        .any(|delay| matches!(delay, Delay::Estimated { .. }));
     let found =
-        rivc::estimate(&data, &structure, &settings).map_err(|error| named(records, error))?;
+        rivc::estimate(&data, &structure, &settings).map_err(|error| named(&records, error))?;
 
     let parameters: Vec<Parameter> = found
         .parameters
@@ -182,7 +247,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             found.iterations
         ));
     }
-    if matches!(delay, Delay::Estimated { .. }) {
+    if estimates_delay {
         let pairs = parameters.iter().zip(&found.parameters);
         for (parameter, _) in pairs.filter(|(_, found)| found.std_error.is_none()) {
             let value = numbers::significant(parameter.value, 4);
@@ -233,23 +298,37 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
         }
     }
     warnings.extend(super::too_fast(&time_constants, first, request.order));
+    if unused > 0 {
+        warnings.push(format!(
+            "{unused} rows between long gaps are too few for initial states of their own, and are not used"
+        ));
+    }
     let mut visible = Visible::default();
     let (mut errors, mut deviations) = (Vec::new(), Vec::new());
-    let mut simulated = Vec::new();
-    for (record, data) in records.iter().zip(&data) {
-        let fitted = found
-            .plant
-            .fitted(data)
-            .map_err(|error| named(records, error))?;
-        let output = &record.outputs[0].values;
-        let error: Vec<f64> = output.iter().zip(&fitted).map(|(y, m)| y - m).collect();
-        visible.test(record, data.reference.is_some(), &error)?;
-        errors.extend(error);
-        let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
-        deviations.extend(output.iter().map(|y| y - mean));
-        if simulated.is_empty() {
-            simulated = fitted;
+    let mut shown: Option<Shown> = None;
+    let mut at = 0;
+    while at < records.len() {
+        let own = 1 + data.iter().skip(at + 1).take_while(|d| d.continues).count();
+        let range = at..at + own;
+        at += own;
+        let mut joined = Joined::default();
+        for (record, data) in records[range.clone()].iter().zip(&data[range]) {
+            let fitted = found
+                .plant
+                .fitted(data)
+                .map_err(|error| named(&records, error))?;
+            let simulated = fitted.iter();
+            let output = &record.outputs[0];
+            let pairs = output.values.iter().zip(simulated);
+            joined.add(record, data.reference.is_some(), pairs.map(|(y, m)| y - m));
+            errors.extend(super::errors(output, &fitted));
+            joined.readings.extend(output.present());
+            joined.shown.simulated.extend(fitted);
         }
+        visible.test(&joined)?;
+        let mean = joined.readings.iter().sum::<f64>() / joined.readings.len().max(1) as f64;
+        deviations.extend(joined.readings.iter().map(|y| y - mean));
+        shown.get_or_insert(joined.shown);
     }
     warnings.extend(visible.warning(inputs));
     let rmse = rms(errors.into_iter());
@@ -260,7 +339,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
         );
     }
     let input_names = first.inputs.iter();
-    Ok(Identification {
+    let identification = Identification {
         schema: 1,
         method: request.method,
         order: request.order,
@@ -278,7 +357,7 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             name: found.method,
             integrator: request.integrator,
             delays: found.plant.delays.clone(),
-            records: records.iter().map(|record| record.name.clone()).collect(),
+            records: all.iter().map(|mended| mended.whole.name.clone()).collect(),
             inputs: input_names.map(|input| input.name.clone()).collect(),
             noise: found
                 .noise
@@ -294,14 +373,51 @@ pub(super) fn identify(records: &[Record], request: &Request) -> Result<Identifi
             converged: found.converged,
         }),
         drift: None,
+        gaps: None,
         plant: found.plant,
-        shown: Shown {
-            time: first.time.clone(),
-            input: first.inputs[0].clone(),
-            output: first.outputs[0].clone(),
-            simulated,
-        },
-    })
+        shown: shown.unwrap_or_default(),
+    };
+    Ok(identification)
+}
+
+/// The parts of a record, one behind the other.
+#[derive(Default)]
+struct Joined {
+    shown: Shown,
+    /// Of the signals that must not show in the error, and the error; with rows without a value between the parts.
+    signals: Vec<ct_signals::Channel>,
+    error: Vec<f64>,
+    readings: Vec<f64>,
+}
+
+impl Joined {
+    /// In open loop every input is held against the error, in a loop the reference, as the input answers to the noise there.
+    fn add(&mut self, record: &Record, in_loop: bool, error: impl Iterator<Item = f64>) {
+        let signals: Vec<&ct_signals::Channel> = match record.references.first().filter(|_| in_loop)
+        {
+            Some(reference) => vec![reference],
+            None => record.inputs.iter().collect(),
+        };
+        let between = match self.signals.is_empty() {
+            true => 0,
+            false => MOST_LAGS,
+        };
+        if self.signals.is_empty() {
+            self.signals = signals.iter().map(|s| s.with_values(Vec::new())).collect();
+            self.shown.input = record.inputs[0].with_values(Vec::new());
+            self.shown.output = record.outputs[0].with_values(Vec::new());
+        }
+        let nothing = || std::iter::repeat_n(f64::NAN, between);
+        for (own, signal) in self.signals.iter_mut().zip(signals) {
+            own.values.extend(nothing());
+            own.values.extend(&signal.values);
+        }
+        self.error.extend(nothing());
+        self.error.extend(error);
+        self.shown.time.extend(&record.time);
+        self.shown.input.values.extend(&record.inputs[0].values);
+        self.shown.output.values.extend(&record.outputs[0].values);
+    }
 }
 
 /// The signal that shows most in the simulation errors.
@@ -312,16 +428,11 @@ struct Visible {
 }
 
 impl Visible {
-    /// In open loop every input is held against the error, in a loop the reference, as the input answers to the noise there.
-    fn test(&mut self, record: &Record, in_loop: bool, error: &[f64]) -> Result<(), Error> {
-        let signals: Vec<&ct_signals::Channel> = match record.references.first().filter(|_| in_loop)
-        {
-            Some(reference) => vec![reference],
-            None => record.inputs.iter().collect(),
-        };
-        let lags = (error.len() / 10).clamp(2, 25);
-        for signal in signals {
-            let (_, p) = residual_tests::prewhitened_input_test(&signal.values, error, lags)?;
+    fn test(&mut self, joined: &Joined) -> Result<(), Error> {
+        let lags = (joined.readings.len() / 10).clamp(2, MOST_LAGS);
+        for signal in &joined.signals {
+            let (_, p) =
+                residual_tests::prewhitened_input_test(&signal.values, &joined.error, lags)?;
             self.tests += 1;
             if self.least.as_ref().is_none_or(|(least, _)| p < *least) {
                 self.least = Some((p, signal.name.clone()));

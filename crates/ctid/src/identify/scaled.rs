@@ -1,6 +1,6 @@
 //! The record in units in which all parameters are about 1, and the model of first order that gives the unit of time.
 
-use ct_lti::{Hold, Start, StateVariableFilter};
+use ct_lti::{Hold, ReadingFilter, Start, StateVariableFilter};
 use ct_signals::Record;
 use nalgebra::{DMatrix, DVector};
 
@@ -31,6 +31,7 @@ pub(super) struct Scaled {
     /// Time from the beginning, in units of the time constant of first order.
     pub time: Vec<f64>,
     pub u: Vec<f64>,
+    /// NaN where its reading is missing.
     pub y: Vec<f64>,
     pub hold: Hold,
     /// Time constant of first order, s: the unit of time.
@@ -155,12 +156,12 @@ impl Scaled {
     }
 
     /// The two filters, at rest on the first sample.
-    pub fn filters(&self, n: usize) -> Result<[StateVariableFilter; 2], Error> {
+    pub fn filters(&self, n: usize) -> Result<(StateVariableFilter, ReadingFilter), Error> {
         let filter = |hold| -> Result<_, Error> {
             let filter = StateVariableFilter::with_bandwidth(n, self.bandwidth, hold)?;
             Ok(filter.starting(Start::Rest))
         };
-        Ok([filter(self.hold)?, filter(Hold::First)?])
+        Ok((filter(self.hold)?, ReadingFilter::new(filter(Hold::First)?)))
     }
 
     /// An output in its unit.
@@ -190,11 +191,12 @@ impl Scaled {
     }
 }
 
-/// Mean and standard deviation.
+/// Mean and standard deviation of the values that are there.
 fn moments(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    let there = values.iter().filter(|v| !v.is_nan());
+    let n = there.clone().count() as f64;
+    let mean = there.clone().sum::<f64>() / n;
+    let squares: f64 = there.map(|v| (v - mean).powi(2)).sum();
     (mean, (squares / n).sqrt())
 }
 
@@ -215,7 +217,8 @@ fn first_order(record: &Record, u: &[f64], y: &[f64], hold: Hold) -> (f64, [f64;
         }
     }
     let (error, time_constant, line, k) = best;
-    let error = (error / y.len().max(1) as f64).sqrt();
+    let readings = y.iter().filter(|y| !y.is_nan()).count();
+    let error = (error / readings.max(1) as f64).sqrt();
     (time_constant, line, error, k == 0 || k + 1 == GRID)
 }
 
@@ -232,15 +235,16 @@ fn lagged(time: &[f64], u: &[f64], time_constant: f64, hold: Hold) -> Option<Vec
     Some(lagged)
 }
 
-/// `y = K x + d` and a decaying initial state, by least squares: the squared error, and K and d.
+/// `y = K x + d` and a decaying initial state, by least squares over the readings that are there: the squared error, and K and d.
 fn line(time: &[f64], x: &[f64], y: &[f64], time_constant: f64) -> (f64, [f64; 2]) {
     let begin = time.first().copied().unwrap_or(0.0);
-    let rows = DMatrix::from_fn(x.len(), 3, |k, column| match column {
-        0 => x[k],
+    let there: Vec<usize> = (0..x.len()).filter(|k| !y[*k].is_nan()).collect();
+    let rows = DMatrix::from_fn(there.len(), 3, |row, column| match column {
+        0 => x[there[row]],
         1 => 1.0,
-        _ => (-(time[k] - begin) / time_constant).exp(),
+        _ => (-(time[there[row]] - begin) / time_constant).exp(),
     });
-    let y = DVector::from_column_slice(y);
+    let y = DVector::from_fn(there.len(), |row, _| y[there[row]]);
     let normal = rows.tr_mul(&rows);
     let Some(fitted) = normal
         .pseudo_inverse(1e-9)

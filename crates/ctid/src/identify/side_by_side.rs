@@ -7,6 +7,8 @@
 //! In a loop the command answers to the noise, and a model that takes this answer for the plant simulates better on the measured command
 //! than the plant does: there no method is called worse for its error, and that is said.
 //!
+//! Missing readings have no error. Of a record that is cut at gaps of its input this error is that over the rows behind which the plant has forgotten them.
+//!
 //! Orders are chosen by
 //! - BIC: `N log sigma^2 + k log N`, `sigma` of the innovations of an autoregressive model of the simulation error, `k` its coefficients,
 //!   the `n + m + 1` parameters, and the initial state and level;
@@ -22,12 +24,14 @@
 use std::time::Instant;
 
 use ct_signals::{ArModel, Channel, Record, residual_tests};
-use missing_effect::Parameter;
+use missing_effect::{MendedGaps, Parameter};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::refined::data;
-use super::{Identification, MAX_ORDER, Method, Order, Request, Shown, identify, rms};
+use super::{
+    Identification, MAX_ORDER, Mended, Method, Order, Request, Shown, identify_mended, rms,
+};
 use crate::Error;
 
 /// Order of the noise model of a simulation error, at most.
@@ -74,6 +78,9 @@ pub struct SideBySide {
     pub record: String,
     /// The record comes from a loop with a known controller: errors on the measured command do not rank the methods.
     pub in_loop: bool,
+    /// What was done about missing rows and samples of the input; nothing where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gaps: Option<MendedGaps>,
     /// Names of the records that were not fitted.
     pub test: Vec<String>,
     /// One for each method, of the order with the least BIC; best simulation first, then those that were refused.
@@ -163,7 +170,7 @@ impl Method {
 /// # Errors
 /// [`Error::Usage`] where every method refuses, with the reason of the first.
 pub fn compare(
-    (record, test, in_loop): (&Record, &[Record], bool),
+    (mended, test, in_loop): (&Mended, &[Mended], bool),
     requests: &[Request],
     orders: &[Order],
     done: &(dyn Fn() + Sync),
@@ -177,10 +184,11 @@ pub fn compare(
             })
         })
         .collect();
+    let record = &mended.whole;
     let mut rows: Vec<Row> = jobs
         .par_iter()
         .map(|request| {
-            let row = row(record, test, request);
+            let row = row(mended, test, request);
             done();
             row
         })
@@ -190,7 +198,7 @@ pub fn compare(
     {
         return Err(Error::Usage(reason));
     }
-    let spread = spread(std::slice::from_ref(record));
+    let spread = spread(std::slice::from_ref(mended));
     let least = |order: Order| {
         let of_order = rows.iter().filter(|row| row.order == order);
         of_order.map(Row::rmse).fold(f64::INFINITY, f64::min)
@@ -219,7 +227,8 @@ pub fn compare(
         schema: 1,
         record: record.name.clone(),
         in_loop,
-        test: test.iter().map(|record| record.name.clone()).collect(),
+        test: test.iter().map(|test| test.whole.name.clone()).collect(),
+        gaps: mended.gaps,
         methods,
         orders: if orders.len() > 1 { rows } else { Vec::new() },
         shown: Shown {
@@ -246,9 +255,9 @@ impl Row {
     }
 }
 
-fn row(record: &Record, test: &[Record], request: &Request) -> Row {
+fn row(record: &Mended, test: &[Mended], request: &Request) -> Row {
     let begun = Instant::now();
-    let found = identify(record, request)
+    let found = identify_mended(std::slice::from_ref(record), request)
         .and_then(|found| outcome(record, test, &found))
         .map_err(|error| error.to_string());
     let (found, refused) = match found {
@@ -265,7 +274,8 @@ fn row(record: &Record, test: &[Record], request: &Request) -> Row {
     }
 }
 
-fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<Outcome, Error> {
+fn outcome(mended: &Mended, test: &[Mended], found: &Identification) -> Result<Outcome, Error> {
+    let record = &mended.whole;
     let on = |record: &Record| -> Result<(Vec<f64>, Vec<f64>), Error> {
         let simulated = found
             .plant
@@ -278,11 +288,12 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
     let (error, simulated) = on(record)?;
     let tested: Vec<Vec<f64>> = test
         .iter()
-        .map(|record| Ok(on(record)?.0))
+        .map(|test| Ok(on(&test.whole)?.0))
         .collect::<Result<_, Error>>()?;
-    let rmse = rms(error.iter().copied());
-    let spread = spread(std::slice::from_ref(record));
-    let test_rmse = (!test.is_empty()).then(|| rms(tested.iter().flatten().copied()));
+    let there = |e: &f64| !e.is_nan();
+    let rmse = rms(error.iter().copied().filter(there));
+    let spread = spread(std::slice::from_ref(mended));
+    let test_rmse = (!test.is_empty()).then(|| rms(tested.iter().flatten().copied().filter(there)));
     let of_plant = found.parameters.iter();
     let of_plant = of_plant.filter(|p| !p.name.starts_with("offset"));
     let estimated = of_plant.clone().count();
@@ -309,15 +320,17 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
         let mean = parts.iter().sum::<f64>() / parts.len() as f64;
         2.0 * (rmse / spread).ln() + mean.ln()
     });
-    let lags = (error.len() / 10).clamp(2, 25);
+    // Where readings are missing the error is NaN.
+    let readings = record.outputs[0].present().count();
+    let lags = (readings / 10).clamp(2, 25);
     let mut input_p = 1.0_f64;
     let inputs: Vec<&Channel> = record.inputs.iter().collect();
     for input in &inputs {
         let (_, p) = residual_tests::prewhitened_input_test(&input.values, &error, lags)?;
         input_p = input_p.min(p * inputs.len() as f64);
     }
-    let noise = ArModel::fit(&[&error], NOISE_ORDER.min(error.len() / 10))?;
-    let samples = error.len() as f64;
+    let noise = ArModel::fit(&[&error], NOISE_ORDER.min(readings / 10))?;
+    let samples = readings as f64;
     let fitted = (estimated + found.order.n + 1 + noise.order()) as f64;
     Ok(Outcome {
         parameters: found.parameters.clone(),
@@ -334,21 +347,27 @@ fn outcome(record: &Record, test: &[Record], found: &Identification) -> Result<O
         whiteness_p: residual_tests::ljung_box(&error, lags, 0)?,
         input_p,
         violated: Vec::new(),
-        warnings: found.warnings.clone(),
+        // What is the same for all is said once.
+        warnings: {
+            let gaps = mended.gaps.and_then(|gaps| gaps.sentence());
+            let own = found.warnings.iter();
+            own.filter(|warning| Some(*warning) != gaps.as_ref())
+                .cloned()
+                .collect()
+        },
         simulated,
     })
 }
 
-/// Standard deviation of the outputs, each record about its own mean.
-fn spread(records: &[Record]) -> f64 {
+/// Standard deviation of the outputs' readings, each record about its own mean.
+fn spread(records: &[Mended]) -> f64 {
     let about_mean = |output: &Channel| {
-        let mean = output.values.iter().sum::<f64>() / output.values.len().max(1) as f64;
-        let values = output.values.iter();
-        values.map(|y| y - mean).collect::<Vec<f64>>()
+        let mean = output.present().sum::<f64>() / output.present().count().max(1) as f64;
+        output.present().map(|y| y - mean).collect::<Vec<f64>>()
     };
     rms(records
         .iter()
-        .flat_map(|record| about_mean(&record.outputs[0])))
+        .flat_map(|record| about_mean(&record.whole.outputs[0])))
 }
 
 fn violated(

@@ -32,9 +32,11 @@ pub(crate) fn measure(found: &SideBySide) -> String {
     } else {
         ""
     };
+    let gaps = found.gaps.and_then(|gaps| gaps.sentence());
+    let gaps = gaps.map_or_else(String::new, |sentence| format!(" {sentence}"));
     format!(
         "Fit: each model runs on the input alone, from an initial state and a level that are fitted, on the record{test}; it is not a \
-         prediction error.{in_loop}"
+         prediction error.{in_loop}{gaps}"
     )
 }
 

@@ -43,6 +43,7 @@ struct Driven<'a> {
     time: Vec<f64>,
     hold: Hold,
     u: &'a [f64],
+    /// NaN where its reading is missing.
     y: &'a [f64],
 }
 
@@ -73,11 +74,18 @@ impl Driven<'_> {
             .collect();
         let columns = DMatrix::from_fn(count, free.len(), |k, i| free[i][k] / sizes[i]);
         let left = DVector::from_fn(count, |k, _| self.y[k] - forced[k]);
-        let normal = columns.tr_mul(&columns);
-        let initial = normal
-            .pseudo_inverse(1e-9)
-            .map(|inverse| inverse * columns.tr_mul(&left))
-            .unwrap_or_else(|_| DVector::zeros(free.len()));
+        let fit = |columns: &DMatrix<f64>, left: &DVector<f64>| {
+            let normal = columns.tr_mul(columns);
+            normal
+                .pseudo_inverse(1e-9)
+                .map(|inverse| inverse * columns.tr_mul(left))
+                .unwrap_or_else(|_| DVector::zeros(free.len()))
+        };
+        let there: Vec<usize> = (0..count).filter(|k| !self.y[*k].is_nan()).collect();
+        let initial = match there.len() == count {
+            true => fit(&columns, &left),
+            false => fit(&columns.select_rows(&there), &left.select_rows(&there)),
+        };
         let fading = (&columns * initial).as_slice().to_vec();
         Ok(Response { forced, fading })
     }

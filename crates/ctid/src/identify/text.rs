@@ -2,7 +2,7 @@
 
 use fcloe::{Condition, NoisePath, Verdict};
 
-use super::{Identification, InLoop, LevelChoice, Order, Refined, rms};
+use super::{Identification, InLoop, LevelChoice, Order, Refined, deviation};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
@@ -262,11 +262,7 @@ fn error(found: &Identification, look: Look) -> String {
         "" => String::new(),
         unit => format!(" {unit}"),
     };
-    let deviation = {
-        let values = &found.shown.output.values;
-        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        rms(values.iter().map(|y| y - mean))
-    };
+    let deviation = deviation(&found.shown.output);
     let line = format!(
         "{}{unit} root mean square, of an output that deviates by {}{unit}: fit {} %",
         numbers::significant(found.simulation_rmse, 3),

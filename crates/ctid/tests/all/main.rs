@@ -9,6 +9,7 @@ mod domain;
 mod effort;
 mod identify;
 mod identify_loop;
+mod identify_missing;
 mod identify_refined;
 mod injected;
 mod model_file;

@@ -6,7 +6,7 @@ use crate::common::Place;
 use crate::identify::{FIRST, Plant, SECOND};
 use ct_signals::Record;
 use ctid::identify::side_by_side::{Orders, Row, SideBySide, compare};
-use ctid::identify::{Method, Order, Request};
+use ctid::identify::{Method, Order, Request, mend};
 
 fn all(record: &Record, test: &[Record], orders: &str) -> SideBySide {
     let orders: Orders = orders.parse().unwrap();
@@ -19,7 +19,8 @@ fn all(record: &Record, test: &[Record], orders: &str) -> SideBySide {
         Method::RecursiveFcloe,
     ];
     let requests = methods.map(|method| Request::new(method, orders.0[0]));
-    compare((record, test, false), &requests, &orders.0, &|| {}).unwrap()
+    let (fitted, test) = mend(vec![record.clone()], test.to_vec(), orders.0[0], false).unwrap();
+    compare((&fitted[0], &test, false), &requests, &orders.0, &|| {}).unwrap()
 }
 
 fn of(found: &SideBySide, method: Method) -> &Row {

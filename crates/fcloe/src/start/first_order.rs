@@ -117,7 +117,7 @@ impl Filtered {
         let point = record.operating_point();
         let (mut u_f, mut y_f) = (0.0, 0.0);
         let (mut phi, mut target) = (Vec::new(), Vec::new());
-        for (u, y) in u.iter().zip(&record.y) {
+        for (u, y) in u.iter().zip(record.y_on_lines().iter()) {
             let y = y - point.y;
             phi.push([-y_f, u_f]);
             target.push(factor * (y - y_f));

@@ -198,13 +198,12 @@ fn residual(records: &[LoopRecord], controller: &Controller, plant: &PlantModel)
     for record in records {
         let simulated = Signals::simulated(plant, record, controller).ok()?;
         let level = record.operating_point().y;
-        let errors = record
-            .y
-            .iter()
-            .zip(&simulated.y)
+        let readings = record.y.iter().zip(&simulated.y);
+        let errors = readings
+            .filter(|(y, _)| !y.is_nan())
             .map(|(y, m)| y - level - m);
         sum += errors.map(|e| e * e).sum::<f64>();
-        samples += record.len();
+        samples += record.readings();
     }
     let rms = (sum / samples.max(1) as f64).sqrt();
     rms.is_finite().then_some(rms)
@@ -226,7 +225,8 @@ fn guesses(
             continue;
         };
         let mean = drive.iter().sum::<f64>() / drive.len().max(1) as f64;
-        for ((r, y), u) in drive.iter().zip(&signals.y).zip(&signals.u) {
+        let rows = drive.iter().zip(&signals.y).zip(&signals.u);
+        for ((r, y), u) in rows.filter(|((_, y), _)| !y.is_nan()) {
             ry += (r - mean) * y;
             ru += (r - mean) * u;
         }

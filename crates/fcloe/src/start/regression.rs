@@ -15,12 +15,19 @@
 //! 741-764, for open loop; M. Gilson, H. Garnier, P. C. Young, P. Van den Hof, in Identification of Continuous-time Models from Sampled Data, Springer
 //! 2008, ch. 5, for the loop). In a loop of a continuous controller there remains the error of what u does between samples.
 //!
+//! Readings of y may be missing; their rows do not count. In least squares y runs on lines between its readings, and rows behind long gaps are left out
+//! ([`ct_lti::ReadingFilter`]). With instruments what the model of the loop says stands for a missing reading in the filters of y: the instruments owe nothing to what the others
+//! hold beside it, so that the estimates are consistent, and for the filter `E = A^` the residual of a row has no part of what stands in other rows at all.
+//!
 //! Several records are taken together.
 
 use ct_lti::Polynomial;
 
 use super::signals::{Signals, Sums};
 use crate::{ClosedLoop, Controller, Error, LoopRecord, Orders, PlantModel};
+
+/// The share of the readings that have to be left for least squares where readings are missing.
+const LEAST_LEFT: f64 = 0.3;
 
 /// A refinement ends where no parameter changes by more than this share of itself.
 const RESTS: f64 = 1e-4;
@@ -32,7 +39,7 @@ const RESTS: f64 = 1e-4;
 ///
 /// # Errors
 /// [`Error::NoRecord`], [`Error::RegressionWithoutInput`], [`Error::Length`] for a filter of another degree,
-/// [`Error::NotDetermined`], [`Error::Lti`]; those of [`LoopRecord::validate`] and [`PlantModel::new`].
+/// [`Error::NotDetermined`], [`Error::Lti`], [`Error::Gaps`]; those of [`LoopRecord::validate`] and [`PlantModel::new`].
 pub fn least_squares(
     records: &[LoopRecord],
     controller: &Controller,
@@ -44,10 +51,21 @@ pub fn least_squares(
     let mut phi = vec![0.0; orders.parameters()];
     for record in records {
         let signals = Signals::measured(record, controller)?;
-        signals.filtered(filter, |y, u| {
+        let mut left = 0;
+        signals.filtered(filter, |_, y, u| {
+            left += 1;
             regressor(&mut phi, orders, y, u);
             sums.add(&phi, &phi, y[orders.n]);
         })?;
+        let readings = record.readings();
+        if (left as f64) < LEAST_LEFT * readings as f64 {
+            return Err(Error::Gaps {
+                record: record.name.clone(),
+                missing: 1.0 - readings as f64 / record.len() as f64,
+                left,
+                rows: record.len(),
+            });
+        }
     }
     plant(&sums.solve()?, orders)
 }
@@ -67,37 +85,42 @@ pub fn instruments(
     ClosedLoop::new(model, controller)?.require_stable()?;
     let mut sums = Sums::new(orders.parameters());
     for record in records {
-        rows(record, controller, filter, model, |z, phi, y| {
+        rows(record, controller, filter, model, |_, z, phi, y| {
             sums.add(z, phi, y);
         })?;
     }
     plant(&sums.solve()?, orders)
 }
 
-/// Shows instruments, regressor and `p^n y_f` at each sample of a record.
+/// Shows the number of the sample, instruments, regressor and `p^n y_f` at each sample of a record whose reading is there.
 pub(super) fn rows(
     record: &LoopRecord,
     controller: &Controller,
     filter: &Polynomial,
     model: &PlantModel,
-    mut see: impl FnMut(&[f64], &[f64], f64),
+    mut see: impl FnMut(usize, &[f64], &[f64], f64),
 ) -> Result<(), Error> {
     let orders = model.orders();
     let measured = Signals::measured(record, controller)?;
     let simulated = Signals::simulated(model, record, controller)?;
     let mut z = Vec::with_capacity(record.len() * orders.parameters());
     let mut row = vec![0.0; orders.parameters()];
-    simulated.filtered(filter, |y, u| {
+    simulated.filtered(filter, |_, y, u| {
         regressor(&mut row, orders, y, u);
         z.extend_from_slice(&row);
     })?;
     let mut z = z.chunks_exact(orders.parameters());
-    measured.filtered(filter, |y, u| {
-        regressor(&mut row, orders, y, u);
-        if let Some(z) = z.next() {
-            see(z, &row, y[orders.n]);
-        }
-    })
+    measured
+        .clone()
+        .filled(&simulated)
+        .filtered(filter, |k, y, u| {
+            regressor(&mut row, orders, y, u);
+            if let Some(z) = z.next()
+                && !measured.is_missing(k)
+            {
+                see(k, z, &row, y[orders.n]);
+            }
+        })
 }
 
 /// The last of a refinement.

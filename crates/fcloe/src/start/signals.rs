@@ -1,6 +1,6 @@
 //! What all regressions share: signals with their derivatives, filtered alike, and the equations' solution.
 
-use ct_lti::{Hold, Polynomial, StateVariableFilter};
+use ct_lti::{Hold, Polynomial, ReadingFilter, StateVariableFilter};
 use nalgebra::{DMatrix, DVector};
 
 use crate::{Controller, Error, LoopRecord, LoopSimulator, PlantModel};
@@ -18,7 +18,7 @@ pub(super) fn input(record: &LoopRecord) -> Result<&[f64], Error> {
         })
 }
 
-/// u as the plant of the loop sees it, through a sensor's filter where there is one, and y: deviations.
+/// u as the plant of the loop sees it, through a sensor's filter where there is one, and y, NaN where its reading is missing: deviations.
 #[derive(Debug, Clone)]
 pub(super) struct Signals {
     pub(super) u: Vec<f64>,
@@ -78,17 +78,35 @@ impl Signals {
         })
     }
 
-    /// Shows y_f and u_f with their derivatives, 0 to n, at each sample.
+    /// Whether the reading of a sample is missing.
+    pub(super) fn is_missing(&self, k: usize) -> bool {
+        self.y[k].is_nan()
+    }
+
+    /// With other readings where some are missing.
+    pub(super) fn filled(mut self, from: &Self) -> Self {
+        for (y, from) in self.y.iter_mut().zip(&from.y) {
+            if y.is_nan() {
+                *y = *from;
+            }
+        }
+        self
+    }
+
+    /// Shows the number of the sample, and y_f and u_f with their derivatives, 0 to n, at each sample; not where a reading is missing, nor where the filter has not forgotten
+    /// a long gap ([`ReadingFilter`]).
     pub(super) fn filtered(
         &self,
         filter: &Polynomial,
-        mut see: impl FnMut(&[f64], &[f64]),
+        mut see: impl FnMut(usize, &[f64], &[f64]),
     ) -> Result<(), Error> {
-        let mut of_y = StateVariableFilter::new(filter, Hold::First)?;
+        let mut of_y = ReadingFilter::new(StateVariableFilter::new(filter, Hold::First)?);
         let mut of_u = StateVariableFilter::new(filter, self.u_hold)?;
-        for (&y, &u) in self.y.iter().zip(&self.u) {
-            let y = of_y.update(y, self.step)?;
-            see(y, of_u.update(u, self.step)?);
+        for (k, (&y, &u)) in self.y.iter().zip(&self.u).enumerate() {
+            let u = of_u.update(u, self.step)?;
+            if let Some(y) = of_y.update(y, self.step)? {
+                see(k, y, u);
+            }
         }
         Ok(())
     }

@@ -8,6 +8,8 @@
 //! to sample, an autoregression is fitted to it, and R is the autocovariance of that behind `A^/E`: no autoregression of modest order
 //! stands for the slow zeros of A. theta follows from x by its derivatives.
 //!
+//! Where readings are missing their rows are 0 in both sums, and w is known only where the filter is A^, where it is e itself.
+//!
 //! Assumptions: the noise is stationary, independent of what drives the instruments, and of one spectrum, counted in samples, in all
 //! records; the model's structure is right; the levels are exact, so that what is not known of them comes on top. Where the inverse of
 //! `A^/E` grows without bound the autoregression is that of e itself.
@@ -49,11 +51,15 @@ pub fn standard_errors(
     let monic = monic(plant);
     let mut sums = Sums::new(p);
     let mut errors = Vec::with_capacity(records.len());
+    let lacks_readings = records.iter().any(LoopRecord::lacks_readings);
+    if lacks_readings && *filter != plant.a_polynomial() {
+        return Err(Error::ErrorsOfOtherFilter);
+    }
     for record in records {
-        let mut e = Vec::with_capacity(record.len());
-        rows(record, controller, filter, plant, |z, phi, y| {
+        let mut e = vec![f64::NAN; record.len()];
+        rows(record, controller, filter, plant, |k, z, phi, y| {
             sums.add(z, phi, y);
-            e.push(y - phi.iter().zip(&monic).map(|(phi, x)| phi * x).sum::<f64>());
+            e[k] = y - phi.iter().zip(&monic).map(|(phi, x)| phi * x).sum::<f64>();
         })?;
         errors.push(e);
     }
@@ -64,7 +70,7 @@ pub fn standard_errors(
     for (record, e) in records.iter().zip(&errors) {
         let sampled = system.sampled(Hold::Zero, record.step)?;
         let w = unfiltered(&system, &sampled, e);
-        // Not finite compares as not bounded.
+        // Not finite, as with missing readings, compares as not bounded.
         if size(&w) * system.d().powi(2) <= UNBOUNDED * size(e) {
             noise.push(w);
         }
@@ -80,12 +86,16 @@ pub fn standard_errors(
     for record in records {
         let process = behind(&ar, &system, record.step)?;
         let mut filtered = process.sum(p);
-        rows(record, controller, filter, plant, |z, _, _| {
+        let (nothing, mut pushed) = (vec![0.0; p], 0);
+        rows(record, controller, filter, plant, |k, z, _, _| {
+            (pushed..k).for_each(|_| filtered.push(&nothing));
             filtered.push(z);
+            pushed = k + 1;
         })?;
         middle += DMatrix::from_row_slice(p, p, &filtered.finish());
     }
-    let samples = segments.iter().map(|w| w.len()).sum::<usize>() as f64;
+    let there = segments.iter().copied().flatten().filter(|w| !w.is_nan());
+    let samples = there.count() as f64;
     // The variance of the innovations is over the samples less their order.
     let order = ar.order() as f64;
     let variance = ar.sigma().powi(2) * (samples - order) / (samples - order - p as f64).max(1.0);

@@ -164,8 +164,12 @@ fn records_that_say_nothing() {
     assert!(constant.contains("r is 2.5 throughout"), "{constant}");
     let missing = with(&|record| record.r = None);
     assert!(missing.contains("no reference r"), "{missing}");
-    let nan = with(&|record| record.y[17] = f64::NAN);
-    assert!(nan.contains("y[17] is NaN"), "{nan}");
+    let infinite = with(&|record| record.y[17] = f64::INFINITY);
+    assert!(infinite.contains("y[17] is inf"), "{infinite}");
+    let none = with(&|record| record.y.fill(f64::NAN));
+    assert!(none.contains("no reading of y"), "{none}");
+    let few = with(&|record| record.y[3..].fill(f64::NAN));
+    assert!(few.contains("3 samples in all, besides"), "{few}");
     let infinite = with(&|record| record.r.as_mut().unwrap()[3] = f64::INFINITY);
     assert!(infinite.contains("r[3] is inf"), "{infinite}");
     let uneven = with(&|record| record.r.as_mut().unwrap().truncate(7));

@@ -65,6 +65,34 @@ fn estimated_levels_and_open_loop() {
     check(&Rig::open_loop());
 }
 
+/// 30 % of the readings are missing, and a block of 10 rows: the noise behind the loop is found from those that are there. Fewer runs than above: each takes
+/// some 50 filters of the residual. `RUNS=400` takes as many.
+#[test]
+fn missing_readings() {
+    let asked = std::env::var("RUNS")
+        .ok()
+        .and_then(|runs| runs.parse().ok());
+    let runs: u64 = asked.unwrap_or(60);
+    for rig in [
+        Rig::second_order(true),
+        Rig::second_order(false),
+        Rig::open_loop(),
+    ] {
+        let rig = rig.with_missing_readings();
+        let found = rig.coverage(runs);
+        println!(
+            "{}, in loop {}, missing: {found:.2?}",
+            rig.name, rig.in_loop
+        );
+        let n = runs as f64;
+        let band = 4.0 * (0.95_f64 * 0.05 / n).sqrt() + 1.0 / n;
+        for (hits, ratio) in found.hits.iter().zip(&found.variance_ratios) {
+            assert!((*hits as f64 / n - 0.95).abs() <= band, "{found:?}");
+            assert!((ratio - 1.0).abs() <= 4.0 * (2.0 / n).sqrt(), "{found:?}");
+        }
+    }
+}
+
 /// Instruments with a filter that stays, and with one that is renewed: hits of the 95 % intervals, and the variance claimed over that of
 /// the estimates, for each parameter.
 fn instruments(rig: &Rig, lambda: f64) -> [Vec<(usize, f64)>; 2] {

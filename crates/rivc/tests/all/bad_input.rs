@@ -58,8 +58,14 @@ fn records() {
     says(&refusal(&[], &first, Noise::White), &["no record"]);
     says(&of(record(10)), &["10 samples", "12 are needed"]);
     let mut bad = record(400);
-    bad.output[7] = f64::NAN;
-    says(&of(bad), &["the output is NaN at sample 7"]);
+    bad.output[7] = f64::INFINITY;
+    says(&of(bad), &["the output is inf at sample 7"]);
+    let mut bad = record(400);
+    bad.output.fill(f64::NAN);
+    says(&of(bad), &["no reading of the output"]);
+    let mut bad = record(400);
+    bad.output[3..].fill(f64::NAN);
+    says(&of(bad), &["3 samples besides 397", "reading is missing"]);
     let mut bad = record(400);
     bad.time[7] = 6.0;
     says(&of(bad), &["from 6 to 6 at sample 7"]);

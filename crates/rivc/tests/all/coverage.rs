@@ -3,7 +3,7 @@
 use crate::support::{add, data, even, held, respond, rng};
 use ct_signals::{ArModel, excitation, noise};
 use fcloe::{Controller, PlantModel, sampled_loop};
-use rand::Rng;
+use rand::{Rng, RngExt};
 use rayon::prelude::*;
 use rivc::{Data, Delay, Kind, Noise, Settings, Structure, estimate};
 
@@ -230,4 +230,104 @@ fn unequal_records() {
             check(name, &Structure::new(1, [0]), noise, &truth, records);
         }
     }
+}
+
+/// 30 % of the readings are missing at random, and a block of 10 rows.
+fn without_some(y: Vec<f64>, rng: &mut impl RngExt) -> Vec<f64> {
+    let block = y.len() / 2..y.len() / 2 + 10;
+    let rows = y.into_iter().enumerate();
+    rows.map(|(k, y)| match rng.random_bool(0.3) || block.contains(&k) {
+        true => f64::NAN,
+        false => y,
+    })
+    .collect()
+}
+
+/// Missing readings, in open loop and in a loop: the residual's spectrum is that of the readings that are there.
+#[test]
+fn missing_readings() {
+    let (a, b) = ([1.0, 12.0, 30.0], [2.0, 3.0]);
+    let truth = [(A(1), 12.0), (A(2), 30.0), (B(0), 2.0), (B(1), 3.0)];
+    let time = even(1000, 1.0);
+    let u = held(excitation::prbs(1000, 10, -1.0, 1.0, 9).unwrap());
+    let clean = respond(&b, &a, &time, &u, 0.0);
+    let rms = 0.1 * spread(&clean);
+    for (name, ar) in [
+        ("white, missing", &[][..]),
+        ("AR(2), missing", &[1.3, -0.5]),
+    ] {
+        let record = |seed| {
+            let mut rng = rng(seed);
+            let v = coloured(clean.len(), rms, ar, &mut rng);
+            let y = without_some(add(&clean, &v), &mut rng);
+            vec![data(time.clone(), vec![u.clone()], y)]
+        };
+        for noise in [Noise::White, Noise::Autoregressive] {
+            check(name, &Structure::new(2, [1]), noise, &truth, record);
+        }
+    }
+    let controller = Controller::pi(0.6, 0.02).unwrap();
+    let n = 2000;
+    let r = excitation::prbs(n, 40, -1.0, 1.0, 9).unwrap();
+    let plant = PlantModel::new(&[12.0, 30.0], &[1.5]).unwrap();
+    let clean = sampled_loop(&plant, &controller, 1.0, 1, &r, fcloe::Noise::None, None).unwrap();
+    let rms = 0.1 * spread(&clean.y);
+    let truth = [(A(1), 12.0), (A(2), 30.0), (B(0), 1.5)];
+    let record = |seed| {
+        let mut rng = rng(seed);
+        let w = coloured(n, rms, &[0.8], &mut rng);
+        let in_loop = fcloe::Noise::InLoop(&w);
+        let found = sampled_loop(&plant, &controller, 1.0, 1, &r, in_loop, None).unwrap();
+        vec![Data {
+            reference: Some(r.clone()),
+            ..data(
+                even(n, 1.0),
+                vec![held(found.u)],
+                without_some(found.y, &mut rng),
+            )
+        }]
+    };
+    for noise in [Noise::White, Noise::Autoregressive] {
+        check(
+            "in a loop, missing",
+            &Structure::new(2, [0]),
+            noise,
+            &truth,
+            record,
+        );
+    }
+}
+
+/// A record in three parts, one of them short, between which the input is not known: one offset, one noise.
+#[test]
+fn parts_of_a_record() {
+    let (a, b) = ([1.0, 10.0], [2.0]);
+    let truth = [(A(1), 10.0), (B(0), 2.0), (Kind::Offset { record: 0 }, 5.0)];
+    let time = even(1000, 1.0);
+    let u = excitation::prbs(1000, 10, -1.0, 1.0, 9).unwrap();
+    let clean = respond(&b, &a, &time, &held(u.clone()), 0.0);
+    let records = |seed: u64| -> Vec<Data> {
+        let mut rng = rng(seed);
+        let v = coloured(clean.len(), 0.2, &[0.7], &mut rng);
+        let y = without_some(add(&clean, &v), &mut rng);
+        let part = |rows: std::ops::Range<usize>| Data {
+            continues: rows.start > 0,
+            ..data(
+                time[rows.clone()].to_vec(),
+                vec![held(u[rows.clone()].to_vec())],
+                y[rows].iter().map(|y| y + 5.0).collect(),
+            )
+        };
+        vec![part(0..450), part(470..490), part(520..1000)]
+    };
+    for noise in [Noise::White, Noise::Autoregressive] {
+        check("parts", &Structure::new(1, [0]), noise, &truth, records);
+    }
+    let found = estimate(
+        &records(1),
+        &Structure::new(1, [0]),
+        &Settings::new(Noise::White),
+    )
+    .unwrap();
+    assert_eq!((found.parameters.len(), found.noise.len()), (3, 1));
 }

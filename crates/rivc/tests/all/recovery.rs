@@ -321,6 +321,7 @@ fn a_loop_in_any_unit() {
         let scaled = |v: &[f64], by: f64| v.iter().map(|v| v * by).collect::<Vec<_>>();
         let record = Data {
             reference: Some(scaled(&r, of_y)),
+            continues: false,
             ..data(
                 even(1000, 1.0),
                 vec![held(scaled(&found.u, of_u))],

@@ -71,6 +71,7 @@ pub fn data(time: Vec<f64>, inputs: Vec<Input>, output: Vec<f64>) -> Data {
         inputs,
         output,
         reference: None,
+        continues: false,
     }
 }
 

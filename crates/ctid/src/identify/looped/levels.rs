@@ -63,7 +63,11 @@ impl Task<'_> {
         if still < ROWS_AT_REST || still >= record.len() {
             return false;
         }
-        let memory = forgets_after(&record.y) as f64;
+        let readings = record.y[..still].iter().filter(|y| !y.is_nan()).count();
+        if readings < ROWS_AT_REST {
+            return false;
+        }
+        let memory = forgets_after(&ct_signals::interpolated(&record.y)) as f64;
         let stands = |signal: &[f64]| {
             let (low, high) = crate::plot::limits([signal]);
             let trend = Trend::new(&signal[..still]);
@@ -105,14 +109,23 @@ struct Trend {
 }
 
 impl Trend {
+    /// Of the values that are there.
     fn new(y: &[f64]) -> Self {
-        let n = y.len() as f64;
-        let (mean, middle) = (y.iter().sum::<f64>() / n, 0.5 * (n - 1.0));
-        let across = n * (n * n - 1.0) / 12.0;
+        let rows = y.iter().enumerate().filter(|(_, y)| !y.is_nan());
+        let n = rows.clone().count() as f64;
+        let mean = rows.clone().map(|(_, y)| y).sum::<f64>() / n;
+        let (middle, across) = match rows.clone().count() == y.len() {
+            true => (0.5 * (n - 1.0), n * (n * n - 1.0) / 12.0),
+            false => {
+                let middle = rows.clone().map(|(k, _)| k as f64).sum::<f64>() / n;
+                let squares = rows.clone().map(|(k, _)| (k as f64 - middle).powi(2));
+                (middle, squares.sum())
+            }
+        };
         let about = |(k, y): (usize, &f64)| (k as f64 - middle) * (y - mean);
-        let slope = y.iter().enumerate().map(about).sum::<f64>() / across;
+        let slope = rows.clone().map(about).sum::<f64>() / across;
         let off = |(k, y): (usize, &f64)| (y - mean - slope * (k as f64 - middle)).powi(2);
-        let variance = y.iter().enumerate().map(off).sum::<f64>() / (n - 2.0);
+        let variance = rows.map(off).sum::<f64>() / (n - 2.0);
         Self {
             mean,
             mean_error: (variance / n).sqrt(),

@@ -15,7 +15,9 @@ use fcloe::{
 use missing_effect::Parameter;
 use serde::Serialize;
 
-use super::{Identification, Method, Order, Request, Shown, Trajectory, names, poles, rms};
+use super::{
+    Identification, Method, Order, Request, Shown, Trajectory, deviation, errors, names, poles, rms,
+};
 use crate::Error;
 pub use levels::LevelChoice;
 
@@ -188,10 +190,9 @@ impl Task<'_> {
             .collect();
         let plant = super::plant(&parameters, order);
         let (time_constants, oscillations) = poles(&plant.a)?;
-        let output = &record.outputs[0].values;
-        let rmse = rms(output.iter().zip(&simulated).map(|(y, model)| y - model));
-        let mean = output.iter().sum::<f64>() / output.len().max(1) as f64;
-        let deviation = rms(output.iter().map(|y| y - mean));
+        let output = &record.outputs[0];
+        let rmse = rms(errors(output, &simulated));
+        let deviation = deviation(output);
         let mut warnings = found.warnings;
         if self.request.levels == LevelChoice::Auto && found.levels_from == LevelChoice::Mean {
             warnings.push(
@@ -243,6 +244,7 @@ impl Task<'_> {
                 convergence,
             }),
             refined: None,
+            gaps: None,
             drift: None,
             plant,
             shown: Shown {
@@ -272,8 +274,7 @@ impl Task<'_> {
         let simulated = self
             .simulated(&batch.record, &batch.plant, batch.levels)
             .ok()?;
-        let output = self.record.outputs[0].values.iter();
-        let best = rms(output.zip(&simulated).map(|(y, model)| y - model));
+        let best = rms(errors(&self.record.outputs[0], &simulated));
         (rmse > MUCH_WORSE * best).then(|| {
             format!(
                 "--method fcloe simulates the record with an error of {best:.3} {unit} instead of {rmse:.3}: the plant drifts, or the recursion went astray, {untold}"
@@ -304,6 +305,20 @@ impl Task<'_> {
                     crate::numbers::significant(mismatch, 3),
                     self.record.inputs[0].unit,
                     100.0 * mismatch / size
+                ),
+            },
+            Error::Loop(fcloe::Error::Gaps {
+                missing,
+                left,
+                rows,
+                ..
+            }) => Error::File {
+                file: self.record.name.clone(),
+                what: format!(
+                    "{:.0} % of the readings of \"{}\" are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of --method {}; --method srivc and fcloe leave single readings out",
+                    100.0 * missing,
+                    ct_signals::quoted(&self.record.outputs[0].name),
+                    self.request.method.id()
                 ),
             },
             Error::Loop(what) => {

@@ -124,7 +124,12 @@ impl Task<'_> {
             found.start.from = "output error of the first rows";
             return Ok(found);
         }
-        self.regression(record, true)
+        let found = self.regression(record.clone(), true);
+        match found {
+            // Filters do not run through long gaps; the simulation of the output error does.
+            Err(Error::Loop(fcloe::Error::Gaps { .. })) => self.batch(record),
+            found => found,
+        }
     }
 
     /// Those of `fcloe`, for the amplitude of this loop.

@@ -25,12 +25,19 @@ impl Task<'_> {
             None => start::lambda_ladder(records, &self.controller, None)?,
         };
         let mut best: Option<(f64, PlantModel, Start, ct_lti::Polynomial)> = None;
+        let mut gaps = None;
         for &lambda in &lambdas {
             let filter = ct_lti::Polynomial::new([lambda, 1.0])?.pow(self.orders.n);
             let least_squares =
                 start::least_squares(records, &self.controller, self.orders, &filter);
-            let Ok(mut plant) = least_squares else {
-                continue;
+            let mut plant = match least_squares {
+                Ok(plant) => plant,
+                Err(error) => {
+                    if matches!(error, fcloe::Error::Gaps { .. }) {
+                        gaps = Some(error);
+                    }
+                    continue;
+                }
             };
             let mut stage = Stage::LeastSquares;
             let mut last_filter = filter.clone();
@@ -46,7 +53,9 @@ impl Task<'_> {
             let Ok(simulated) = self.simulated(&record, &plant, self.levels_of(&record)) else {
                 continue;
             };
-            let error = rms(record.y.iter().zip(&simulated).map(|(y, model)| y - model));
+            let pairs = record.y.iter().zip(&simulated);
+            let readings = pairs.filter(|(y, _)| !y.is_nan());
+            let error = rms(readings.map(|(y, model)| y - model));
             if error.is_finite() && best.as_ref().is_none_or(|(least, ..)| error < *least) {
                 let start = Start {
                     from: name(stage),
@@ -57,7 +66,8 @@ impl Task<'_> {
             }
         }
         let tried = lambdas.len();
-        let (_, plant, start, filter) = best.ok_or(fcloe::Error::NoStart { tried })?;
+        let none = gaps.unwrap_or(fcloe::Error::NoStart { tried });
+        let (_, plant, start, filter) = best.ok_or(none)?;
         let mut std_errors = vec![None; plant.theta().len()];
         let warning = if with_instruments {
             match start::standard_errors(records, &self.controller, &filter, &plant) {

@@ -6,6 +6,7 @@ use fcloe::{
     Controller, LoopRecord, Noise, Offsets, PlantModel, Problem, Settings, Uncertainty,
     continuous_loop, noise_at_snr,
 };
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
@@ -24,6 +25,8 @@ pub struct Rig {
     pub unknown_levels: bool,
     /// Of white noise, or the correlation of neighbours.
     pub rho: f64,
+    /// 30 % of the readings are missing at random, and a block of 10 rows.
+    pub missing: bool,
 }
 
 impl Rig {
@@ -40,6 +43,7 @@ impl Rig {
             in_loop,
             unknown_levels: false,
             rho: 0.0,
+            missing: false,
         }
     }
 
@@ -54,6 +58,7 @@ impl Rig {
             in_loop,
             unknown_levels: false,
             rho: 0.0,
+            missing: false,
         }
     }
 
@@ -71,6 +76,7 @@ impl Rig {
             in_loop,
             unknown_levels: false,
             rho: 0.0,
+            missing: false,
         }
     }
 
@@ -89,6 +95,13 @@ impl Rig {
         Self {
             name: "the same, levels estimated",
             unknown_levels: true,
+            ..self
+        }
+    }
+
+    pub fn with_missing_readings(self) -> Self {
+        Self {
+            missing: true,
             ..self
         }
     }
@@ -133,6 +146,14 @@ impl Rig {
                 *v += 20.0;
             }
             offsets = Offsets::Estimated;
+        }
+        if self.missing {
+            let block = data.y.len() / 2..data.y.len() / 2 + 10;
+            for (k, y) in data.y.iter_mut().enumerate() {
+                if rng.random_bool(0.3) || block.contains(&k) {
+                    *y = f64::NAN;
+                }
+            }
         }
         if self.controller.is_open_loop() {
             return LoopRecord::open_loop(self.step, r, data.y, offsets);

@@ -40,6 +40,8 @@ enum Operation {
     Quantise(Register, Register),
     /// One of two, by a condition.
     Select(usize, Register, Register),
+    /// The one that a condition has chosen.
+    Copy(Register),
 }
 
 /// A difference whose sign decides on a branch.
@@ -148,6 +150,9 @@ pub(crate) struct Registers<T> {
     /// The answers of the guards.
     pub answers: Vec<bool>,
     taken: Vec<bool>,
+    /// The operations, and where their results go, that the taken branches leave: those that slopes and guards need, and all.
+    slopes: Vec<(Operation, Register)>,
+    all: Vec<(Operation, Register)>,
     /// Roots, powers and logarithms that have no value are zero: beyond a branch that a step has to end at.
     pub extended: bool,
 }
@@ -312,13 +317,71 @@ impl Tape {
         {
             *value = T::constant(*constant);
         }
-        self.run(0..self.once, &mut values, &[], false);
-        Registers {
-            values,
-            answers: vec![false; self.guards.len()],
-            taken: vec![false; self.branches.len()],
-            extended: false,
+        let once = self.operations[..self.once].iter().copied();
+        let once = once.zip(self.first_operation..);
+        for (operation, to) in once {
+            values[to] = operation.result(&values, false);
         }
+        let answers = vec![false; self.guards.len()];
+        let taken = self.branches.iter().map(|branch| branch.holds(&answers));
+        let mut registers = Registers {
+            values,
+            taken: taken.collect(),
+            answers,
+            slopes: Vec::with_capacity(self.operations.len()),
+            all: Vec::with_capacity(self.operations.len()),
+            extended: false,
+        };
+        self.choose_operations(&mut registers);
+        registers
+    }
+
+    /// Leaves out what only branches need that are not taken.
+    fn choose_operations<T>(&self, registers: &mut Registers<T>) {
+        let guards = self.guards.iter().map(|guard| guard.difference);
+        let slopes: Vec<Register> = self.derivatives.iter().copied().chain(guards).collect();
+        let delays = self.delays.iter().flat_map(|&(what, by)| [what, by]);
+        let plays = self.plays.iter().flat_map(|play| [play.from, play.to]);
+        let all = slopes.iter().chain(&self.outputs).chain(&self.starts);
+        let all: Vec<Register> = all.copied().chain(delays).chain(plays).collect();
+        self.needed(&slopes, &registers.taken, &mut registers.slopes);
+        self.needed(&all, &registers.taken, &mut registers.all);
+    }
+
+    /// The operations that results need, in order; what reads a choice reads the one that is chosen.
+    fn needed(&self, results: &[Register], taken: &[bool], into: &mut Vec<(Operation, Register)>) {
+        let first = self.first_operation;
+        let chosen = |mut register: Register| {
+            while let Some(i) = register.checked_sub(first)
+                && let Operation::Select(branch, a, b) = self.operations[i]
+            {
+                register = if taken[branch] { a } else { b };
+            }
+            register
+        };
+        let mut needed = vec![false; self.operations.len()];
+        for result in results {
+            if let Some(i) = result.checked_sub(first) {
+                needed[i] = true;
+            }
+        }
+        into.clear();
+        for i in (self.once..self.operations.len()).rev() {
+            if !needed[i] {
+                continue;
+            }
+            let operation = match self.operations[i] {
+                Operation::Select(..) => Operation::Copy(chosen(first + i)),
+                other => other.with(chosen),
+            };
+            for register in operation.reads().into_iter().flatten() {
+                if let Some(i) = register.checked_sub(first) {
+                    needed[i] = true;
+                }
+            }
+            into.push((operation, first + i));
+        }
+        into.reverse();
     }
 
     /// Of each delay, whether what is delayed is made of inputs, parameters and the time alone.
@@ -352,9 +415,18 @@ impl Tape {
 
     /// Computes everything from the time, inputs, states and delayed values, with the answers of the guards that the registers hold.
     pub fn evaluate<T: Scalar>(&self, registers: &mut Registers<T>) {
-        let all = self.once..self.operations.len();
         let extended = registers.extended;
-        self.run(all, &mut registers.values, &registers.taken, extended);
+        for &(operation, to) in &registers.all {
+            registers.values[to] = operation.result(&registers.values, extended);
+        }
+    }
+
+    /// The same for the slopes of the states and the differences of the guards alone.
+    pub fn evaluate_slopes<T: Scalar>(&self, registers: &mut Registers<T>) {
+        let extended = registers.extended;
+        for &(operation, to) in &registers.slopes {
+            registers.values[to] = operation.result(&registers.values, extended);
+        }
     }
 
     /// The same, where every guard answers by its difference.
@@ -377,77 +449,21 @@ impl Tape {
 
     /// Has the branches follow the answers.
     pub fn answers_changed<T>(&self, registers: &mut Registers<T>) {
+        let mut changed = false;
         for (branch, taken) in self.branches.iter().zip(&mut registers.taken) {
-            *taken = branch.holds(&registers.answers);
+            let now = branch.holds(&registers.answers);
+            changed |= now != *taken;
+            *taken = now;
+        }
+        if changed {
+            self.choose_operations(registers);
         }
     }
 
     /// Takes over the answers of other registers.
     pub fn copy_answers<T, S>(&self, from: &Registers<S>, to: &mut Registers<T>) {
         to.answers.copy_from_slice(&from.answers);
-        to.taken.copy_from_slice(&from.taken);
-    }
-
-    fn run<T: Scalar>(
-        &self,
-        which: std::ops::Range<usize>,
-        values: &mut [T],
-        taken: &[bool],
-        extended: bool,
-    ) {
-        let no_value = |x: f64| extended && x < 0.0;
-        let begin = self.first_operation + which.start;
-        for (i, operation) in self.operations[which].iter().enumerate() {
-            values[begin + i] = match *operation {
-                Operation::Negative(a) => -values[a],
-                Operation::Add(a, b) => values[a] + values[b],
-                Operation::Subtract(a, b) => values[a] - values[b],
-                Operation::Multiply(a, b) => values[a] * values[b],
-                Operation::Divide(a, b) => values[a] / values[b],
-                Operation::Power(a, _) | Operation::Sqrt(a) | Operation::Log(a)
-                    if no_value(values[a].value()) =>
-                {
-                    T::constant(0.0)
-                }
-                Operation::Power(a, b) => power(values[a], values[b]),
-                Operation::WholePower(a, n) => whole_power(values[a], n),
-                Operation::Sqrt(a) => {
-                    let root = values[a].value().sqrt();
-                    slope(values[a], root, 0.5 / root)
-                }
-                Operation::Exp(a) => values[a].exp(),
-                Operation::Log(a) => {
-                    let x = values[a].value();
-                    slope(values[a], x.ln(), 1.0 / x)
-                }
-                Operation::Log10(a) => {
-                    let x = values[a].value();
-                    slope(values[a], x.log10(), std::f64::consts::LOG10_E / x)
-                }
-                Operation::Sin(a) => values[a].sin_cos().0,
-                Operation::Cos(a) => values[a].sin_cos().1,
-                Operation::Tan(a) => {
-                    let tan = values[a].value().tan();
-                    slope(values[a], tan, 1.0 + tan * tan)
-                }
-                Operation::Tanh(a) => {
-                    let tanh = values[a].value().tanh();
-                    slope(values[a], tanh, 1.0 - tanh * tanh)
-                }
-                Operation::Atan2(a, b) => {
-                    let (y, x) = (values[a].value(), values[b].value());
-                    let square = x * x + y * y;
-                    let of = [(values[a], x / square), (values[b], -y / square)];
-                    T::with_slopes(y.atan2(x), of)
-                }
-                Operation::Quantise(a, b) => {
-                    // What is rounded rises as what goes in, on the whole; its steps have no derivative.
-                    let value = quantised(values[a].value(), values[b].value());
-                    slope(values[a], value, 1.0)
-                }
-                Operation::Select(branch, a, b) => values[if taken[branch] { a } else { b }],
-            };
-        }
+        self.answers_changed(to);
     }
 }
 
@@ -471,6 +487,61 @@ fn whole_power<T: Scalar>(a: T, n: i32) -> T {
 }
 
 impl Operation {
+    /// Its result. `extended`: roots, powers and logarithms of what is negative are zero.
+    #[inline(always)]
+    fn result<T: Scalar>(self, values: &[T], extended: bool) -> T {
+        let no_value = |x: f64| extended && x < 0.0;
+        match self {
+            Self::Negative(a) => -values[a],
+            Self::Add(a, b) => values[a] + values[b],
+            Self::Subtract(a, b) => values[a] - values[b],
+            Self::Multiply(a, b) => values[a] * values[b],
+            Self::Divide(a, b) => values[a] / values[b],
+            Self::Power(a, _) | Self::Sqrt(a) | Self::Log(a) if no_value(values[a].value()) => {
+                T::constant(0.0)
+            }
+            Self::Power(a, b) => power(values[a], values[b]),
+            Self::WholePower(a, n) => whole_power(values[a], n),
+            Self::Sqrt(a) => {
+                let root = values[a].value().sqrt();
+                slope(values[a], root, 0.5 / root)
+            }
+            Self::Exp(a) => values[a].exp(),
+            Self::Log(a) => {
+                let x = values[a].value();
+                slope(values[a], x.ln(), 1.0 / x)
+            }
+            Self::Log10(a) => {
+                let x = values[a].value();
+                slope(values[a], x.log10(), std::f64::consts::LOG10_E / x)
+            }
+            Self::Sin(a) => values[a].sin_cos().0,
+            Self::Cos(a) => values[a].sin_cos().1,
+            Self::Tan(a) => {
+                let tan = values[a].value().tan();
+                slope(values[a], tan, 1.0 + tan * tan)
+            }
+            Self::Tanh(a) => {
+                let tanh = values[a].value().tanh();
+                slope(values[a], tanh, 1.0 - tanh * tanh)
+            }
+            Self::Atan2(a, b) => {
+                let (y, x) = (values[a].value(), values[b].value());
+                let square = x * x + y * y;
+                let of = [(values[a], x / square), (values[b], -y / square)];
+                T::with_slopes(y.atan2(x), of)
+            }
+            Self::Quantise(a, b) => {
+                // What is rounded rises as what goes in, on the whole; its steps have no derivative.
+                let value = quantised(values[a].value(), values[b].value());
+                slope(values[a], value, 1.0)
+            }
+            Self::Copy(a) => values[a],
+            // Which of the two is decided before it is computed.
+            Self::Select(_, a, _) => values[a],
+        }
+    }
+
     /// The registers that it reads, guards aside.
     fn reads(self) -> [Option<Register>; 2] {
         match self {
@@ -491,7 +562,8 @@ impl Operation {
             | Self::Sin(a)
             | Self::Cos(a)
             | Self::Tan(a)
-            | Self::Tanh(a) => [Some(a), None],
+            | Self::Tanh(a)
+            | Self::Copy(a) => [Some(a), None],
         }
     }
 
@@ -516,6 +588,7 @@ impl Operation {
             Self::Atan2(a, b) => Self::Atan2(moved(a), moved(b)),
             Self::Quantise(a, b) => Self::Quantise(moved(a), moved(b)),
             Self::Select(branch, a, b) => Self::Select(branch, moved(a), moved(b)),
+            Self::Copy(a) => Self::Copy(moved(a)),
         }
     }
 }

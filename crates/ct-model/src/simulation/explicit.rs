@@ -57,7 +57,7 @@ const BEND: [f64; STAGES] = [
     69_997_945.0 / 29_380_423.0,
 ];
 
-/// Steps from `x` at `time` by `h`, to `work.next`.
+/// Steps from `x` at `time` by `h`, to `work.next`; where `work.begun`, the slope there stands in the first stage.
 pub(super) fn step<T: Scalar>(
     tape: &Tape,
     work: &mut Step<T>,
@@ -65,7 +65,8 @@ pub(super) fn step<T: Scalar>(
     (time, x, h): (T, &[T], T),
 ) {
     let n = x.len();
-    for (stage, row) in A.iter().enumerate() {
+    // The slope at the beginning may be known from the end of the last step.
+    for (stage, row) in A.iter().enumerate().skip(usize::from(work.begun)) {
         for i in 0..n {
             let mut sum = T::constant(0.0);
             for (k, a) in work.slopes.chunks_exact(n.max(1)).zip(*row) {
@@ -77,9 +78,10 @@ pub(super) fn step<T: Scalar>(
         let next = std::mem::take(&mut work.next);
         drive.load(tape, work, at, &next);
         work.next = next;
-        tape.evaluate(&mut work.registers);
+        tape.evaluate_slopes(&mut work.registers);
         work.keep_slope(tape, stage);
     }
+    work.begun = true;
 }
 
 /// The error of the step against the tolerance: at most one where it is good.

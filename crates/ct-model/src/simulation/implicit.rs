@@ -66,7 +66,7 @@ impl Jacobian {
                 *state = Dual::variable(state.re, lane);
             }
             tape.copy_answers(at, &mut self.registers);
-            tape.evaluate(&mut self.registers);
+            tape.evaluate_slopes(&mut self.registers);
             for (i, &register) in tape.derivatives.iter().enumerate() {
                 for lane in 0..LANES.min(n - begin) {
                     self.matrix[(i, begin + lane)] = self.registers.values[register].eps[lane];
@@ -94,8 +94,9 @@ pub(super) fn step<T: Scalar>(
 ) -> Option<f64> {
     let n = x.len();
     drive.load(tape, work, time, x);
-    tape.evaluate(&mut work.registers);
+    tape.evaluate_slopes(&mut work.registers);
     work.keep_slope(tape, 0);
+    work.begun = false;
     jacobian.compute(tape, &work.registers);
     let newton = DMatrix::identity(n, n) - &jacobian.matrix * (GAMMA * h.value());
     let inverse = newton.try_inverse()?;
@@ -116,7 +117,7 @@ pub(super) fn step<T: Scalar>(
             let next = std::mem::take(&mut work.next);
             drive.load(tape, work, time + h * NODES[stage], &next);
             work.next = next;
-            tape.evaluate(&mut work.registers);
+            tape.evaluate_slopes(&mut work.registers);
             for (i, &register) in tape.derivatives.iter().enumerate() {
                 left[i] = work.registers.values[register] - slope[i];
             }

@@ -43,13 +43,7 @@ impl<T: Scalar> Simulation<'_, T> {
         if self.settled || (tape.settled.is_empty() && tape.plays.is_empty()) {
             return;
         }
-        let still = vec![0.0; inputs.len()];
-        let drive = Drive {
-            begin: 0.0,
-            from: inputs,
-            rise: &still,
-            delays,
-        };
+        let drive = Drive::held(inputs, &self.held, delays);
         drive.load(tape, &mut self.work, self.time, &self.state);
         self.before_the_record();
     }

@@ -26,8 +26,11 @@ use crate::scalar::Scalar;
 use crate::spec::ModelSpec;
 use crate::tape::Tape;
 
-/// Error of a step, as a share of the largest absolute value that a state has had.
-const TOLERANCE: f64 = 1e-10;
+/// Error of a step, as a share of the largest absolute value that a state has had: of an explicit step that of the result of order four,
+/// which is larger than that of the result of order five that is kept.
+const TOLERANCE: f64 = 2e-10;
+/// Of an implicit step.
+const TOLERANCE_IMPLICIT: f64 = 1e-10;
 /// The shortest step, as a share of an interval between rows.
 const SHORTEST: f64 = 1e-9;
 /// Two events of one guard that lie nearer to each other than this share of an interval slide: from there a step of this length is taken.
@@ -136,6 +139,14 @@ pub struct Simulation<'a, T> {
     rise: Vec<f64>,
     /// The inputs at the end of the last interval.
     last: Vec<f64>,
+    /// The inputs of the last reading.
+    read: Vec<f64>,
+    /// No rise.
+    held: Vec<f64>,
+    /// The registers hold what these and the present states give.
+    computed: bool,
+    /// What the rise of the inputs adds to the slopes, per unit of time: of exact steps.
+    added: Vec<T>,
     scratch: Vec<T>,
     begun: bool,
     /// Settled states have their initial values.
@@ -184,6 +195,10 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             length: f64::INFINITY,
             rise: vec![0.0; tape.inputs],
             last: vec![0.0; tape.inputs],
+            read: vec![0.0; tape.inputs],
+            held: vec![0.0; tape.inputs],
+            computed: false,
+            added: vec![zero; tape.states],
             scratch: vec![zero; tape.states],
             begun: false,
             settled: false,
@@ -209,13 +224,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let Some(delays) = self.delays.take() else {
             return;
         };
-        self.rise.fill(0.0);
-        let drive = Drive {
-            begin: 0.0,
-            from: inputs,
-            rise: &self.rise,
-            delays: &delays,
-        };
+        let drive = Drive::held(inputs, &self.held, &delays);
         let tape = &self.model.tape;
         drive.load(tape, &mut self.work, self.time, &self.state);
         if self.begun {
@@ -224,6 +233,9 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             self.before_the_record();
         }
         self.remember();
+        self.read.copy_from_slice(inputs);
+        // A delay may let something through, and a play move, where the interval begins.
+        self.computed = tape.delays.is_empty() && tape.plays.is_empty();
         self.delays = Some(delays);
         for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {
             *output = self.work.registers.values[register];
@@ -270,6 +282,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             self.steps(tape, (from, &rise), (begin, until), delays)
         };
         self.rise = rise;
+        self.computed = false;
         self.time = T::constant(until);
         let finite = |x: &T| x.value().abs() < 1e150;
         if result.is_ok() && self.state.iter().all(finite) {
@@ -296,34 +309,33 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let tape = &self.model.tape;
         let n = tape.states;
         let delays = Delays { all: Vec::new() };
-        let mut drive = Drive {
-            begin: 0.0,
-            from,
-            rise: &[],
-            delays: &delays,
-        };
         // `time` plays no part in what is linear; held inputs first, then what their rise adds.
-        let held = vec![0.0; from.len()];
-        drive.rise = &held;
-        drive.load(tape, &mut self.work, self.time, &self.state);
-        // A branch may stand on an input.
-        tape.evaluate_with_guards(&mut self.work.registers);
+        if !self.is_computed(from) {
+            let drive = Drive::held(from, &self.held, &delays);
+            drive.load(tape, &mut self.work, self.time, &self.state);
+            // A branch may stand on an input.
+            tape.evaluate_with_guards(&mut self.work.registers);
+        }
         self.work.keep_slope(tape, 0);
         self.remember();
         self.begun = true;
-        let mut added = vec![T::constant(0.0); n];
         if rise.iter().any(|rise| *rise != 0.0) {
-            let ends: Vec<f64> = from.iter().zip(rise).map(|(u, r)| u + r * h).collect();
-            drive.from = &ends;
+            let ends = self.last.iter_mut().zip(from).zip(rise);
+            for ((end, from), rise) in ends {
+                *end = from + rise * h;
+            }
+            let drive = Drive::held(&self.last, &self.held, &delays);
             drive.load(tape, &mut self.work, self.time, &self.state);
             tape.evaluate(&mut self.work.registers);
             self.work.keep_slope(tape, 1);
-            for (i, added) in added.iter_mut().enumerate() {
+            for (i, added) in self.added.iter_mut().enumerate() {
                 *added = (self.work.slopes[n + i] - self.work.slopes[i]) * (1.0 / h);
             }
+        } else {
+            self.added.fill(T::constant(0.0));
         }
         if let Some(exact) = &mut self.exact {
-            exact.step(&mut self.state, &self.work.slopes[..n], &added, h);
+            exact.step(&mut self.state, &self.work.slopes[..n], &self.added, h);
         }
         Ok(())
     }
@@ -360,15 +372,24 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             }
         }
         self.begun = true;
-        let drive = Drive {
-            begin,
-            from,
-            rise,
-            delays,
-        };
-        drive.load(tape, &mut self.work, self.time, &self.state);
-        tape.evaluate_with_guards(&mut self.work.registers);
-        self.remember();
+        if !self.is_computed(from) {
+            let drive = Drive {
+                begin,
+                from,
+                rise,
+                delays,
+            };
+            drive.load(tape, &mut self.work, self.time, &self.state);
+            tape.evaluate_with_guards(&mut self.work.registers);
+            self.remember();
+        }
+        self.work.keep_slope(tape, 0);
+        self.work.begun = true;
+    }
+
+    /// Whether the registers hold what these inputs give at the present row.
+    fn is_computed(&self, inputs: &[f64]) -> bool {
+        self.computed && self.read == inputs
     }
 
     /// Keeps what is delayed over the next or the last step: what is known ahead for a whole interval, everything else after each step.
@@ -486,20 +507,25 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             if !error.is_finite() {
                 return Err(NoSolution { time: now });
             }
-            let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
             let is_new = beyond.is_none();
             let event = match beyond {
                 Some((event, _)) => Some(event),
                 None => self.first_event(tape, (from, rise), (begin, interval), h, delays),
             };
-            if event.is_none() && (!whole || grown > self.length || error > 0.5) {
-                self.length = grown.max(shortest);
+            let is_short = !whole || error > 0.5 || self.length.is_finite();
+            if event.is_none() && is_short {
+                let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
+                if !whole || error > 0.5 || grown > self.length {
+                    self.length = grown.max(shortest);
+                }
             }
             if let Some(Event { after, .. }) = event.as_ref().filter(|_| is_new) {
                 h = *after;
                 self.attempt(tape, (from, rise), begin, h, delays);
             }
             self.keep_past(from, rise, (begin, h), delays, false);
+            self.work
+                .go_on(event.is_none() && self.method == Method::Explicit);
             self.state.copy_from_slice(&self.work.next);
             self.time = self.time + h;
             self.note_largest();
@@ -525,6 +551,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 }
             } else if let Some(out) = out.filter(|_| whole) {
                 delays.all[out].let_out();
+                self.work.begun = false;
                 // A branch may stand on what jumps.
                 let drive = Drive {
                     begin,
@@ -557,6 +584,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         delays: &Delays<T>,
     ) -> Option<(Event<T>, f64)> {
         self.work.registers.extended = true;
+        self.work.begun = false;
         let error = self.attempt(tape, inputs, begin, h, delays);
         let event = error
             .is_finite()
@@ -567,6 +595,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             (event, error)
         });
         self.work.registers.extended = false;
+        self.work.begun = false;
         found
     }
 
@@ -586,7 +615,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             delays,
         };
         drive.load(tape, &mut self.work, self.time, &self.state);
-        tape.evaluate(&mut self.work.registers);
+        tape.evaluate_slopes(&mut self.work.registers);
         for (x, &register) in self.state.iter_mut().zip(&tape.derivatives) {
             *x = *x + left * self.work.registers.values[register];
         }
@@ -622,6 +651,10 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             rise,
             delays,
         };
+        let tolerance = match self.method {
+            Method::Implicit => TOLERANCE_IMPLICIT,
+            _ => TOLERANCE,
+        };
         for (i, scale) in self.scale.iter_mut().enumerate() {
             let slope = self.work.slopes.get(i).map_or(0.0, |k| k.value().abs());
             let moved = if slope.is_finite() {
@@ -629,7 +662,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             } else {
                 0.0
             };
-            *scale = TOLERANCE * self.largest[i].max(moved).max(1e-30);
+            *scale = tolerance * self.largest[i].max(moved).max(1e-30);
         }
         let at = (self.time, &self.state[..], h);
         match (&mut self.jacobian, self.method) {

@@ -13,6 +13,8 @@ pub(super) struct Step<T> {
     pub slopes: Vec<T>,
     /// The states at the end.
     pub next: Vec<T>,
+    /// The slope at the beginning stands in the first stage.
+    pub begun: bool,
 }
 
 impl<T: Scalar> Step<T> {
@@ -22,7 +24,17 @@ impl<T: Scalar> Step<T> {
             registers: tape.registers(parameters),
             slopes: vec![zero; explicit::STAGES * tape.states],
             next: vec![zero; tape.states],
+            begun: false,
         }
+    }
+
+    /// What follows a step: the slope at its end is that at the next one's beginning, where nothing jumps between.
+    pub fn go_on(&mut self, smooth: bool) {
+        let n = self.next.len();
+        if smooth {
+            self.slopes.copy_within((explicit::STAGES - 1) * n.., 0);
+        }
+        self.begun = smooth;
     }
 
     /// Keeps the derivative that the registers hold as that of a stage.
@@ -44,7 +56,17 @@ pub(super) struct Drive<'a, T> {
     pub delays: &'a Delays<T>,
 }
 
-impl<T: Scalar> Drive<'_, T> {
+impl<'a, T: Scalar> Drive<'a, T> {
+    /// Inputs that are held; `still`: a zero for each.
+    pub fn held(inputs: &'a [f64], still: &'a [f64], delays: &'a Delays<T>) -> Self {
+        Self {
+            begin: 0.0,
+            from: inputs,
+            rise: still,
+            delays,
+        }
+    }
+
     /// Writes time, inputs, states and delayed values into the registers.
     pub fn load(&self, tape: &Tape, work: &mut Step<T>, time: T, x: &[T]) {
         let values = &mut work.registers.values;

@@ -14,6 +14,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use crate::tour_records::Result;
 
 /// A column of a record.
+#[derive(Debug)]
 struct Column {
     /// Its head.
     head: &'static str,
@@ -24,6 +25,7 @@ struct Column {
 }
 
 /// How the record of a model is made.
+#[derive(Debug)]
 struct Recipe {
     name: &'static str,
     /// Head of the time's column, and interval \[its unit\].
@@ -281,7 +283,69 @@ pub fn make() -> Result<Vec<ModelRecord>> {
     RECIPES.iter().zip(1..).map(record).collect()
 }
 
-fn record((recipe, seed): (&Recipe, u64)) -> Result<ModelRecord> {
+/// A model with the parameters that make its record, and how it is driven.
+#[derive(Debug)]
+pub struct DrivenModel {
+    /// Of the model: its files are `name.mo`, `name.toml` and `name.csv`.
+    pub name: &'static str,
+    /// The model as its text has it, but for the values of its parameters.
+    pub spec: ModelSpec,
+    /// The values of the text, in the order of the parameters.
+    pub guesses: Vec<f64>,
+    /// Initial states.
+    pub initial: Vec<f64>,
+    /// Rows of the record.
+    pub rows: usize,
+    /// Between two rows \[unit of the model's time\].
+    pub interval: f64,
+    /// Seconds in one unit of the model's time, and how that is written.
+    pub time_unit: (f64, &'static str),
+    /// Whether inputs run in straight lines between rows, and are not held.
+    pub lines: bool,
+    /// Standard deviation of each output's noise \[unit of the model\].
+    pub noise: Vec<f64>,
+    recipe: &'static Recipe,
+}
+
+impl DrivenModel {
+    /// Samples of every input, as many digits as a file has \[unit of the model\].
+    ///
+    /// # Errors
+    /// Where the settings of the excitation cannot be.
+    pub fn inputs(&self, rows: usize, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<f64>>> {
+        let columns = self.columns(rows, rng)?;
+        let of = |(samples, column): (Vec<f64>, &Column)| {
+            samples.into_iter().map(|u| u / column.per_unit).collect()
+        };
+        Ok(columns
+            .into_iter()
+            .zip(self.recipe.inputs)
+            .map(of)
+            .collect())
+    }
+
+    /// The same in the units of the file's columns.
+    fn columns(&self, rows: usize, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<f64>>> {
+        let mut inputs = (self.recipe.drive)(rows, rng)?;
+        for (samples, column) in inputs.iter_mut().zip(self.recipe.inputs) {
+            let scale = 10_f64.powi(column.digits as i32);
+            for sample in samples {
+                *sample = (*sample * scale).round() / scale;
+            }
+        }
+        Ok(inputs)
+    }
+}
+
+/// All models with what drives them.
+///
+/// # Errors
+/// Where a text cannot be read or has other names than the settings here.
+pub fn driven_models() -> Result<Vec<DrivenModel>> {
+    RECIPES.iter().map(driven).collect()
+}
+
+fn driven(recipe: &'static Recipe) -> Result<DrivenModel> {
     let text = std::fs::read_to_string(folder().join(recipe.name).with_extension("mo"))?;
     let mut spec = ModelSpec::parse(&text)?;
     let guesses = spec
@@ -297,23 +361,43 @@ fn record((recipe, seed): (&Recipe, u64)) -> Result<ModelRecord> {
         }
     }
     let model = Model::new(spec);
+    let mut initial = model.starts(&model.parameters());
     let spec = model.spec();
-    let parameters = model.parameters();
-    let mut initial = model.starts(&parameters);
     for (name, value) in states {
         let i = spec.states.iter().position(|s| s.about.name == name);
         initial[i.ok_or_else(|| format!("{}: no {name}", recipe.name))?] = value;
     }
+    Ok(DrivenModel {
+        name: recipe.name,
+        guesses,
+        initial,
+        rows: recipe.rows,
+        interval: recipe.time.1,
+        time_unit: if recipe.time.0.ends_with("[h]") {
+            (3600.0, "h")
+        } else {
+            (1.0, "s")
+        },
+        lines: recipe.lines,
+        noise: recipe
+            .outputs
+            .iter()
+            .map(|(column, sigma)| sigma / column.per_unit)
+            .collect(),
+        spec: spec.clone(),
+        recipe,
+    })
+}
+
+fn record((recipe, seed): (&'static Recipe, u64)) -> Result<ModelRecord> {
+    let driven = driven(recipe)?;
+    let model = Model::new(driven.spec.clone());
+    let spec = model.spec();
+    let parameters = model.parameters();
 
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // The simulator gets the inputs as the file will have them.
-    let mut inputs = (recipe.drive)(recipe.rows, &mut rng)?;
-    for (samples, column) in inputs.iter_mut().zip(recipe.inputs) {
-        let scale = 10_f64.powi(column.digits as i32);
-        for sample in samples {
-            *sample = (*sample * scale).round() / scale;
-        }
-    }
+    let inputs = driven.columns(recipe.rows, &mut rng)?;
     let noise: Vec<Vec<f64>> = recipe
         .outputs
         .iter()
@@ -328,7 +412,7 @@ fn record((recipe, seed): (&Recipe, u64)) -> Result<ModelRecord> {
     let heads = recipe.inputs.iter().map(|column| column.head);
     let heads = heads.chain(recipe.outputs.iter().map(|(column, _)| column.head));
     let mut csv = heads.fold(head.to_string(), |line, head| line + "," + head) + "\n";
-    let mut simulation = Simulation::new(&model, &parameters, &initial, 0.0);
+    let mut simulation = Simulation::new(&model, &parameters, &driven.initial, 0.0);
     let mut read = vec![0.0; spec.outputs.len()];
     for k in 0..recipe.rows {
         // A sum of intervals would drift away from what is written.
@@ -347,10 +431,10 @@ fn record((recipe, seed): (&Recipe, u64)) -> Result<ModelRecord> {
             simulation.advance(&at(k), &to, time(k + 1))?;
         }
     }
-    let outputs = spec.outputs.iter().zip(recipe.outputs);
-    let noise = outputs.map(|(output, (column, sigma))| {
+    let outputs = spec.outputs.iter().zip(&driven.noise);
+    let noise = outputs.map(|(output, sigma)| {
         let name = spec.about(output.variable).name.clone();
-        (name, sigma / column.per_unit)
+        (name, *sigma)
     });
     let parameters = spec.parameters.iter();
     Ok(ModelRecord {
@@ -360,6 +444,6 @@ fn record((recipe, seed): (&Recipe, u64)) -> Result<ModelRecord> {
         parameters: parameters
             .map(|parameter| (parameter.about.name.clone(), parameter.value))
             .collect(),
-        guesses,
+        guesses: driven.guesses,
     })
 }

@@ -1,0 +1,199 @@
+//! How often what is hidden in a record of a model of `examples/models` is named:
+//!
+//! ```sh
+//! cargo run --release -p ctid-tests --example library_study -- --sample 60
+//! ```
+//! Every effect at every port, alone and in pairs, the candidates of a user's own beside decoys, nothing, and what neither the catalogue nor
+//! a candidate holds. The truth is the model's own text with parameters of its own and the effect; the noise is scaled so that what the
+//! refitted believed model leaves of the noise-free record is 1 or 3 times the noise (root mean square over the outputs). The believed
+//! parameters are up to 40 % off; some records come in two parts, miss cells, or have a slower output.
+//!
+//! Counted are records on which the noise that made them shows what is hidden. A miss is printed with a name that `--only` runs again.
+#![allow(clippy::unwrap_used)]
+
+mod outside;
+mod own;
+mod record;
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use ct_model::effects::{Visited, candidates};
+use ctid_examples::model_records::driven_models;
+use effect_search::Verdict;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use record::{Hidden, Job, Outcome, outcome};
+
+/// A study of simulated records of the model library.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// Records in a cell.
+    #[arg(long, default_value_t = 1)]
+    records: u64,
+    /// So many of all records, drawn at random.
+    #[arg(long)]
+    sample: Option<usize>,
+    /// Of these kinds: single, own, pair, clean, outside.
+    #[arg(long, value_delimiter = ',', default_values = ["single", "own", "pair", "clean", "outside"])]
+    kinds: Vec<String>,
+    /// Of these models, all where none is given.
+    #[arg(long, value_delimiter = ',')]
+    models: Vec<String>,
+    /// Structural errors over the noise.
+    #[arg(long, value_delimiter = ',', default_values_t = [1.0, 3.0])]
+    ratios: Vec<f64>,
+    /// Only records whose name holds this.
+    #[arg(long, default_value = "")]
+    only: String,
+    /// Seed of everything.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Time limit of a diagnosis \[s\].
+    #[arg(long, default_value_t = 20.0)]
+    limit: f64,
+    /// Says more of each record.
+    #[arg(long)]
+    verbose: bool,
+}
+
+fn main() {
+    let arguments = Arguments::parse();
+    let models = driven_models().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(arguments.seed);
+    let mut jobs = Vec::new();
+    for (model, driven) in models.iter().enumerate() {
+        if !arguments.models.is_empty() && !arguments.models.iter().any(|m| m == driven.name) {
+            continue;
+        }
+        let all = candidates(&driven.spec, &Visited::nominal(&driven.spec));
+        let effects: Vec<String> = all.iter().map(|c| c.id.clone()).collect();
+        let own: Vec<String> = own::candidates(driven.name).into_keys().collect();
+        let mut hidden: Vec<(&'static str, Hidden)> = Vec::new();
+        hidden.extend(
+            effects
+                .iter()
+                .map(|id| ("single", Hidden::Effects(vec![id.clone()]))),
+        );
+        hidden.extend(
+            own.iter()
+                .map(|id| ("own", Hidden::Effects(vec![id.clone()]))),
+        );
+        let both: Vec<&String> = effects.iter().chain(&own).collect();
+        for _ in 0..both.len() {
+            let a = both[rng.random_range(0..both.len())];
+            // As often as not one of them is of the user's own.
+            let b = if rng.random::<f64>() < 0.4 && !own.is_empty() {
+                &own[rng.random_range(0..own.len())]
+            } else {
+                both[rng.random_range(0..both.len())]
+            };
+            if a != b {
+                hidden.push(("pair", Hidden::Effects(vec![a.clone(), b.clone()])));
+            }
+        }
+        hidden.extend((0..20).map(|_| ("clean", Hidden::Nothing)));
+        hidden.extend(
+            (0..3 * outside::KINDS.len())
+                .map(|k| ("outside", Hidden::Outside(k % outside::KINDS.len()))),
+        );
+        let mut number = 0;
+        for (kind, hidden) in hidden {
+            for &ratio in &arguments.ratios {
+                for coloured in [false, true] {
+                    for closed in [false, true] {
+                        for _ in 0..arguments.records {
+                            number += 1;
+                            jobs.push(Job {
+                                model,
+                                kind,
+                                hidden: hidden.clone(),
+                                ratio,
+                                coloured,
+                                closed,
+                                number,
+                            });
+                        }
+                    }
+                }
+            }
+        }
+    }
+    jobs.retain(|job| {
+        arguments.kinds.iter().any(|kind| kind == job.kind)
+            && job.name(&models).contains(&arguments.only)
+    });
+    if let Some(sample) = arguments.sample {
+        // As many of each kind.
+        jobs.shuffle(&mut rng);
+        let share = sample.div_ceil(arguments.kinds.len());
+        let mut taken: BTreeMap<&str, usize> = BTreeMap::new();
+        jobs.retain(|job| {
+            let count = taken.entry(job.kind).or_default();
+            *count += 1;
+            *count <= share
+        });
+    }
+    let begun = Instant::now();
+    let mut cells: BTreeMap<String, Vec<Outcome>> = BTreeMap::new();
+    let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
+    for job in &jobs {
+        let name = job.name(&models);
+        let limit = Duration::from_secs_f64(arguments.limit);
+        match outcome(job, &models, arguments.seed, limit, arguments.verbose) {
+            Ok(outcome) => {
+                if !outcome.right || arguments.verbose {
+                    let mark = if outcome.right { "right" } else { "MISS" };
+                    println!("{mark} {} `{name}`: {}", job.kind, outcome.told);
+                }
+                let noise = if job.coloured { "coloured" } else { "white" };
+                let cell = match job.kind {
+                    "clean" => format!("clean, {noise}"),
+                    kind => format!("{kind}, {noise}, {}x", job.ratio),
+                };
+                cells.entry(cell).or_default().push(outcome.clone());
+                cells
+                    .entry(format!("{}, all", job.kind))
+                    .or_default()
+                    .push(outcome);
+            }
+            Err(why) => *skipped.entry(format!("{}: {why}", job.kind)).or_default() += 1,
+        }
+    }
+    table(&cells);
+    for (why, count) in skipped {
+        println!("left out, {why}: {count}");
+    }
+    println!("{:.0} s", begun.elapsed().as_secs_f64());
+}
+
+fn table(cells: &BTreeMap<String, Vec<Outcome>>) {
+    println!(
+        "{:<26}{:>8}{:>8}{:>9}{:>8}{:>8}{:>8}{:>9}{:>9}{:>6}",
+        "", "records", "right", "in group", "first", "group", "claims", "median s", "most s", "cut"
+    );
+    for (cell, outcomes) in cells {
+        let share = |of: &dyn Fn(&Outcome) -> bool| {
+            let count = outcomes.iter().filter(|o| of(o)).count();
+            format!("{:.0} %", 100.0 * count as f64 / outcomes.len() as f64)
+        };
+        let middle = |of: &dyn Fn(&Outcome) -> f64| {
+            let mut all: Vec<f64> = outcomes.iter().map(of).collect();
+            all.sort_by(f64::total_cmp);
+            (all[all.len() / 2], all[all.len() - 1])
+        };
+        let (median, most) = middle(&|o| o.seconds);
+        println!(
+            "{cell:<26}{:>8}{:>8}{:>9}{:>8}{:>8}{:>8}{median:>9.1}{most:>9.1}{:>6}",
+            outcomes.len(),
+            share(&|o| o.right),
+            share(&|o| o.in_group),
+            share(&|o| o.first),
+            middle(&|o| o.group as f64).0,
+            share(&|o| !matches!(o.verdict, Verdict::Adequate | Verdict::Unexplained)),
+            outcomes.iter().filter(|o| o.cut_short).count(),
+        );
+    }
+}

@@ -26,6 +26,8 @@ use crate::{Error, held_out_errors};
 /// Shares of the time limit after which the phases end.
 const SEARCHED_WHITE: f64 = 0.5;
 const SEARCHED: f64 = 0.8;
+/// So many effects are searched in white noise before the noise model is taken from what they leave: more of them explain noise.
+const BEFORE_NOISE: usize = 2;
 /// Effects that leave more than noise are a part of the answer where they explain this share of the error above the noise.
 const PART: f64 = 0.38;
 /// Noise models whose coefficients differ by less are one.
@@ -53,11 +55,21 @@ pub fn diagnose(
     let (context, base) = begin(problem, options, limit)?;
     tell("searching the effects");
     let white = Noise::white(problem.spec.outputs.len());
-    let by_error = context.grow(base.clone(), &white, options.max_effects, SEARCHED_WHITE)?;
-    let noise = context.noise_of(&by_error.best)?;
+    let few = options.max_effects.min(BEFORE_NOISE);
+    let mut by_error = context.grow(base.clone(), &white, few, SEARCHED_WHITE)?;
+    let mut noise = context.noise_of(&by_error.best)?;
+    let full = by_error.best.added.len() >= base.added.len() + few;
+    if noise.order() == 0 && full && few < options.max_effects {
+        by_error = context.grow_on(by_error, &white, options.max_effects, SEARCHED_WHITE)?;
+        noise = context.noise_of(&by_error.best)?;
+    }
     let (grown, noise) = in_metric(&context, by_error, noise, options)?;
     tell("confirming");
     let mut confirmed = context.confirm(grown.best.clone(), &grown.base, &noise)?;
+    if grown.cut_short && confirmed.added.len() == grown.base.added.len() {
+        // The noise model of a search that was cut short explains what was not reached: the test below decides without it.
+        confirmed = grown.best.clone();
+    }
     if confirmed.added.len() > grown.base.added.len() {
         // Each model with the noise model of its own residual: what coloured noise explains needs no effect.
         let own = context.in_own_noise(&confirmed)?;
@@ -72,8 +84,12 @@ pub fn diagnose(
     let left = context.left(&confirmed, &own)?;
     tell("telling apart");
     let found = confirmed.added.len() > grown.base.added.len();
-    let share = found.then(|| explained(&base, &confirmed, &own, left.is_none()));
+    // What a search did not reach its noise model explains: then the effects are a part of the answer at most.
+    let open = grown.cut_short && own.noise.order() > 0;
+    let whole = left.is_none() && !open;
+    let share = found.then(|| explained(&base, &confirmed, &own, whole));
     let verdict_of = |groups: &[Vec<usize>]| match (found, &left, share) {
+        (true, None, _) if open => Verdict::Partial,
         (false, None, _) => Verdict::Adequate,
         (false, Some(_), _) => Verdict::Unexplained,
         (true, Some(_), Some(share)) if share >= PART => Verdict::Partial,
@@ -92,8 +108,31 @@ pub fn diagnose(
         own
     };
     report(
-        &context, &grown, &base, &confirmed, &last, verdict, groups, left, share,
+        &context,
+        &grown,
+        Finding {
+            base: &base,
+            last: &confirmed,
+            own: &last,
+            verdict,
+            groups,
+            left,
+            share,
+        },
     )
+}
+
+/// What was found.
+struct Finding<'a> {
+    /// The believed model, and the last one.
+    base: &'a Node,
+    last: &'a Node,
+    /// The fit whose noise is told: that of the last model with the noise model of its own residual.
+    own: &'a Fit,
+    verdict: Verdict,
+    groups: Vec<Vec<usize>>,
+    left: Option<crate::Left>,
+    share: Option<f64>,
 }
 
 /// The believed model fitted, and the candidates.
@@ -183,13 +222,23 @@ fn in_metric(
     noise: Noise,
     options: &Options,
 ) -> Result<(Grown, Noise), Error> {
-    if noise.order() == 0 || context.limit.passed(SEARCHED_WHITE) {
+    if noise.order() == 0 {
         return Ok((by_error, noise));
     }
     let begin = context.refitted(&by_error.base, &noise, FINE);
     let Ok(begin) = begin else {
         return Ok((by_error, Noise::white(noise.outputs())));
     };
+    if context.limit.passed(SEARCHED_WHITE) {
+        // Sets are compared in one metric, whatever time is left.
+        let mut grown = by_error;
+        if let Ok(best) = context.refitted(&grown.best, &noise, FINE) {
+            (grown.base, grown.best) = (begin, best);
+            grown.cut_short = true;
+            return Ok((grown, noise));
+        }
+        return Ok((grown, Noise::white(noise.outputs())));
+    }
     let grown = context.grow(begin, &noise, options.max_effects, SEARCHED)?;
     // The rich set of white noise may be the better one here too.
     let other = context.refitted(&by_error.best, &noise, FINE);
@@ -232,18 +281,16 @@ fn explained(base: &Node, last: &Node, own: &Fit, whole: bool) -> f64 {
     ((before - after.max(1.0)) / (before - 1.0)).clamp(0.0, 1.0)
 }
 
-#[allow(clippy::too_many_arguments)]
-fn report(
-    context: &Context,
-    grown: &Grown,
-    base: &Node,
-    last: &Node,
-    own: &Fit,
-    verdict: Verdict,
-    groups: Vec<Vec<usize>>,
-    left: Option<crate::Left>,
-    share: Option<f64>,
-) -> Result<Diagnosis, Error> {
+fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosis, Error> {
+    let Finding {
+        base,
+        last,
+        own,
+        verdict,
+        groups,
+        left,
+        share,
+    } = finding;
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
     let floors: Vec<f64> = own.noise.iter().map(ArModel::stationary_std).collect();
@@ -313,7 +360,7 @@ fn report(
         noise: noise.collect(),
         singles,
         candidates: context.candidates.len(),
-        cut_short: context.limit.passed(SEARCHED),
+        cut_short: grown.cut_short || context.limit.passed(SEARCHED),
         seconds: context.limit.seconds(),
     })
 }
@@ -371,7 +418,16 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
         .iter()
         .flat_map(|_| spec.states.iter().map(|s| s.about.unit.clone()));
     let entries = setup.names().iter().zip(units.chain(states)).enumerate();
+    let effect_of = |name: &String| {
+        let brings = |&&c: &&usize| {
+            let own = &context.candidates[c].parameters;
+            own.iter().any(|p| p.name == *name)
+        };
+        let effect = node.added.iter().find(brings);
+        effect.map(|&c| context.candidates[c].id.clone())
+    };
     let parameters = entries.map(|(i, (name, unit))| Estimate {
+        effect: effect_of(name),
         name: name.clone(),
         value: node.fit.x[i],
         std_error: errors[i],

@@ -15,6 +15,10 @@ const REFITS: usize = 20;
 /// Those whose first fit is within this are fitted to the end.
 const NEAR: f64 = 60.0;
 
+/// A stand-in is fitted where one step promises at least this share of what the effect itself explains, but for this much.
+const PROMISE: f64 = 0.3;
+const SPARE: f64 = 10.0;
+
 impl Context<'_> {
     /// For each effect that the search added itself, then all that can stand in for it, best first.
     pub fn groups(
@@ -29,10 +33,12 @@ impl Context<'_> {
             let mut group = vec![own];
             if !self.limit.passed(0.95) {
                 let without = self.without(last, position, noise, FINE)?;
+                let fall = without.fit.deviance - last.fit.deviance;
                 let trials = self.trials(&without, noise);
                 let trials: Vec<_> = trials
                     .into_iter()
                     .filter(|trial| !last.added.contains(&trial.candidate))
+                    .filter(|trial| trial.fall > PROMISE * fall - SPARE)
                     .take(REFITS)
                     .collect();
                 let near = |node: &Node| node.fit.bic() - last.fit.bic() < NEAR;

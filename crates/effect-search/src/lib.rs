@@ -12,6 +12,7 @@ mod diagnose;
 mod error;
 mod groups;
 mod held_out;
+mod joined;
 mod left;
 mod node;
 mod pairs;

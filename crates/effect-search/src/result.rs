@@ -35,6 +35,9 @@ pub struct Estimate {
     pub unit: String,
     /// It is not fitted.
     pub known: bool,
+    /// The effect whose parameter it is; `None` of the believed model's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effect: Option<String>,
 }
 
 /// A model on the way: the believed one, then with one effect more each.

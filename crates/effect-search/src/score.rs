@@ -11,10 +11,11 @@ use std::sync::Arc;
 
 use ct_model::Model;
 use ct_model::effects::Role;
-use estimation::{Noise, Residuals, linearise, within};
+use estimation::{Noise, Residuals, Rows, Triangle, linearise, within};
 use rayon::prelude::*;
 
 use crate::Error;
+use crate::joined::Joined;
 use crate::node::{Context, Node};
 use crate::spectral_line::strongest_line;
 
@@ -22,6 +23,10 @@ use crate::spectral_line::strongest_line;
 const MOST_STARTS: usize = 24;
 /// Damping of the predicted step, against what the data do not determine.
 const DAMPING: f64 = 1e-9;
+/// From so many of the best starts of a threshold or a shape a candidate is fitted.
+const PLACES: usize = 2;
+/// So many of the best starts of a threshold are linearised by all parameters.
+const LINEARISED: usize = 3;
 
 /// A candidate beside a set of effects, before it is fitted.
 #[derive(Debug, Clone)]
@@ -29,10 +34,19 @@ pub(crate) struct Trial {
     /// Position among the candidates.
     pub candidate: usize,
     pub model: Arc<Model>,
-    /// Starts of its fit, best first: where it was linearised, and one step from there.
+    /// Starts of its fit, best first: where it was linearised, or one step from there where that is better.
     pub starts: Vec<Vec<f64>>,
     /// Predicted fall of the deviance.
     pub fall: f64,
+}
+
+/// A start of a candidate's fit.
+struct Place {
+    /// Cost that a step of Gauss and Newton predicts.
+    predicted: f64,
+    cost: f64,
+    x: Vec<f64>,
+    stepped: Vec<f64>,
 }
 
 /// The effect whose starts follow from the spectrum of the residual.
@@ -74,10 +88,13 @@ impl Context<'_> {
             .copied()
             .filter(|i| !node.added.contains(i))
             .collect();
+        let Some(known) = self.rows_of(node) else {
+            return Vec::new();
+        };
         let mut trials: Vec<Trial> = others
             .into_par_iter()
             .filter(|_| !self.limit.passed(1.0))
-            .filter_map(|i| self.trial(node, i, noise).ok().flatten())
+            .filter_map(|i| self.trial_beside(node, &known, i, noise).ok().flatten())
             .collect();
         trials.sort_by(|a, b| {
             b.fall
@@ -89,6 +106,25 @@ impl Context<'_> {
 
     /// A candidate at its best start; `None` where no start gives a simulation.
     pub fn trial(&self, node: &Node, i: usize, noise: &Noise) -> Result<Option<Trial>, Error> {
+        match self.rows_of(node) {
+            Some(known) => self.trial_beside(node, &known, i, noise),
+            None => Ok(None),
+        }
+    }
+
+    /// Derivatives and residuals of a set where its fit ended.
+    fn rows_of(&self, node: &Node) -> Option<Rows> {
+        estimation::rows(&self.setup(&node.model).ok()?, &node.fit.x)
+    }
+
+    /// The same beside a set whose rows are known.
+    fn trial_beside(
+        &self,
+        node: &Node,
+        known: &Rows,
+        i: usize,
+        noise: &Noise,
+    ) -> Result<Option<Trial>, Error> {
         let candidate = &self.candidates[i];
         let mut added = node.added.clone();
         added.push(i);
@@ -143,49 +179,95 @@ impl Context<'_> {
                 .collect();
         }
         let count = self.samples();
-        let mut scored: Vec<(f64, Vec<f64>, Vec<f64>)> = starts
+        let set = self.setup(&node.model)?;
+        let columns = self.columns_beside(node, &set, &setup);
+        let place = |x: Vec<f64>, triangle: Triangle| {
+            let free: Vec<usize> = (0..setup.free().len()).collect();
+            let scale: Vec<f64> = free
+                .iter()
+                .map(|&j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
+                .collect();
+            let step = triangle.solve(&free, &scale, DAMPING);
+            let predicted = triangle.predicted(&step);
+            let mut stepped = x.clone();
+            for (d, &at) in step.iter().zip(setup.free()) {
+                stepped[at] = within(stepped[at] + d, setup.bounds()[at]);
+            }
+            // A size that its bound forbids explains nothing.
+            let forbidden = smooth
+                && candidate
+                    .parameters
+                    .iter()
+                    .zip(&places)
+                    .any(|(own, place)| {
+                        let stays = |at: usize| stepped[at] == own.absent;
+                        own.role == Role::Size && place.is_some_and(stays)
+                    });
+            let predicted = if forbidden {
+                triangle.cost()
+            } else {
+                predicted
+            };
+            predicted.is_finite().then(|| Place {
+                predicted,
+                cost: triangle.cost(),
+                x,
+                stepped,
+            })
+        };
+        let mut scored: Vec<Place> = starts
             .into_iter()
             .filter_map(|x| {
-                let triangle = linearise(&setup, &x, noise)?;
-                let free: Vec<usize> = (0..setup.free().len()).collect();
-                let scale: Vec<f64> = free
-                    .iter()
-                    .map(|&j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
-                    .collect();
-                let step = triangle.solve(&free, &scale, DAMPING);
-                let predicted = triangle.predicted(&step);
-                let mut stepped = x.clone();
-                for (d, &at) in step.iter().zip(setup.free()) {
-                    stepped[at] = within(stepped[at] + d, setup.bounds()[at]);
-                }
-                // A size that its bound forbids explains nothing.
-                let forbidden = smooth
-                    && candidate
-                        .parameters
-                        .iter()
-                        .zip(&places)
-                        .any(|(own, place)| {
-                            let stays = |at: usize| stepped[at] == own.absent;
-                            own.role == Role::Size && place.is_some_and(stays)
-                        });
-                let predicted = if forbidden {
-                    triangle.cost()
-                } else {
-                    predicted
-                };
-                predicted.is_finite().then_some((predicted, x, stepped))
+                let joined = Joined::at(&setup, known, &columns, &x)?;
+                let triangle = linearise(&joined, &x, noise)?;
+                place(x, triangle)
             })
             .collect();
-        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((best, ..)) = scored.first() else {
+        scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+        if !smooth {
+            // Where the effect acts the set's own derivatives are others.
+            scored.truncate(LINEARISED);
+            scored = scored
+                .into_iter()
+                .filter_map(|Place { x, .. }| {
+                    let triangle = linearise(&setup, &x, noise)?;
+                    place(x, triangle)
+                })
+                .collect();
+            scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+        }
+        let Some(Place {
+            predicted: best, ..
+        }) = scored.first()
+        else {
             return Ok(None);
         };
         let fall = count * (node.fit.cost / best.max(f64::MIN_POSITIVE)).ln();
-        let starts = scored
+        // Of a place and one step from there the better one begins the fit: a simulation without derivatives tells.
+        let kept = if smooth && scored.len() == 1 {
+            1
+        } else {
+            PLACES
+        };
+        let cost = |x: &[f64]| {
+            let squares = estimation::squares(&setup, x, noise);
+            let cost = squares.map_or(f64::INFINITY, |squares| squares.cost());
+            if cost.is_nan() { f64::INFINITY } else { cost }
+        };
+        let mut places: Vec<(f64, Vec<f64>)> = scored
             .into_iter()
-            .take(2)
-            .flat_map(|(_, x, stepped)| [x, stepped])
+            .take(kept)
+            .map(|place| {
+                let there = cost(&place.stepped);
+                if there <= place.cost {
+                    (there, place.stepped)
+                } else {
+                    (place.cost, place.x)
+                }
+            })
             .collect();
+        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let starts = places.into_iter().map(|(_, x)| x).collect();
         Ok(Some(Trial {
             candidate: i,
             model: model.clone(),

@@ -21,6 +21,12 @@ const PAIRS: usize = 8;
 const ALWAYS: usize = 40;
 /// Sets that grow side by side.
 const BEAM: usize = 4;
+/// A set grows where it lowers the criterion by this share of what the best one does.
+const WORTH: f64 = 0.6;
+/// A candidate is fitted beside a set where so many times its predicted fall of the deviance, and this much more, would pay for it: the
+/// prediction of one step falls short where an effect is far from linear.
+const OPTIMISM: f64 = 2.0;
+const SPARE: f64 = 6.0;
 /// A larger set has to lower the criterion by this, or the search ends.
 const PAYS: f64 = 2.0;
 
@@ -32,6 +38,12 @@ pub(crate) struct Grown {
     pub singles: Vec<Node>,
     /// The set with the least criterion.
     pub best: Node,
+    /// Candidates that are scored beside sets of several: what does next to nothing beside the believed model is not.
+    among: Vec<usize>,
+    /// Sets that may grow, best first.
+    beam: Vec<Node>,
+    /// The time ended the search.
+    pub cut_short: bool,
 }
 
 impl Context<'_> {
@@ -52,7 +64,7 @@ impl Context<'_> {
         best_first(fits.collect())
     }
 
-    /// The search.
+    /// The search of sets of up to so many effects.
     pub fn grow(
         &self,
         base: Node,
@@ -63,7 +75,6 @@ impl Context<'_> {
         let trials = self.trials(&base, noise);
         let promising = &trials[..trials.len().min(FIRST_REFITS)];
         let singles = self.refits(&base, promising, noise);
-        let mut best = base.clone();
         let mut beam: Vec<Node> = Vec::new();
         if max_effects > 0 {
             beam.extend(singles.iter().take(BEAM).cloned());
@@ -76,10 +87,36 @@ impl Context<'_> {
                 .collect();
             beam.extend(fits);
         }
-        // What does next to nothing beside the believed model is not scored again beside larger sets.
         let many = (trials.len() / 2).max(ALWAYS).min(trials.len());
-        let among: Vec<usize> = trials[..many].iter().map(|t| t.candidate).collect();
-        let mut size = base.added.len() + 1;
+        let grown = Grown {
+            best: base.clone(),
+            among: trials[..many].iter().map(|t| t.candidate).collect(),
+            cut_short: self.limit.passed(share),
+            base,
+            singles,
+            beam,
+        };
+        self.grow_on(grown, noise, max_effects, share)
+    }
+
+    /// The search goes on, to sets of up to so many effects.
+    pub fn grow_on(
+        &self,
+        grown: Grown,
+        noise: &Noise,
+        max_effects: usize,
+        share: f64,
+    ) -> Result<Grown, Error> {
+        let Grown {
+            base,
+            singles,
+            mut best,
+            among,
+            mut beam,
+            mut cut_short,
+        } = grown;
+        let first_size = base.added.len() + 1;
+        let mut size = first_size.max(best.added.len());
         loop {
             beam = best_first(beam);
             beam.truncate(BEAM);
@@ -88,26 +125,35 @@ impl Context<'_> {
             if gain > 0.0 {
                 best = first.clone();
             }
-            let grown = beam.iter().any(|node| node.added.len() >= size);
-            if gain < PAYS && grown && size > base.added.len() + 1
-                || size >= base.added.len() + max_effects
-                || self.limit.passed(share)
+            let longer = beam.iter().any(|node| node.added.len() >= size);
+            if gain < PAYS && longer && size > first_size || size >= base.added.len() + max_effects
             {
                 break;
             }
+            if self.limit.passed(share) {
+                cut_short = true;
+                break;
+            }
             size += 1;
+            let enough = WORTH * beam[0].gain_over(&base);
             let parents: Vec<Node> = beam
                 .iter()
                 .filter(|node| node.added.len() < base.added.len() + max_effects)
+                .filter(|node| node.gain_over(&base) >= enough)
                 .cloned()
                 .collect();
             for parent in &parents {
                 if self.limit.passed(share) {
+                    cut_short = true;
                     break;
                 }
                 let trials = self.trials_among(parent, &among, noise);
-                let promising = &trials[..trials.len().min(REFITS)];
-                for child in self.refits(parent, promising, noise) {
+                let promising: Vec<Trial> = trials
+                    .into_iter()
+                    .filter(|trial| self.may_pay(trial))
+                    .take(REFITS)
+                    .collect();
+                for child in self.refits(parent, &promising, noise) {
                     let same = |known: &Node| same_set(known, &child);
                     if !beam.iter().any(same) {
                         beam.push(child);
@@ -120,7 +166,16 @@ impl Context<'_> {
             base,
             singles,
             best,
+            among,
+            beam,
+            cut_short,
         })
+    }
+
+    /// Whether a candidate might lower the criterion.
+    fn may_pay(&self, trial: &Trial) -> bool {
+        let fitted = self.candidates[trial.candidate].fitted().max(1) as f64;
+        OPTIMISM * trial.fall + SPARE > fitted * self.samples().ln()
     }
 
     /// A pair of candidates beside a set, from the best starts of each.

@@ -249,6 +249,14 @@ impl<'a> ModelSetup<'a> {
         self.model
     }
 
+    /// The same of which only these of its fitted entries are fitted.
+    #[must_use]
+    pub fn with_free(&self, only: &[usize]) -> Self {
+        let mut setup = self.clone();
+        setup.free.retain(|i| only.contains(i));
+        setup
+    }
+
     /// The same with the standard deviation of each output's noise known: outputs count by them, and not by their residuals.
     #[must_use]
     pub fn with_scales(self, scales: Vec<f64>) -> Self {
@@ -527,14 +535,15 @@ impl Residuals for ModelSetup<'_> {
     }
 
     fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
-        let states = self.model.spec().states.len();
-        let parameters = self
-            .free
-            .iter()
-            .filter(|&&i| i < self.parameter_count())
-            .count();
-        match parameters + states {
-            0..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
+        // A record has the parameters and its own states.
+        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
+        let parameters = self.free.iter().filter(|&&i| i < count).count();
+        let of = |r: usize| count + r * states..count + (r + 1) * states;
+        let own = |r: usize| self.free.iter().filter(|i| of(r).contains(i)).count();
+        let lanes = parameters + (0..self.records.len()).map(own).max().unwrap_or(0);
+        match lanes {
+            0..=2 => self.each_row_in_lanes::<2>(x, &self.free, each),
+            3..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
             5..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
             9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
             _ => self.each_row_in_lanes::<8>(x, &self.free, each),

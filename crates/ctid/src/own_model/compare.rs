@@ -109,6 +109,7 @@ pub(crate) fn compare(
         std_error: errors[i],
         unit: unit.clone(),
         known: !free.contains(&i),
+        effect: None,
     });
     let step = Step {
         added: None,

@@ -116,18 +116,13 @@ fn sentences(diagnosis: &Diagnosis) -> Vec<String> {
 
 /// The sizes of an effect in the last model.
 fn size_of(diagnosis: &Diagnosis, effect: &str) -> String {
-    let stem: String = effect
-        .trim_end_matches(')')
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
-        .collect();
     let Some(last) = diagnosis.steps.last() else {
         return String::new();
     };
     let own = last
         .parameters
         .iter()
-        .filter(|p| p.name.starts_with(&stem) && !p.name.ends_with(')'));
+        .filter(|p| p.effect.as_deref() == Some(effect));
     let sizes: Vec<String> = own
         .map(|p| {
             let (value, error) = numbers::value_and_error(p.value, p.std_error);

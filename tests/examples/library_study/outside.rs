@@ -29,7 +29,6 @@ pub fn candidate(
 ) -> OwnCandidate {
     let (state, balance) = balances[rng.random_range(0..balances.len())];
     let name = spec.states[state].about.name.clone();
-    let span = visited.span(Variable::State(state));
     let share = |variable: Variable| {
         let span = visited.span(variable);
         let name = &spec.about(variable).name;
@@ -130,7 +129,6 @@ pub fn candidate(
         }
     };
     let size = if kind == 6 { 1.0 } else { 0.1 * balance };
-    let _ = span;
     OwnCandidate {
         parameters: BTreeMap::from([(
             "size".to_string(),

@@ -43,6 +43,7 @@ pub mod progress;
 pub mod report;
 pub mod serve;
 mod signature;
+mod symptoms;
 mod simulate;
 pub mod tables;
 pub mod term_file;

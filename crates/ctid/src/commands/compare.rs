@@ -13,6 +13,8 @@ use crate::input::excitation::{self, ExcitationWarning};
 use crate::input::{self, Files, Input, ReadArguments};
 use crate::interrupt;
 use crate::look::Look;
+use crate::output::Kind;
+use crate::own_model::report::{self, Paged};
 use crate::own_model::{self, AnyModelFile, OwnModelFile};
 use crate::progress::Bar;
 use crate::{Error, terminal};
@@ -139,11 +141,6 @@ impl Compare {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
-        if self.results.report.is_some() {
-            return Err(Error::Usage(
-                "--report: a page of a model of your own cannot be written yet; leave it out, or write --json".to_string(),
-            ));
-        }
         let records = model.records(files)?;
         let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
@@ -156,7 +153,10 @@ impl Compare {
         let notes = input::notes(&records.summaries, look) + &unused.collect::<String>();
         let comparison = comparison?;
         let text = notes + &own_model::said(&comparison, look);
-        finish(&comparison, &text, &outputs, out, look)
+        let page = outputs.iter().any(|output| output.kind() == Kind::Report);
+        let page = page.then(|| report::of_comparison(model, &records, &comparison));
+        let found = Paged::new(&comparison, page.unwrap_or_default());
+        finish(&found, &text, &outputs, out, look)
     }
 }
 
@@ -197,9 +197,9 @@ impl Diagnose {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
-        if self.compare.results.report.is_some() || self.unknown.is_some() {
+        if self.unknown.is_some() {
             return Err(Error::Usage(
-                "--report and --unknown: they cannot be written of a model of your own yet; leave them out, or write --json".to_string(),
+                "--unknown cannot be written of a model of your own yet; leave it out, or write --report".to_string(),
             ));
         }
         let records = model.records(files)?;
@@ -219,7 +219,10 @@ impl Diagnose {
         bar.clear();
         let diagnosis = diagnosis?;
         let text =
-            input::notes(&records.summaries, look) + &own_model::diagnosis_said(&diagnosis, look);
-        finish(&diagnosis, &text, &outputs, out, look)
+            input::notes(&records.summaries, look) + &own_model::diagnosis_said(model, &diagnosis, look);
+        let page = outputs.iter().any(|output| output.kind() == Kind::Report);
+        let page = page.then(|| report::of_diagnosis(model, &records, &diagnosis));
+        let found = Paged::new(&diagnosis, page.unwrap_or_default());
+        finish(&found, &text, &outputs, out, look)
     }
 }

@@ -1,14 +1,13 @@
 //! What a model of its user's own is missing.
 
-use effect_search::{Diagnosis, Left, Options, Problem, Step, Verdict};
+use effect_search::{Diagnosis, Left, Options, Step, Verdict};
 
 use super::file::{OwnModelFile, Records};
+use super::problem::{blamed, problem};
+use super::words::EffectWords;
 use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::numbers;
-use crate::output::Found;
-
-impl Found for Diagnosis {}
 
 /// Single effects that are listed.
 const LISTED: usize = 8;
@@ -23,34 +22,13 @@ pub(crate) fn diagnose(
     options: &Options,
     progress: &(dyn Fn(effect_search::Progress) + Sync),
 ) -> Result<Diagnosis, Error> {
-    let problem = Problem {
-        spec: file.model.spec().clone(),
-        effects: Vec::new(),
-        records: records.records.clone(),
-        test: records.test.clone(),
-        known: file.known.clone(),
-        priors: file.priors.clone(),
-        candidates: file.candidates.clone(),
-        time_unit: records.time_unit,
-        time_unit_name: unit_of(records.time_unit).to_string(),
-    };
-    let names = || problem.records.iter().map(|record| record.name.as_str());
-    effect_search::diagnose(&problem, options, progress).map_err(|error| Error::File {
-        file: names().collect::<Vec<_>>().join(", "),
-        what: error.to_string(),
-    })
-}
-
-/// The unit of time of so many seconds.
-fn unit_of(seconds: f64) -> &'static str {
-    [(0.001, "ms"), (60.0, "min"), (3600.0, "h"), (86_400.0, "d")]
-        .into_iter()
-        .find(|(unit, _)| (seconds / unit - 1.0).abs() < 1e-9)
-        .map_or("s", |(_, name)| name)
+    let problem = problem(file, records);
+    effect_search::diagnose(&problem, options, progress).map_err(|error| blamed(&problem, &error))
 }
 
 /// What a person reads of a diagnosis.
-pub(crate) fn said(diagnosis: &Diagnosis, look: Look) -> String {
+pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
+    let words = EffectWords::of(&file.base, &file.candidates);
     let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
     text += &singles(diagnosis, look);
     text += &errors(diagnosis, look);
@@ -58,7 +36,7 @@ pub(crate) fn said(diagnosis: &Diagnosis, look: Look) -> String {
         text += &estimates(last, look);
     }
     text += &format!("\n{}\n", look.heading(&heading(diagnosis)));
-    for sentence in sentences(diagnosis) {
+    for sentence in sentences(diagnosis, &words) {
         text += &look.paragraph("  ", &sentence);
     }
     text
@@ -76,18 +54,26 @@ fn heading(diagnosis: &Diagnosis) -> String {
     }
 }
 
-fn sentences(diagnosis: &Diagnosis) -> Vec<String> {
+/// What was found, in sentences.
+pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
     let mut all = Vec::new();
     for group in &diagnosis.groups {
-        all.push(match group.as_slice() {
-            [one] => format!("It is {one}: {}.", size_of(diagnosis, one)),
-            [first, others @ ..] => format!(
-                "It is {first} ({}) or {}: these records cannot tell them apart.",
-                size_of(diagnosis, first),
-                others.join(" or ")
-            ),
-            [] => continue,
-        });
+        let [first, others @ ..] = group.as_slice() else {
+            continue;
+        };
+        all.push(format!(
+            "It is {}, {}. {}.",
+            words.placed(first),
+            size_of(diagnosis, first, words),
+            words.physics(first)
+        ));
+        if !others.is_empty() {
+            let others: Vec<String> = others.iter().map(|id| words.placed(id)).collect();
+            all.push(format!(
+                "Or it is {}: these records cannot tell them apart.",
+                others.join(", or ")
+            ));
+        }
     }
     if let Some(share) = diagnosis.share {
         all.push(format!(
@@ -115,19 +101,11 @@ fn sentences(diagnosis: &Diagnosis) -> Vec<String> {
 }
 
 /// The sizes of an effect in the last model.
-fn size_of(diagnosis: &Diagnosis, effect: &str) -> String {
-    let stem: String = effect
-        .trim_end_matches(')')
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
-        .collect();
+fn size_of(diagnosis: &Diagnosis, effect: &str, words: &EffectWords) -> String {
     let Some(last) = diagnosis.steps.last() else {
         return String::new();
     };
-    let own = last
-        .parameters
-        .iter()
-        .filter(|p| p.name.starts_with(&stem) && !p.name.ends_with(')'));
+    let own = last.parameters.iter().filter(|p| words.is_of(effect, &p.name));
     let sizes: Vec<String> = own
         .map(|p| {
             let (value, error) = numbers::value_and_error(p.value, p.std_error);

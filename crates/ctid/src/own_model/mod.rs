@@ -3,12 +3,16 @@
 mod candidates;
 mod compare;
 mod diagnose;
+pub(crate) mod effects;
 mod export;
 mod file;
 mod identify;
 pub(crate) mod ports;
+mod problem;
+pub(crate) mod report;
 mod simulate;
 mod text;
+mod words;
 
 pub(crate) use self::compare::{Comparison, compare};
 pub(crate) use self::diagnose::{diagnose, said as diagnosis_said};

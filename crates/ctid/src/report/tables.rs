@@ -9,9 +9,8 @@ use crate::numbers::duration;
 
 /// What was looked at: plant, records, noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
-    let output = unit(&diagnosis.output_unit);
     let several = findings::several(diagnosis);
-    let mut facts = vec![("Plant", escape(&diagnosis.plant))];
+    let mut facts = vec![("Model", escape(&diagnosis.plant))];
     if !diagnosis.known_effects.is_empty() {
         let known = escape(&diagnosis.known_effects.join(", "));
         facts.push(("Already in the model", known));
@@ -30,11 +29,9 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
         }
         facts.push((role, text));
     }
-    for floor in diagnosis
-        .noise
-        .iter()
-        .filter(|noise| noise.level.is_finite())
-    {
+    let floors = diagnosis.noise.iter().enumerate();
+    for (k, floor) in floors.filter(|(_, noise)| noise.level.is_finite()) {
+        let output = unit(diagnosis.unit_of(k));
         let level = significant(floor.level, 2);
         let source = escape(&floor.source);
         let of = if several {
@@ -319,7 +316,7 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
 /// The rows of the simulation error of an output; its name stands before them where there are several.
 fn errors(diagnosis: &Diagnosis, index: usize, name: &str) -> String {
     let steps = &diagnosis.steps;
-    let unit = unit(&diagnosis.output_unit);
+    let unit = unit(diagnosis.unit_of(index));
     let of = |text: &str| {
         if findings::several(diagnosis) {
             format!("{}: {text}", escape(name))

@@ -114,6 +114,7 @@ fn problem(believed: &str, record: Record) -> Problem {
     Problem {
         spec: ModelSpec::parse(believed).unwrap(),
         effects: Vec::new(),
+        kept: BTreeMap::new(),
         records: vec![record],
         test: Vec::new(),
         known: BTreeMap::new(),

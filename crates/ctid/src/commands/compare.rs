@@ -154,8 +154,8 @@ impl Compare {
         let comparison = comparison?;
         let text = notes + &own_model::said(&comparison, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);
-        let page = page.then(|| report::of_comparison(model, &records, &comparison));
-        let found = Paged::new(&comparison, page.unwrap_or_default());
+        let page = page.then(|| report::compared(model, &records, &comparison));
+        let found = Paged::new(&comparison, page.as_ref());
         finish(&found, &text, &outputs, out, look)
     }
 }
@@ -221,8 +221,8 @@ impl Diagnose {
         let text =
             input::notes(&records.summaries, look) + &own_model::diagnosis_said(model, &diagnosis, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);
-        let page = page.then(|| report::of_diagnosis(model, &records, &diagnosis));
-        let found = Paged::new(&diagnosis, page.unwrap_or_default());
+        let page = page.then(|| report::diagnosed(model, &records, &diagnosis));
+        let found = Paged::new(&diagnosis, page.as_ref());
         finish(&found, &text, &outputs, out, look)
     }
 }

@@ -59,6 +59,11 @@ impl Findings {
         })
     }
 
+    /// Whether it says anything of an effect.
+    pub fn has(&self, id: &str) -> bool {
+        self.record_numbers.contains_key(id)
+    }
+
     /// The value of a parameter in the last model that has it.
     fn value(&self, name: &str) -> Option<f64> {
         let steps = self.steps.iter().rev().flat_map(|step| &step.parameters);

@@ -43,7 +43,7 @@ pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> St
 }
 
 /// The finding in a few words.
-fn heading(diagnosis: &Diagnosis) -> String {
+pub(crate) fn heading(diagnosis: &Diagnosis) -> String {
     match diagnosis.verdict {
         Verdict::Adequate => "Nothing is missing that these records would show".to_string(),
         Verdict::Unexplained => "Nothing explains it".to_string(),
@@ -55,7 +55,7 @@ fn heading(diagnosis: &Diagnosis) -> String {
 }
 
 /// What was found, in sentences.
-pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
+pub(crate) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
     let mut all = Vec::new();
     for group in &diagnosis.groups {
         let [first, others @ ..] = group.as_slice() else {

@@ -12,10 +12,13 @@ mod problem;
 pub(crate) mod report;
 mod simulate;
 mod text;
-mod words;
+pub(crate) mod words;
 
 pub(crate) use self::compare::{Comparison, compare};
-pub(crate) use self::diagnose::{diagnose, said as diagnosis_said};
+pub(crate) use self::diagnose::{
+    diagnose, heading as diagnosis_heading, said as diagnosis_said,
+    sentences as diagnosis_sentences,
+};
 pub(crate) use self::export::{Exported, commented, export, number};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
 pub(crate) use self::identify::{Beside, OneByOne};

@@ -28,9 +28,12 @@ pub(crate) struct Paged<'t, T> {
 }
 
 impl<'t, T> Paged<'t, T> {
-    /// With the page that was made of it.
-    pub fn new(found: &'t T, page: String) -> Self {
-        Self { found, page }
+    /// With the page that shows this, where one is asked for.
+    pub fn new(found: &'t T, shown: Option<&Diagnosis>) -> Self {
+        Self {
+            found,
+            page: shown.map(report::html).unwrap_or_default(),
+        }
     }
 }
 
@@ -40,20 +43,11 @@ impl<T: Serialize> Found for Paged<'_, T> {
     }
 }
 
-/// The page of a comparison.
-pub(crate) fn of_comparison(file: &OwnModelFile, records: &Records, found: &Comparison) -> String {
+/// What the report shows of a comparison.
+pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Diagnosis {
     let mut shown = document(file, records, &found.steps, &found.noise);
     shown.seconds = found.seconds;
-    report::html(&shown)
-}
-
-/// The page of a diagnosis.
-pub(crate) fn of_diagnosis(
-    file: &OwnModelFile,
-    records: &Records,
-    found: &effect_search::Diagnosis,
-) -> String {
-    report::html(&diagnosed(file, records, found))
+    shown
 }
 
 /// What the report shows of a diagnosis.

@@ -11,9 +11,33 @@ use super::effects::every_candidate;
 /// What is said of the effects of a model.
 pub(crate) struct EffectWords(BTreeMap<String, Words>);
 
+/// A port that effects sit at, by the name of its variable.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Site {
+    Input(String),
+    Output(String),
+    /// The equation of a state.
+    Equation(String),
+    /// A parameter or a named flow.
+    Value(String),
+}
+
+impl Site {
+    /// What it is.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Input(_) => "input",
+            Self::Output(_) => "output",
+            Self::Equation(_) => "equation",
+            Self::Value(_) => "parameter or flow",
+        }
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 struct Words {
     place: String,
+    sites: Vec<Site>,
     physics: &'static str,
     parameters: Vec<String>,
 }
@@ -25,6 +49,10 @@ impl EffectWords {
         let all = every_candidate(spec, own).unwrap_or_default();
         let words = |candidate: &Candidate| Words {
             place: place(spec, candidate.port),
+            sites: match own.get(&candidate.id) {
+                Some(own) => own.terms.keys().map(|key| site_of_term(spec, key)).collect(),
+                None => sites(spec, candidate.port),
+            },
             physics: candidate
                 .effect
                 .map_or("a term of the model file", |effect| effect.physics),
@@ -41,6 +69,11 @@ impl EffectWords {
         }
     }
 
+    /// The ports that it sits at.
+    pub fn sites(&self, id: &str) -> &[Site] {
+        self.0.get(id).map_or(&[], |words| &words.sites)
+    }
+
     /// What it does, in a sentence without its end.
     pub fn physics(&self, id: &str) -> &'static str {
         let words = self.0.get(id).map_or("", |words| words.physics);
@@ -51,6 +84,33 @@ impl EffectWords {
     pub fn is_of(&self, id: &str, parameter: &str) -> bool {
         let words = self.0.get(id);
         words.is_some_and(|words| words.parameters.iter().any(|own| own == parameter))
+    }
+}
+
+fn sites(spec: &ModelSpec, port: Port) -> Vec<Site> {
+    let of = |variable: Variable| spec.about(variable).name.clone();
+    let input = |u: usize| Site::Input(of(Variable::Input(u)));
+    let equation = |x: usize| Site::Equation(of(Variable::State(x)));
+    let output = |y: usize| Site::Output(of(spec.outputs[y].variable));
+    match port {
+        Port::Input(u) => vec![input(u)],
+        Port::Output(y) | Port::OutputAnd(y, _) => vec![output(y)],
+        Port::Balance(x) | Port::BalanceAnd(x, _) => vec![equation(x)],
+        Port::Value(v) | Port::Dependence(v, _) => vec![Site::Value(of(v))],
+        Port::Between(a, b) => vec![equation(a), equation(b)],
+        Port::InputAndBalance(u, x) => vec![input(u), equation(x)],
+        Port::Own => Vec::new(),
+    }
+}
+
+/// What a term of the model file is added to.
+fn site_of_term(spec: &ModelSpec, name: &str) -> Site {
+    match spec.find(name) {
+        Some(Variable::State(_)) => Site::Equation(name.to_string()),
+        Some(variable) if spec.outputs.iter().any(|o| o.variable == variable) => {
+            Site::Output(name.to_string())
+        }
+        _ => Site::Value(name.to_string()),
     }
 }
 

@@ -190,6 +190,7 @@ fn an_effect_means_the_same_beside_another_record() {
         place.write("m.toml", bent(record));
         place.succeeds(&format!("simulate m.toml {inputs} --out y.csv"));
         let text = place.read("y.csv");
+        std::fs::remove_file(place.path("y.csv")).unwrap();
         let rows = text.lines().skip(1);
         rows.map(|row| row.split(',').nth(1).unwrap().parse().unwrap())
             .collect()

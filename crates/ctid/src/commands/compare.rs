@@ -132,6 +132,22 @@ impl Compare {
     }
 }
 
+/// Tables of a model file that a comparison does not use, in a line.
+fn unused(tables: &[String], look: Look) -> String {
+    const NAMED: usize = 3;
+    if tables.is_empty() {
+        return String::new();
+    }
+    let named: Vec<String> = tables.iter().take(NAMED).map(|table| format!("[{table}]")).collect();
+    let more = match tables.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let verb = if tables.len() == 1 { "has" } else { "have" };
+    let note = format!("note: {}{more} {verb} no part in a comparison", named.join(", "));
+    look.paragraph("", &note)
+}
+
 impl Compare {
     /// A model of the user's own.
     fn run_own(
@@ -147,10 +163,7 @@ impl Compare {
         bar.phase("fitting the model");
         let comparison = own_model::compare(model, &records, &FitOptions::default());
         bar.clear();
-        let unused = model.unused.iter().map(|table| {
-            look.paragraph("", &format!("note: [{table}] has no part in a comparison"))
-        });
-        let notes = input::notes(&records.summaries, look) + &unused.collect::<String>();
+        let notes = input::notes(&records.summaries, look) + &unused(&model.unused, look);
         let comparison = comparison?;
         let text = notes + &own_model::said(&comparison, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);

@@ -301,11 +301,13 @@ impl OwnModelFile {
         }
     }
 
-    /// Puts the channels into the units of the model, where the model file reads them in others.
+    /// Puts the channels into the units of the model, where the model file reads them in others, and gives them the names of its signals:
+    /// results name these, whatever the columns are called.
     pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
         for (channel, about) in channels.zip(self.signals()) {
             convert(&record.name, channel, about)?;
+            channel.name.clone_from(&about.name);
         }
         Ok(())
     }

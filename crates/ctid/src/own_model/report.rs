@@ -45,7 +45,8 @@ impl<T: Serialize> Found for Paged<'_, T> {
 
 /// What the report shows of a comparison.
 pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Diagnosis {
-    let mut shown = document(file, records, &found.steps, &found.noise);
+    let source = "what the past of the model's residual does not predict";
+    let mut shown = document(file, records, (&found.steps, &found.noise), source);
     shown.seconds = found.seconds;
     shown
 }
@@ -57,7 +58,8 @@ pub(crate) fn diagnosed(
     found: &effect_search::Diagnosis,
 ) -> Diagnosis {
     let words = EffectWords::of(&file.base, &file.candidates);
-    let mut shown = document(file, records, &found.steps, &found.noise);
+    let source = "the residual of the last model";
+    let mut shown = document(file, records, (&found.steps, &found.noise), source);
     shown.verdict = match found.verdict {
         effect_search::Verdict::Effect => Verdict::Effect,
         effect_search::Verdict::Undecided => Verdict::Undecided,
@@ -123,12 +125,12 @@ fn parameter(estimate: &Estimate) -> Parameter {
     }
 }
 
-/// A document without a finding: records, steps, where they fail, tests of their residuals.
+/// A document without a finding; `source`: where the noise is from. Records, steps, where they fail, tests of their residuals.
 fn document(
     file: &OwnModelFile,
     records: &Records,
-    steps: &[Step],
-    noise: &[NoiseFloor],
+    (steps, noise): (&[Step], &[NoiseFloor]),
+    source: &str,
 ) -> Diagnosis {
     let spec = &file.base;
     let fitted = &records.records;
@@ -173,7 +175,7 @@ fn document(
         level: floor.level,
         innovation: floor.innovation,
         coefficients: floor.coefficients.clone(),
-        source: "the residual of the last model".to_string(),
+        source: source.to_string(),
     });
     let noise: Vec<_> = noise.collect();
     let unit = units.first().cloned().unwrap_or_default();

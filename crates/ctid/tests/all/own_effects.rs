@@ -263,3 +263,104 @@ fn what_cannot_be_added_is_refused_in_a_line() {
     refused("effect.\"lag(y)\".tau = nan", &["bad.toml:2: tau has to be a finite number"]);
     refused("effect.\"lag(y)\".fixed = [\"tau\"]", &["bad.toml:2: tau is fixed and has no value"]);
 }
+
+#[test]
+fn a_candidate_that_cannot_be_is_refused_with_its_line_and_the_mend() {
+    let place = place();
+    let refused = |candidates: &str, says: &[&str]| {
+        place.write("bad.toml", format!("{MODEL}\n{candidates}\n"));
+        for command in ["compare", "diagnose"] {
+            place.refuses(&format!("{command} a.csv --model bad.toml"), says);
+        }
+    };
+    let one = |name: &str, parameters: &str, terms: &str| {
+        format!("[candidates.{name}]\nparameters = {{ {parameters} }}\nterms = {{ {terms} }}\n")
+    };
+    refused(
+        &one("draught", "c = { start = 0.1 }", "T = \"-c*(T - Tq)\""),
+        &["bad.toml:9: candidates.draught.terms.T: 1:9: `Tq` is not declared", "did you mean `Ta`?"],
+    );
+    refused(
+        &one("draught", "c = { start = 0.1 }", "Tq = \"-c*T\""),
+        &["bad.toml:9: candidates.draught.terms.Tq: `Tq` is no state, named flow or output of Block", "T, y"],
+    );
+    let twins = one("draught", "c = { start = 0.1 }", "T = \"-c*(T - Ta)^2\"")
+        + &one("wind", "w = { start = 3.0 }", "T = \"-w*(T - Ta)^2\"");
+    refused(&twins, &["bad.toml:10: candidates.wind: it is the same as draught: keep one of them"]);
+    refused(
+        &one("draught", "", "T = \"-0.1*(T - Ta)\""),
+        &["bad.toml:7: candidates.draught: it has no parameter: give it one"],
+    );
+    refused(
+        &one("draught", "c = { start = 0.1 }", ""),
+        &["bad.toml:7: candidates.draught: it has no terms: write"],
+    );
+}
+
+#[test]
+fn a_thousand_candidates_end_in_bounded_time() {
+    let place = place();
+    let mut file = MODEL.to_string();
+    for k in 1..=1000 {
+        let term = format!("a*sin({}*time)", f64::from(k) / 1000.0);
+        write!(file, "\n[candidates.c{k}]\nparameters = {{ a = {{ start = 1.0 }} }}\nterms = {{ T = \"{term}\" }}\n").unwrap();
+    }
+    place.write("m.toml", file);
+    let said = place.succeeds("compare a.csv --model m.toml");
+    let notes: Vec<&str> = said.lines().filter(|line| line.contains("no part in")).collect();
+    assert!(said.contains("[candidates.c1], [candidates.c10], [candidates.c100] and 997 more"), "{notes:?}");
+    let begun = std::time::Instant::now();
+    place.succeeds("diagnose a.csv --model m.toml --effort quick --json found.json");
+    // The limit of this effort is 5 s; what had begun then is ended.
+    assert!(begun.elapsed().as_secs() < 40, "{:?}", begun.elapsed());
+    let found = place.json("found.json");
+    assert!(found["candidates"].as_u64().unwrap() > 1000);
+}
+
+#[test]
+fn the_report_shows_the_ports_the_sizes_and_every_output_in_its_unit() {
+    let place = place();
+    place.write("b.csv", record(200, 24.0, 0.1));
+    place.succeeds("diagnose a.csv --test b.csv --model m.toml --report found.html --json found.json");
+    let page = place.read("found.html");
+    let (_, after) = page.split_once("id=\"data\">").unwrap();
+    let data: Value = serde_json::from_str(after.split_once("</script>").unwrap().0).unwrap();
+    let found = place.json("found.json");
+    assert_eq!(data["outputs"][0]["name"], "y");
+    assert_eq!(data["outputs"][0]["unit"], "degC");
+    let inputs = data["records"][0]["inputs"].as_array().unwrap();
+    let units: Vec<&str> = inputs.iter().map(|one| one["unit"].as_str().unwrap()).collect();
+    assert_eq!(units, ["%", "degC"]);
+    let steps = data["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), 2);
+    for (step, of) in steps.iter().zip(found["steps"].as_array().unwrap()) {
+        assert_eq!(step["outputs"][0]["rmse"], of["rmse_per_output"]["y"]);
+        assert_eq!(step["outputs"][0]["rmse_test"], of["rmse_test_per_output"]["y"]);
+        // Curves and residuals over both records.
+        let runs = step["outputs"][0]["runs"].as_array().unwrap();
+        let lengths: Vec<usize> = runs.iter().map(|run| run["residual"]["y"].as_array().unwrap().len()).collect();
+        assert_eq!(lengths, [400, 200]);
+    }
+    assert_eq!(data["scores"][0]["effect"], found["ranked"][0]);
+    let text = page.split_once("<main>").unwrap().0;
+    assert!(text.contains("lag(y) at the output y, which reads T (block)"), "{text}");
+    let (tau, _) = parameter(last(&found), "lag_y_tau");
+    assert!(text.contains(&format!("lag_y_tau = {tau:.2}")), "{text}");
+    // A comparison has a page too.
+    place.succeeds("compare a.csv --model m.toml --report fit.html");
+    assert!(place.read("fit.html").contains("Model against measurement"));
+}
+
+#[test]
+fn effects_are_found_by_what_is_seen() {
+    let place = place();
+    let first = |words: &str| {
+        let said = place.succeeds(words);
+        said.split([',', ' ', '\n']).find(|word| !word.is_empty()).unwrap().to_string()
+    };
+    for (word, effect) in [("late", "delay(u)"), ("drift", "gain_drift(u)"), ("clog", "drift(k)"), ("leak", "constant(T)"), ("noisy", "quantisation(y)")] {
+        assert_eq!(first(&format!("effects --like {word} --model m.toml")), effect, "{word}");
+    }
+    assert_eq!(first("effects --like clog"), "valve_drift");
+    place.refuses("effects --like xyzzy", &["no effect is described by \"xyzzy\": try one of clog, drift, leak, stick, late, noisy"]);
+}

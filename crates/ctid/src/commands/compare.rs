@@ -15,7 +15,7 @@ use crate::interrupt;
 use crate::look::Look;
 use crate::output::Kind;
 use crate::own_model::report::{self, Paged};
-use crate::own_model::{self, AnyModelFile, OwnModelFile};
+use crate::own_model::{self, AnyModelFile, OwnModelFile, RecordNumbers};
 use crate::progress::Bar;
 use crate::{Error, terminal};
 
@@ -132,6 +132,14 @@ impl Compare {
     }
 }
 
+/// What is said of effects whose numbers are those of the records at hand.
+fn not_kept(model: &OwnModelFile, used: &RecordNumbers, look: Look) -> String {
+    let notes = model.not_kept(used).into_iter();
+    notes
+        .map(|note| look.paragraph("", &format!("note: {note}")))
+        .collect()
+}
+
 /// Tables of a model file that a comparison does not use, in a line.
 fn unused(tables: &[String], look: Look) -> String {
     const NAMED: usize = 3;
@@ -165,6 +173,7 @@ impl Compare {
         bar.clear();
         let notes = input::notes(&records.summaries, look) + &unused(&model.unused, look);
         let comparison = comparison?;
+        let notes = notes + &not_kept(model, &comparison.record_numbers, look);
         let text = notes + &own_model::said(&comparison, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);
         let page = page.then(|| report::compared(model, &records, &comparison));
@@ -231,8 +240,9 @@ impl Diagnose {
         });
         bar.clear();
         let diagnosis = diagnosis?;
-        let text =
-            input::notes(&records.summaries, look) + &own_model::diagnosis_said(model, &diagnosis, look);
+        let text = input::notes(&records.summaries, look)
+            + &not_kept(model, &diagnosis.record_numbers, look)
+            + &own_model::diagnosis_said(model, &diagnosis, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);
         let page = page.then(|| report::diagnosed(model, &records, &diagnosis));
         let found = Paged::new(&diagnosis, page.as_ref());

@@ -7,7 +7,7 @@ use ct_model::{Model, ModelSpec};
 use effect_search::{Believed, Options, Problem, believed};
 
 use super::file::{OwnModelFile, Records};
-use crate::Error;
+use crate::{Error, numbers};
 
 /// The numbers of a record that effects are written in, by the effects' identifiers.
 pub(crate) type RecordNumbers = BTreeMap<String, BTreeMap<&'static str, f64>>;
@@ -115,6 +115,27 @@ impl OwnModelFile {
             spec,
             record_numbers,
         })
+    }
+
+    /// Which effects are written in numbers of the records at hand, as the file keeps none: a sentence for each. `used`: those of a result.
+    pub fn not_kept(&self, used: &RecordNumbers) -> Vec<String> {
+        let on = self.effects.on.iter();
+        let lacking = on.filter_map(|id| {
+            let kept = self.effects.kept.get(id);
+            let numbers = used.get(id)?.iter();
+            let lacks = numbers.filter(|(n, _)| !kept.is_some_and(|k| k.numbers.contains_key(**n)));
+            let lacks = lacks.map(|(name, value)| format!("{name} = {}", numbers::significant(*value, 4)));
+            let lacks: Vec<String> = lacks.collect();
+            (!lacks.is_empty()).then_some((id, lacks))
+        });
+        lacking
+            .map(|(id, lacks)| {
+                format!(
+                    "{id} is written in numbers of these records ({}): `ctid add '{id}' --from RESULT.json` keeps them, so that it means the same beside others",
+                    lacks.join(", ")
+                )
+            })
+            .collect()
     }
 
     /// All candidates of a model where a record visits this, with what the file keeps.

@@ -131,9 +131,12 @@ fn without_a_result_the_effect_is_fitted_from_its_own_starts() {
     let mended = place.result("compare a.csv --model m.toml");
     assert!(mended["steps"][0]["rmse"].as_f64().unwrap() < 0.11);
     assert_eq!(mended["record_numbers"]["lag(y)"]["duration"], 1995.0);
+    let said = place.succeeds("compare a.csv --model m.toml");
+    assert!(said.contains("note: lag(y) is written in numbers of these records (duration = 1995, interval = 5.000)"), "{said}");
     // A comparison says what a diagnosis says of it.
     place.succeeds("compare a.csv --model m.toml --json fit.json");
     place.succeeds("add lag(y) --model m.toml --from fit.json");
+    assert!(!place.succeeds("compare a.csv --model m.toml").contains("numbers of these records"));
     let table: toml::Table = place.read("m.toml").parse().unwrap();
     let tau = table["effect"]["lag(y)"]["tau"].as_float().unwrap();
     let (fitted, _) = parameter(&mended["steps"][0], "lag_y_tau");
@@ -363,4 +366,27 @@ fn effects_are_found_by_what_is_seen() {
     }
     assert_eq!(first("effects --like clog"), "valve_drift");
     place.refuses("effects --like xyzzy", &["no effect is described by \"xyzzy\": try one of clog, drift, leak, stick, late, noisy"]);
+}
+
+#[test]
+fn identify_takes_a_model_with_effects_where_it_is_linear() {
+    let place = place();
+    place.write(
+        "m.toml",
+        format!("{}\n[effect.\"lag(y)\"]\ntau = 25.0\nrecord = {{ duration = 1995.0, interval = 5.0 }}\n", MODEL.replace("effects = []", "effects = [\"lag(y)\"]")),
+    );
+    place.succeeds("identify a.csv --model m.toml --method srivc --order 2,0 --input u --json i.json");
+    let own = &place.json("i.json")["own_model"];
+    let number = |value: &Value| value.as_f64().unwrap();
+    // (50/0.8 s + 1)(25 s + 1) of the text and the table, and 1.6/0.8.
+    for (k, a) in [1.0, 87.5, 1562.5].into_iter().enumerate() {
+        assert!((number(&own["a"][k]) / a - 1.0).abs() < 1e-9, "{own}");
+    }
+    assert!(own["b"].as_array().unwrap().len() == 1 && (number(&own["b"][0]) - 2.0).abs() < 1e-9, "{own}");
+    let said = place.succeeds("check m.toml");
+    assert!(said.contains("lag_y_tau"), "{said}");
+    // One that bends makes it nonlinear.
+    let bent = place.read("m.toml").replace("lag(y)", "nonlinearity(u)").replace("tau = 25.0", "bend = 0.1");
+    place.write("bent.toml", bent.replace("{ duration = 1995.0, interval = 5.0 }", "{ high = 36.0, low = 0.0, width = 36.0 }"));
+    place.refuses("identify a.csv --model bent.toml --method srivc --input u", &["is not linear in the equation of"]);
 }

@@ -219,7 +219,10 @@ fn another_compiler_reads_all_texts_as_they_stand_and_as_they_are_written() {
     // Models with effects in them, but for the operators that are not Modelica's.
     let mended = mended("heated-block");
     assert!(mended.len() > 30, "{}", mended.len());
-    let asked: Vec<_> = mended.iter().map(|(_, text)| (text.clone(), 1.0, 0)).collect();
+    let asked: Vec<_> = mended
+        .iter()
+        .map(|(_, text)| (text.clone(), 1.0, 0))
+        .collect();
     for ((effect, text), found) in mended.iter().zip(by_rumoca(&asked)) {
         assert_eq!(found.get("refused"), None, "{effect}:\n{text}");
     }

@@ -42,7 +42,9 @@ pub(crate) fn like(
         return Err(sought.nothing());
     }
     let widest = found.iter().map(|effect| effect.id.len()).max();
-    let rows = found.iter().map(|effect| row(effect, domain, widest.unwrap_or(0), look));
+    let rows = found
+        .iter()
+        .map(|effect| row(effect, domain, widest.unwrap_or(0), look));
     Ok(rows.collect())
 }
 

@@ -5,9 +5,9 @@ use std::path::Path;
 use ct_model::{About, Given, Linearity, ModelSpec, Variable, unit_warnings};
 use ct_signals::{escaped, shown};
 
+use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::own_model::{self, AnyModelFile};
-use crate::Error;
 
 /// Reads a model and says what it holds; of a model file the model that it names, with its effects in it.
 ///

@@ -9,14 +9,67 @@ use crate::Error;
 /// Beginnings of words that mean the same at a plant; the first one names the family.
 const FAMILIES: [&[&str]; 12] = [
     &["clog", "foul", "block", "plug", "dirt", "lodged", "narrow"],
-    &["drift", "creep", "wander", "ages", "aging", "wears", "over time"],
+    &[
+        "drift",
+        "creep",
+        "wander",
+        "ages",
+        "aging",
+        "wears",
+        "over time",
+    ],
     &["leak", "loses", "loss", "hole", "escape", "spill"],
-    &["stick", "sticti", "play", "slack", "backlash", "hysteresis", "jam", "coulomb", "friction", "stribeck"],
-    &["late", "dead time", "delay", "lag", "slow", "sluggish", "time constant"],
-    &["noisy", "noise", "coarse", "stairs", "quantis", "round", "resolution", "rough"],
-    &["sudden", "jump", "instant", "step", "different since", "broke"],
-    &["oscillat", "period", "hum", "rhythm", "vibrat", "swing", "day and night"],
-    &["saturat", "limit", "clip", "flat top", "end stop", "cuts out", "rim"],
+    &[
+        "stick",
+        "sticti",
+        "play",
+        "slack",
+        "backlash",
+        "hysteresis",
+        "jam",
+        "coulomb",
+        "friction",
+        "stribeck",
+    ],
+    &[
+        "late",
+        "dead time",
+        "delay",
+        "lag",
+        "slow",
+        "sluggish",
+        "time constant",
+    ],
+    &[
+        "noisy",
+        "noise",
+        "coarse",
+        "stairs",
+        "quantis",
+        "round",
+        "resolution",
+        "rough",
+    ],
+    &[
+        "sudden",
+        "jump",
+        "instant",
+        "step",
+        "different since",
+        "broke",
+    ],
+    &[
+        "oscillat",
+        "period",
+        "hum",
+        "rhythm",
+        "vibrat",
+        "swing",
+        "day and night",
+    ],
+    &[
+        "saturat", "limit", "clip", "flat top", "end stop", "cuts out", "rim",
+    ],
     &["offset", "zero", "shift", "calibrat"],
     &["bend", "bent", "nonlinear", "curved", "operating point"],
     &["hot", "heat", "temperature", "steam"],
@@ -34,14 +87,27 @@ impl Sought {
     pub fn of(said: &str) -> Self {
         let mut stems: Vec<(String, u32)> = Vec::new();
         for word in said.to_lowercase().split_whitespace() {
-            let means = |stem: &&str| word.starts_with(stem) || word.len() > 3 && stem.starts_with(word);
-            let family = FAMILIES.iter().find(|family| family.iter().any(|stem| means(&stem)));
+            let means =
+                |stem: &&str| word.starts_with(stem) || word.len() > 3 && stem.starts_with(word);
+            let family = FAMILIES
+                .iter()
+                .find(|family| family.iter().any(|stem| means(&stem)));
             let of_family = family.into_iter().flat_map(|family| family.iter());
             // The word itself counts for more than others of its family.
-            stems.extend(of_family.map(|stem| ((*stem).to_string(), if means(&stem) { 4 } else { 1 })));
+            stems.extend(
+                of_family.map(|stem| ((*stem).to_string(), if means(&stem) { 4 } else { 1 })),
+            );
             if family.is_none() {
-                let short = ["ing", "ed", "es", "s"].into_iter().find_map(|end| word.strip_suffix(end));
-                stems.push((short.filter(|short| short.len() > 2).unwrap_or(word).to_string(), 4));
+                let short = ["ing", "ed", "es", "s"]
+                    .into_iter()
+                    .find_map(|end| word.strip_suffix(end));
+                stems.push((
+                    short
+                        .filter(|short| short.len() > 2)
+                        .unwrap_or(word)
+                        .to_string(),
+                    4,
+                ));
             }
         }
         Self {
@@ -67,7 +133,11 @@ impl Sought {
 
     /// How well an effect of a tank goes with it.
     pub fn score_of_plant(&self, effect: &EffectInfo) -> u32 {
-        self.score(&[effect.id, effect.physics, effect.general.unwrap_or_default()])
+        self.score(&[
+            effect.id,
+            effect.physics,
+            effect.general.unwrap_or_default(),
+        ])
     }
 
     /// How well an effect at a port, or a candidate of the model file, goes with it.
@@ -121,7 +191,10 @@ mod tests {
             assert_eq!(of_tanks(said)[0], first, "{said}: {:?}", of_tanks(said));
         }
         for (said, among) in [
-            ("drift", &["sensor_drift", "pump_gain_drift", "valve_drift"][..]),
+            (
+                "drift",
+                &["sensor_drift", "pump_gain_drift", "valve_drift"][..],
+            ),
             ("leaks", &["const_leak", "leak_at_height"]),
             ("late", &["pump_lag", "sensor_lag", "transport_delay"]),
         ] {
@@ -141,7 +214,10 @@ mod tests {
             let score = |effect: &&ct_model::effects::Effect| {
                 sought.score(&[effect.id, &effect.symptoms.join(", "), effect.physics])
             };
-            best(all_effects(), score).iter().map(|effect| effect.id).collect()
+            best(all_effects(), score)
+                .iter()
+                .map(|effect| effect.id)
+                .collect()
         };
         for (said, effect) in [
             ("clog", "drift"),
@@ -152,7 +228,10 @@ mod tests {
             ("noisy", "quantisation"),
         ] {
             let found = first(said);
-            assert!(found[..found.len().min(5)].contains(&effect), "{said}: {found:?}");
+            assert!(
+                found[..found.len().min(5)].contains(&effect),
+                "{said}: {found:?}"
+            );
             assert!(found.len() < 20, "{said}: {found:?}");
         }
     }

@@ -282,7 +282,8 @@ fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<
 fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
     let errors = node.fit.std_errors();
     let parameters = node.spec().parameters.iter().enumerate();
-    let own = parameters.filter(|(_, p)| candidate.parameters.iter().any(|o| o.name == p.about.name));
+    let own =
+        parameters.filter(|(_, p)| candidate.parameters.iter().any(|o| o.name == p.about.name));
     own.map(|(i, parameter)| Estimate {
         name: parameter.about.name.clone(),
         value: node.fit.x[i],

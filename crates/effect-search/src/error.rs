@@ -29,7 +29,9 @@ pub enum Error {
         id: String,
     },
     /// An effect of the model file beside which the model cannot be simulated.
-    #[error("with {id} no start of its parameters gives a simulation: start them nearer under [effect.\"{id}\"], or remove it")]
+    #[error(
+        "with {id} no start of its parameters gives a simulation: start them nearer under [effect.\"{id}\"], or remove it"
+    )]
     NoStart {
         /// Its identifier.
         id: String,

@@ -171,7 +171,10 @@ fn what_is_not_there_yet_is_refused() {
 
 /// The heated block of the examples, its capacity known.
 fn block() -> String {
-    let path = format!("{}/../examples/models/heated-block.mo", env!("CARGO_MANIFEST_DIR"));
+    let path = format!(
+        "{}/../examples/models/heated-block.mo",
+        env!("CARGO_MANIFEST_DIR")
+    );
     let text = std::fs::read_to_string(path).unwrap();
     text.replace("parameter Real C(", "final parameter Real C(")
 }
@@ -214,7 +217,10 @@ fn a_model_of_ones_own_is_diagnosed_and_mended() {
     browser.click("#own-diagnose");
     browser.until("document.querySelector('#own-findings .groups li') && document.getElementById('working').hidden");
     let found = browser.text("#own-findings");
-    assert!(found.contains("lag(y) at the output y, which reads T (block)"), "{found}");
+    assert!(
+        found.contains("lag(y) at the output y, which reads T (block)"),
+        "{found}"
+    );
     // Where it sits among the ports.
     let sits = browser.evaluate(
         "[...document.querySelectorAll('#own-ports tbody tr')].filter((row) => row.lastChild.innerText.includes('found')).map((row) => row.children[0].innerText)",

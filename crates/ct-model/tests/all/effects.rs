@@ -484,12 +484,22 @@ fn an_effect_keeps_the_numbers_of_the_record_that_it_was_written_in() {
     let numbers = [("begin", 0.0), ("duration", 1000.0), ("width", 1.0)];
     assert_eq!(drift.record_numbers, BTreeMap::from(numbers));
     let kept = BTreeMap::from([("duration".to_string(), 250.0), ("begin".to_string(), 50.0)]);
-    let all = candidates_keeping(&spec, &visited, &BTreeMap::from([("drift(y)".to_string(), kept)]));
-    assert_eq!(find(all.clone(), "drift(y)").record_numbers["duration"], 250.0);
+    let all = candidates_keeping(
+        &spec,
+        &visited,
+        &BTreeMap::from([("drift(y)".to_string(), kept)]),
+    );
+    assert_eq!(
+        find(all.clone(), "drift(y)").record_numbers["duration"],
+        250.0
+    );
     // Half the kept duration behind the kept begin it has moved by half of its change, whatever this record visits.
     let reading = |candidate: &Candidate| {
         let mut mended = apply(&spec, &[candidate]).unwrap();
-        let change = mended.parameters.iter_mut().find(|p| p.about.name == "drift_y_change");
+        let change = mended
+            .parameters
+            .iter_mut()
+            .find(|p| p.about.name == "drift_y_change");
         change.unwrap().value = 4.0;
         let model = Model::new(mended);
         let parameters = model.parameters();

@@ -146,13 +146,20 @@ fn unused(tables: &[String], look: Look) -> String {
     if tables.is_empty() {
         return String::new();
     }
-    let named: Vec<String> = tables.iter().take(NAMED).map(|table| format!("[{table}]")).collect();
+    let named: Vec<String> = tables
+        .iter()
+        .take(NAMED)
+        .map(|table| format!("[{table}]"))
+        .collect();
     let more = match tables.len().saturating_sub(NAMED) {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
     let verb = if tables.len() == 1 { "has" } else { "have" };
-    let note = format!("note: {}{more} {verb} no part in a comparison", named.join(", "));
+    let note = format!(
+        "note: {}{more} {verb} no part in a comparison",
+        named.join(", ")
+    );
     look.paragraph("", &note)
 }
 

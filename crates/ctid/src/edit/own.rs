@@ -8,8 +8,8 @@ use ct_model::effects::Candidate;
 use serde::Deserialize;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
 
-use super::layout::{document, push, take_out};
 use super::Edited;
+use super::layout::{document, push, take_out};
 use crate::Error;
 use crate::model_file::read_text;
 use crate::own_model::effects::{RECORD, every_candidate, find, plain};
@@ -127,12 +127,19 @@ pub(crate) fn with_effect(
     let text = document.to_string();
     let model = OwnModelFile::parse_with(path, &text, read)?;
     let verb = if is_on { "kept" } else { "added" };
-    let done = format!("{file}: {verb} {id}{kept}; effects = {:?}", model.effects.on);
+    let done = format!(
+        "{file}: {verb} {id}{kept}; effects = {:?}",
+        model.effects.on
+    );
     Ok(Edited { text, done })
 }
 
 /// Writes what a result found of an effect into its table. Returns what, in words.
-fn keep(document: &mut DocumentMut, candidate: &Candidate, found: &Findings) -> Result<String, String> {
+fn keep(
+    document: &mut DocumentMut,
+    candidate: &Candidate,
+    found: &Findings,
+) -> Result<String, String> {
     let id = &candidate.id;
     let Some(numbers) = found.record_numbers.get(id) else {
         let known: Vec<&str> = found.record_numbers.keys().map(String::as_str).collect();
@@ -224,6 +231,9 @@ pub(crate) fn without_effect(
     } else {
         String::new()
     };
-    let done = format!("{file}: removed {wanted}; effects = {:?}{kept}", model.effects.on);
+    let done = format!(
+        "{file}: removed {wanted}; effects = {:?}{kept}",
+        model.effects.on
+    );
     Ok(Edited { text, done })
 }

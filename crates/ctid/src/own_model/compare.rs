@@ -104,12 +104,15 @@ pub(crate) fn compare(
         .records
         .iter()
         .flat_map(|_| spec.states.iter().map(|s| &s.about.unit));
-    let noise_floors = outputs.iter().zip(&noise).map(|(about, &sigma)| NoiseFloor {
-        output: about.name.clone(),
-        level: sigma,
-        innovation: sigma,
-        coefficients: Vec::new(),
-    });
+    let noise_floors = outputs
+        .iter()
+        .zip(&noise)
+        .map(|(about, &sigma)| NoiseFloor {
+            output: about.name.clone(),
+            level: sigma,
+            innovation: sigma,
+            coefficients: Vec::new(),
+        });
     let noise_floors = noise_floors.collect();
     let errors = fit.std_errors();
     let free = setup.free();

@@ -105,7 +105,10 @@ fn size_of(diagnosis: &Diagnosis, effect: &str, words: &EffectWords) -> String {
     let Some(last) = diagnosis.steps.last() else {
         return String::new();
     };
-    let own = last.parameters.iter().filter(|p| words.is_of(effect, &p.name));
+    let own = last
+        .parameters
+        .iter()
+        .filter(|p| words.is_of(effect, &p.name));
     let sizes: Vec<String> = own
         .map(|p| {
             let (value, error) = numbers::value_and_error(p.value, p.std_error);

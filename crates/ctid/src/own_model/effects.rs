@@ -73,7 +73,10 @@ pub(super) fn read(
         let at = written.span().start;
         let candidate = find(spec, &all, written.as_ref()).map_err(|what| source.at(at, what))?;
         if on.iter().any(|other| other.id == candidate.id) {
-            return Err(source.at(at, format!("{} is listed twice: once is enough", candidate.id)));
+            return Err(source.at(
+                at,
+                format!("{} is listed twice: once is enough", candidate.id),
+            ));
         }
         on.push(candidate);
     }
@@ -126,7 +129,9 @@ pub(crate) fn find<'c>(
     }
     let name = id.split('(').next().unwrap_or_default();
     let ids = || all.iter().map(|candidate| candidate.id.as_str());
-    let ports: Vec<&str> = ids().filter(|id| id.split('(').next() == Some(name)).collect();
+    let ports: Vec<&str> = ids()
+        .filter(|id| id.split('(').next() == Some(name))
+        .collect();
     let near = names::suggestion(&id, ids());
     let where_it_acts = match ports.len() {
         0 if all_effects().any(|effect| effect.id == name) => {
@@ -134,7 +139,10 @@ pub(crate) fn find<'c>(
         }
         0 => String::new(),
         1..=8 => format!("; {name} may act here: {}", ports.join(", ")),
-        count => format!("; {name} may act at {count} ports, such as {}", ports[..4].join(", ")),
+        count => format!(
+            "; {name} may act at {count} ports, such as {}",
+            ports[..4].join(", ")
+        ),
     };
     Err(format!(
         "\"{}\" is no effect that can act in {}: `ctid effects --model` lists them{where_it_acts}{near}",
@@ -159,7 +167,10 @@ fn settings(
             known => format!("there are {}", known.join(", ")),
         };
         let near = names::suggestion(name, known);
-        Err(source.at(at, format!("{} is no {what} of {id}: {may}{near}", quoted(name))))
+        Err(source.at(
+            at,
+            format!("{} is no {what} of {id}: {may}{near}", quoted(name)),
+        ))
     };
     let mut kept = Kept::default();
     let mut fixed_names: Vec<(usize, String)> = Vec::new();
@@ -203,7 +214,10 @@ fn settings(
             return unknown(at, "parameter", &name, shorts().collect());
         };
         let Some(value) = kept.start.get(&name) else {
-            return Err(source.at(at, format!("{name} is fixed and has no value: write {name} = ... beside it")));
+            return Err(source.at(
+                at,
+                format!("{name} is fixed and has no value: write {name} = ... beside it"),
+            ));
         };
         fixed.insert(own.name.clone(), *value);
     }

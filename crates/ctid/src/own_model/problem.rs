@@ -71,7 +71,13 @@ impl OwnModelFile {
             file: self.name.clone(),
             what,
         };
-        let all = self.candidates_of(&self.base, &Visited::nominal(&self.base))?;
+        let declared = self.columns.time.is_some();
+        let time_unit = declared.then(|| self.columns.time_header().1);
+        let visited = Visited {
+            time_unit: unit_of(time_unit.unwrap_or(1.0)).to_string(),
+            ..Visited::nominal(&self.base)
+        };
+        let all = self.candidates_of(&self.base, &visited)?;
         let mut on = Vec::new();
         for id in &self.effects.on {
             let candidate = all.iter().find(|candidate| candidate.id == *id);
@@ -124,7 +130,8 @@ impl OwnModelFile {
             let kept = self.effects.kept.get(id);
             let numbers = used.get(id)?.iter();
             let lacks = numbers.filter(|(n, _)| !kept.is_some_and(|k| k.numbers.contains_key(**n)));
-            let lacks = lacks.map(|(name, value)| format!("{name} = {}", numbers::significant(*value, 4)));
+            let lacks =
+                lacks.map(|(name, value)| format!("{name} = {}", numbers::significant(*value, 4)));
             let lacks: Vec<String> = lacks.collect();
             (!lacks.is_empty()).then_some((id, lacks))
         });

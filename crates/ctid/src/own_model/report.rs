@@ -105,11 +105,7 @@ fn only(values: &[f64]) -> f64 {
 }
 
 /// Root mean square of the errors, each divided by its output's noise.
-fn weighted(
-    outputs: &[String],
-    errors: &BTreeMap<String, f64>,
-    floors: &[f64],
-) -> f64 {
+fn weighted(outputs: &[String], errors: &BTreeMap<String, f64>, floors: &[f64]) -> f64 {
     let each = outputs.iter().zip(floors);
     let squares = each.filter_map(|(name, floor)| Some((errors.get(name)? / floor).powi(2)));
     (squares.sum::<f64>() / outputs.len().max(1) as f64).sqrt()
@@ -244,7 +240,10 @@ fn of_step(
         let series = fitted.iter().enumerate().map(|(r, record)| Series {
             name: &record.name,
             time: &record.time,
-            input: record.inputs.first().map_or(&record.time, |input| &input.values),
+            input: record
+                .inputs
+                .first()
+                .map_or(&record.time, |input| &input.values),
             model: &step.simulated[r * count + o],
             residual: &residuals[r * count + o],
         });
@@ -268,7 +267,11 @@ fn of_step(
         let test = step.rmse_test_per_output.as_ref();
         OutputStep {
             name: outputs[o].clone(),
-            rmse: step.rmse_per_output.get(&outputs[o]).copied().unwrap_or(f64::NAN),
+            rmse: step
+                .rmse_per_output
+                .get(&outputs[o])
+                .copied()
+                .unwrap_or(f64::NAN),
             rmse_test: test.and_then(|test| test.get(&outputs[o])).copied(),
             held_out_error: None,
             tests: tests(&fitted[0], &residuals[o]),
@@ -280,7 +283,10 @@ fn of_step(
         added: step.added.clone(),
         place: None,
         rmse: step.rmse.unwrap_or(f64::NAN),
-        rmse_test: match test.map(|test| test.values().copied().collect::<Vec<_>>()).as_deref() {
+        rmse_test: match test
+            .map(|test| test.values().copied().collect::<Vec<_>>())
+            .as_deref()
+        {
             Some([one]) => Some(*one),
             _ => None,
         },

@@ -50,13 +50,21 @@ impl EffectWords {
         let words = |candidate: &Candidate| Words {
             place: place(spec, candidate.port),
             sites: match own.get(&candidate.id) {
-                Some(own) => own.terms.keys().map(|key| site_of_term(spec, key)).collect(),
+                Some(own) => own
+                    .terms
+                    .keys()
+                    .map(|key| site_of_term(spec, key))
+                    .collect(),
                 None => sites(spec, candidate.port),
             },
             physics: candidate
                 .effect
                 .map_or("a term of the model file", |effect| effect.physics),
-            parameters: candidate.parameters.iter().map(|p| p.name.clone()).collect(),
+            parameters: candidate
+                .parameters
+                .iter()
+                .map(|p| p.name.clone())
+                .collect(),
         };
         Self(all.iter().map(|c| (c.id.clone(), words(c))).collect())
     }
@@ -153,7 +161,11 @@ fn place(spec: &ModelSpec, port: Port) -> String {
         Port::Dependence(v, x) => format!("at {}, with {}", value(v), of(x)),
         Port::Between(a, b) => format!("between {} and {}", state(a), state(b)),
         Port::InputAndBalance(u, x) => {
-            format!("from the input {} into the equation of {}", of(Variable::Input(u)), state(x))
+            format!(
+                "from the input {} into the equation of {}",
+                of(Variable::Input(u)),
+                state(x)
+            )
         }
         Port::BalanceAnd(x, a) => format!("in the equation of {}, with {}", state(x), of(a)),
         Port::OutputAnd(y, a) => format!("at the output {}, with {}", output(y), of(a)),
@@ -176,8 +188,14 @@ mod tests {
             ("lag(y)", "lag(y) at the output y, which reads T (block)"),
             ("step(T)", "step(T) in the equation of T (block)"),
             ("drift(k)", "drift(k) at the parameter k (loss to the room)"),
-            ("varies_with(k,T)", "varies_with(k,T) at the parameter k (loss to the room), with T (block)"),
-            ("radiation(T,Ta)", "radiation(T,Ta) in the equation of T (block), with Ta (room)"),
+            (
+                "varies_with(k,T)",
+                "varies_with(k,T) at the parameter k (loss to the room), with T (block)",
+            ),
+            (
+                "radiation(T,Ta)",
+                "radiation(T,Ta) in the equation of T (block), with Ta (room)",
+            ),
         ];
         for (id, placed) in said {
             assert_eq!(words.placed(id), placed);

@@ -140,7 +140,11 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
     Failures {
         by_time,
         by_level: bins(simulated, residual, &even_edges(simulated, 10)),
-        by_flow: bins(&record.inputs[0].values, residual, &even_edges(&record.inputs[0].values, 10)),
+        by_flow: bins(
+            &record.inputs[0].values,
+            residual,
+            &even_edges(&record.inputs[0].values, 10),
+        ),
         by_direction: bins(&rate, residual, &[-1.0, -0.003, 0.003, 1.0]),
         by_frequency,
         sentences,

@@ -19,7 +19,9 @@ pub(super) fn of_diagnosis(diagnosis: &Diagnosis) -> usize {
     let records = diagnosis.records.iter();
     let records = records.flat_map(|shown| {
         let inputs = shown.inputs.iter().map(|input| &input.values);
-        std::iter::once(&shown.time).chain(inputs).chain(&shown.outputs)
+        std::iter::once(&shown.time)
+            .chain(inputs)
+            .chain(&shown.outputs)
     });
     let runs = diagnosis.steps.iter().flat_map(|step| &step.simulated);
     let paths = diagnosis.unknown.iter();

@@ -21,10 +21,10 @@ use super::held::of_diagnosis;
 use super::own_findings::{self, Diagnosed};
 use super::session::Session;
 use super::upload::Upload;
-use crate::look::Look;
-use crate::model_file::read_text;
 use crate::edit::own::Findings;
 use crate::effort::EffortLevel;
+use crate::look::Look;
+use crate::model_file::read_text;
 use crate::own_model::{Comparison, OwnModelFile, Records, compare, diagnose, report};
 use crate::report::{min_max, rounded};
 use crate::{Error, check, edit, numbers};
@@ -203,13 +203,15 @@ impl Own {
         let unused = model.as_ref().ok().map(|model| model.unused.clone());
         let found = self.diagnosis.as_ref();
         let effects = found.map_or(&[][..], |found| &found.effects);
-        let ports = model.as_ref().ok().map(|model| own_findings::ports(model, effects));
+        let ports = model
+            .as_ref()
+            .ok()
+            .map(|model| own_findings::ports(model, effects));
         let diagnosis = found.map(|found| {
             let mut body = found.body.clone();
             body["id"] = json!(found.id);
-            body["of_this_model"] = json!(
-                found.text == self.text && found.file == self.file && found.data == data
-            );
+            body["of_this_model"] =
+                json!(found.text == self.text && found.file == self.file && found.data == data);
             body
         });
         json!({
@@ -294,7 +296,8 @@ pub(super) fn change(session: &mut Session, change: Change) -> Result<(), Refusa
             let found = own.diagnosis.as_ref().map(|found| &found.findings);
             let found = found.filter(|found| found.has(&effect));
             let path = Path::new(FILE);
-            let edited = edit::own::with_effect(path, &own.file, &effect, found, &own.named_text())?;
+            let edited =
+                edit::own::with_effect(path, &own.file, &effect, found, &own.named_text())?;
             own.file = edited.text;
         }
         Change::Remove { effect } => {

@@ -32,11 +32,17 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
     let one = |id: &String| json!({ "effect": id, "placed": words.placed(id), "physics": words.physics(id) });
     let groups = found.groups.iter().filter_map(|group| {
         let (first, others) = group.split_first()?;
-        let sizes = found.steps.last().into_iter().flat_map(|last| &last.parameters);
+        let sizes = found
+            .steps
+            .last()
+            .into_iter()
+            .flat_map(|last| &last.parameters);
         let sizes = sizes.filter(|p| words.is_of(first, &p.name)).map(|p| {
             let (value, error) = numbers::value_and_error(p.value, p.std_error);
             let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-            format!("{} = {value}{error} {}", p.name, p.unit).trim_end().to_string()
+            format!("{} = {value}{error} {}", p.name, p.unit)
+                .trim_end()
+                .to_string()
         });
         let mut shown = one(first);
         shown["sizes"] = json!(sizes.collect::<Vec<_>>());
@@ -49,14 +55,25 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
     };
     let units = |name: &String| {
         let spec = &model.base;
-        let mut outputs = spec.outputs.iter().map(|output| spec.about(output.variable));
-        outputs.find(|about| about.name == *name).map_or(String::new(), |about| about.unit.clone())
+        let mut outputs = spec
+            .outputs
+            .iter()
+            .map(|output| spec.about(output.variable));
+        outputs
+            .find(|about| about.name == *name)
+            .map_or(String::new(), |about| about.unit.clone())
     };
     let steps = found.steps.iter().map(|step| {
-        let name = step.added.as_ref().map_or_else(|| found.model.clone(), |effect| format!("+ {effect}"));
+        let name = step
+            .added
+            .as_ref()
+            .map_or_else(|| found.model.clone(), |effect| format!("+ {effect}"));
         json!({ "name": name, "errors": errors(step) })
     });
-    let outputs: Vec<&String> = found.steps.first().map_or_else(Vec::new, |step| step.rmse_per_output.keys().collect());
+    let outputs: Vec<&String> = found
+        .steps
+        .first()
+        .map_or_else(Vec::new, |step| step.rmse_per_output.keys().collect());
     json!({
         "headline": diagnosis_heading(found),
         "sentences": diagnosis_sentences(found, &words),
@@ -93,13 +110,18 @@ pub(super) fn ports(model: &OwnModelFile, found: &[String]) -> Value {
 fn listed(spec: &ModelSpec) -> Vec<(Site, &About)> {
     let inputs = (0..spec.inputs.len()).map(Variable::Input);
     let inputs = inputs.map(|v| (Site::Input(spec.about(v).name.clone()), spec.about(v)));
-    let outputs = spec.outputs.iter().map(|output| spec.about(output.variable));
+    let outputs = spec
+        .outputs
+        .iter()
+        .map(|output| spec.about(output.variable));
     let outputs = outputs.map(|about| (Site::Output(about.name.clone()), about));
     let states = spec.states.iter().map(|state| &state.about);
     let states = states.map(|about| (Site::Equation(about.name.clone()), about));
     let values = spec.ports().values;
     let values = values.into_iter().filter_map(|port| match port {
-        ct_model::effects::Port::Value(v) => Some((Site::Value(spec.about(v).name.clone()), spec.about(v))),
+        ct_model::effects::Port::Value(v) => {
+            Some((Site::Value(spec.about(v).name.clone()), spec.about(v)))
+        }
         _ => None,
     });
     inputs.chain(outputs).chain(states).chain(values).collect()

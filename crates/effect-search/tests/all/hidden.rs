@@ -281,7 +281,10 @@ fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
     let found = believed(&problem, &Options::default()).unwrap();
     let tau = |found: &Believed| {
         let mut parameters = found.spec.parameters.iter();
-        parameters.find(|p| p.about.name == "lag_y_tau").unwrap().value
+        parameters
+            .find(|p| p.about.name == "lag_y_tau")
+            .unwrap()
+            .value
     };
     assert!((tau(&found) - 25.0).abs() < 1.0, "{}", tau(&found));
     let numbers = &found.record_numbers["lag(y)"];
@@ -294,7 +297,10 @@ fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
     assert_eq!(&diagnosis.record_numbers["lag(y)"], numbers);
     // Numbers of an earlier record stay, and a start is tried beside the effect's own.
     let kept = Kept {
-        numbers: BTreeMap::from([("duration".to_string(), 900.0), ("interval".to_string(), 2.0)]),
+        numbers: BTreeMap::from([
+            ("duration".to_string(), 900.0),
+            ("interval".to_string(), 2.0),
+        ]),
         start: BTreeMap::from([("tau".to_string(), 24.0)]),
     };
     problem.kept.insert("lag(y)".to_string(), kept);

@@ -17,7 +17,7 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     if path.extension().is_none_or(|kind| kind != "toml") {
         return Ok(said(&own_model::read_model(path)?, look));
     }
-    match AnyModelFile::read(path)?.as_it_stands()? {
+    match AnyModelFile::read(path)?.with_effects()? {
         AnyModelFile::Own(file) => Ok(said(file.model.spec(), look)),
         AnyModelFile::Plant(_) => Err(Error::file(
             path,

@@ -91,11 +91,11 @@ impl Sought {
                 |stem: &&str| word.starts_with(stem) || word.len() > 3 && stem.starts_with(word);
             let family = FAMILIES
                 .iter()
-                .find(|family| family.iter().any(|stem| means(&stem)));
+                .find(|family| family.iter().any(&means));
             let of_family = family.into_iter().flat_map(|family| family.iter());
             // The word itself counts for more than others of its family.
             stems.extend(
-                of_family.map(|stem| ((*stem).to_string(), if means(&stem) { 4 } else { 1 })),
+                of_family.map(|stem| ((*stem).to_string(), if means(stem) { 4 } else { 1 })),
             );
             if family.is_none() {
                 let short = ["ing", "ed", "es", "s"]

@@ -125,7 +125,7 @@ impl AnyModelFile {
     ///
     /// # Errors
     /// Where the file lacks a number that they need.
-    pub fn as_it_stands(self) -> Result<Self, Error> {
+    pub fn with_effects(self) -> Result<Self, Error> {
         Ok(match self {
             Self::Own(file) => Self::Own(Box::new(file.mended(None)?)),
             plant => plant,

@@ -89,9 +89,7 @@ impl Sought {
         for word in said.to_lowercase().split_whitespace() {
             let means =
                 |stem: &&str| word.starts_with(stem) || word.len() > 3 && stem.starts_with(word);
-            let family = FAMILIES
-                .iter()
-                .find(|family| family.iter().any(&means));
+            let family = FAMILIES.iter().find(|family| family.iter().any(&means));
             let of_family = family.into_iter().flat_map(|family| family.iter());
             // The word itself counts for more than others of its family.
             stems.extend(

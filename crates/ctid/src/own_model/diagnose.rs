@@ -55,7 +55,7 @@ pub(crate) fn heading(diagnosis: &Diagnosis) -> String {
 }
 
 /// What was found, in sentences.
-pub(crate) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
+pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
     let mut all = Vec::new();
     for group in &diagnosis.groups {
         let [first, others @ ..] = group.as_slice() else {
@@ -75,6 +75,13 @@ pub(crate) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<Strin
             ));
         }
     }
+    all.extend(remaining(diagnosis));
+    all
+}
+
+/// How much the effects explain, and what remains.
+pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
+    let mut all = Vec::new();
     if let Some(share) = diagnosis.share {
         all.push(format!(
             "The effects explain {:.0} % of the squared error above the noise.",

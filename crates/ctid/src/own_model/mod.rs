@@ -17,7 +17,7 @@ pub(crate) mod words;
 pub(crate) use self::compare::{Comparison, compare};
 pub(crate) use self::diagnose::{
     diagnose, heading as diagnosis_heading, said as diagnosis_said,
-    sentences as diagnosis_sentences,
+    remaining as diagnosis_remaining,
 };
 pub(crate) use self::export::{Exported, commented, export, number};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};

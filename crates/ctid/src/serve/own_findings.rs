@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::edit::own::Findings;
 use crate::numbers;
 use crate::own_model::words::{EffectWords, Site};
-use crate::own_model::{OwnModelFile, diagnosis_heading, diagnosis_sentences};
+use crate::own_model::{OwnModelFile, diagnosis_heading, diagnosis_remaining};
 
 /// A diagnosis.
 #[derive(Debug, Clone)]
@@ -76,7 +76,7 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
         .map_or_else(Vec::new, |step| step.rmse_per_output.keys().collect());
     json!({
         "headline": diagnosis_heading(found),
-        "sentences": diagnosis_sentences(found, &words),
+        "sentences": diagnosis_remaining(found),
         "groups": groups.collect::<Vec<_>>(),
         "outputs": outputs.iter().map(|name| json!({ "name": name, "unit": units(name) })).collect::<Vec<_>>(),
         "steps": steps.collect::<Vec<_>>(),

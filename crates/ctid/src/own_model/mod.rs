@@ -16,8 +16,8 @@ pub(crate) mod words;
 
 pub(crate) use self::compare::{Comparison, compare};
 pub(crate) use self::diagnose::{
-    diagnose, heading as diagnosis_heading, said as diagnosis_said,
-    remaining as diagnosis_remaining,
+    diagnose, heading as diagnosis_heading, remaining as diagnosis_remaining,
+    said as diagnosis_said,
 };
 pub(crate) use self::export::{Exported, commented, export, number};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};

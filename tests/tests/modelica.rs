@@ -6,6 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use ct_model::effects::{Visited, apply, candidates};
 use ct_model::{Model, ModelSpec, Simulation};
 use plants::Plant;
 use serde_json::{Value, json};
@@ -36,6 +37,28 @@ equation
   (1 + p)*der(x2) = 0.05*(c + d + e) - x2;
 end Everything;
 "#;
+
+/// A model of the examples with each effect in it that can be said in Modelica, at a start of its parameters.
+fn mended(name: &str) -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/models");
+    let text = fs::read_to_string(folder.join(name).with_extension("mo")).unwrap();
+    let spec = ModelSpec::parse(&text).unwrap();
+    let all = candidates(&spec, &Visited::nominal(&spec));
+    let of_modelica = |text: &String| !text.contains("play(") && !text.contains("quantise(");
+    let texts = all.iter().map(|candidate| {
+        let mut mended = apply(&spec, &[candidate]).unwrap();
+        for own in &candidate.parameters {
+            let mut parameters = mended.parameters.iter_mut();
+            let parameter = parameters.find(|p| p.about.name == own.name).unwrap();
+            parameter.value = own.starts[0];
+        }
+        let text = mended.to_string();
+        // It is the same model when it is read again.
+        assert_eq!(ModelSpec::parse(&text).unwrap().to_string(), text);
+        (candidate.id.clone(), text)
+    });
+    texts.filter(|(_, text)| of_modelica(text)).collect()
+}
 
 /// A text of the repository, and what its inputs are before, between and after the jumps.
 struct Case {
@@ -193,6 +216,16 @@ fn another_compiler_reads_all_texts_as_they_stand_and_as_they_are_written() {
     let late = "model Late parameter Real d = 2.5; input Real u; output Real y = x; Real x(start=0); equation der(x) = delay(u, d) - delay(x, 0.5); end Late;";
     let written = ModelSpec::parse(late).unwrap().to_string();
     assert_eq!(by_rumoca(&[(written, 1.0, 0)])[0].get("refused"), None);
+    // Models with effects in them, but for the operators that are not Modelica's.
+    let mended = mended("heated-block");
+    assert!(mended.len() > 30, "{}", mended.len());
+    let asked: Vec<_> = mended
+        .iter()
+        .map(|(_, text)| (text.clone(), 1.0, 0))
+        .collect();
+    for ((effect, text), found) in mended.iter().zip(by_rumoca(&asked)) {
+        assert_eq!(found.get("refused"), None, "{effect}:\n{text}");
+    }
     // It does refuse.
     let wrong = EVERYTHING.replace("^q*0.01", "^qq*0.01");
     assert!(by_rumoca(&[(wrong, 1.0, 0)])[0]["refused"].is_string());

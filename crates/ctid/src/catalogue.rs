@@ -4,6 +4,7 @@ use plants::{CATALOGUE, Domain, EffectInfo, Known, ParameterInfo, Place, Placed,
 
 use crate::look::{Look, Side, table};
 use crate::model_file::{self, ModelFile};
+use crate::symptoms::{Sought, best};
 use crate::{Error, names, numbers, signature};
 
 /// The whole catalogue, by place.
@@ -15,13 +16,46 @@ pub fn list(look: Look) -> String {
 /// The effects that may be added to a model, by place, in the words of its domain.
 #[must_use]
 pub fn list_for(model: &ModelFile, look: Look) -> String {
-    let domain = model.domain();
-    let offered = |effect: &'static EffectInfo| {
-        domain.offers(effect)
-            && effect.sites(model.plant, &model.known).next().is_some()
-            && model.effects.iter().all(|on| on.effect.id != effect.id)
-    };
-    listed(domain, offered, look)
+    listed(model.domain(), |effect| offered(model, effect), look)
+}
+
+fn offered(model: &ModelFile, effect: &'static EffectInfo) -> bool {
+    model.domain().offers(effect)
+        && effect.sites(model.plant, &model.known).next().is_some()
+        && model.effects.iter().all(|on| on.effect.id != effect.id)
+}
+
+/// The effects that go with what somebody says of the plant, best first; of a model those that may be added to it.
+///
+/// # Errors
+/// Where none does.
+pub(crate) fn like(
+    sought: &Sought,
+    model: Option<&ModelFile>,
+    look: Look,
+) -> Result<String, Error> {
+    let domain = model.map_or(Domain::Hydraulic, ModelFile::domain);
+    let all = CATALOGUE.iter().copied();
+    let all = all.filter(|effect| model.is_none_or(|model| offered(model, effect)));
+    let found = best(all, |effect| sought.score_of_plant(effect));
+    if found.is_empty() {
+        return Err(sought.nothing());
+    }
+    let widest = found.iter().map(|effect| effect.id.len()).max();
+    let rows = found
+        .iter()
+        .map(|effect| row(effect, domain, widest.unwrap_or(0), look));
+    Ok(rows.collect())
+}
+
+/// An effect and what it is.
+fn row(effect: &EffectInfo, domain: Domain, widest: usize, look: Look) -> String {
+    let first = format!(
+        "  {}{}  ",
+        look.strong(effect.id),
+        " ".repeat(widest - effect.id.len())
+    );
+    look.paragraph(&first, effect.in_words(domain))
 }
 
 fn listed(domain: Domain, offered: impl Fn(&'static EffectInfo) -> bool, look: Look) -> String {
@@ -41,12 +75,7 @@ fn listed(domain: Domain, offered: impl Fn(&'static EffectInfo) -> bool, look: L
         text += &format!("{}\n", look.heading(heading));
         let here = CATALOGUE.iter().filter(|effect| effect.place == place);
         for effect in here.filter(|effect| offered(effect)) {
-            let first = format!(
-                "  {}{}  ",
-                look.strong(effect.id),
-                " ".repeat(widest - effect.id.len())
-            );
-            text += &look.paragraph(&first, effect.in_words(domain));
+            text += &row(effect, domain, widest, look);
         }
         text.push('\n');
     }

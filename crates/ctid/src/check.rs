@@ -5,15 +5,25 @@ use std::path::Path;
 use ct_model::{About, Given, Linearity, ModelSpec, Variable, unit_warnings};
 use ct_signals::{escaped, shown};
 
+use crate::Error;
 use crate::look::{Look, Side, table};
-use crate::{Error, own_model};
+use crate::own_model::{self, AnyModelFile};
 
-/// Reads a model and says what it holds.
+/// Reads a model and says what it holds; of a model file the model that it names, with its effects in it.
 ///
 /// # Errors
 /// One line that names the file, line and column, what is wrong and the mend.
 pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
-    Ok(said(&own_model::read_model(path)?, look))
+    if path.extension().is_none_or(|kind| kind != "toml") {
+        return Ok(said(&own_model::read_model(path)?, look));
+    }
+    match AnyModelFile::read(path)?.with_effects()? {
+        AnyModelFile::Own(file) => Ok(said(file.model.spec(), look)),
+        AnyModelFile::Plant(_) => Err(Error::file(
+            path,
+            "it names one of the plants, which has no text to check: `ctid effects --model` lists what may be added to it",
+        )),
+    }
 }
 
 /// What a model holds, in words.

@@ -44,6 +44,7 @@ pub mod report;
 pub mod serve;
 mod signature;
 mod simulate;
+mod symptoms;
 pub mod tables;
 pub mod term_file;
 pub mod terminal;

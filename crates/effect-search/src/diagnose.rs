@@ -8,20 +8,20 @@
 //! 4. Residual tests of what it leaves decide between the verdicts; groups hold what cannot be told apart.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
-use ct_model::Model;
-use ct_model::effects::{Candidate, Visited, candidates, own_candidates};
+use ct_model::Given;
+use ct_model::effects::Candidate;
 use ct_signals::ArModel;
 use estimation::{Fit, Noise};
-use greybox::{FitOptions, ModelSetup, Robust, weighted_rms};
+use greybox::{Robust, weighted_rms};
 
 use crate::accept::{BIC_MARGIN, NOISE_ORDER};
+use crate::believed::begin;
 use crate::node::{Context, FINE, Node};
 use crate::problem::{Limit, Options, Problem};
 use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
-use crate::{Error, held_out_errors};
+use crate::{Error, held_out};
 
 /// Shares of the time limit after which the phases end.
 const SEARCHED_WHITE: f64 = 0.5;
@@ -135,86 +135,6 @@ struct Finding<'a> {
     share: Option<f64>,
 }
 
-/// The believed model fitted, and the candidates.
-fn begin<'a>(
-    problem: &'a Problem,
-    options: &Options<'a>,
-    limit: Limit<'a>,
-) -> Result<(Context<'a>, Node), Error> {
-    let mut context = Context {
-        problem,
-        candidates: Vec::new(),
-        scales: None,
-        limit,
-    };
-    let fit_options = FitOptions {
-        starts: options.starts,
-        seed: options.seed,
-        ..FitOptions::default()
-    };
-    let model = Arc::new(Model::new(problem.spec.clone()));
-    let (fit, visited) = {
-        let setup = context.setup(&model)?;
-        let fit = setup.fit(&fit_options)?;
-        let visited = visited(problem, &setup, &fit)?;
-        (fit, visited)
-    };
-    let mut all = candidates(&problem.spec, &visited);
-    let own: Vec<Candidate> = own_candidates(&problem.spec, &problem.candidates)?;
-    all.extend(own);
-    context.candidates = all;
-    let bare = Node {
-        added: Vec::new(),
-        model,
-        fit,
-    };
-    if problem.effects.is_empty() {
-        return Ok((context, bare));
-    }
-    // The effects of the model file, one after the other: each from its best start.
-    let white = Noise::white(problem.spec.outputs.len());
-    let mut node = bare;
-    for id in &problem.effects {
-        let Some(i) = context.candidates.iter().position(|c| c.id == *id) else {
-            return Err(Error::UnknownEffect {
-                id: id.clone(),
-                near: String::new(),
-            });
-        };
-        if let Some(trial) = context.trial(&node, i, &white)? {
-            let mut added = node.added.clone();
-            added.push(i);
-            node = context.fitted(added, trial.model, trial.starts, &white, FINE)?;
-        }
-    }
-    Ok((context, node))
-}
-
-/// What the fitted model visits in all records.
-fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
-    let (count, states) = (setup.parameter_count(), problem.spec.states.len());
-    let mut all: Option<Visited> = None;
-    for (r, record) in problem.records.iter().enumerate() {
-        let time = setup.model_time(r);
-        let inputs: Vec<Vec<f64>> = (0..record.len())
-            .map(|k| record.inputs.iter().map(|input| input.values[k]).collect())
-            .collect();
-        let initial = &fit.x[count + r * states..count + (r + 1) * states];
-        let own = Visited::of_simulation(
-            &problem.spec,
-            (&fit.x[..count], initial),
-            &time,
-            &inputs,
-            &problem.time_unit_name,
-        )?;
-        match &mut all {
-            None => all = Some(own),
-            Some(all) => all.join(&own),
-        }
-    }
-    all.ok_or_else(|| greybox::Error::NoRecord.into())
-}
-
 /// The search in the metric of a noise model, where that is not white.
 fn in_metric(
     context: &Context,
@@ -320,9 +240,10 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         .singles
         .iter()
         .filter_map(|node| {
-            let &i = node.added.last()?;
+            let candidate = &context.candidates[*node.added.last()?];
             Some(Single {
-                effect: context.candidates[i].id.clone(),
+                effect: candidate.id.clone(),
+                sizes: sizes(node, candidate),
                 bic_gain: node.gain_over(&grown.base),
                 rmse_per_output: named(&node.fit.rmse),
             })
@@ -347,6 +268,12 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         .filter_map(|own| groups.iter().find(|group| group.first() == Some(own)))
         .map(|group| context.ids(group))
         .collect();
+    let said = groups.iter().flatten().chain(&problem.effects);
+    let said = said.chain(singles.iter().map(|single| &single.effect));
+    let record_numbers = said
+        .filter_map(|id| context.candidates.iter().find(|c| c.id == *id))
+        .map(|candidate| (candidate.id.clone(), candidate.record_numbers.clone()))
+        .collect();
     Ok(Diagnosis {
         schema: 2,
         model: problem.spec.name.clone(),
@@ -359,6 +286,7 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         left,
         noise: noise.collect(),
         singles,
+        record_numbers,
         candidates: context.candidates.len(),
         cut_short: grown.cut_short || context.limit.passed(SEARCHED),
         seconds: context.limit.seconds(),
@@ -395,6 +323,23 @@ fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<
         nodes.push(next);
     }
     Ok(nodes)
+}
+
+/// What was found of the parameters of an effect in a set.
+fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
+    let errors = node.fit.std_errors();
+    let parameters = node.spec().parameters.iter().enumerate();
+    let own =
+        parameters.filter(|(_, p)| candidate.parameters.iter().any(|o| o.name == p.about.name));
+    own.map(|(i, parameter)| Estimate {
+        effect: Some(candidate.id.clone()),
+        name: parameter.about.name.clone(),
+        value: node.fit.x[i],
+        std_error: errors[i],
+        unit: parameter.about.unit.clone(),
+        known: parameter.given != Given::Fitted,
+    })
+    .collect()
 }
 
 fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<Step, Error> {
@@ -434,7 +379,9 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
         unit,
         known: !setup.free().contains(&i),
     });
-    let test = held_out_errors(&setup, &node.fit, &problem.test)?;
+    let test = held_out(&setup, &node.fit, &problem.test)?;
+    let mut simulated = setup.simulate(&node.fit.x).unwrap_or_default();
+    simulated.extend(test.iter().flat_map(|test| test.simulated.iter().cloned()));
     let added = node.added.len() > base.added.len();
     Ok(Step {
         added: added.then(|| {
@@ -444,12 +391,12 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
         }),
         rmse: (outputs.len() == 1).then(|| node.fit.rmse[0]),
         rmse_per_output: named(&node.fit.rmse),
-        rmse_test_per_output: test.map(|rmse| named(&rmse)),
+        rmse_test_per_output: test.map(|test| named(&test.rmse)),
         weighted_rmse: weighted_rms(&node.fit.rmse, floors, &node.fit.samples_per_output),
         bic: node.fit.bic(),
         starts: node.fit.starts,
         starts_agree: node.fit.agree,
-        simulated: setup.simulate(&node.fit.x).unwrap_or_default(),
+        simulated,
         parameters: parameters.collect(),
     })
 }

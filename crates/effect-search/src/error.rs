@@ -23,11 +23,17 @@ pub enum Error {
     #[error(transparent)]
     Simulation(#[from] ct_model::NoSolution),
     /// An effect of the model file that the model cannot have.
-    #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can{near}")]
+    #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can")]
     UnknownEffect {
         /// Its identifier.
         id: String,
-        /// A similar one, in words.
-        near: String,
+    },
+    /// An effect of the model file beside which the model cannot be simulated.
+    #[error(
+        "with {id} no start of its parameters gives a simulation: start them nearer under [effect.\"{id}\"], or remove it"
+    )]
+    NoStart {
+        /// Its identifier.
+        id: String,
     },
 }

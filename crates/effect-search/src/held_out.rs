@@ -9,20 +9,26 @@ use crate::Error;
 /// Samples on which the initial states of a held-out record are fitted, and which are not scored.
 const STATE_ROWS: usize = 5;
 
-/// Simulation error of each output on held-out records \[its unit\]; `None` without any. `fit`: of the model that `setup` has.
+/// A fitted model on held-out records.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOut {
+    /// Simulation error of each output \[its unit\].
+    pub rmse: Vec<f64>,
+    /// What the model gives: a series for each record and output; NaN where the simulation cannot go on.
+    pub simulated: Vec<Vec<f64>>,
+}
+
+/// A fitted model on held-out records; `None` without any. `fit`: of the model that `setup` has.
 ///
 /// # Errors
 /// Where a record is not one of this model, or its initial states cannot be fitted.
-pub fn held_out_errors(
-    setup: &ModelSetup,
-    fit: &Fit,
-    test: &[Record],
-) -> Result<Option<Vec<f64>>, Error> {
+pub fn held_out(setup: &ModelSetup, fit: &Fit, test: &[Record]) -> Result<Option<HeldOut>, Error> {
     if test.is_empty() {
         return Ok(None);
     }
     let outputs = fit.rmse.len();
     let mut sums = vec![(0.0, 0_usize); outputs];
+    let mut simulated = Vec::new();
     for record in test {
         let whole = [record.clone()];
         let first = [record.rows(0..STATE_ROWS.min(record.len()))];
@@ -30,11 +36,8 @@ pub fn held_out_errors(
             .held_out(&first, &fit.x)?
             .fit_states(&FitOptions::default())?;
         let model = setup.held_out(&whole, &fit.x)?.simulate(&states);
+        let model = model.unwrap_or_else(|| vec![vec![f64::NAN; record.len()]; outputs]);
         for (o, sum) in sums.iter_mut().enumerate() {
-            let Some(model) = &model else {
-                sum.0 = f64::NAN;
-                continue;
-            };
             let measured = record.outputs[o].values.iter();
             let pairs = measured.zip(&model[o]).skip(STATE_ROWS);
             for (y, m) in pairs.filter(|(y, _)| !y.is_nan()) {
@@ -42,7 +45,11 @@ pub fn held_out_errors(
                 sum.1 += 1;
             }
         }
+        simulated.extend(model);
     }
     let rms = |(sum, n): (f64, usize)| (sum / n.max(1) as f64).sqrt();
-    Ok(Some(sums.into_iter().map(rms).collect()))
+    Ok(Some(HeldOut {
+        rmse: sums.into_iter().map(rms).collect(),
+        simulated,
+    }))
 }

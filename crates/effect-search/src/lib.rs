@@ -8,6 +8,7 @@
 //! fit, [`estimation`] least squares under a noise model.
 
 mod accept;
+mod believed;
 mod diagnose;
 mod error;
 mod groups;
@@ -23,10 +24,11 @@ mod score;
 mod search;
 mod spectral_line;
 
+pub use believed::{Believed, believed};
 pub use diagnose::{Progress, diagnose};
 pub use error::Error;
-pub use held_out::held_out_errors;
+pub use held_out::{HeldOut, held_out};
 pub use left::Left;
-pub use problem::{Options, Problem};
+pub use problem::{Kept, Options, Problem};
 pub use result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 pub use spectral_line::{Line, strongest_line};

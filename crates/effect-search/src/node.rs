@@ -59,6 +59,14 @@ impl Node {
     }
 }
 
+/// What is said of the parameters that a model has.
+fn of_model<T: Clone>(model: &Model, said: &BTreeMap<String, T>) -> BTreeMap<String, T> {
+    let mut said = said.clone();
+    let parameters = &model.spec().parameters;
+    said.retain(|name, _| parameters.iter().any(|p| p.about.name == *name));
+    said
+}
+
 impl Context<'_> {
     /// The model with a set of effects.
     pub fn model(&self, added: &[usize]) -> Result<Model, Error> {
@@ -70,15 +78,10 @@ impl Context<'_> {
     pub fn setup<'b>(&'b self, model: &'b Model) -> Result<ModelSetup<'b>, Error> {
         let problem = self.problem;
         // Effects of the model file may be fixed too, but not all sets have them.
-        let names = &model.spec().parameters;
-        let known: BTreeMap<String, f64> = problem
-            .known
-            .iter()
-            .filter(|(name, _)| names.iter().any(|p| p.about.name == **name))
-            .map(|(name, value)| (name.clone(), *value))
-            .collect();
+        let known = of_model(model, &problem.known);
+        let priors = of_model(model, &problem.priors);
         let setup = ModelSetup::new(model, &problem.records, &known, problem.time_unit)?;
-        let setup = setup.with_priors(&problem.priors)?;
+        let setup = setup.with_priors(&priors)?;
         Ok(match &self.scales {
             Some(scales) => setup.with_scales(scales.clone()),
             None => setup,

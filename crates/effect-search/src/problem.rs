@@ -16,6 +16,8 @@ pub struct Problem {
     pub spec: ModelSpec,
     /// Effects that the model has already, as [`ct_model::effects::Candidate::id`] has them.
     pub effects: Vec<String>,
+    /// What is kept of effects from an earlier record, by their identifiers.
+    pub kept: BTreeMap<String, Kept>,
     /// Records that are fitted, whose inputs and outputs are those of the model, in its order and units; inputs are whole.
     pub records: Vec<Record>,
     /// Records that take part in no fit and no choice.
@@ -30,6 +32,15 @@ pub struct Problem {
     pub time_unit: f64,
     /// The unit of the model's time, as it is written: `s`, `h`.
     pub time_unit_name: String,
+}
+
+/// What is kept of an effect from an earlier record.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Kept {
+    /// The numbers of that record that the effect is written in ([`ct_model::effects::Candidate::record_numbers`]).
+    pub numbers: BTreeMap<String, f64>,
+    /// Where fits of its parameters begin, by their names in the effect \[unit of the parameter\].
+    pub start: BTreeMap<String, f64>,
 }
 
 /// How to search.

@@ -63,7 +63,7 @@ pub struct Step {
     pub starts: usize,
     /// How many of them ended in the best minimum.
     pub starts_agree: usize,
-    /// What the model gives: a series for each fitted record and output.
+    /// What the model gives: a series for each fitted record and output, then those of the held-out records.
     #[serde(skip)]
     pub simulated: Vec<Vec<f64>>,
 }
@@ -73,6 +73,8 @@ pub struct Step {
 pub struct Single {
     /// The effect.
     pub effect: String,
+    /// Its parameters, from a first fit.
+    pub sizes: Vec<Estimate>,
     /// Fall of the criterion; larger is better.
     pub bic_gain: f64,
     /// Simulation error by output \[unit of the output\].
@@ -117,6 +119,9 @@ pub struct Diagnosis {
     pub noise: Vec<NoiseFloor>,
     /// Single effects that were fitted, best first.
     pub singles: Vec<Single>,
+    /// What of the records the named effects are written in ([`ct_model::effects::Candidate::record_numbers`]), by their identifiers: with
+    /// these numbers an effect means the same beside another record.
+    pub record_numbers: BTreeMap<String, BTreeMap<&'static str, f64>>,
     /// How many candidates were scored.
     pub candidates: usize,
     /// The time limit ended the search.

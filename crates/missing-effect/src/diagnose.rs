@@ -411,6 +411,7 @@ pub(crate) fn assemble(
         input_unit: problem.records[0].inputs[0].unit.clone(),
         outputs: outputs.iter().map(|output| output.name.clone()).collect(),
         output_unit: outputs[0].unit.clone(),
+        output_units: Vec::new(),
         records: problem
             .records
             .iter()

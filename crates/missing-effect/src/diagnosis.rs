@@ -394,16 +394,21 @@ pub struct Shown {
     pub held_out: bool,
     /// Sampling instants \[s\].
     pub time: Vec<f64>,
-    /// Command.
-    pub input: Vec<f64>,
-    /// Command of the second pump, or the measured disturbance, where the model runs on it too.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub input_2: Option<Vec<f64>>,
-    /// Its unit, where that is another than the first one's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub input_2_unit: Option<String>,
+    /// The inputs that the model runs on; of a plant the command first.
+    pub inputs: Vec<ShownInput>,
     /// Readings, a series for each output.
     pub outputs: Vec<Vec<f64>>,
+}
+
+/// An input of a record as the report shows it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShownInput {
+    /// How it is called: `input`, `input 2`, or its own name.
+    pub name: String,
+    /// Its unit; empty where none is known.
+    pub unit: String,
+    /// Its samples \[unit\].
+    pub values: Vec<f64>,
 }
 
 impl Shown {
@@ -414,13 +419,20 @@ impl Shown {
             name: record.name.clone(),
             held_out,
             time: record.time.clone(),
-            input: record.inputs[0].values.clone(),
-            input_2: record.inputs.get(1).map(|second| second.values.clone()),
-            input_2_unit: record
+            inputs: record
                 .inputs
-                .get(1)
-                .map(|second| second.unit.clone())
-                .filter(|unit| *unit != record.inputs[0].unit),
+                .iter()
+                .enumerate()
+                .map(|(k, input)| ShownInput {
+                    name: if record.inputs.len() > 1 {
+                        format!("input {}", k + 1)
+                    } else {
+                        "input".to_string()
+                    },
+                    unit: input.unit.clone(),
+                    values: input.values.clone(),
+                })
+                .collect(),
             outputs: record.outputs.iter().map(|y| y.values.clone()).collect(),
         }
     }
@@ -489,6 +501,9 @@ pub struct Diagnosis {
     pub outputs: Vec<String>,
     /// Unit of the outputs.
     pub output_unit: String,
+    /// Unit of each output where they differ; else empty.
+    #[serde(skip)]
+    pub output_units: Vec<String>,
     /// The records, fitted ones first.
     #[serde(skip)]
     pub records: Vec<Shown>,
@@ -501,6 +516,12 @@ impl Diagnosis {
     #[must_use]
     pub fn domain(&self) -> Domain {
         domain_of(&self.plant, &self.output_unit)
+    }
+
+    /// The unit of an output, by its position.
+    #[must_use]
+    pub fn unit_of(&self, output: usize) -> &str {
+        self.output_units.get(output).unwrap_or(&self.output_unit)
     }
 
     /// Adds what is known of the loop, and what there is to say of it.

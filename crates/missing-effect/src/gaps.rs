@@ -122,9 +122,8 @@ impl Mended {
     pub fn report(&self, diagnosis: &mut Diagnosis) {
         diagnosis.records = self.joined(&diagnosis.records, |whole: &mut Shown, part| {
             whole.time.extend(part.time);
-            whole.input.extend(part.input);
-            if let (Some(whole), Some(part)) = (&mut whole.input_2, part.input_2) {
-                whole.extend(part);
+            for (whole, part) in whole.inputs.iter_mut().zip(part.inputs) {
+                whole.values.extend(part.values);
             }
             for (whole, part) in whole.outputs.iter_mut().zip(part.outputs) {
                 whole.extend(part);

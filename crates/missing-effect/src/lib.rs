@@ -53,12 +53,13 @@ pub use compare::compare;
 pub use diagnose::diagnose;
 pub use diagnosis::{
     Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor,
-    OutputStep, Parameter, PerOutput, PlaceScore, Rankings, ResidualTests, Score, Shown, Step,
-    Verdict,
+    OutputStep, Parameter, PerOutput, PlaceScore, Rankings, ResidualTests, Score, Shown,
+    ShownInput, Step, Verdict,
 };
 pub use error::Error;
 pub use fitted::{Fitted, fitted};
 pub use gaps::{LONGEST_HOLD, MendedGaps};
 pub use groups::GROUP_MARGIN;
+pub use locate::{Located, Series, locate};
 pub use problem::{Options, Problem, Progress, TIME_LIMIT};
 pub use unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window};

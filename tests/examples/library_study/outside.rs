@@ -1,6 +1,7 @@
 //! What neither the catalogue nor a candidate holds: terms of a truth that are offered to no search.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 use ct_model::effects::{OwnCandidate, OwnParameter, OwnState, Visited};
 use ct_model::{ModelSpec, Variable};
@@ -57,7 +58,7 @@ pub fn candidate(
         2 => {
             let (first, last) = (rng.random_range(2.0..5.0), rng.random_range(15.0..30.0));
             format!(
-                "sin(6.2831853*({first:e}*{part} + {:e}*{part}^2))",
+                "sin(TAU*({first:e}*{part} + {:e}*{part}^2))",
                 0.5 * (last - first)
             )
         }
@@ -101,7 +102,7 @@ pub fn candidate(
             let variable = spec.outputs[output].variable;
             let measured = &spec.about(variable).name;
             place = measured.clone();
-            let frequency = 6.2831853 / (visited.interval * rng.random_range(8.0..25.0));
+            let frequency = TAU / (visited.interval * rng.random_range(8.0..25.0));
             let first = visited.span(variable).first;
             let own = |start: f64, equation: String| OwnState {
                 start,
@@ -124,7 +125,7 @@ pub fn candidate(
             let (cycles, duty) = (rng.random_range(5.0..14.0), rng.random_range(-0.5..0.5));
             format!(
                 "(if sin({:e}*{part}) > {duty:e} then 1 else 0)",
-                6.2831853 * cycles
+                TAU * cycles
             )
         }
     };

@@ -17,6 +17,9 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{outside, own};
 
+/// Of one record, its inputs and its outputs, each a series.
+type Series = (Vec<Vec<f64>>, Vec<Vec<f64>>);
+
 /// Correlation of coloured noise from row to row.
 const CORRELATION: f64 = 0.8;
 /// The truth has to lower the criterion by this against what lacks (a part of) it, under the noise that made the record.
@@ -119,11 +122,7 @@ struct Drive<'a> {
 impl Drive<'_> {
     /// Inputs as they were given, and outputs without noise, of each record.
     #[allow(clippy::type_complexity)]
-    fn simulate(
-        &self,
-        spec: &ModelSpec,
-        noise: &[Vec<Vec<f64>>],
-    ) -> Option<Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)>> {
+    fn simulate(&self, spec: &ModelSpec, noise: &[Vec<Vec<f64>>]) -> Option<Vec<Series>> {
         let model = Model::new(spec.clone());
         let parameters = model.parameters();
         let (u, y, gain, rows) = controller(self.driven.name);
@@ -183,7 +182,7 @@ impl Drive<'_> {
     fn records(
         &self,
         spec: &ModelSpec,
-        simulated: &[(Vec<Vec<f64>>, Vec<Vec<f64>>)],
+        simulated: &[Series],
         noise: &[Vec<Vec<f64>>],
     ) -> Vec<Record> {
         let unit = self.driven.time_unit.0;
@@ -192,7 +191,7 @@ impl Drive<'_> {
         } else {
             Hold::Zero
         };
-        let one = |(r, (inputs, outputs)): (usize, &(Vec<Vec<f64>>, Vec<Vec<f64>>))| {
+        let one = |(r, (inputs, outputs)): (usize, &Series)| {
             let rows = inputs[0].len();
             let begin = r as f64 * 1.02 * rows as f64 * self.driven.interval;
             let channel = |about: &ct_model::About, values: Vec<f64>| {
@@ -491,6 +490,7 @@ pub fn outcome(
     };
     let problem = Problem {
         spec: believed.clone(),
+        kept: std::collections::BTreeMap::default(),
         effects: Vec::new(),
         records,
         test: Vec::new(),
@@ -539,8 +539,8 @@ pub fn outcome(
     if !hidden.is_empty() {
         let mut least = base.bic() - best.bic();
         if hidden.len() > 1 {
-            for i in 0..hidden.len() {
-                let one = apply(&spec, &[&hidden[i]]).map_err(|error| error.to_string())?;
+            for part in &hidden {
+                let one = apply(&spec, &[part]).map_err(|error| error.to_string())?;
                 let one = judge
                     .fit(&one, &of_truth)
                     .ok_or("a part cannot be fitted")?;
@@ -706,11 +706,7 @@ fn structural(
 }
 
 #[allow(clippy::type_complexity)]
-fn visited(
-    spec: &ModelSpec,
-    drive: &Drive,
-    simulated: &[(Vec<Vec<f64>>, Vec<Vec<f64>>)],
-) -> Result<Visited, String> {
+fn visited(spec: &ModelSpec, drive: &Drive, simulated: &[Series]) -> Result<Visited, String> {
     let model = Model::new(spec.clone());
     let mut all: Option<Visited> = None;
     for ((r, (inputs, _)), initial) in simulated.iter().enumerate().zip(&drive.initial) {

@@ -34,11 +34,14 @@ fn an_example_is_fitted_and_its_text_is_changed() {
     );
     assert!(browser.text("#own-parameters").contains("UA"));
     assert!(browser.text("#own-check").starts_with("CoupledHeaters"));
-    assert!(
-        browser
-            .text("#own")
-            .contains("is not asked here for models of your own yet")
+    // Its ports are listed, and nothing sits there yet.
+    assert_eq!(
+        browser.evaluate(
+            "[...document.querySelectorAll('#own-ports tbody th')].filter((one) => one.innerText === 'input').length"
+        ),
+        json!(3)
     );
+    assert_eq!(browser.text("#own-ports td:last-child").trim(), "");
     for part in ["missing", "chains-part", "trail-part", "model"] {
         assert_eq!(
             browser.evaluate(&format!("document.getElementById('{part}').hidden")),
@@ -129,18 +132,19 @@ fn what_is_not_there_yet_is_refused() {
         "/api/own",
         json!({ "do": "example", "name": "heated-block" }),
     );
-    for what in [
-        json!({ "what": "diagnose" }),
-        json!({ "what": "chain", "effects": [] }),
-    ] {
-        let refused = posted("/api/run", what);
-        assert_eq!(refused.status, 422);
-        assert!(
-            refused
-                .error()
-                .contains("not on the page for models of your own yet")
-        );
-    }
+    let refused = posted("/api/run", json!({ "what": "chain", "effects": [] }));
+    assert_eq!(refused.status, 422);
+    assert!(
+        refused
+            .error()
+            .contains("not on the page for models of your own yet")
+    );
+    // What cannot act there is refused with what may have been meant, and the file stays.
+    let before = tab.state()["own"]["file"].clone();
+    let refused = posted("/api/own", json!({ "do": "add", "effect": "lagg(y)" }));
+    assert_eq!(refused.status, 422);
+    assert!(refused.error().contains("did you mean lag(y)?"));
+    assert_eq!(tab.state()["own"]["file"], before);
     let file = "model = \"/etc/passwd\"\n[known]\nC = 52.0\n";
     let state = posted("/api/own", json!({ "do": "write", "file": file })).json();
     assert_eq!(state["own"]["file_error"], json!(null));
@@ -163,4 +167,76 @@ fn what_is_not_there_yet_is_refused() {
         json!({ "do": "write", "text": " ".repeat(1 << 21) }),
     );
     assert_eq!(large.status, 413);
+}
+
+/// The heated block of the examples, its capacity known.
+fn block() -> String {
+    let path = format!(
+        "{}/../examples/models/heated-block.mo",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let text = std::fs::read_to_string(path).unwrap();
+    text.replace("parameter Real C(", "final parameter Real C(")
+}
+
+/// A record of the block whose sensor lags by 25 s.
+fn lagging() -> String {
+    let mut text = String::from("t [s],u [%],Ta [degC],y [degC]\n");
+    let (mut warm, mut read) = (20.0, 20.0);
+    for k in 0..400_usize {
+        let u = (((k / 17) * 7919) % 13) as f64 * 3.0;
+        let room = 15.0 + 4.0 * (0.013 * k as f64).sin();
+        // Something that looks like noise and is the same everywhere.
+        let noise = (((k * 7919 + 13) % 101) as f64 / 50.0 - 1.0) * 0.1;
+        text += &format!("{},{u},{room:.4},{:.4}\n", 5 * k, read + noise);
+        for _ in 0..500 {
+            read += 0.01 * (warm - read) / 25.0;
+            warm += 0.01 * (0.4 * u - 0.2 * (warm - room)) / 50.0;
+        }
+    }
+    text
+}
+
+/// What is missing in a model of one's own is found at its port, added with its sizes, and the error falls.
+#[test]
+#[cfg_attr(not(chromium), ignore = "chromium is not installed")]
+fn a_model_of_ones_own_is_diagnosed_and_mended() {
+    let address = serve(&[]).to_string();
+    let _alone = alone();
+    let mut browser = Browser::open(&address);
+    let folder = browser.folder.path().to_path_buf();
+    let (record, text) = (folder.join("rows.csv"), folder.join("block.mo"));
+    std::fs::write(&record, lagging()).unwrap();
+    std::fs::write(&text, block()).unwrap();
+    browser.drop_files("#drop-fitted", &[&record, &text]);
+    browser.until("document.getElementById('own-text').value.includes('final parameter') && !document.getElementById('own-fit').disabled");
+    browser.click("#own-fit");
+    wait_for_fit(&mut browser, 1);
+    let error = "Number(document.querySelector('#own-errors td').innerText)";
+    let before = browser.evaluate(error).as_f64().unwrap();
+    browser.click("#own-diagnose");
+    browser.until("document.querySelector('#own-findings .groups li') && document.getElementById('working').hidden");
+    let found = browser.text("#own-findings");
+    assert!(
+        found.contains("lag(y) at the output y, which reads T (block)"),
+        "{found}"
+    );
+    // Where it sits among the ports.
+    let sits = browser.evaluate(
+        "[...document.querySelectorAll('#own-ports tbody tr')].filter((row) => row.lastChild.innerText.includes('found')).map((row) => row.children[0].innerText)",
+    );
+    assert!(!sits.as_array().unwrap().is_empty(), "{sits}");
+    browser.picture("own-found");
+    browser.click("#own-found-0");
+    browser.until("document.getElementById('own-file').value.includes('[effect.')");
+    wait_for_fit(&mut browser, 1);
+    let after = browser.evaluate(error).as_f64().unwrap();
+    assert!(before > 5.0 * after && after < 0.12, "{before} {after}");
+    assert!(browser.text("#own-ports").contains("in the model"));
+    for (width, height) in [(1400, 1000), (390, 844)] {
+        browser.look(width, height, "light");
+        browser.until("document.documentElement.scrollWidth <= innerWidth");
+        browser.picture(&format!("own-mended-{width}"));
+    }
+    browser.assert_quiet(&address);
 }

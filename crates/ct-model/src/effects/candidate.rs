@@ -44,6 +44,9 @@ pub struct Candidate {
     pub effect: Option<&'static Effect>,
     /// Its parameters.
     pub parameters: Vec<EffectParameter>,
+    /// What of the record it is written in, by the names of its text ([`Effect::record_numbers`]): given again to [`candidates_keeping`] it
+    /// means the same beside another record.
+    pub record_numbers: BTreeMap<&'static str, f64>,
     pub(super) fragment: Fragment,
     /// Names of its variables begin with this.
     pub(super) stem: String,
@@ -130,11 +133,22 @@ fn identifier(id: &str) -> String {
 /// it stands already; a flow that a fitted parameter scales, as the parameter's own effects are the same.
 #[must_use]
 pub fn candidates(spec: &ModelSpec, visited: &Visited) -> Vec<Candidate> {
+    candidates_keeping(spec, visited, &BTreeMap::new())
+}
+
+/// The same; those that `kept` names, by their identifiers, are written in these numbers of an earlier record
+/// ([`Candidate::record_numbers`]) in place of those that `visited` gives.
+#[must_use]
+pub fn candidates_keeping(
+    spec: &ModelSpec,
+    visited: &Visited,
+    kept: &BTreeMap<String, BTreeMap<String, f64>>,
+) -> Vec<Candidate> {
     let ports = spec.ports();
     let mut all = Vec::new();
     for effect in all_effects() {
         for port in ports_of(spec, visited, effect, &ports) {
-            all.extend(candidate(spec, visited, effect, port));
+            all.extend(candidate(spec, visited, effect, port, kept));
         }
     }
     all
@@ -213,7 +227,9 @@ fn candidate(
     visited: &Visited,
     effect: &'static Effect,
     port: Port,
+    kept: &BTreeMap<String, BTreeMap<String, f64>>,
 ) -> Option<Candidate> {
+    let id = format!("{}({})", effect.id, port.names(spec));
     let state = Variable::State;
     let (inputs, targets): Wiring = match port {
         Port::Input(u) => (vec![("u", Variable::Input(u))], Vec::new()),
@@ -260,7 +276,7 @@ fn candidate(
     } else {
         273.15
     };
-    let constants = BTreeMap::from([
+    let mut constants = BTreeMap::from([
         ("low", span.low),
         ("high", span.high),
         ("middle", 0.5 * (span.low + span.high)),
@@ -272,6 +288,14 @@ fn candidate(
         ("interval", visited.interval),
         ("balance", balance),
     ]);
+    if let Some(kept) = kept.get(&id) {
+        for (name, value) in &mut constants {
+            *value = kept.get(*name).copied().unwrap_or(*value);
+        }
+    }
+    let numbers = effect.record_numbers().into_iter();
+    let numbers = numbers.filter_map(|name| Some((name, *constants.get(name)?)));
+    let record_numbers = numbers.collect();
     let mut fragment = instance(effect, &inputs, &constants, Counts::of(spec), &targets).ok()?;
     let port_unit = spec.about(signal).unit.clone();
     let balance_unit = match (targets.first(), port) {
@@ -327,10 +351,11 @@ fn candidate(
         }
     });
     let mut candidate = Candidate {
-        id: format!("{}({})", effect.id, port.names(spec)),
+        id,
         port,
         effect: Some(effect),
         parameters: parameters.collect(),
+        record_numbers,
         fragment,
         stem: String::new(),
     };

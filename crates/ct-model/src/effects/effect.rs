@@ -1,5 +1,10 @@
 //! What an effect is: a small model, and what its text cannot say.
 
+use std::collections::BTreeMap;
+
+use crate::spec::Given;
+use crate::text::parse_effect;
+
 /// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Place {
@@ -85,4 +90,25 @@ pub struct Effect {
     pub confirm: &'static str,
     /// Words that a person may describe it with.
     pub symptoms: &'static [&'static str],
+}
+
+/// What of a record the text of an effect may be written in.
+const RECORD_NUMBERS: [&str; 10] = [
+    "low", "high", "middle", "width", "first", "begin", "zero", "duration", "interval", "balance",
+];
+
+impl Effect {
+    /// The constants of its text that take their values from what the data visit: `low`, `duration`. With them the effect means the same on
+    /// another record.
+    #[must_use]
+    pub fn record_numbers(&self) -> Vec<&'static str> {
+        // A test reads every text.
+        let parameters =
+            parse_effect(self.text, &BTreeMap::new()).map_or_else(|_| Vec::new(), |s| s.parameters);
+        let is_constant = |name: &&str| {
+            let mut parameters = parameters.iter();
+            parameters.any(|p| p.given == Given::Constant && p.about.name == **name)
+        };
+        RECORD_NUMBERS.into_iter().filter(is_constant).collect()
+    }
 }

@@ -45,7 +45,7 @@ mod thermal;
 mod visited;
 
 pub use apply::{ApplyError, apply};
-pub use candidate::{Candidate, EffectParameter, candidates};
+pub use candidate::{Candidate, EffectParameter, candidates, candidates_keeping};
 pub use effect::{Effect, Place, Role, Starts};
 pub use own::{OwnCandidate, OwnError, OwnParameter, OwnState, own_candidate, own_candidates};
 pub use port::{Port, Ports};

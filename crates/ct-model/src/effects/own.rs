@@ -268,6 +268,7 @@ pub fn own_candidate(
         port: Port::Own,
         effect: None,
         parameters: effect.collect(),
+        record_numbers: BTreeMap::new(),
         fragment: Fragment {
             parameters,
             states,

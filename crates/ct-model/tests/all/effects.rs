@@ -1,8 +1,10 @@
 //! Effects at the ports of models: every one at every port is added, gives the outputs of the model without it where it is absent, and has
 //! the derivatives that differences have.
 
+use std::collections::BTreeMap;
+
 use ct_model::effects::{
-    Candidate, EffectParameter, Role, Visited, all_effects, apply, candidates,
+    Candidate, EffectParameter, Role, Visited, all_effects, apply, candidates, candidates_keeping,
 };
 use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation, unit_warnings};
 
@@ -471,4 +473,42 @@ fn effects_of_the_projects_models_are_written_out_and_fit_in_their_units() {
         }
     }
     assert!(models > 10, "{models}");
+}
+
+#[test]
+fn an_effect_keeps_the_numbers_of_the_record_that_it_was_written_in() {
+    let spec = ModelSpec::parse(BLOCK).unwrap();
+    let visited = Visited::nominal(&spec);
+    let find = |all: Vec<Candidate>, id: &str| all.into_iter().find(|c| c.id == id).unwrap();
+    let drift = find(candidates(&spec, &visited), "drift(y)");
+    let numbers = [("begin", 0.0), ("duration", 1000.0), ("width", 1.0)];
+    assert_eq!(drift.record_numbers, BTreeMap::from(numbers));
+    let kept = BTreeMap::from([("duration".to_string(), 250.0), ("begin".to_string(), 50.0)]);
+    let all = candidates_keeping(
+        &spec,
+        &visited,
+        &BTreeMap::from([("drift(y)".to_string(), kept)]),
+    );
+    assert_eq!(
+        find(all.clone(), "drift(y)").record_numbers["duration"],
+        250.0
+    );
+    // Half the kept duration behind the kept begin it has moved by half of its change, whatever this record visits.
+    let reading = |candidate: &Candidate| {
+        let mut mended = apply(&spec, &[candidate]).unwrap();
+        let change = mended
+            .parameters
+            .iter_mut()
+            .find(|p| p.about.name == "drift_y_change");
+        change.unwrap().value = 4.0;
+        let model = Model::new(mended);
+        let parameters = model.parameters();
+        let mut simulation =
+            Simulation::<f64>::new(&model, &parameters, &model.starts(&parameters), 175.0);
+        let mut row = vec![0.0; 1];
+        simulation.read(&[0.0, 31.0], &mut row);
+        row[0]
+    };
+    assert!((reading(&find(all, "drift(y)")) - 33.0).abs() < 1e-9);
+    assert!((reading(&drift) - 31.7).abs() < 1e-9);
 }

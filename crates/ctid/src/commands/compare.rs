@@ -13,7 +13,9 @@ use crate::input::excitation::{self, ExcitationWarning};
 use crate::input::{self, Files, Input, ReadArguments};
 use crate::interrupt;
 use crate::look::Look;
-use crate::own_model::{self, AnyModelFile, OwnModelFile};
+use crate::output::Kind;
+use crate::own_model::report::{self, Paged};
+use crate::own_model::{self, AnyModelFile, OwnModelFile, RecordNumbers};
 use crate::progress::Bar;
 use crate::{Error, terminal};
 
@@ -130,6 +132,37 @@ impl Compare {
     }
 }
 
+/// What is said of effects whose numbers are those of the records at hand.
+fn not_kept(model: &OwnModelFile, used: &RecordNumbers, look: Look) -> String {
+    let notes = model.not_kept(used).into_iter();
+    notes
+        .map(|note| look.paragraph("", &format!("note: {note}")))
+        .collect()
+}
+
+/// Tables of a model file that a comparison does not use, in a line.
+fn unused(tables: &[String], look: Look) -> String {
+    const NAMED: usize = 3;
+    if tables.is_empty() {
+        return String::new();
+    }
+    let named: Vec<String> = tables
+        .iter()
+        .take(NAMED)
+        .map(|table| format!("[{table}]"))
+        .collect();
+    let more = match tables.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let verb = if tables.len() == 1 { "has" } else { "have" };
+    let note = format!(
+        "note: {}{more} {verb} no part in a comparison",
+        named.join(", ")
+    );
+    look.paragraph("", &note)
+}
+
 impl Compare {
     /// A model of the user's own.
     fn run_own(
@@ -139,24 +172,20 @@ impl Compare {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
-        if self.results.report.is_some() {
-            return Err(Error::Usage(
-                "--report: a page of a model of your own cannot be written yet; leave it out, or write --json".to_string(),
-            ));
-        }
         let records = model.records(files)?;
         let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
         let comparison = own_model::compare(model, &records, &FitOptions::default());
         bar.clear();
-        let unused = model.unused.iter().map(|table| {
-            look.paragraph("", &format!("note: [{table}] has no part in a comparison"))
-        });
-        let notes = input::notes(&records.summaries, look) + &unused.collect::<String>();
+        let notes = input::notes(&records.summaries, look) + &unused(&model.unused, look);
         let comparison = comparison?;
+        let notes = notes + &not_kept(model, &comparison.record_numbers, look);
         let text = notes + &own_model::said(&comparison, look);
-        finish(&comparison, &text, &outputs, out, look)
+        let page = outputs.iter().any(|output| output.kind() == Kind::Report);
+        let page = page.then(|| report::compared(model, &records, &comparison));
+        let found = Paged::new(&comparison, page.as_ref());
+        finish(&found, &text, &outputs, out, look)
     }
 }
 
@@ -197,9 +226,9 @@ impl Diagnose {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
-        if self.compare.results.report.is_some() || self.unknown.is_some() {
+        if self.unknown.is_some() {
             return Err(Error::Usage(
-                "--report and --unknown: they cannot be written of a model of your own yet; leave them out, or write --json".to_string(),
+                "--unknown cannot be written of a model of your own yet; leave it out, or write --report".to_string(),
             ));
         }
         let records = model.records(files)?;
@@ -218,8 +247,12 @@ impl Diagnose {
         });
         bar.clear();
         let diagnosis = diagnosis?;
-        let text =
-            input::notes(&records.summaries, look) + &own_model::diagnosis_said(&diagnosis, look);
-        finish(&diagnosis, &text, &outputs, out, look)
+        let text = input::notes(&records.summaries, look)
+            + &not_kept(model, &diagnosis.record_numbers, look)
+            + &own_model::diagnosis_said(model, &diagnosis, look);
+        let page = outputs.iter().any(|output| output.kind() == Kind::Report);
+        let page = page.then(|| report::diagnosed(model, &records, &diagnosis));
+        let found = Paged::new(&diagnosis, page.as_ref());
+        finish(&found, &text, &outputs, out, look)
     }
 }

@@ -120,6 +120,7 @@ impl Identify {
     /// The model file, where one is given.
     fn model_file(&self) -> Result<Option<AnyModelFile>, Error> {
         let file = self.model.as_deref().map(AnyModelFile::read).transpose()?;
+        let file = file.map(AnyModelFile::with_effects).transpose()?;
         if let (Some(AnyModelFile::Plant(_)), Some(path), true) = (
             &file,
             &self.model,

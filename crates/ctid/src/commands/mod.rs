@@ -20,6 +20,7 @@ use crate::look::Look;
 use crate::output::{self, Found, Kind, Output};
 use crate::own_model::{self, AnyModelFile};
 use crate::progress::Bar;
+use crate::symptoms::Sought;
 use crate::{Error, catalogue, check, design, edit, monitor, serve, tour};
 
 /// Says which physical effect a model of measured data is missing.
@@ -76,13 +77,14 @@ struct Results {
 
 #[derive(Debug, Args)]
 struct Add {
-    /// The effect, as `ctid effects` lists it, or with --from a name of your own
+    /// The effect, as `ctid effects` lists it, of a plant with --from a name of your own
     effect: String,
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
-    /// The shape of a term of your own, as `ctid diagnose --unknown` writes it
-    #[arg(long, value_name = "F.csv", conflicts_with = "place")]
+    /// Of a plant the shape of a term of your own, as `ctid diagnose --unknown` writes it; of a model of your own the result that `ctid diagnose --json`
+    /// wrote, of which the effect's sizes and the numbers of its record are kept
+    #[arg(long, value_name = "F", conflicts_with = "place")]
     from: Option<PathBuf>,
     /// The vessel it acts in, or the pump, where the plant has several
     #[arg(long = "where", value_parser = ["upper", "lower", "T1", "T2", "T3", "pump_1", "pump_2"])]
@@ -105,12 +107,15 @@ struct Effects {
     /// List only what may be added to the model of this file
     #[arg(long, value_name = "M.toml", conflicts_with = "effect")]
     model: Option<PathBuf>,
+    /// List those that go with a symptom or a word of the process, best first: clog, drift, leak, stick, late, noisy
+    #[arg(long, value_name = "WORDS", conflicts_with = "effect")]
+    like: Option<String>,
 }
 
 #[derive(Debug, Args)]
 struct Check {
-    /// The model's text, in a flat subset of Modelica
-    #[arg(value_name = "MODEL.mo")]
+    /// The model's text, in a flat subset of Modelica; or a model file, whose effects are then in the model
+    #[arg(value_name = "MODEL")]
     model: PathBuf,
 }
 
@@ -126,9 +131,9 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Add(Add {
             effect,
             model,
-            from: Some(shape),
+            from: Some(from),
             ..
-        })) => say(out, &(edit::add_term(&model, &effect, &shape)? + "\n")),
+        })) => say(out, &(edit::add_from(&model, &effect, &from)? + "\n")),
         Some(Command::Add(Add {
             effect,
             model,
@@ -143,14 +148,26 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
             ..
         })) => say(out, &catalogue::describe(&effect, look)?),
         Some(Command::Effects(Effects {
-            model: Some(model), ..
+            model: Some(model),
+            like,
+            ..
         })) => {
-            let text = match AnyModelFile::read(&model)? {
-                AnyModelFile::Plant(model) => catalogue::list_for(&model, look),
-                AnyModelFile::Own(model) => own_model::ports::listed(&model, look)?,
+            let sought = like.as_deref().map(Sought::of);
+            let text = match (AnyModelFile::read(&model)?, sought) {
+                (AnyModelFile::Plant(model), None) => catalogue::list_for(&model, look),
+                (AnyModelFile::Plant(model), Some(sought)) => {
+                    catalogue::like(&sought, Some(&model), look)?
+                }
+                (AnyModelFile::Own(model), None) => own_model::ports::listed(&model, look)?,
+                (AnyModelFile::Own(model), Some(sought)) => {
+                    own_model::ports::like(&model, &sought, look)?
+                }
             };
             say(out, &text)
         }
+        Some(Command::Effects(Effects {
+            like: Some(like), ..
+        })) => say(out, &catalogue::like(&Sought::of(&like), None, look)?),
         Some(Command::Effects(_)) => say(out, &catalogue::list(look)),
         Some(Command::Check(Check { model })) => say(out, &check::run(&model, look)?),
         Some(Command::Simulate(arguments)) => arguments.run(out, look),

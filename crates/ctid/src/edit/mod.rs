@@ -2,6 +2,7 @@
 //! everything else as it stands, comments and layout included.
 
 mod layout;
+pub(crate) mod own;
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -24,17 +25,32 @@ use crate::{Error, atomic, names};
 /// then as it was.
 pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Error> {
     let name = path.display().to_string();
-    change(path, |text| with_effect(&name, text, effect, place))
+    change(path, |text| match (own::is_own(text), place) {
+        (false, _) => with_effect(&name, text, effect, place),
+        (true, None) => own::with_effect(path, text, effect, None, &own::beside(path)),
+        (true, Some(_)) => Err(Error::Usage(
+            "--where is of the plants: at a model of your own the effect names its port, as lag(u)"
+                .to_string(),
+        )),
+    })
 }
 
-/// Adds a term of the user's own, its shape read from a CSV file. Returns what was done, in one line.
+/// Adds to a plant a term of the user's own, its shape read from a CSV file; to a model of the user's own an effect, with what a result in
+/// JSON found of it. Returns what was done, in one line.
 ///
 /// # Errors
-/// Where the name is taken or the shape cannot act on this plant; the file is then as it was.
-pub fn add_term(path: &Path, name: &str, shape: &Path) -> Result<String, Error> {
+/// Where the name is taken or the shape cannot act on this plant, or the result is not one of this model and effect; the file is then as it
+/// was.
+pub fn add_from(path: &Path, name: &str, from: &Path) -> Result<String, Error> {
+    if own::is_own(&model_file::read_text(path)?) {
+        let found = own::Findings::read(from)?;
+        return change(path, |text| {
+            own::with_effect(path, text, name, Some(&found), &own::beside(path))
+        });
+    }
     let file = path.display().to_string();
-    let read = term_file::read(shape)?;
-    let from = shape.display().to_string();
+    let read = term_file::read(from)?;
+    let from = from.display().to_string();
     change(path, |text| with_term(&file, text, name, &from, &read))
 }
 
@@ -44,7 +60,13 @@ pub fn add_term(path: &Path, name: &str, shape: &Path) -> Result<String, Error> 
 /// Where the effect is unknown or not on; the file is then as it was.
 pub fn remove(path: &Path, effect: &str) -> Result<String, Error> {
     let name = path.display().to_string();
-    change(path, |text| without_effect(&name, text, effect))
+    change(path, |text| {
+        if own::is_own(text) {
+            own::without_effect(path, text, effect, &own::beside(path))
+        } else {
+            without_effect(&name, text, effect)
+        }
+    })
 }
 
 /// A changed text and what was done, in one line.
@@ -249,7 +271,7 @@ fn with_waiting_term(
 /// The text of a model file with a term of the user's own; `from` names the file of its shape in messages.
 ///
 /// # Errors
-/// As [`add_term`].
+/// As [`add_from`].
 pub fn with_term(
     file: &str,
     text: &str,

@@ -58,7 +58,7 @@ impl Arguments {
     /// # Errors
     /// Where the model, the state or the first line cannot be used, nothing comes, or something cannot be written.
     pub fn run(&self, out: &mut dyn Write) -> Result<(), Error> {
-        let file = AnyModelFile::read(&self.model)?;
+        let file = AnyModelFile::read(&self.model)?.with_effects()?;
         let mut session = Session::new(self, &file, out)?;
         let events = source::open()?;
         let mut lines = Lines::default();

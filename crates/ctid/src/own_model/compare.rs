@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use effect_search::{Estimate, Step, held_out_errors};
+use effect_search::{Estimate, NoiseFloor, Step, held_out};
 use greybox::{Fit, FitOptions, ModelSetup, weighted_rms};
 use serde::Serialize;
 
 use super::file::{OwnModelFile, Records};
+use super::problem::RecordNumbers;
 use crate::Error;
-use crate::output::Found;
 
 /// Estimates whose correlation is above this are not known one without the other.
 const TOGETHER: f64 = 0.999;
@@ -32,16 +32,19 @@ pub(crate) struct Comparison {
     pub schema: u32,
     /// The model's name.
     pub model: String,
+    /// The effects of the model file that are in the model.
     pub effects: Vec<String>,
+    /// What of the records they are written in.
+    pub record_numbers: RecordNumbers,
     pub steps: [Step; 1],
+    /// What a linear prediction from the past of each output's residual leaves.
+    pub noise: Vec<NoiseFloor>,
     /// Fitted entries that these records do not determine, alone or together with another one.
     pub not_determined: Vec<Vec<String>>,
     pub seconds: f64,
     #[serde(skip)]
     pub curves: Vec<Curves>,
 }
-
-impl Found for Comparison {}
 
 /// Fits the model and says how far it is off.
 ///
@@ -53,6 +56,7 @@ pub(crate) fn compare(
     options: &FitOptions,
 ) -> Result<Comparison, Error> {
     let began = Instant::now();
+    let file = &file.mended(Some(records))?;
     let spec = file.model.spec();
     let blame = |error: greybox::Error| Error::File {
         file: records
@@ -77,7 +81,7 @@ pub(crate) fn compare(
     let simulated = setup
         .simulate(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
-    let test = held_out_errors(&setup, &fit, &records.test).map_err(|error| match error {
+    let test = held_out(&setup, &fit, &records.test).map_err(|error| match error {
         effect_search::Error::Fit(error) => blame(error),
         other => Error::Columns(other.to_string()),
     })?;
@@ -100,6 +104,16 @@ pub(crate) fn compare(
         .records
         .iter()
         .flat_map(|_| spec.states.iter().map(|s| &s.about.unit));
+    let noise_floors = outputs
+        .iter()
+        .zip(&noise)
+        .map(|(about, &sigma)| NoiseFloor {
+            output: about.name.clone(),
+            level: sigma,
+            innovation: sigma,
+            coefficients: Vec::new(),
+        });
+    let noise_floors = noise_floors.collect();
     let errors = fit.std_errors();
     let free = setup.free();
     let entries = setup.names().iter().zip(units.chain(states)).enumerate();
@@ -115,14 +129,17 @@ pub(crate) fn compare(
         added: None,
         rmse: (outputs.len() == 1).then(|| fit.rmse[0]),
         rmse_per_output: named(&fit.rmse),
-        rmse_test_per_output: test.map(|rms| named(&rms)),
+        rmse_test_per_output: test.as_ref().map(|test| named(&test.rmse)),
         weighted_rmse: weighted_rms(&fit.rmse, &noise, &fit.samples_per_output),
         bic: fit.bic(),
         parameters: estimates.collect(),
         starts: fit.starts,
         starts_agree: fit.agree,
-        // The curves have them with what was measured.
-        simulated: Vec::new(),
+        simulated: simulated
+            .iter()
+            .cloned()
+            .chain(test.into_iter().flat_map(|test| test.simulated))
+            .collect(),
     };
     let measured = records.records.iter().flat_map(|record| {
         let channels = record.outputs.iter().zip(&outputs);
@@ -141,10 +158,12 @@ pub(crate) fn compare(
     Ok(Comparison {
         schema: 2,
         model: spec.name.clone(),
-        effects: Vec::new(),
+        effects: file.effects.on.clone(),
+        record_numbers: file.record_numbers.clone(),
         not_determined: not_determined(&setup, &fit),
         curves: curves.collect(),
         steps: [step],
+        noise: noise_floors,
         seconds: began.elapsed().as_secs_f64(),
     })
 }

@@ -1,14 +1,13 @@
 //! What a model of its user's own is missing.
 
-use effect_search::{Diagnosis, Left, Options, Problem, Step, Verdict};
+use effect_search::{Diagnosis, Left, Options, Step, Verdict};
 
 use super::file::{OwnModelFile, Records};
+use super::problem::{blamed, problem};
+use super::words::EffectWords;
 use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::numbers;
-use crate::output::Found;
-
-impl Found for Diagnosis {}
 
 /// Single effects that are listed.
 const LISTED: usize = 8;
@@ -23,34 +22,13 @@ pub(crate) fn diagnose(
     options: &Options,
     progress: &(dyn Fn(effect_search::Progress) + Sync),
 ) -> Result<Diagnosis, Error> {
-    let problem = Problem {
-        spec: file.model.spec().clone(),
-        effects: Vec::new(),
-        records: records.records.clone(),
-        test: records.test.clone(),
-        known: file.known.clone(),
-        priors: file.priors.clone(),
-        candidates: file.candidates.clone(),
-        time_unit: records.time_unit,
-        time_unit_name: unit_of(records.time_unit).to_string(),
-    };
-    let names = || problem.records.iter().map(|record| record.name.as_str());
-    effect_search::diagnose(&problem, options, progress).map_err(|error| Error::File {
-        file: names().collect::<Vec<_>>().join(", "),
-        what: error.to_string(),
-    })
-}
-
-/// The unit of time of so many seconds.
-fn unit_of(seconds: f64) -> &'static str {
-    [(0.001, "ms"), (60.0, "min"), (3600.0, "h"), (86_400.0, "d")]
-        .into_iter()
-        .find(|(unit, _)| (seconds / unit - 1.0).abs() < 1e-9)
-        .map_or("s", |(_, name)| name)
+    let problem = problem(file, records);
+    effect_search::diagnose(&problem, options, progress).map_err(|error| blamed(&problem, &error))
 }
 
 /// What a person reads of a diagnosis.
-pub(crate) fn said(diagnosis: &Diagnosis, look: Look) -> String {
+pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
+    let words = EffectWords::of(&file.base, &file.candidates);
     let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
     text += &singles(diagnosis, look);
     text += &errors(diagnosis, look);
@@ -58,14 +36,14 @@ pub(crate) fn said(diagnosis: &Diagnosis, look: Look) -> String {
         text += &estimates(last, look);
     }
     text += &format!("\n{}\n", look.heading(&heading(diagnosis)));
-    for sentence in sentences(diagnosis) {
+    for sentence in sentences(diagnosis, &words) {
         text += &look.paragraph("  ", &sentence);
     }
     text
 }
 
 /// The finding in a few words.
-fn heading(diagnosis: &Diagnosis) -> String {
+pub(crate) fn heading(diagnosis: &Diagnosis) -> String {
     match diagnosis.verdict {
         Verdict::Adequate => "Nothing is missing that these records would show".to_string(),
         Verdict::Unexplained => "Nothing explains it".to_string(),
@@ -76,19 +54,37 @@ fn heading(diagnosis: &Diagnosis) -> String {
     }
 }
 
-fn sentences(diagnosis: &Diagnosis) -> Vec<String> {
+/// What was found, in sentences.
+pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
     let mut all = Vec::new();
     for group in &diagnosis.groups {
-        all.push(match group.as_slice() {
-            [one] => format!("It is {one}: {}.", size_of(diagnosis, one)),
-            [first, others @ ..] => format!(
-                "It is {first} ({}) or {}: these records cannot tell them apart.",
-                size_of(diagnosis, first),
-                others.join(" or ")
-            ),
-            [] => continue,
-        });
+        let [first, others @ ..] = group.as_slice() else {
+            continue;
+        };
+        all.push(format!(
+            "It is {}, {}. {}.",
+            words.placed(first),
+            match sizes(diagnosis, first) {
+                sizes if sizes.is_empty() => "see its parameters above".to_string(),
+                sizes => sizes.join(", "),
+            },
+            words.physics(first)
+        ));
+        if !others.is_empty() {
+            let others: Vec<String> = others.iter().map(|id| words.placed(id)).collect();
+            all.push(format!(
+                "Or it is {}: these records cannot tell them apart.",
+                others.join(", or ")
+            ));
+        }
     }
+    all.extend(remaining(diagnosis));
+    all
+}
+
+/// How much the effects explain, and what remains.
+pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
+    let mut all = Vec::new();
     if let Some(share) = diagnosis.share {
         all.push(format!(
             "The effects explain {:.0} % of the squared error above the noise.",
@@ -114,29 +110,20 @@ fn sentences(diagnosis: &Diagnosis) -> Vec<String> {
     all
 }
 
-/// The sizes of an effect in the last model.
-fn size_of(diagnosis: &Diagnosis, effect: &str) -> String {
-    let Some(last) = diagnosis.steps.last() else {
-        return String::new();
-    };
+/// The sizes of an effect in the last model, each with its standard error and unit.
+pub(crate) fn sizes(diagnosis: &Diagnosis, effect: &str) -> Vec<String> {
+    let last = diagnosis.steps.last().into_iter();
     let own = last
-        .parameters
-        .iter()
+        .flat_map(|last| &last.parameters)
         .filter(|p| p.effect.as_deref() == Some(effect));
-    let sizes: Vec<String> = own
-        .map(|p| {
-            let (value, error) = numbers::value_and_error(p.value, p.std_error);
-            let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-            format!("{} = {value}{error} {}", p.name, p.unit)
-                .trim_end()
-                .to_string()
-        })
-        .collect();
-    if sizes.is_empty() {
-        "see its parameters above".to_string()
-    } else {
-        sizes.join(", ")
-    }
+    own.map(|p| {
+        let (value, error) = numbers::value_and_error(p.value, p.std_error);
+        let error = error.map_or(String::new(), |error| format!(" ± {error}"));
+        format!("{} = {value}{error} {}", p.name, p.unit)
+            .trim_end()
+            .to_string()
+    })
+    .collect()
 }
 
 fn said_of(left: &Left) -> String {

@@ -49,6 +49,7 @@ pub(crate) fn export(
     records: Option<(Records, &[PathBuf])>,
     options: &FitOptions,
 ) -> Result<(Exported, Vec<ReadSummary>), Error> {
+    let file = &file.mended(records.as_ref().map(|(records, _)| records))?;
     let mut spec = file.model.spec().clone();
     for parameter in &mut spec.parameters {
         if let Some(value) = file.known.get(&parameter.about.name) {

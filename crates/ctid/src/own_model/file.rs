@@ -14,6 +14,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::candidates::{self, RawCandidates};
+use super::effects::{self, OwnEffects, RawEffects};
+use super::problem::RecordNumbers;
 use crate::input::Files;
 use crate::model_file::{self, ModelFile, Source};
 use crate::{Error, names};
@@ -27,6 +29,8 @@ struct Raw {
     model: Spanned<String>,
     #[serde(default)]
     effects: Vec<Spanned<String>>,
+    #[serde(default)]
+    effect: RawEffects,
     #[serde(default)]
     columns: BTreeMap<Spanned<String>, Spanned<Column>>,
     #[serde(default)]
@@ -52,9 +56,18 @@ enum Column {
 }
 
 /// A model file with `model = "x.mo"`, and the model.
+#[derive(Clone)]
 pub(crate) struct OwnModelFile {
-    /// The model.
+    /// The file's name.
+    pub name: String,
+    /// The model as its text has it.
+    pub base: ModelSpec,
+    /// The same, or after [`OwnModelFile::mended`] the one with the effects in it.
     pub model: Model,
+    /// The effects of the file.
+    pub effects: OwnEffects,
+    /// What of a record the effects in the model are written in.
+    pub record_numbers: RecordNumbers,
     /// Where its text is.
     pub text: PathBuf,
     /// Which column is which input and output, in the order of the model.
@@ -107,6 +120,19 @@ impl AnyModelFile {
     }
 }
 
+impl AnyModelFile {
+    /// The same with the effects of a model of its user's own in it, as they stand in the file.
+    ///
+    /// # Errors
+    /// Where the file lacks a number that they need.
+    pub fn with_effects(self) -> Result<Self, Error> {
+        Ok(match self {
+            Self::Own(file) => Self::Own(Box::new(file.mended(None)?)),
+            plant => plant,
+        })
+    }
+}
+
 impl OwnModelFile {
     /// Reads the text of a model file, and the model that it names, which is looked for beside the file.
     ///
@@ -131,20 +157,12 @@ impl OwnModelFile {
         let source = Source { file: &file, text };
         let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
         let spec = read(Path::new(raw.model.as_ref()))?;
-        if let Some(effect) = raw.effects.first() {
-            return Err(source.at(
-                effect.span().start,
-                format!(
-                    "{} cannot be added to a model of your own yet: write its equation into {}, and leave effects = []",
-                    quoted(effect.as_ref()),
-                    raw.model.as_ref()
-                ),
-            ));
-        }
-        let parameters: Vec<&str> = spec
-            .parameters
-            .iter()
-            .map(|p| p.about.name.as_str())
+        let own_candidates = candidates::read(&spec, &raw.candidates, &source)?;
+        let listed = (&raw.effects[..], &raw.effect);
+        let effects = effects::read(&spec, &own_candidates, listed, &source)?;
+        let parameters = spec.parameters.iter().map(|p| p.about.name.as_str());
+        let parameters: Vec<&str> = parameters
+            .chain(effects.parameters.iter().map(String::as_str))
             .collect();
         let is_parameter = |name: &Spanned<String>| {
             if parameters.contains(&name.as_ref().as_str()) {
@@ -165,29 +183,31 @@ impl OwnModelFile {
             is_parameter(name)?;
         }
         let columns = columns(&spec, &raw, &source)?;
-        let own_candidates = candidates::read(&spec, &raw.candidates, &source)?;
         let own = |name: Spanned<String>| name.into_inner();
-        let candidates = raw
-            .candidates
-            .keys()
-            .map(|name| format!("candidates.{}", name.as_ref()));
+        let candidates = raw.candidates.keys().map(AsRef::as_ref);
+        let candidates = candidates
+            .filter(|name: &&String| !effects.on.contains(name))
+            .map(|name| format!("candidates.{name}"));
+        let waiting = effects.waiting.iter();
+        let waiting = waiting.map(|id| format!("effect.\"{id}\""));
         let controllers = raw
             .controller
             .keys()
             .map(|name| format!("controller.{name}"));
-        let unused = candidates.chain(controllers).collect();
+        let unused = candidates.chain(controllers).chain(waiting).collect();
+        let known = raw.known.into_iter();
+        let known = known.map(|(name, value)| (own(name), value));
         Ok(Self {
-            model: Model::new(spec),
+            name: file.clone(),
+            model: Model::new(spec.clone()),
+            base: spec,
+            record_numbers: RecordNumbers::new(),
             text: path
                 .parent()
                 .unwrap_or(Path::new(""))
                 .join(raw.model.as_ref()),
             columns,
-            known: raw
-                .known
-                .into_iter()
-                .map(|(name, value)| (own(name), value))
-                .collect(),
+            known: known.chain(effects.fixed.clone()).collect(),
             priors: raw
                 .prior
                 .into_iter()
@@ -195,6 +215,7 @@ impl OwnModelFile {
                 .collect(),
             hold: raw.hold,
             candidates: own_candidates,
+            effects,
             unused,
         })
     }
@@ -280,11 +301,13 @@ impl OwnModelFile {
         }
     }
 
-    /// Puts the channels into the units of the model, where the model file reads them in others.
+    /// Puts the channels into the units of the model, where the model file reads them in others, and gives them the names of its signals:
+    /// results name these, whatever the columns are called.
     pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
         for (channel, about) in channels.zip(self.signals()) {
             convert(&record.name, channel, about)?;
+            channel.name.clone_from(&about.name);
         }
         Ok(())
     }

@@ -3,17 +3,25 @@
 mod candidates;
 mod compare;
 mod diagnose;
+pub(crate) mod effects;
 mod export;
 mod file;
 mod identify;
 pub(crate) mod ports;
+mod problem;
+pub(crate) mod report;
 mod simulate;
 mod text;
+pub(crate) mod words;
 
 pub(crate) use self::compare::{Comparison, compare};
-pub(crate) use self::diagnose::{diagnose, said as diagnosis_said};
+pub(crate) use self::diagnose::{
+    diagnose, heading as diagnosis_heading, remaining as diagnosis_remaining,
+    said as diagnosis_said, sizes,
+};
 pub(crate) use self::export::{Exported, commented, export, number};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
 pub(crate) use self::identify::{Beside, OneByOne};
+pub(crate) use self::problem::RecordNumbers;
 pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;

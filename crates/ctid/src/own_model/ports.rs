@@ -1,11 +1,13 @@
 //! What can act where in a model of its user's own.
 
 use ct_model::ModelSpec;
-use ct_model::effects::{Candidate, Place, Port, Visited, candidates, own_candidates};
+use ct_model::effects::{Candidate, Place, Port, Visited, candidates};
 
 use super::OwnModelFile;
+use super::effects::every_candidate;
 use crate::Error;
 use crate::look::Look;
+use crate::symptoms::{Sought, best};
 
 /// Headings in the order in which candidates are listed.
 const HEADINGS: [&str; 6] = [
@@ -36,10 +38,8 @@ fn group(candidate: &Candidate) -> usize {
 /// # Errors
 /// As [`own_candidates`], which the model file has passed.
 pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
-    let spec = file.model.spec();
-    let mut all = candidates(spec, &Visited::nominal(spec));
-    let own = own_candidates(spec, &file.candidates);
-    all.extend(own.map_err(|error| Error::Columns(error.to_string()))?);
+    let spec = &file.base;
+    let all = every_candidate(spec, &file.candidates)?;
     let mut text = String::new();
     for (i, heading) in HEADINGS.into_iter().enumerate() {
         let here: Vec<&Candidate> = all.iter().filter(|c| group(c) == i).collect();
@@ -47,19 +47,39 @@ pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
             continue;
         }
         text += &format!("{}\n", look.heading(heading));
-        let mut rest = &here[..];
-        while let Some(first) = rest.first() {
-            let same = |c: &&&Candidate| c.effect == first.effect && c.effect.is_some();
-            let count = rest.iter().take_while(same).count().max(1);
-            let ids: Vec<&str> = rest[..count].iter().map(|c| c.id.as_str()).collect();
-            text += &look.paragraph("  ", &look.strong(ids.join(", ")));
-            let own = "a term of the model file";
-            text += &look.paragraph("      ", first.effect.map_or(own, |effect| effect.physics));
-            rest = &rest[count..];
-        }
+        text += &by_effect(&here, look);
         text.push('\n');
     }
     Ok(text)
+}
+
+/// Candidates, those of one effect that follow each other together, with its physics.
+fn by_effect(all: &[&Candidate], look: Look) -> String {
+    let mut text = String::new();
+    let mut rest = all;
+    while let Some(first) = rest.first() {
+        let same = |c: &&&Candidate| c.effect == first.effect && c.effect.is_some();
+        let count = rest.iter().take_while(same).count().max(1);
+        let ids: Vec<&str> = rest[..count].iter().map(|c| c.id.as_str()).collect();
+        text += &look.paragraph("  ", &look.strong(ids.join(", ")));
+        let own = "a term of the model file";
+        text += &look.paragraph("      ", first.effect.map_or(own, |effect| effect.physics));
+        rest = &rest[count..];
+    }
+    text
+}
+
+/// `ctid effects --like WORD --model M.toml`: those that go with what somebody says of the plant, best first.
+///
+/// # Errors
+/// Where none does.
+pub(crate) fn like(file: &OwnModelFile, sought: &Sought, look: Look) -> Result<String, Error> {
+    let all = every_candidate(&file.base, &file.candidates)?;
+    let found = best(all.iter(), |candidate| sought.score_of(candidate));
+    if found.is_empty() {
+        return Err(sought.nothing());
+    }
+    Ok(by_effect(&found, look))
 }
 
 /// `ctid check`: the ports with the names of what can act there, a few lines.

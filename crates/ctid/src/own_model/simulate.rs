@@ -79,6 +79,7 @@ pub(crate) fn simulate(
     };
     summaries.push(read.summary);
     let record = &read.record;
+    let file = &file.mended(records.as_ref())?;
     let spec = file.model.spec();
     let count = spec.parameters.len();
     let fit = match &records {

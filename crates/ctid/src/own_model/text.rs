@@ -8,7 +8,8 @@ use crate::plot::{self, Curve, plot};
 /// The whole comparison, the first record drawn.
 pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     let [step] = &comparison.steps;
-    let mut text = format!("{}\n\n", look.heading(&comparison.model));
+    let name = [std::slice::from_ref(&comparison.model), &comparison.effects].concat();
+    let mut text = format!("{}\n\n", look.heading(&name.join(" + ")));
     let first = comparison.curves.first().map(|curves| &curves.record);
     for curves in comparison
         .curves

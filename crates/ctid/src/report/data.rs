@@ -31,6 +31,7 @@ struct Report<'a> {
 #[derive(Serialize)]
 struct Output<'a> {
     name: &'a str,
+    unit: &'a str,
     noise_floor: f64,
 }
 
@@ -61,10 +62,15 @@ struct Record<'a> {
     held_out: bool,
     /// In the order of the outputs.
     outputs: Vec<Curve>,
-    input: Curve,
-    input_2: Option<Curve>,
-    /// Unit of the second input, where it is another than the first one's.
-    input_2_unit: Option<String>,
+    inputs: Vec<Input<'a>>,
+}
+
+#[derive(Serialize)]
+struct Input<'a> {
+    name: &'a str,
+    unit: &'a str,
+    #[serde(flatten)]
+    curve: Curve,
 }
 
 #[derive(Serialize)]
@@ -124,6 +130,7 @@ pub(crate) fn json(diagnosis: &Diagnosis) -> String {
             .enumerate()
             .map(|(k, name)| Output {
                 name,
+                unit: diagnosis.unit_of(k),
                 noise_floor: diagnosis.noise.get(k).map_or(f64::NAN, |noise| noise.level),
             })
             .collect(),
@@ -157,6 +164,7 @@ pub(crate) fn records(
             .iter()
             .map(|name| Output {
                 name,
+                unit: output_unit,
                 noise_floor: f64::NAN,
             })
             .collect(),
@@ -200,12 +208,15 @@ fn record(shown: &Shown) -> Record<'_> {
             .iter()
             .map(|output| curve(&shown.time, output))
             .collect(),
-        input: curve(&shown.time, &shown.input),
-        input_2_unit: shown.input_2_unit.clone(),
-        input_2: shown
-            .input_2
-            .as_ref()
-            .map(|second| curve(&shown.time, second)),
+        inputs: shown
+            .inputs
+            .iter()
+            .map(|input| Input {
+                name: &input.name,
+                unit: &input.unit,
+                curve: curve(&shown.time, &input.values),
+            })
+            .collect(),
     }
 }
 
@@ -281,7 +292,11 @@ fn cloud(series: &[Series]) -> Option<Cloud> {
         .copied()
         .collect();
     let flow: Vec<f64> = fitted()
-        .flat_map(|series| series.record.input.iter().take(series.simulated.len()))
+        .flat_map(|series| {
+            let input = series.record.inputs.first();
+            let values = input.map_or(&[][..], |input| &input.values);
+            values.iter().take(series.simulated.len())
+        })
         .copied()
         .collect();
     let at: Vec<usize> = (0..residual.len())
@@ -393,9 +408,7 @@ mod tests {
             name: "long".to_owned(),
             held_out: false,
             time: (0..n).map(|k| k as f64 * 0.1).collect(),
-            input: vec![0.0; n],
-            input_2: None,
-            input_2_unit: None,
+            inputs: Vec::new(),
             outputs: vec![output],
         };
         let curve = &record(&shown).outputs[0];
@@ -411,9 +424,7 @@ mod tests {
             name: String::new(),
             held_out: false,
             time: vec![0.0, 1.0],
-            input: vec![],
-            input_2: None,
-            input_2_unit: None,
+            inputs: Vec::new(),
             outputs: vec![vec![1.0, 2.0, 3.0]],
         };
         let run = Series {

@@ -13,7 +13,8 @@ const diagnosisFigures = (report, view) => {
 
   // --- words -------------------------------------------------------------------------------
 
-  const OUT = pretty(report.output_unit);
+  const unitOf = (o) => pretty(outputs[o]?.unit ?? report.output_unit);
+  const OUT = () => unitOf(view.output);
   const IN = pretty(report.input_unit);
   const sized = (value, unit) => `${value === null || value === undefined ? "–" : Number(value.toPrecision(2))} ${unit}`.trim();
 
@@ -72,7 +73,7 @@ const diagnosisFigures = (report, view) => {
     pattern: hatch(bins.map((b) => b.fails)),
   });
   const binHover = (bins, name) => bins.map((b, k) =>
-    `${name(b, k)}<br>${b.count} values, rms ${sized(b.rms, OUT)}, mean ${sized(b.mean, OUT)}${b.fails ? "<br>fails" : ""}`);
+    `${name(b, k)}<br>${b.count} values, rms ${sized(b.rms, OUT())}, mean ${sized(b.mean, OUT())}${b.fails ? "<br>fails" : ""}`);
 
   const tallest = (kind) => 1.08 * largest([level(), ...seen().flatMap((s) => s.failures[kind].map((b) => b.rms))]) || 1;
 
@@ -83,9 +84,11 @@ const diagnosisFigures = (report, view) => {
     const record = records[r];
     const c = theme();
     const count = record.outputs.length;
-    // Heights of a panel with the space below it and of the input's, in those of a figure with one output.
-    const [panel, space, low] = [0.67, 0.09, 0.24];
-    const total = count * (panel + space) + low;
+    // Inputs of one unit share a panel.
+    const panels = [...record.inputs.reduce((by, one) => by.set(one.unit, [...(by.get(one.unit) ?? []), one]), new Map()).values()];
+    // Heights of a panel with the space below it and of the inputs', in those of a figure with one output.
+    const [panel, space, low, gap] = [0.67, 0.09, 0.24, 0.06];
+    const total = count * (panel + space) + Math.max(panels.length, 1) * (low + gap) - gap;
     const axisOf = (k) => (k ? `y${k + 1}` : "y");
     const data = [];
     const axes = {};
@@ -94,7 +97,7 @@ const diagnosisFigures = (report, view) => {
       const yaxis = axisOf(o);
       // One entry of the legend switches a model on and off in every panel.
       const shared = (group) => (several ? { yaxis, legendgroup: group, showlegend: o === 0 } : {});
-      const hovertemplate = `%{y:.4~g} ${OUT}${several ? ` (${outputName(o)})` : ""}`;
+      const hovertemplate = `%{y:.4~g} ${unitOf(o)}${several ? ` (${outputName(o)})` : ""}`;
       data.push({
         name: "measured", x: measured.t.map(at), y: measured.y, mode: "lines", line: { color: c.measured, width: 1.3 }, opacity: 0.75,
         hovertemplate, ...shared("measured"),
@@ -111,21 +114,27 @@ const diagnosisFigures = (report, view) => {
         });
       });
       const top = 1 - (o * (panel + space)) / total;
-      axes[o ? `yaxis${o + 1}` : "yaxis"] = axis(named(several ? outputName(o) : "output", OUT), { domain: [top - panel / total, top] });
+      axes[o ? `yaxis${o + 1}` : "yaxis"] = axis(named(several ? outputName(o) : "output", unitOf(o)), { domain: [top - panel / total, top] });
       shapes.push(...failingWindows(r, o, several ? `${yaxis} domain` : "paper"));
     });
-    const inputs = record.input_2 ? [["input 1", record.input, c.faint, "solid", IN], [named("input 2", record.input_2_unit || ""), record.input_2, c.text, "dot", record.input_2_unit || IN]] : [["input", record.input, c.faint, "solid", IN]];
-    for (const [name, input, color, dash, unit] of inputs) {
-      data.push({
-        name, x: input.t.map(at), y: input.y, yaxis: axisOf(count), mode: "lines", showlegend: inputs.length > 1, legendrank: 2000,
-        line: { color, width: 1.2, dash, shape: "hv" }, hovertemplate: `%{y:.4~g} ${unit}`,
+    const looks = [[c.faint, "solid"], [c.text, "dot"], [c.best, "dash"], [c.held, "dashdot"]];
+    panels.forEach((inputs, p) => {
+      const yaxis = axisOf(count + p);
+      inputs.forEach(({ name, unit, t, y }, k) => {
+        const [color, dash] = looks[k % looks.length];
+        data.push({
+          name: plain(name), x: t.map(at), y, yaxis, mode: "lines", showlegend: record.inputs.length > 1, legendrank: 2000 + p,
+          line: { color, width: 1.2, dash, shape: "hv" }, hovertemplate: `%{y:.4~g} ${pretty(unit)}`,
+        });
       });
-    }
+      const foot = ((panels.length - 1 - p) * (low + gap)) / total;
+      const title = inputs.length > 1 ? "inputs" : plain(inputs[0].name);
+      axes[`yaxis${count + p + 1}`] = axis(named(title, pretty(inputs[0].unit)), { domain: [foot, foot + low / total], nticks: 4 });
+    });
     return { data, layout: layout((narrow.matches ? 400 : 460) * total, {
       showlegend: true, hovermode: "x unified", hoversubplots: "axis", shapes,
-      xaxis: timeAxis({ anchor: axisOf(count), showspikes: false }),
+      xaxis: timeAxis({ anchor: axisOf(count + Math.max(panels.length, 1) - 1), showspikes: false }),
       ...axes,
-      [`yaxis${count + 1}`]: axis(named("input", record.input_2_unit ? "" : IN), { domain: [0, low / total], nticks: 4 }),
     }) };
   }
 
@@ -136,10 +145,10 @@ const diagnosisFigures = (report, view) => {
     const floor = level() === null ? [] : [across(level(), "y", theme().text, "dash"), across(-level(), "y", theme().text, "dash")];
     return { data: [{
       x: run.residual.t.map(at), y: run.residual.y, mode: "lines", line: { color: stepColour(view.chosen), width: 1.4 }, name: "residual",
-      hovertemplate: `${DATED ? "%{x}" : `%{x:.6~g} ${clock.unit}`}: %{y:.3~g} ${OUT}<extra></extra>`,
+      hovertemplate: `${DATED ? "%{x}" : `%{x:.6~g} ${clock.unit}`}: %{y:.3~g} ${OUT()}<extra></extra>`,
     }], layout: layout(narrow.matches ? 240 : 280, {
       hovermode: "x", shapes: failingWindows(view.residualRecord, view.output, "paper").concat(floor),
-      xaxis: timeAxis({}), yaxis: axis(named(ofOutput("residual"), OUT), { range: [-most, most], uirevision: zoomOfOutput() }),
+      xaxis: timeAxis({}), yaxis: axis(named(ofOutput("residual"), OUT()), { range: [-most, most], uirevision: zoomOfOutput() }),
     }) };
   }
 
@@ -154,7 +163,7 @@ const diagnosisFigures = (report, view) => {
     if (cloud) {
       data.push({
         x: cloud[at], y: cloud.residual, mode: "markers", marker: { color: stepColour(view.chosen), size: 4, opacity: 0.4 },
-        hovertemplate: `%{x:.4~g}: %{y:.3~g} ${OUT}<extra></extra>`,
+        hovertemplate: `%{x:.4~g}: %{y:.3~g} ${OUT()}<extra></extra>`,
       });
     }
     data.push({
@@ -167,8 +176,8 @@ const diagnosisFigures = (report, view) => {
     return { data, layout: layout(400, {
       uirevision: zoomOfOutput(), hovermode: "closest", shapes: floorLine("y2"),
       xaxis: axis(title, { anchor: "y2" }),
-      yaxis: axis(named(ofOutput("residual"), OUT), { domain: [0.42, 1], range: [-most, most] }),
-      yaxis2: axis(named("rms", OUT), { domain: [0, 0.34], range: [0, tallest(kind)], nticks: 4 }),
+      yaxis: axis(named(ofOutput("residual"), OUT()), { domain: [0.42, 1], range: [-most, most] }),
+      yaxis2: axis(named("rms", OUT()), { domain: [0, 0.34], range: [0, tallest(kind)], nticks: 4 }),
     }) };
   }
 
@@ -189,7 +198,7 @@ const diagnosisFigures = (report, view) => {
     }
     return { data, layout: layout(300, {
       hovermode: "closest", shapes: floorLine("y"), xaxis: axis(title, { type: "category" }),
-      yaxis: axis(named(ofOutput("residual"), OUT), { range: [low, tallest(kind)] }),
+      yaxis: axis(named(ofOutput("residual"), OUT()), { range: [low, tallest(kind)] }),
     }) };
   }
 
@@ -239,7 +248,7 @@ const diagnosisFigures = (report, view) => {
       marker: { color: best.map((s) => (s.added ? c.best : s.equal ? c.equal : c.passing)),
         pattern: hatch(best.map((s) => s.equal)) },
       text: best.map((s) => (s.bic_gain === null ? "" : s.bic_gain.toFixed(1).replace("-", "−"))), textposition: "outside", cliponaxis: false,
-      hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${several ? sized(s.weighted_rmse, "times the noise") : sized(s.rmse, OUT)}`), hoverinfo: "text",
+      hovertext: best.map((s) => `${plain(s.effect)}: error after the refit ${several ? sized(s.weighted_rmse, "times the noise") : sized(s.rmse, OUT())}`), hoverinfo: "text",
     }], layout: layout(70 + 26 * best.length, {
       hovermode: "closest", margin: { l: 20, r: tight() ? 10 : 40, t: 10, b: 40 },
       // Room for the numbers at the ends of the bars.
@@ -256,13 +265,13 @@ const diagnosisFigures = (report, view) => {
     if (errors.some((s) => s.rmse_test !== null)) {
       data.push({ name: "held-out data", x: names, y: errors.map((s) => s.rmse_test), mode: "lines+markers", line: { color: c.held, width: 2.5, dash: "dot" }, marker: { size, opacity: 1, symbol: "square" } });
     }
-    data.forEach((d) => { d.hovertemplate = `%{y:.3~g} ${OUT}`; });
+    data.forEach((d) => { d.hovertemplate = `%{y:.3~g} ${OUT()}`; });
     if (level() !== null) {
-      data.push({ name: "noise floor", x: names, y: names.map(level), mode: "lines", line: { color: c.text, width: 1.5, dash: "dash" }, hovertemplate: `%{y:.3~g} ${OUT}` });
+      data.push({ name: "noise floor", x: names, y: names.map(level), mode: "lines", line: { color: c.text, width: 1.5, dash: "dash" }, hovertemplate: `%{y:.3~g} ${OUT()}` });
     }
     return { data, layout: layout(340, {
       showlegend: true, hovermode: "x unified", xaxis: axis("", { type: "category", range: [-0.4, names.length - 0.6] }),
-      yaxis: axis(named(`${ofOutput("simulation error")}, rms`, OUT), { rangemode: "tozero" }),
+      yaxis: axis(named(`${ofOutput("simulation error")}, rms`, OUT()), { rangemode: "tozero" }),
     }) };
   }
 
@@ -302,8 +311,8 @@ const diagnosisFigures = (report, view) => {
     "unknown-path": unknownPath,
     "unknown-shape": unknownShape,
     "by-time": byTime,
-    "by-level": () => binned("by_level", "level", named(several ? `simulated ${outputName(view.output)}` : "simulated output", OUT)),
-    "by-flow": () => binned("by_flow", "flow", named("input", IN)),
+    "by-level": () => binned("by_level", "level", named(several ? `simulated ${outputName(view.output)}` : "simulated output", OUT())),
+    "by-flow": () => binned("by_flow", "flow", named(plain(records[0]?.inputs[0]?.name ?? "input"), IN)),
     "by-direction": () => bars("by_direction", directionName, true, ""),
     "by-frequency": () => bars("by_frequency", bandName, false, ""),
     autocorrelation: () => correlation("autocorrelation", "autocorrelation_bound", 1),

@@ -165,8 +165,8 @@ fn trail(diagnosis: &Diagnosis) -> String {
 
 /// The error of each output by its name, a line each.
 fn errors_of_outputs(diagnosis: &Diagnosis, step: &Step) -> String {
-    let unit = text::unit(&diagnosis.output_unit);
-    let line = |output: &OutputStep| {
+    let line = |(k, output): (usize, &OutputStep)| {
+        let unit = text::unit(diagnosis.unit_of(k));
         let test = output.rmse_test.map_or(String::new(), |error| {
             format!(", held out {} {unit}", significant(error, 2))
         });
@@ -176,7 +176,7 @@ fn errors_of_outputs(diagnosis: &Diagnosis, step: &Step) -> String {
             significant(output.rmse, 2)
         )
     };
-    step.outputs.iter().map(line).collect()
+    step.outputs.iter().enumerate().map(line).collect()
 }
 
 /// What the plots show: buttons that choose the model, and the choice of the output, each where there are several.

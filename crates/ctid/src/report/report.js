@@ -28,7 +28,7 @@
     const put = (id, text) => { const e = document.getElementById(id); if (e) e.textContent = text; };
     put("whiteness", step.outputs[view.output].whiteness);
     put("input-test", step.outputs[view.output].input_test);
-    const error = ({ rmse }, o) => `${several ? `${report.outputs[o].name} ` : ""}${rmse === null ? "unknown" : sized(rmse, report.output_unit || "")}`;
+    const error = ({ rmse }, o) => `${several ? `${report.outputs[o].name} ` : ""}${rmse === null ? "unknown" : sized(rmse, report.outputs[o].unit)}`;
     put("shown", `${step.label}: simulation error ${step.outputs.map(error).join(", ")}`);
     const list = document.getElementById("failure-sentences");
     if (list) list.replaceChildren(...step.sentences.map((s) => { const item = document.createElement("li"); item.textContent = s; return item; }));

@@ -3,7 +3,7 @@
 
 use missing_effect::{
     Acceptance, Bin, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor, OutputStep, Parameter,
-    PerOutput, PlaceScore, Rankings, ResidualTests, Score, Shown, Step, Verdict,
+    PerOutput, PlaceScore, Rankings, ResidualTests, Score, Shown, ShownInput, Step, Verdict,
 };
 
 use crate::identify::rms;
@@ -140,7 +140,11 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
     Failures {
         by_time,
         by_level: bins(simulated, residual, &even_edges(simulated, 10)),
-        by_flow: bins(&record.input, residual, &even_edges(&record.input, 10)),
+        by_flow: bins(
+            &record.inputs[0].values,
+            residual,
+            &even_edges(&record.inputs[0].values, 10),
+        ),
         by_direction: bins(&rate, residual, &[-1.0, -0.003, 0.003, 1.0]),
         by_frequency,
         sentences,
@@ -190,7 +194,7 @@ fn step(
 ) -> Step {
     let runs: Vec<[Vec<f64>; 2]> = records
         .iter()
-        .map(|r| simulate(&r.input, model.0, model.1, model.2))
+        .map(|r| simulate(&r.inputs[0].values, model.0, model.1, model.2))
         .collect();
     let of_output = |output: usize| {
         let residuals: Vec<Vec<f64>> = records
@@ -206,7 +210,7 @@ fn step(
             rmse: rms(residuals[0].iter().copied()),
             rmse_test: Some(rms(residuals[1].iter().copied())),
             held_out_error: None,
-            tests: tests(&records[0].input, &residuals[0]),
+            tests: tests(&records[0].inputs[0].values, &residuals[0]),
             failures: failures(&records[0], &runs[0][output], &residuals[0]),
         }
     };
@@ -299,9 +303,11 @@ fn diagnosis(outputs: &[&str]) -> Diagnosis {
                     noisy.map(|(y, e)| y + e).collect()
                 })
                 .collect(),
-            input,
-            input_2: None,
-            input_2_unit: None,
+            inputs: vec![ShownInput {
+                name: "input".into(),
+                unit: "V".into(),
+                values: input,
+            }],
         }
     })
     .collect();
@@ -392,6 +398,7 @@ fn diagnosis(outputs: &[&str]) -> Diagnosis {
         known_effects: vec!["sqrt_outflow".into()],
         input_unit: "V".into(),
         output_unit: "V".into(),
+        output_units: Vec::new(),
         outputs,
         records,
         seconds: 0.4,
@@ -499,7 +506,7 @@ pub(crate) fn awkward() -> Diagnosis {
         let n = record.time.len() * repeats;
         record.name = "<a href=\"x\">week</a> & <b>\"all\"</b>".to_owned();
         record.time = (0..n).map(|i| i as f64 * PERIOD).collect();
-        record.input = record.input.repeat(repeats);
+        record.inputs[0].values = record.inputs[0].values.repeat(repeats);
         record.outputs[0] = record.outputs[0].repeat(repeats);
         record.outputs[0][n / 3..n / 2].fill(f64::NAN);
         for step in &mut diagnosis.steps {

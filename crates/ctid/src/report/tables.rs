@@ -9,9 +9,8 @@ use crate::numbers::duration;
 
 /// What was looked at: plant, records, noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
-    let output = unit(&diagnosis.output_unit);
     let several = findings::several(diagnosis);
-    let mut facts = vec![("Plant", escape(&diagnosis.plant))];
+    let mut facts = vec![("Model", escape(&diagnosis.plant))];
     if !diagnosis.known_effects.is_empty() {
         let known = escape(&diagnosis.known_effects.join(", "));
         facts.push(("Already in the model", known));
@@ -30,11 +29,9 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
         }
         facts.push((role, text));
     }
-    for floor in diagnosis
-        .noise
-        .iter()
-        .filter(|noise| noise.level.is_finite())
-    {
+    let floors = diagnosis.noise.iter().enumerate();
+    for (k, floor) in floors.filter(|(_, noise)| noise.level.is_finite()) {
+        let output = unit(diagnosis.unit_of(k));
         let level = significant(floor.level, 2);
         let source = escape(&floor.source);
         let of = if several {
@@ -191,6 +188,10 @@ pub(super) fn shares(unknown: &Unknown) -> String {
     )
 }
 
+const SCORED: &str = "Simulation error: root mean square on the fitted data after the refit.";
+const SIGNATURES: &str = " Visible part: how much of the effect's signature the fitted parameters cannot imitate. Visible from: an effect of a smaller \
+     size would have stayed hidden in these data.";
+
 /// The catalogue, best effect first.
 pub(super) fn scores(diagnosis: &Diagnosis) -> String {
     let error_unit = if findings::several(diagnosis) {
@@ -198,6 +199,9 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
     } else {
         unit(&diagnosis.output_unit)
     };
+    // A model of its user's own is scored without a signature of each effect.
+    let visible = diagnosis.scores.iter().any(|s| s.visibility.is_finite());
+    let of_signature = |cell: String| if visible { cell } else { String::new() };
     let rows: String = diagnosis
         .scores
         .iter()
@@ -218,14 +222,18 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
             });
             format!(
                 "<tr{class}><td class=\"number\">{}</td><th scope=\"row\">{}{place}</th>\
-                 <td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
-                 <td class=\"number\">{}</td><td class=\"number\">{smallest}</td></tr>\n",
+                 <td class=\"number\">{}</td><td class=\"number\">{}</td>{}\
+                 <td class=\"number\">{}</td>{}</tr>\n",
                 k + 1,
                 code(&score.effect),
                 one_decimal(score.bic_gain),
                 significant(findings::score_error(diagnosis, score).0, 3),
-                percent(score.visibility),
+                of_signature(format!(
+                    "<td class=\"number\">{}</td>",
+                    percent(score.visibility)
+                )),
                 size(score.size.as_ref()),
+                of_signature(format!("<td class=\"number\">{smallest}</td>")),
             )
         })
         .collect();
@@ -235,14 +243,13 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
             "<tr><th scope=\"col\" class=\"number\">#</th><th scope=\"col\">Effect</th>\
              <th scope=\"col\" class=\"number\">Fall of BIC</th>\
              <th scope=\"col\" class=\"number\">Simulation error [{error_unit}]</th>\
-             <th scope=\"col\" class=\"number\">Visible part</th>\
-             <th scope=\"col\" class=\"number\">Size ± standard error</th>\
-             <th scope=\"col\" class=\"number\">Visible from</th></tr>"
+             {}\
+             <th scope=\"col\" class=\"number\">Size ± standard error</th>{}</tr>",
+            of_signature("<th scope=\"col\" class=\"number\">Visible part</th>".to_owned()),
+            of_signature("<th scope=\"col\" class=\"number\">Visible from</th>".to_owned()),
         ),
         &rows,
-        "Simulation error: root mean square on the fitted data after the refit. Visible part: how much of \
-         the effect's signature the fitted parameters cannot imitate. Visible from: an effect of a smaller \
-         size would have stayed hidden in these data.",
+        &(SCORED.to_owned() + &of_signature(SIGNATURES.to_owned())),
     )
 }
 
@@ -319,7 +326,7 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> String {
 /// The rows of the simulation error of an output; its name stands before them where there are several.
 fn errors(diagnosis: &Diagnosis, index: usize, name: &str) -> String {
     let steps = &diagnosis.steps;
-    let unit = unit(&diagnosis.output_unit);
+    let unit = unit(diagnosis.unit_of(index));
     let of = |text: &str| {
         if findings::several(diagnosis) {
             format!("{}: {text}", escape(name))

@@ -144,6 +144,15 @@ async fn file(
                     .map_or(UNNAMED.into(), |name| name.to_string_lossy());
                 (plain_name(&name), "application/toml", session.text.clone())
             }
+            Wanted::Report if session.own.is_some() => {
+                let shown = session.own.as_ref().and_then(|own| own.shown.clone());
+                let shown = shown.ok_or_else(|| missing("nothing was computed yet; fit first"))?;
+                (
+                    "report.html".to_string(),
+                    "text/html; charset=utf-8",
+                    report::html(&shown),
+                )
+            }
             Wanted::Report => {
                 // Whatever was computed last.
                 let latest = [&session.fitted, &session.diagnosis].into_iter().flatten();

@@ -18,8 +18,10 @@ pub(super) fn of_record(record: &Record) -> usize {
 pub(super) fn of_diagnosis(diagnosis: &Diagnosis) -> usize {
     let records = diagnosis.records.iter();
     let records = records.flat_map(|shown| {
-        let inputs = [&shown.time, &shown.input].into_iter();
-        inputs.chain(&shown.input_2).chain(&shown.outputs)
+        let inputs = shown.inputs.iter().map(|input| &input.values);
+        std::iter::once(&shown.time)
+            .chain(inputs)
+            .chain(&shown.outputs)
     });
     let runs = diagnosis.steps.iter().flat_map(|step| &step.simulated);
     let paths = diagnosis.unknown.iter();

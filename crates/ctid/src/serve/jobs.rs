@@ -54,6 +54,7 @@ enum Input {
 /// What came out.
 enum Outcome {
     Own(Box<Comparison>),
+    OwnDiagnosed(Box<effect_search::Diagnosis>),
     Fitted(Diagnosis),
     Diagnosed(Diagnosis),
     Designed(Box<Design>, Columns),
@@ -143,10 +144,12 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     let mut session = lock(shared);
     session.stop();
     let work = match (&task, &session.own) {
-        (Task::Compare, Some(_)) => Input::Own(Box::new(own::Work::new(&mut session)?)),
+        (Task::Compare | Task::Diagnose { .. }, Some(_)) => {
+            Input::Own(Box::new(own::Work::new(&mut session)?))
+        }
         (_, Some(_)) => {
             return Err(Refusal::input(
-                "this is not on the page for models of your own yet: `ctid diagnose` in a terminal says what is missing; write it into the text, and fit it again",
+                "experiments and chains are not on the page for models of your own yet: add an effect, and fit the model again",
             ));
         }
         (task, None) => {
@@ -210,7 +213,15 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 if stop.load(Ordering::Relaxed) {
                     return Err(Error::Usage("stopped".to_string()));
                 }
-                work.compute().map(|found| Outcome::Own(Box::new(found)))
+                match task {
+                    Task::Diagnose {
+                        max_effects,
+                        effort,
+                    } => work
+                        .search(max_effects, effort, &interrupt, &show)
+                        .map(|found| Outcome::OwnDiagnosed(Box::new(found))),
+                    _ => work.compute().map(|found| Outcome::Own(Box::new(found))),
+                }
             }
         }));
         // The tab may be gone, and so is whoever waits.
@@ -278,12 +289,15 @@ fn compute(
 fn settle(session: &mut Session, work: Input, outcome: Outcome) {
     let work = match (work, &outcome) {
         (Input::Own(work), Outcome::Own(found)) => return work.settle(session, found),
+        (Input::Own(work), Outcome::OwnDiagnosed(found)) => {
+            return work.settle_diagnosis(session, found);
+        }
         (Input::Plant(work), _) => *work,
         (Input::Own(_), _) => return,
     };
     let id = session.number();
     match outcome {
-        Outcome::Own(_) => {}
+        Outcome::Own(_) | Outcome::OwnDiagnosed(_) => {}
         Outcome::Fitted(found) => {
             let Some(step) = found.steps.last() else {
                 return;

@@ -61,6 +61,7 @@ mod guard;
 mod held;
 mod jobs;
 mod own;
+mod own_findings;
 mod session;
 mod sessions;
 mod settings;

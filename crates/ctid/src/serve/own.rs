@@ -3,20 +3,29 @@
 //!
 //! Nothing of it reaches the file system: the `model` that a model file names is the text that the page holds, whatever name stands there.
 
+use std::num::NonZeroU8;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use axum::body::Bytes;
 use ct_model::{ModelSpec, TextError};
 use ct_signals::{Columns, ReadOptions, Reading};
+use effect_search::{Diagnosis, Options};
 use greybox::FitOptions;
+use missing_effect::{Diagnosis as Shown, Progress};
 use serde_json::{Value, json};
 
 use super::guard::Refusal;
+use super::held::of_diagnosis;
+use super::own_findings::{self, Diagnosed};
 use super::session::Session;
 use super::upload::Upload;
+use crate::edit::own::Findings;
+use crate::effort::EffortLevel;
 use crate::look::Look;
 use crate::model_file::read_text;
-use crate::own_model::{Comparison, OwnModelFile, Records, compare};
+use crate::own_model::{Comparison, OwnModelFile, Records, compare, diagnose, report};
 use crate::report::{min_max, rounded};
 use crate::{Error, check, edit, numbers};
 
@@ -61,6 +70,10 @@ pub(super) struct Own {
     pub file: String,
     /// What was fitted last.
     pub fit: Option<Fit>,
+    /// What was diagnosed last.
+    pub diagnosis: Option<Diagnosed>,
+    /// What the report shows: the last of both.
+    pub shown: Option<Arc<Shown>>,
     /// Columns and what is held, as they were read last: a text that is being typed is no model for a while.
     read: (Columns, ReadOptions),
 }
@@ -94,6 +107,10 @@ pub(super) enum Change {
     },
     /// Which column a signal is, or the time.
     Column { signal: String, column: String },
+    /// An effect into the model file, with what the diagnosis found of it.
+    Add { effect: String },
+    /// An effect out of it.
+    Remove { effect: String },
 }
 
 impl Own {
@@ -121,12 +138,7 @@ impl Own {
     /// # Errors
     /// One line that names the place and the mend.
     pub(super) fn model(&self) -> Result<OwnModelFile, Error> {
-        OwnModelFile::parse_with(Path::new(FILE), &self.file, |named| {
-            self.spec().map_err(|source| Error::Text {
-                file: named.display().to_string(),
-                source,
-            })
-        })
+        OwnModelFile::parse_with(Path::new(FILE), &self.file, self.named_text())
     }
 
     /// Columns and what is held.
@@ -145,7 +157,18 @@ impl Own {
     pub(super) fn held(&self) -> usize {
         let fit = self.fit.as_ref();
         let of_fit = |fit: &Fit| fit.body.len() + fit.text.len() + fit.file.len();
-        self.text.len() + self.file.len() + fit.map_or(0, of_fit)
+        let shown = self.shown.as_ref().map_or(0, |shown| of_diagnosis(shown));
+        self.text.len() + self.file.len() + fit.map_or(0, of_fit) + shown
+    }
+
+    /// The text in the place of the file that a model file names.
+    fn named_text(&self) -> impl Fn(&Path) -> Result<ModelSpec, Error> {
+        |named: &Path| {
+            self.spec().map_err(|source| Error::Text {
+                file: named.display().to_string(),
+                source,
+            })
+        }
     }
 
     /// What the page shows of it.
@@ -178,6 +201,19 @@ impl Own {
             _ => None,
         };
         let unused = model.as_ref().ok().map(|model| model.unused.clone());
+        let found = self.diagnosis.as_ref();
+        let effects = found.map_or(&[][..], |found| &found.effects);
+        let ports = model
+            .as_ref()
+            .ok()
+            .map(|model| own_findings::ports(model, effects));
+        let diagnosis = found.map(|found| {
+            let mut body = found.body.clone();
+            body["id"] = json!(found.id);
+            body["of_this_model"] =
+                json!(found.text == self.text && found.file == self.file && found.data == data);
+            body
+        });
         json!({
             "text": self.text,
             "file": self.file,
@@ -187,6 +223,9 @@ impl Own {
             "time": columns.and_then(|columns| columns.time.clone()),
             "signals": signals,
             "unused": unused,
+            "effects": model.as_ref().ok().map(|model| model.effects.on.clone()),
+            "ports": ports,
+            "diagnosis": diagnosis,
             "fit": self.fit.as_ref().map(|fit| fit.id),
             "fitted": self.fit.as_ref().is_some_and(|fit| {
                 fit.text == self.text && fit.file == self.file && fit.data == data
@@ -249,9 +288,23 @@ pub(super) fn change(session: &mut Session, change: Change) -> Result<(), Refusa
             }
         }
         Change::Column { signal, column } => {
-            let own = session.own.as_mut();
-            let own = own.ok_or_else(|| Refusal::input("there is no model of your own yet"))?;
+            let own = session.own.as_mut().ok_or_else(no_model)?;
             own.file = edit::with_column(FILE, &own.file, &signal, &column)?;
+        }
+        Change::Add { effect } => {
+            let own = session.own.as_mut().ok_or_else(no_model)?;
+            let found = own.diagnosis.as_ref().map(|found| &found.findings);
+            let found = found.filter(|found| found.has(&effect));
+            let path = Path::new(FILE);
+            let edited =
+                edit::own::with_effect(path, &own.file, &effect, found, &own.named_text())?;
+            own.file = edited.text;
+        }
+        Change::Remove { effect } => {
+            let own = session.own.as_mut().ok_or_else(no_model)?;
+            let path = Path::new(FILE);
+            let edited = edit::own::without_effect(path, &own.file, &effect, &own.named_text())?;
+            own.file = edited.text;
         }
     }
     session.own = session.own.take().map(Own::looked_at);
@@ -260,7 +313,11 @@ pub(super) fn change(session: &mut Session, change: Change) -> Result<(), Refusa
     Ok(())
 }
 
-/// What a fit works on.
+fn no_model() -> Refusal {
+    Refusal::input("there is no model of your own yet")
+}
+
+/// What a fit or a diagnosis works on.
 pub(super) struct Work {
     own: Own,
     model: OwnModelFile,
@@ -272,8 +329,7 @@ impl Work {
     /// # Errors
     /// Where text, file or records do not allow a fit.
     pub(super) fn new(session: &mut Session) -> Result<Self, Refusal> {
-        let own = session.own.clone();
-        let own = own.ok_or_else(|| Refusal::input("there is no model of your own yet"))?;
+        let own = session.own.clone().ok_or_else(no_model)?;
         let model = own.model()?;
         let options = ReadOptions::from(model.hold);
         let (mut fitted, mut held_out): (Vec<Reading>, Vec<Reading>) = Default::default();
@@ -307,9 +363,66 @@ impl Work {
         compare(&self.model, &self.records, &FitOptions::default())
     }
 
+    /// Searches what is missing, until the flag is set.
+    pub(super) fn search(
+        &self,
+        max_effects: Option<NonZeroU8>,
+        effort: EffortLevel,
+        interrupt: &AtomicBool,
+        show: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Diagnosis, Error> {
+        /// What a search goes through.
+        const PHASES: [&str; 4] = [
+            "fitting the model",
+            "searching the effects",
+            "confirming",
+            "telling apart",
+        ];
+        let mut options = Options {
+            time_limit: Some(effort.limit()),
+            interrupt: Some(interrupt),
+            ..Options::default()
+        };
+        if let Some(most) = max_effects {
+            options.max_effects = usize::from(most.get());
+        }
+        diagnose(&self.model, &self.records, &options, &|now| {
+            let done = PHASES.iter().position(|phase| *phase == now.phase);
+            show(Progress {
+                phase: now.phase,
+                done: done.unwrap_or(0),
+                total: PHASES.len(),
+            });
+        })
+    }
+
+    /// Puts a diagnosis where the page finds it.
+    pub(super) fn settle_diagnosis(self, session: &mut Session, found: &Diagnosis) {
+        let id = session.number();
+        let json = serde_json::to_string(found).unwrap_or_default();
+        let Ok(findings) = Findings::of_text(&json) else {
+            return session.fail("the diagnosis cannot be kept, which is a fault of ctid".into());
+        };
+        let diagnosed = Diagnosed {
+            id,
+            body: own_findings::body(&self.model, found),
+            effects: found.effects.clone(),
+            findings,
+            text: self.own.text,
+            file: self.own.file,
+            data: self.data,
+        };
+        let shown = report::diagnosed(&self.model, &self.records, found);
+        if let Some(own) = &mut session.own {
+            own.diagnosis = Some(diagnosed);
+            own.shown = Some(Arc::new(shown));
+        }
+    }
+
     /// Puts what came out where the page finds it.
     pub(super) fn settle(self, session: &mut Session, found: &Comparison) {
         let id = session.number();
+        let shown = report::compared(&self.model, &self.records, found);
         let fit = Fit {
             id,
             body: self.body(id, found).to_string().into(),
@@ -319,6 +432,7 @@ impl Work {
         };
         if let Some(own) = &mut session.own {
             own.fit = Some(fit);
+            own.shown = Some(Arc::new(shown));
         }
     }
 
@@ -367,6 +481,7 @@ impl Work {
         json!({
             "id": id,
             "model": found.model,
+            "effects": found.effects,
             "outputs": outputs.collect::<Vec<_>>(),
             "weighted": numbers::significant(step.weighted_rmse, 3),
             "parameters": parameters.collect::<Vec<_>>(),

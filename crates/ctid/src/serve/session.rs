@@ -442,6 +442,8 @@ impl Session {
     pub(super) fn stop(&mut self) {
         if let Some(job) = self.job.take() {
             job.stop.store(true, Ordering::Relaxed);
+            // A search of a model of its user's own knows this flag alone.
+            job.interrupt.store(true, Ordering::Relaxed);
             self.version += 1;
         }
     }

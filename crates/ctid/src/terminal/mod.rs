@@ -72,7 +72,10 @@ pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
             .to_string(),
             record.samples().to_string(),
             numbers::duration(length(record)),
-            range(&record.input, &diagnosis.input_unit),
+            range(
+                record.inputs.first().map_or(&[], |input| &input.values),
+                &diagnosis.input_unit,
+            ),
         ];
         // Further outputs stand below the first.
         for (name, output) in diagnosis.outputs.iter().zip(&record.outputs) {

@@ -9,6 +9,9 @@ use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 
+/// A number of pairs of an estimate and its standard error.
+type Measure<'a> = &'a dyn Fn(&[(f64, f64)]) -> f64;
+
 const ROWS: usize = 1500;
 
 /// Noise of a tenth of the output, signals about their levels of rest.
@@ -68,13 +71,11 @@ fn sure(method: Method, missing: bool) -> Sure {
         })
         .collect();
     let n = found.len() as f64;
-    let of = |i: usize, measure: &dyn Fn(&[(f64, f64)]) -> f64| {
+    let of = |i: usize, measure: Measure| {
         let errors: Vec<(f64, f64)> = found.iter().map(|record| record[i]).collect();
         measure(&errors)
     };
-    let all = |measure: &dyn Fn(&[(f64, f64)]) -> f64| -> Vec<f64> {
-        (0..truth.len()).map(|i| of(i, measure)).collect()
-    };
+    let all = |measure: Measure| -> Vec<f64> { (0..truth.len()).map(|i| of(i, measure)).collect() };
     let mean = |e: &[(f64, f64)]| e.iter().map(|e| e.0).sum::<f64>() / n;
     let spread = |e: &[(f64, f64)]| {
         let mean = mean(e);

@@ -15,6 +15,7 @@ mod injected;
 mod model_file;
 mod monitor;
 mod outputs;
+mod own_effects;
 mod own_term;
 mod prior;
 mod program;

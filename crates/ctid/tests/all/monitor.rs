@@ -804,6 +804,34 @@ fn a_model_of_ones_own_is_watched() {
 }
 
 #[test]
+fn a_model_of_ones_own_is_watched_with_its_effects() {
+    let place = own_place();
+    let with = |kept: &str| {
+        let file = OWN.replacen('\n', "\neffects = [\"lag(y)\"]\n", 1);
+        place.write(
+            "m.toml",
+            format!("{file}[effect.\"lag(y)\"]\ntau = 2.0\n{kept}"),
+        );
+        fed(&place, "--estimates", block_rows(2600, 2600))
+    };
+    let refused = with("");
+    assert_eq!(refused.code, Some(2));
+    assert_says(
+        &refused,
+        "m.toml: lag(y) is written in numbers of a record (duration, interval)",
+    );
+    let outcome = with("record = { duration = 600.0, interval = 0.5 }\n");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+    let events = events(&outcome.out);
+    let estimates = events.iter().rfind(|e| e["event"] == "estimates").unwrap();
+    let all = estimates["parameters"].as_array().unwrap();
+    let tau = all.iter().find(|p| p["name"] == "lag_y_tau").unwrap();
+    // Its sensor does not lag.
+    let value = tau["value"].as_f64().unwrap();
+    assert!(value.abs() < 0.1 && tau["unit"] == "h", "{tau}");
+}
+
+#[test]
 fn a_state_of_a_model_of_ones_own_goes_on() {
     let place = own_place();
     let all = block_rows(2600, 2000);

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use ct_model::effects::{OwnCandidate, OwnParameter};
 use ct_model::{Model, ModelSpec, Simulation};
 use ct_signals::{Channel, Record, noise};
-use effect_search::{Diagnosis, Error, Options, Problem, Verdict, diagnose};
+use effect_search::{
+    Believed, Diagnosis, Error, Kept, Options, Problem, Verdict, believed, diagnose,
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -114,6 +116,7 @@ fn problem(believed: &str, record: Record) -> Problem {
     Problem {
         spec: ModelSpec::parse(believed).unwrap(),
         effects: Vec::new(),
+        kept: BTreeMap::new(),
         records: vec![record],
         test: Vec::new(),
         known: BTreeMap::new(),
@@ -263,4 +266,45 @@ fn an_effect_that_the_model_cannot_have_is_refused() {
     problem.effects.push("lag(q)".to_string());
     let refused = diagnose(&problem, &Options::default(), &|_| {});
     assert!(matches!(refused, Err(Error::UnknownEffect { id, .. }) if id == "lag(q)"));
+}
+
+#[test]
+fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
+    let lagging = block("g*u - k*(T - Ta)")
+        .replace(
+            "output Real y(unit=\"degC\") = T;",
+            "output Real y(unit=\"degC\") = s;\n  Real s(start=20);",
+        )
+        .replace("end Block", "  25*der(s) = T - s;\nend Block");
+    let mut problem = problem(BLOCK, record(&lagging, 0.0, 0.2, 3));
+    problem.effects.push("lag(y)".to_string());
+    let found = believed(&problem, &Options::default()).unwrap();
+    let tau = |found: &Believed| {
+        let mut parameters = found.spec.parameters.iter();
+        parameters
+            .find(|p| p.about.name == "lag_y_tau")
+            .unwrap()
+            .value
+    };
+    assert!((tau(&found) - 25.0).abs() < 1.0, "{}", tau(&found));
+    let numbers = &found.record_numbers["lag(y)"];
+    assert_eq!(numbers["duration"], STEP * (ROWS - 1) as f64);
+    assert_eq!(numbers["interval"], STEP);
+    // It belongs to the believed model: nothing is missing beside it.
+    let diagnosis = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
+    assert_eq!(diagnosis.verdict, Verdict::Adequate);
+    assert!(diagnosis.effects.is_empty());
+    assert_eq!(&diagnosis.record_numbers["lag(y)"], numbers);
+    // Numbers of an earlier record stay, and a start is tried beside the effect's own.
+    let kept = Kept {
+        numbers: BTreeMap::from([
+            ("duration".to_string(), 900.0),
+            ("interval".to_string(), 2.0),
+        ]),
+        start: BTreeMap::from([("tau".to_string(), 24.0)]),
+    };
+    problem.kept.insert("lag(y)".to_string(), kept);
+    let found = believed(&problem, &Options::default()).unwrap();
+    assert_eq!(found.record_numbers["lag(y)"]["duration"], 900.0);
+    assert!((tau(&found) - 25.0).abs() < 1.0, "{}", tau(&found));
 }

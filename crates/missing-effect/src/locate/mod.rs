@@ -17,23 +17,35 @@ const BINS: usize = 12;
 /// Bins with fewer samples are not judged.
 const FEWEST: usize = 8;
 
-/// One record as a model sees it.
-pub(crate) struct Series<'a> {
+/// One record as a model sees it; all series are as long as `time`.
+#[derive(Debug, Clone, Copy)]
+pub struct Series<'a> {
+    /// The record's name.
     pub name: &'a str,
+    /// Sampling instants, rising \[s\].
     pub time: &'a [f64],
+    /// The input that the residual is shown against \[`input_unit`\].
     pub input: &'a [f64],
+    /// What the model gives \[`output_unit`\].
     pub model: &'a [f64],
+    /// Measured minus model, NaN where nothing was measured \[`output_unit`\].
     pub residual: &'a [f64],
 }
 
 /// What is judged, against which noise, in which units.
-pub(crate) struct Located<'a> {
+#[derive(Debug, Clone, Copy)]
+pub struct Located<'a> {
     /// At least one record.
     pub series: &'a [Series<'a>],
+    /// The noise of the output.
     pub noise: &'a ArModel,
+    /// Unit of the output.
     pub output_unit: &'a str,
+    /// Unit of the input.
     pub input_unit: &'a str,
+    /// How times are said.
     pub clock: &'a Clock,
+    /// What things are called.
     pub domain: Domain,
 }
 
@@ -176,7 +188,8 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
 }
 
 /// Where the model fails: windows record by record, the rest over all records together.
-pub(crate) fn locate(located: &Located) -> Failures {
+#[must_use]
+pub fn locate(located: &Located) -> Failures {
     let Located { series, noise, .. } = *located;
     let expected: Vec<Expected> = series
         .iter()

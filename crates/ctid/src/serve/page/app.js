@@ -108,7 +108,7 @@ function show(state, trouble) {
   fail(state.failure);
   const mine = own.is(state);
   $("place").textContent = state.file && !mine ? `edits ${state.file}` : "model kept in this tab";
-  for (const [id, there] of [["text", mine], ["model", mine || state.text], ["report", !mine && (state.current || state.diagnosis)]]) {
+  for (const [id, there] of [["text", mine], ["model", mine || state.text], ["report", mine ? state.own.fit !== null || state.own.diagnosis : state.current || state.diagnosis]]) {
     $(`download-${id}`).hidden = !there;
     $(`download-${id}`).href = server.link(id);
   }

@@ -6,7 +6,7 @@ import * as server from "./server.js";
 const PAUSE = 600;
 // What the plants have and a model of one's own has not.
 const PLANTS = ["model", "missing", "columns", "trail-part", "fit-part", "fails-part", "unknown-part", "parameters-part", "chains-part", "experiment-part"];
-const OWN = ["own", "own-fit-part", "own-parameters-part", "own-check-part"];
+const OWN = ["own", "own-missing", "own-fit-part", "own-parameters-part", "own-ports-part", "own-check-part"];
 // Box, key of the request, what is wrong with it.
 const TEXTS = [["own-text", "text", "own-text-error"], ["own-file", "file", "own-file-error"]];
 
@@ -118,6 +118,53 @@ function columns(state) {
   if (state.records.some((one) => one.error)) $("own-columns").open = true;
 }
 
+const toggle = (own, effect, id) => {
+  const on = own.effects.includes(effect);
+  const press = async () => {
+    try {
+      await flush();
+      forget();
+      await change({ do: on ? "remove" : "add", effect });
+      await server.run("compare");
+    } catch (error) {
+      complain(error);
+    }
+  };
+  return button(on ? "Remove" : "Add", { id, className: on ? "added" : "primary", ariaLabel: `${on ? "Remove" : "Add"} ${effect}` }, press);
+};
+
+/** What a diagnosis found: the effects, each with its port in words, and what cannot be told from it. */
+function findings(own) {
+  const found = own.diagnosis;
+  const line = (one, id) => make("div", { className: "head" }, make("code", { className: "name" }, one.placed), toggle(own, one.effect, id));
+  $("own-diagnose").textContent = found ? "Diagnose again" : "Diagnose";
+  $("own-diagnose-hint").hidden = Boolean(found);
+  fill($("own-effects"), own.effects.length ? ["In the model: ", own.effects.map((effect, k) => [make("code", {}, effect), " ", toggle(own, effect, `own-on-${k}`), " "])].flat(2) : "");
+  if (!found) { fill($("own-findings")); return; }
+  const heads = [["Model"], ...found.outputs.map(({ name, unit }) => [unit ? `${name} [${unit}]` : name, true])];
+  const errors = make("table");
+  table(errors, heads, found.steps.map(({ name, errors: each }) => [make("code", {}, name), ...each]));
+  fill($("own-findings"),
+    make("p", { className: "verdict-line" }, found.headline),
+    found.of_this_model ? null : make("p", { className: "caption" }, "Text, model file or records have changed since: diagnose again."),
+    found.groups.length ? make("ul", { className: "groups" }, found.groups.map((one, k) => make("li", { className: "found" },
+      line(one, `own-found-${k}`),
+      make("p", { className: "figures" }, one.sizes.map((size) => make("span", {}, units(size)))),
+      make("p", {}, `${one.physics}.`),
+      one.others.length ? [make("p", { className: "caption" }, "These records cannot tell it from:"), make("ul", { className: "others" }, one.others.map((other, l) => make("li", {}, line(other, `own-other-${k}-${l}`))))] : null))) : null,
+    found.sentences.map((sentence) => make("p", {}, units(sentence))),
+    make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": "How the error fell" }, errors),
+    make("p", { className: "caption" }, `${found.candidates} candidates in ${found.seconds.toFixed(1)} s. Simulation error, root mean square.`));
+}
+
+/** The ports of the model, with the effects that sit there. */
+function ports(own) {
+  $("own-ports-part").hidden = !(own.ports || []).length;
+  const marked = ({ on, found }) => [...on.map((id) => [make("code", {}, id), " in the model "]), ...found.filter((id) => !on.includes(id)).map((id) => [make("code", { className: "name" }, id), " found "])].flat();
+  table($("own-ports"), [["Port"], ["Name"], ["Unit"], ["Meaning"], ["Effects"]],
+    (own.ports || []).map((one) => [one.kind, make("code", {}, one.name), units(one.unit), one.description, make("span", {}, marked(one))]));
+}
+
 /** What to do next. */
 export function next(state) {
   const { own } = state;
@@ -125,7 +172,10 @@ export function next(state) {
   if (own.file_error) return "mend the model file where the message says";
   if (!state.records.some((one) => !one.held_out)) return "drop a record";
   if (state.records.some((one) => one.error)) return "say which column is what";
-  return own.fitted ? "" : "fit the model";
+  if (!own.fitted) return "fit the model";
+  const open = (own.diagnosis?.groups || []).find((one) => ![one, ...one.others].some(({ effect }) => own.effects.includes(effect)));
+  if (open) return `add ${open.effect}, and watch the error fall`;
+  return own.diagnosis ? "" : "diagnose what is missing";
 }
 
 export async function show(state) {
@@ -153,6 +203,14 @@ export async function show(state) {
   $("own-unused").textContent = `No part in a fit has ${(own.unused || []).map((one) => `[${one}]`).join(", ")}.`;
   const ready = !own.text_error && !own.file_error && !state.job && state.records.some((one) => !one.held_out) && state.records.every((one) => one.read);
   $("own-fit").disabled = !ready;
+  $("own-diagnose").disabled = !ready;
+  $("own-missing").hidden = Boolean(own.text_error || own.file_error);
+  if (!own.file_error && !own.text_error) {
+    findings(own);
+    ports(own);
+  } else {
+    $("own-ports-part").hidden = true;
+  }
   document.querySelector(".see").classList.toggle("stale", own.fit !== null && !own.fitted);
   const wanted = `${own.fit}`;
   if (wanted !== shown) {
@@ -244,6 +302,14 @@ export function start(examples, told) {
     $("own-load").value = "";
   });
   $("own-fit").addEventListener("click", fit);
+  $("own-diagnose").addEventListener("click", async () => {
+    try {
+      await flush();
+      await server.run("diagnose", { max_effects: null, effort: $("own-effort").value });
+    } catch (error) {
+      complain(error);
+    }
+  });
   $("begin-own").addEventListener("click", () => change({ do: "begin" }).catch(complain));
   $("begin-own-2").addEventListener("click", () => change({ do: "begin" }).catch(complain));
   $("own-end").addEventListener("click", () => change({ do: "end" }).catch(complain));

@@ -1,0 +1,239 @@
+//! `ctid add` and `ctid remove` of effects at the ports of a model of its user's own.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use ct_model::ModelSpec;
+use ct_model::effects::Candidate;
+use serde::Deserialize;
+use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
+
+use super::Edited;
+use super::layout::{document, push, take_out};
+use crate::Error;
+use crate::model_file::read_text;
+use crate::own_model::effects::{RECORD, every_candidate, find, plain};
+use crate::own_model::{OwnModelFile, read_model};
+use crate::report::rounded;
+
+/// Where the text that a model file names is read.
+pub(crate) type ReadText<'r> = &'r dyn Fn(&Path) -> Result<ModelSpec, Error>;
+
+/// Of what `ctid diagnose --json` and `ctid compare --json` write of a model of its user's own, what is kept in a model file.
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct Findings {
+    model: String,
+    steps: Vec<FoundStep>,
+    record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct FoundStep {
+    parameters: Vec<FoundParameter>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct FoundParameter {
+    name: String,
+    value: Option<f64>,
+}
+
+impl Findings {
+    /// Reads a result.
+    ///
+    /// # Errors
+    /// Where the file is none of a diagnosis or a comparison of a model of its user's own.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        Self::of_text(&read_text(path)?).map_err(|what| Error::file(path, what))
+    }
+
+    /// The same of its text.
+    ///
+    /// # Errors
+    /// What is wrong and the mend.
+    pub fn of_text(text: &str) -> Result<Self, String> {
+        serde_json::from_str(text).map_err(|error| {
+            format!(
+                "this is no result of a model of your own: give what `ctid diagnose --json` wrote ({error})"
+            )
+        })
+    }
+
+    /// Whether it says anything of an effect.
+    pub fn has(&self, id: &str) -> bool {
+        self.record_numbers.contains_key(id)
+    }
+
+    /// The value of a parameter in the last model that has it.
+    fn value(&self, name: &str) -> Option<f64> {
+        let steps = self.steps.iter().rev().flat_map(|step| &step.parameters);
+        let mut named = steps.filter(|parameter| parameter.name == name);
+        named.find_map(|parameter| parameter.value)
+    }
+}
+
+/// Whether a text is the model file of a model of its user's own.
+pub(super) fn is_own(text: &str) -> bool {
+    let table = text.parse::<toml::Table>();
+    table.is_ok_and(|table| table.contains_key("model"))
+}
+
+/// Where the text stands that a model file of this path names.
+pub(super) fn beside(path: &Path) -> impl Fn(&Path) -> Result<ModelSpec, Error> {
+    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    move |named| read_model(&folder.join(named))
+}
+
+/// The text of a model file with one more effect; with a result its numbers and its sizes are kept in `[effect."..."]`.
+///
+/// # Errors
+/// Where nothing of this name can act in the model, it is on already and no result is given, or the result does not have it.
+pub(crate) fn with_effect(
+    path: &Path,
+    text: &str,
+    effect: &str,
+    from: Option<&Findings>,
+    read: ReadText,
+) -> Result<Edited, Error> {
+    let file = path.display().to_string();
+    let refuse = |what: String| Error::File {
+        file: file.clone(),
+        what,
+    };
+    let model = OwnModelFile::parse_with(path, text, read)?;
+    let all = every_candidate(&model.base, &model.candidates)?;
+    let candidate = find(&model.base, &all, effect).map_err(Error::UnknownEffect)?;
+    let id = &candidate.id;
+    let is_on = model.effects.on.contains(id);
+    if is_on && from.is_none() {
+        return Err(refuse(format!(
+            "{id} is on already; `ctid remove '{id}'` takes it out, and --from RESULT.json keeps what a result found of it"
+        )));
+    }
+    let mut document = document(&file, text)?;
+    if !is_on {
+        push(&mut document, id);
+    }
+    let mut kept = String::new();
+    if let Some(found) = from {
+        if found.model != model.base.name {
+            return Err(refuse(format!(
+                "the result is of the model {}, and this file has {}: give a result of this model",
+                found.model, model.base.name
+            )));
+        }
+        kept = keep(&mut document, candidate, found).map_err(&refuse)?;
+    }
+    let text = document.to_string();
+    let model = OwnModelFile::parse_with(path, &text, read)?;
+    let verb = if is_on { "kept" } else { "added" };
+    let done = format!(
+        "{file}: {verb} {id}{kept}; effects = {:?}",
+        model.effects.on
+    );
+    Ok(Edited { text, done })
+}
+
+/// Writes what a result found of an effect into its table. Returns what, in words.
+fn keep(
+    document: &mut DocumentMut,
+    candidate: &Candidate,
+    found: &Findings,
+) -> Result<String, String> {
+    let id = &candidate.id;
+    let Some(numbers) = found.record_numbers.get(id) else {
+        let known: Vec<&str> = found.record_numbers.keys().map(String::as_str).collect();
+        return Err(format!(
+            "the result says nothing of {id}: it has {}; without --from the effect is fitted anew",
+            known.join(", ")
+        ));
+    };
+    let no_table = || format!("[effect.\"{id}\"] is not a table; make it one");
+    let mut tables = Table::new();
+    tables.set_implicit(true);
+    let mut own = Table::new();
+    own.decor_mut().set_prefix("\n");
+    let table = document
+        .entry("effect")
+        .or_insert(Item::Table(tables))
+        .as_table_like_mut()
+        .ok_or_else(no_table)?
+        .entry(id)
+        .or_insert(Item::Table(own))
+        .as_table_like_mut()
+        .ok_or_else(no_table)?;
+    let mut said = Vec::new();
+    for parameter in &candidate.parameters {
+        let Some(size) = found.value(&parameter.name) else {
+            continue;
+        };
+        let size = rounded(size, 7);
+        said.push(format!("{} = {size}", parameter.short));
+        set(table, &parameter.short, value(size));
+    }
+    if !numbers.is_empty() {
+        let mut inline = InlineTable::new();
+        for (name, number) in numbers {
+            inline.insert(name, (*number).into());
+        }
+        set(table, RECORD, value(inline));
+    }
+    Ok(match said.as_slice() {
+        [] => " with the numbers of its record".to_string(),
+        said => format!(" with {}", said.join(", ")),
+    })
+}
+
+/// Sets a key; a comment behind it stays.
+fn set(table: &mut dyn toml_edit::TableLike, key: &str, mut item: Item) {
+    let before = table.get(key).and_then(Item::as_value);
+    if let (Some(before), Some(new)) = (before, item.as_value_mut()) {
+        *new.decor_mut() = before.decor().clone();
+    }
+    table.insert(key, item);
+}
+
+/// The text of a model file without an effect; its `[effect."..."]` table stays for another day.
+///
+/// # Errors
+/// Where it is not on.
+pub(crate) fn without_effect(
+    path: &Path,
+    text: &str,
+    effect: &str,
+    read: ReadText,
+) -> Result<Edited, Error> {
+    let file = path.display().to_string();
+    let mut document = document(&file, text)?;
+    let wanted = plain(effect);
+    // As it is written there, with blanks or without.
+    let listed = document.get_mut("effects").and_then(Item::as_array_mut);
+    let removed = listed.is_some_and(|effects| {
+        let written = effects.iter().filter_map(|on| on.as_str());
+        let written = written.map(str::to_string).find(|on| plain(on) == wanted);
+        written.is_some_and(|written| take_out(effects, &written))
+    });
+    if !removed {
+        let model = OwnModelFile::parse_with(path, text, read)?;
+        return Err(Error::File {
+            file,
+            what: format!(
+                "{wanted} is not on, so it cannot be removed; effects = {:?}",
+                model.effects.on
+            ),
+        });
+    }
+    let text = document.to_string();
+    let model = OwnModelFile::parse_with(path, &text, read)?;
+    let waits = model.effects.waiting.contains(&wanted);
+    let kept = if waits {
+        format!("; [effect.\"{wanted}\"] stays for the day it is added again")
+    } else {
+        String::new()
+    };
+    let done = format!(
+        "{file}: removed {wanted}; effects = {:?}{kept}",
+        model.effects.on
+    );
+    Ok(Edited { text, done })
+}

@@ -1,0 +1,225 @@
+//! `effects = [...]` of a model file with a model of its user's own, and what `[effect."lag(u)"]` keeps of an effect.
+
+use std::collections::BTreeMap;
+
+use ct_model::ModelSpec;
+use ct_model::effects::{
+    Candidate, OwnCandidate, Visited, all_effects, apply, candidates, own_candidates,
+};
+use ct_signals::quoted;
+use effect_search::Kept;
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::model_file::Source;
+use crate::{Error, names};
+
+/// The tables of effects, by identifier.
+pub(super) type RawEffects = BTreeMap<Spanned<String>, BTreeMap<Spanned<String>, Setting>>;
+
+/// The key of the numbers of the record, beside the names of parameters.
+pub(crate) const RECORD: &str = "record";
+/// The key of the parameters that are not fitted.
+const FIXED: &str = "fixed";
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "a number, `fixed = [\"a parameter\"]`, or `record = { duration = 600.0 }`"
+)]
+pub(super) enum Setting {
+    Start(f64),
+    Fixed(Vec<String>),
+    Record(BTreeMap<String, f64>),
+}
+
+/// The effects of a model file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct OwnEffects {
+    /// Identifiers of those that are on, in order.
+    pub on: Vec<String>,
+    /// What is kept of them.
+    pub kept: BTreeMap<String, Kept>,
+    /// Parameters of theirs that are not fitted, and their values.
+    pub fixed: BTreeMap<String, f64>,
+    /// Names of all their parameters in the model that they are in.
+    pub parameters: Vec<String>,
+    /// Tables of effects that are not on.
+    pub waiting: Vec<String>,
+}
+
+/// An identifier without the blanks that somebody has typed.
+pub(crate) fn plain(id: &str) -> String {
+    id.chars().filter(|c| !c.is_whitespace()).collect()
+}
+
+/// Reads and checks the effects of a model file.
+///
+/// # Errors
+/// One line that names the file, the line, what is wrong and the mend.
+pub(super) fn read(
+    spec: &ModelSpec,
+    own: &BTreeMap<String, OwnCandidate>,
+    (listed, tables): (&[Spanned<String>], &RawEffects),
+    source: &Source,
+) -> Result<OwnEffects, Error> {
+    let mut effects = OwnEffects::default();
+    if listed.is_empty() && tables.is_empty() {
+        return Ok(effects);
+    }
+    let all = every_candidate(spec, own)?;
+    let mut on: Vec<&Candidate> = Vec::new();
+    for written in listed {
+        let at = written.span().start;
+        let candidate = find(spec, &all, written.as_ref()).map_err(|what| source.at(at, what))?;
+        if on.iter().any(|other| other.id == candidate.id) {
+            return Err(source.at(
+                at,
+                format!("{} is listed twice: once is enough", candidate.id),
+            ));
+        }
+        on.push(candidate);
+    }
+    if let (Err(error), Some(first)) = (apply(spec, &on), listed.first()) {
+        return Err(source.at(first.span().start, error.to_string()));
+    }
+    for (written, table) in tables {
+        let at = written.span().start;
+        let candidate = find(spec, &all, written.as_ref()).map_err(|what| source.at(at, what))?;
+        let (kept, fixed) = settings(candidate, table, source)?;
+        if !on.iter().any(|other| other.id == candidate.id) {
+            effects.waiting.push(candidate.id.clone());
+            continue;
+        }
+        effects.kept.insert(candidate.id.clone(), kept);
+        effects.fixed.extend(fixed);
+    }
+    let parameters = on.iter().flat_map(|candidate| &candidate.parameters);
+    effects.parameters = parameters.map(|p| p.name.clone()).collect();
+    effects.on = on.iter().map(|candidate| candidate.id.clone()).collect();
+    Ok(effects)
+}
+
+/// All that can act in a model, of the catalogue and of the model file.
+///
+/// # Errors
+/// As [`own_candidates`], which a model file passes first.
+pub(crate) fn every_candidate(
+    spec: &ModelSpec,
+    own: &BTreeMap<String, OwnCandidate>,
+) -> Result<Vec<Candidate>, Error> {
+    let mut all = candidates(spec, &Visited::nominal(spec));
+    let own = own_candidates(spec, own);
+    all.extend(own.map_err(|error| Error::Columns(error.to_string()))?);
+    Ok(all)
+}
+
+/// The candidate of an identifier.
+///
+/// # Errors
+/// In one line where there is none, with the identifiers that may have been meant.
+pub(crate) fn find<'c>(
+    spec: &ModelSpec,
+    all: &'c [Candidate],
+    written: &str,
+) -> Result<&'c Candidate, String> {
+    let id = plain(written);
+    if let Some(found) = all.iter().find(|candidate| candidate.id == id) {
+        return Ok(found);
+    }
+    let name = id.split('(').next().unwrap_or_default();
+    let ids = || all.iter().map(|candidate| candidate.id.as_str());
+    let ports: Vec<&str> = ids()
+        .filter(|id| id.split('(').next() == Some(name))
+        .collect();
+    let near = names::suggestion(&id, ids());
+    let where_it_acts = match ports.len() {
+        0 if all_effects().any(|effect| effect.id == name) => {
+            format!("; {name} acts nowhere in {}", spec.name)
+        }
+        0 => String::new(),
+        1..=8 => format!("; {name} may act here: {}", ports.join(", ")),
+        count => format!(
+            "; {name} may act at {count} ports, such as {}",
+            ports[..4].join(", ")
+        ),
+    };
+    Err(format!(
+        "\"{}\" is no effect that can act in {}: `ctid effects --model` lists them{where_it_acts}{near}",
+        quoted(written),
+        spec.name
+    ))
+}
+
+type Settings = (Kept, BTreeMap<String, f64>);
+
+/// The table of an effect: what is kept of it, and what is not fitted.
+fn settings(
+    candidate: &Candidate,
+    table: &BTreeMap<Spanned<String>, Setting>,
+    source: &Source,
+) -> Result<Settings, Error> {
+    let id = &candidate.id;
+    let shorts = || candidate.parameters.iter().map(|p| p.short.as_str());
+    let unknown = |at: usize, what: &str, name: &str, known: Vec<&str>| {
+        let may = match known.as_slice() {
+            [] => "there are none".to_string(),
+            known => format!("there are {}", known.join(", ")),
+        };
+        let near = names::suggestion(name, known);
+        Err(source.at(
+            at,
+            format!("{} is no {what} of {id}: {may}{near}", quoted(name)),
+        ))
+    };
+    let mut kept = Kept::default();
+    let mut fixed_names: Vec<(usize, String)> = Vec::new();
+    for (key, setting) in table {
+        let (at, name) = (key.span().start, key.as_ref().as_str());
+        match (name, setting) {
+            (RECORD, Setting::Record(numbers)) => {
+                let known = || candidate.record_numbers.keys().copied();
+                if let Some(name) = numbers.keys().find(|n| !known().any(|k| k == **n)) {
+                    return unknown(at, "number of the record", name, known().collect());
+                }
+                let mut infinite = numbers.iter().filter(|(_, value)| !value.is_finite());
+                if let Some((name, _)) = infinite.next() {
+                    return Err(source.at(at, format!("{name} has to be a finite number")));
+                }
+                kept.numbers.clone_from(numbers);
+            }
+            (FIXED, Setting::Fixed(names)) => {
+                fixed_names.extend(names.iter().map(|name| (at, name.clone())));
+            }
+            (RECORD | FIXED, _) => {
+                let form = "write record = { duration = 600.0 }, fixed = [\"tau\"], and numbers for parameters";
+                return Err(source.at(at, format!("{name} of {id}: {form}")));
+            }
+            (_, Setting::Start(value)) => {
+                if !shorts().any(|short| short == name) {
+                    return unknown(at, "parameter", name, shorts().collect());
+                }
+                if !value.is_finite() {
+                    return Err(source.at(at, format!("{name} has to be a finite number")));
+                }
+                kept.start.insert(name.to_string(), *value);
+            }
+            _ => return unknown(at, "list or table", name, vec![RECORD, FIXED]),
+        }
+    }
+    let mut fixed = BTreeMap::new();
+    for (at, name) in fixed_names {
+        let own = candidate.parameters.iter().find(|p| p.short == name);
+        let Some(own) = own else {
+            return unknown(at, "parameter", &name, shorts().collect());
+        };
+        let Some(value) = kept.start.get(&name) else {
+            return Err(source.at(
+                at,
+                format!("{name} is fixed and has no value: write {name} = ... beside it"),
+            ));
+        };
+        fixed.insert(own.name.clone(), *value);
+    }
+    Ok((kept, fixed))
+}

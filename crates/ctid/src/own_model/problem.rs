@@ -1,0 +1,181 @@
+//! A model file and its records as the search takes them, and the model with the effects of its file in it.
+
+use std::collections::BTreeMap;
+
+use ct_model::effects::{Candidate, Role, Visited, apply, candidates_keeping, own_candidates};
+use ct_model::{Model, ModelSpec};
+use effect_search::{Believed, Options, Problem, believed};
+
+use super::file::{OwnModelFile, Records};
+use crate::{Error, numbers};
+
+/// The numbers of a record that effects are written in, by the effects' identifiers.
+pub(crate) type RecordNumbers = BTreeMap<String, BTreeMap<&'static str, f64>>;
+
+/// What the search works on.
+pub(super) fn problem(file: &OwnModelFile, records: &Records) -> Problem {
+    Problem {
+        spec: file.base.clone(),
+        effects: file.effects.on.clone(),
+        kept: file.effects.kept.clone(),
+        records: records.records.clone(),
+        test: records.test.clone(),
+        known: file.known.clone(),
+        priors: file.priors.clone(),
+        candidates: file.candidates.clone(),
+        time_unit: records.time_unit,
+        time_unit_name: unit_of(records.time_unit).to_string(),
+    }
+}
+
+/// An error of the search, with the records that it is of.
+pub(super) fn blamed(problem: &Problem, error: &effect_search::Error) -> Error {
+    let mut names: Vec<&str> = problem.records.iter().map(|r| r.name.as_str()).collect();
+    names.dedup();
+    Error::File {
+        file: names.join(", "),
+        what: error.to_string(),
+    }
+}
+
+impl OwnModelFile {
+    /// The model with its effects in it. With records the effects are fitted to them one after the other, and parameters begin there; what the
+    /// file does not keep of an earlier record is taken from these. Without any the file has to say all of it.
+    ///
+    /// # Errors
+    /// Where the records do not allow a fit, or without any where the file lacks a number.
+    pub fn mended(&self, records: Option<&Records>) -> Result<Self, Error> {
+        if self.effects.on.is_empty() {
+            return Ok(self.clone());
+        }
+        let Believed {
+            spec,
+            record_numbers,
+        } = match records {
+            None => self.as_it_stands()?,
+            Some(records) => {
+                let problem = problem(self, records);
+                believed(&problem, &Options::default()).map_err(|e| blamed(&problem, &e))?
+            }
+        };
+        Ok(Self {
+            model: Model::new(spec),
+            record_numbers,
+            ..self.clone()
+        })
+    }
+
+    /// The model with its effects as the file has them.
+    fn as_it_stands(&self) -> Result<Believed, Error> {
+        let refuse = |what: String| Error::File {
+            file: self.name.clone(),
+            what,
+        };
+        let declared = self.columns.time.is_some();
+        let time_unit = declared.then(|| self.columns.time_header().1);
+        let visited = Visited {
+            time_unit: unit_of(time_unit.unwrap_or(1.0)).to_string(),
+            ..Visited::nominal(&self.base)
+        };
+        let all = self.candidates_of(&self.base, &visited)?;
+        let mut on = Vec::new();
+        for id in &self.effects.on {
+            let candidate = all.iter().find(|candidate| candidate.id == *id);
+            on.push(candidate.ok_or_else(|| refuse(format!("{id} cannot act in this model")))?);
+        }
+        let mut record_numbers = RecordNumbers::new();
+        let mut values = BTreeMap::new();
+        for candidate in &on {
+            let id = &candidate.id;
+            let kept = self.effects.kept.get(id);
+            let numbers = candidate.record_numbers.keys();
+            let lacks = numbers.filter(|n| !kept.is_some_and(|k| k.numbers.contains_key(**n)));
+            let lacks: Vec<&str> = lacks.copied().collect();
+            if !lacks.is_empty() {
+                return Err(refuse(format!(
+                    "{id} is written in numbers of a record ({}): fit the model to records, or keep those of a diagnosis with `ctid add '{id}' --from RESULT.json`",
+                    lacks.join(", ")
+                )));
+            }
+            record_numbers.insert(id.clone(), candidate.record_numbers.clone());
+            for parameter in &candidate.parameters {
+                let kept = kept.and_then(|kept| kept.start.get(&parameter.short).copied());
+                let own = candidate.effect.is_none().then(|| own_start(parameter));
+                let value = kept.or(self.known.get(&parameter.name).copied()).or(own);
+                let value = value.ok_or_else(|| {
+                    refuse(format!(
+                        "{id} has no value for {0}: fit the model to records, or write {0} = ... under [effect.\"{id}\"]",
+                        parameter.short
+                    ))
+                })?;
+                values.insert(parameter.name.clone(), value);
+            }
+        }
+        let mut spec = apply(&self.base, &on).map_err(|error| refuse(error.to_string()))?;
+        for parameter in &mut spec.parameters {
+            if let Some(value) = values.get(&parameter.about.name) {
+                parameter.value = *value;
+            }
+        }
+        Ok(Believed {
+            spec,
+            record_numbers,
+        })
+    }
+
+    /// Which effects are written in numbers of the records at hand, as the file keeps none: a sentence for each. `used`: those of a result.
+    pub fn not_kept(&self, used: &RecordNumbers) -> Vec<String> {
+        let on = self.effects.on.iter();
+        let lacking = on.filter_map(|id| {
+            let kept = self.effects.kept.get(id);
+            let numbers = used.get(id)?.iter();
+            let lacks = numbers.filter(|(n, _)| !kept.is_some_and(|k| k.numbers.contains_key(**n)));
+            let lacks =
+                lacks.map(|(name, value)| format!("{name} = {}", numbers::significant(*value, 4)));
+            let lacks: Vec<String> = lacks.collect();
+            (!lacks.is_empty()).then_some((id, lacks))
+        });
+        lacking
+            .map(|(id, lacks)| {
+                format!(
+                    "{id} is written in numbers of these records ({}): `ctid add '{id}' --from RESULT.json` keeps them, so that it means the same beside others",
+                    lacks.join(", ")
+                )
+            })
+            .collect()
+    }
+
+    /// All candidates of a model where a record visits this, with what the file keeps.
+    ///
+    /// # Errors
+    /// As [`own_candidates`], which the file has passed.
+    pub(super) fn candidates_of(
+        &self,
+        spec: &ModelSpec,
+        visited: &Visited,
+    ) -> Result<Vec<Candidate>, Error> {
+        let kept = self.effects.kept.iter();
+        let kept = kept.map(|(id, kept)| (id.clone(), kept.numbers.clone()));
+        let mut all = candidates_keeping(spec, visited, &kept.collect());
+        let own = own_candidates(spec, &self.candidates);
+        all.extend(own.map_err(|error| Error::Columns(error.to_string()))?);
+        Ok(all)
+    }
+}
+
+/// Where a parameter of a candidate of the model file starts.
+fn own_start(parameter: &ct_model::effects::EffectParameter) -> f64 {
+    let first = parameter.starts.first().copied();
+    match parameter.role {
+        Role::Shape => parameter.absent,
+        _ => first.unwrap_or(parameter.absent),
+    }
+}
+
+/// The unit of time of so many seconds.
+fn unit_of(seconds: f64) -> &'static str {
+    [(0.001, "ms"), (60.0, "min"), (3600.0, "h"), (86_400.0, "d")]
+        .into_iter()
+        .find(|(unit, _)| (seconds / unit - 1.0).abs() < 1e-9)
+        .map_or("s", |(_, name)| name)
+}

@@ -1,0 +1,331 @@
+//! The report of a comparison or a diagnosis of a model of its user's own: the document of the plants, filled from the model's signals.
+
+use std::collections::BTreeMap;
+
+use ct_signals::{ArModel, Channel, Clock, Record, residual_tests};
+use effect_search::{Estimate, NoiseFloor, Step};
+use missing_effect::{
+    Diagnosis, Effort, Located, OutputStep, Parameter, PerOutput, Rankings, ResidualTests, Score,
+    Series, Shown, ShownInput, Verdict, locate,
+};
+use plants::Domain;
+use serde::Serialize;
+
+use super::compare::Comparison;
+use super::diagnose::sentences;
+use super::file::{OwnModelFile, Records};
+use super::words::EffectWords;
+use crate::output::Found;
+use crate::report;
+
+/// What was found, written as JSON as it stands, and its page.
+#[derive(Debug, Serialize)]
+pub(crate) struct Paged<'t, T> {
+    #[serde(flatten)]
+    found: &'t T,
+    #[serde(skip)]
+    page: String,
+}
+
+impl<'t, T> Paged<'t, T> {
+    /// With the page that shows this, where one is asked for.
+    pub fn new(found: &'t T, shown: Option<&Diagnosis>) -> Self {
+        Self {
+            found,
+            page: shown.map(report::html).unwrap_or_default(),
+        }
+    }
+}
+
+impl<T: Serialize> Found for Paged<'_, T> {
+    fn page(&self) -> String {
+        self.page.clone()
+    }
+}
+
+/// What the report shows of a comparison.
+pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Diagnosis {
+    let source = "what the past of the model's residual does not predict";
+    let mut shown = document(file, records, (&found.steps, &found.noise), source);
+    shown.seconds = found.seconds;
+    shown
+}
+
+/// What the report shows of a diagnosis.
+pub(crate) fn diagnosed(
+    file: &OwnModelFile,
+    records: &Records,
+    found: &effect_search::Diagnosis,
+) -> Diagnosis {
+    let words = EffectWords::of(&file.base, &file.candidates);
+    let source = "the residual of the last model";
+    let mut shown = document(file, records, (&found.steps, &found.noise), source);
+    shown.verdict = match found.verdict {
+        effect_search::Verdict::Effect => Verdict::Effect,
+        effect_search::Verdict::Undecided => Verdict::Undecided,
+        effect_search::Verdict::Partial => Verdict::Partial,
+        effect_search::Verdict::Unexplained => Verdict::Unexplained,
+        effect_search::Verdict::Adequate => Verdict::Adequate,
+    };
+    shown.effects.clone_from(&found.effects);
+    shown.groups.clone_from(&found.groups);
+    shown.in_doubt = vec![false; found.effects.len()];
+    shown.places = vec![Vec::new(); found.effects.len()];
+    shown.residual_unexplained = found.left.is_some();
+    shown.ranked.clone_from(&found.ranked);
+    let floors: Vec<f64> = found.noise.iter().map(|noise| noise.level).collect();
+    let singles = found.singles.iter().map(|single| {
+        let errors: Vec<f64> = single.rmse_per_output.values().copied().collect();
+        Score {
+            effect: single.effect.clone(),
+            place: None,
+            bic_gain: single.bic_gain,
+            rmse: only(&errors),
+            weighted_rmse: weighted(&shown.outputs, &single.rmse_per_output, &floors),
+            visibility: f64::NAN,
+            size: single.sizes.first().map(parameter),
+            smallest_visible: None,
+        }
+    });
+    shown.scores = singles.collect();
+    shown.sentences = sentences(found, &words);
+    if found.cut_short {
+        shown.effort.left_out = vec!["larger sets of effects".to_string()];
+    }
+    shown.seconds = found.seconds;
+    shown
+}
+
+/// The number of an only output; NaN of several.
+fn only(values: &[f64]) -> f64 {
+    match values {
+        [one] => *one,
+        _ => f64::NAN,
+    }
+}
+
+/// Root mean square of the errors, each divided by its output's noise.
+fn weighted(outputs: &[String], errors: &BTreeMap<String, f64>, floors: &[f64]) -> f64 {
+    let each = outputs.iter().zip(floors);
+    let squares = each.filter_map(|(name, floor)| Some((errors.get(name)? / floor).powi(2)));
+    (squares.sum::<f64>() / outputs.len().max(1) as f64).sqrt()
+}
+
+fn parameter(estimate: &Estimate) -> Parameter {
+    Parameter {
+        name: estimate.name.clone(),
+        value: estimate.value,
+        std_error: estimate.std_error,
+        unit: estimate.unit.clone(),
+        prior: None,
+    }
+}
+
+/// A document without a finding; `source`: where the noise is from. Records, steps, where they fail, tests of their residuals.
+fn document(
+    file: &OwnModelFile,
+    records: &Records,
+    (steps, noise): (&[Step], &[NoiseFloor]),
+    source: &str,
+) -> Diagnosis {
+    let spec = &file.base;
+    let fitted = &records.records;
+    let units: Vec<String> = spec
+        .outputs
+        .iter()
+        .map(|output| spec.about(output.variable).unit.clone())
+        .collect();
+    let outputs: Vec<String> = spec
+        .outputs
+        .iter()
+        .map(|output| spec.about(output.variable).name.clone())
+        .collect();
+    let shown = |record: &Record, held_out: bool| {
+        let inputs = spec.inputs.iter().zip(&record.inputs);
+        let inputs = inputs.map(|(input, channel)| ShownInput {
+            name: input.about.name.clone(),
+            unit: input.about.unit.clone(),
+            values: channel.values.clone(),
+        });
+        Shown {
+            inputs: inputs.collect(),
+            ..Shown::of(record, held_out)
+        }
+    };
+    let all = fitted.iter().map(|record| shown(record, false));
+    let all = all.chain(records.test.iter().map(|record| shown(record, true)));
+    let floors: Vec<f64> = noise.iter().map(|noise| noise.level).collect();
+    let steps: Vec<missing_effect::Step> = steps
+        .iter()
+        .map(|step| of_step(step, fitted, &outputs, &units, noise))
+        .map(|mut step| {
+            if let Some(test) = &step.rmse_test_per_output {
+                let errors = test.0.iter().cloned().collect();
+                step.weighted_rmse_test = Some(weighted(&outputs, &errors, &floors));
+            }
+            step
+        })
+        .collect();
+    let noise = noise.iter().map(|floor| missing_effect::NoiseFloor {
+        output: floor.output.clone(),
+        level: floor.level,
+        innovation: floor.innovation,
+        coefficients: floor.coefficients.clone(),
+        source: source.to_string(),
+    });
+    let noise: Vec<_> = noise.collect();
+    let unit = units.first().cloned().unwrap_or_default();
+    Diagnosis {
+        schema: 2,
+        verdict: Verdict::Adequate,
+        clock: Clock::of(fitted),
+        gaps: None,
+        effects: Vec::new(),
+        groups: Vec::new(),
+        in_doubt: Vec::new(),
+        places: Vec::new(),
+        acceptance: None,
+        residual_unexplained: false,
+        ranked: Vec::new(),
+        steps,
+        noise_floor: only(&floors),
+        noise,
+        rankings: Rankings::default(),
+        effort: Effort::default(),
+        scores: Vec::new(),
+        unknown: None,
+        control_loop: None,
+        sentences: Vec::new(),
+        plant: spec.name.clone(),
+        known_effects: file.effects.on.clone(),
+        input_unit: spec
+            .inputs
+            .first()
+            .map_or(String::new(), |input| input.about.unit.clone()),
+        output_units: if units.iter().all(|other| *other == unit) {
+            Vec::new()
+        } else {
+            units
+        },
+        outputs,
+        output_unit: unit,
+        records: all.collect(),
+        seconds: 0.0,
+    }
+}
+
+fn of_step(
+    step: &Step,
+    fitted: &[Record],
+    outputs: &[String],
+    units: &[String],
+    noise: &[NoiseFloor],
+) -> missing_effect::Step {
+    let count = outputs.len();
+    let named = |errors: &BTreeMap<String, f64>| {
+        let values = outputs.iter().map(|name| {
+            let value = errors.get(name).copied().unwrap_or(f64::NAN);
+            (name.clone(), value)
+        });
+        PerOutput(values.collect())
+    };
+    let residuals: Vec<Vec<f64>> = fitted
+        .iter()
+        .flat_map(|record| &record.outputs)
+        .zip(&step.simulated)
+        .map(|(y, model)| y.values.iter().zip(model).map(|(y, m)| y - m).collect())
+        .collect();
+    let clock = Clock::of(fitted);
+    let of_output = |o: usize| {
+        let series = fitted.iter().enumerate().map(|(r, record)| Series {
+            name: &record.name,
+            time: &record.time,
+            input: record
+                .inputs
+                .first()
+                .map_or(&record.time, |input| &input.values),
+            model: &step.simulated[r * count + o],
+            residual: &residuals[r * count + o],
+        });
+        let series: Vec<Series> = series.collect();
+        let noise = noise.get(o).map_or_else(
+            || ArModel::white(f64::INFINITY),
+            |floor| {
+                ArModel::from_coefficients(&floor.coefficients, floor.innovation)
+                    .unwrap_or_else(|_| ArModel::white(floor.level))
+            },
+        );
+        let input = fitted[0].inputs.first();
+        let failures = locate(&Located {
+            series: &series,
+            noise: &noise,
+            output_unit: &units[o],
+            input_unit: input.map_or("", |input| &input.unit),
+            clock: &clock,
+            domain: Domain::General,
+        });
+        let test = step.rmse_test_per_output.as_ref();
+        OutputStep {
+            name: outputs[o].clone(),
+            rmse: step
+                .rmse_per_output
+                .get(&outputs[o])
+                .copied()
+                .unwrap_or(f64::NAN),
+            rmse_test: test.and_then(|test| test.get(&outputs[o])).copied(),
+            held_out_error: None,
+            tests: tests(&fitted[0], &residuals[o]),
+            failures,
+        }
+    };
+    let test = step.rmse_test_per_output.as_ref();
+    missing_effect::Step {
+        added: step.added.clone(),
+        place: None,
+        rmse: step.rmse.unwrap_or(f64::NAN),
+        rmse_test: match test
+            .map(|test| test.values().copied().collect::<Vec<_>>())
+            .as_deref()
+        {
+            Some([one]) => Some(*one),
+            _ => None,
+        },
+        rmse_per_output: named(&step.rmse_per_output),
+        rmse_test_per_output: test.map(named),
+        weighted_rmse: step.weighted_rmse,
+        weighted_rmse_test: None,
+        bic: step.bic,
+        parameters: step.parameters.iter().map(parameter).collect(),
+        starts: step.starts,
+        starts_agree: step.starts_agree,
+        outputs: (0..count).map(of_output).collect(),
+        simulated: step.simulated.clone(),
+    }
+}
+
+/// Tests of a residual, on the first record: whiteness, and the input that leaves the clearest trace, its chance counted over all inputs.
+fn tests(record: &Record, residual: &[f64]) -> ResidualTests {
+    let samples = residual.iter().filter(|e| !e.is_nan()).count();
+    let lags = (samples / 10).clamp(2, 60);
+    let portmanteau = (samples / 10).clamp(2, 25);
+    let moves = |input: &&Channel| {
+        let (low, high) = input.range();
+        high > low
+    };
+    let inputs: Vec<&Channel> = record.inputs.iter().filter(moves).collect();
+    let count = inputs.len() as f64;
+    let trace = inputs.iter().filter_map(|input| {
+        residual_tests::prewhitened_input_test(&input.values, residual, lags).ok()
+    });
+    let clearest = trace.min_by(|a, b| a.1.total_cmp(&b.1));
+    let (cross, p) = clearest.unwrap_or((vec![f64::NAN; lags + 1], f64::NAN));
+    let bound = 1.96 * (record.len() as f64).sqrt() / samples.max(1) as f64;
+    ResidualTests {
+        autocorrelation: residual_tests::autocorrelation(residual, lags),
+        cross_correlation: cross,
+        autocorrelation_bound: bound,
+        cross_correlation_bound: bound,
+        whiteness_p: residual_tests::ljung_box(residual, portmanteau, 0).unwrap_or(f64::NAN),
+        input_p: if p.is_nan() { p } else { (count * p).min(1.0) },
+    }
+}

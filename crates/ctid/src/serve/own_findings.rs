@@ -1,0 +1,116 @@
+//! What a diagnosis of a model of its user's own found, as the page shows it: the effects, where each sits among the model's ports, and how
+//! the error falls.
+
+use ct_model::{About, ModelSpec, Variable};
+use effect_search::{Diagnosis, Step};
+use serde_json::{Value, json};
+
+use crate::edit::own::Findings;
+use crate::numbers;
+use crate::own_model::words::{EffectWords, Site};
+use crate::own_model::{OwnModelFile, diagnosis_heading, diagnosis_remaining, sizes};
+
+/// A diagnosis.
+#[derive(Debug, Clone)]
+pub(super) struct Diagnosed {
+    pub id: u64,
+    /// Of which texts and records.
+    pub text: String,
+    pub file: String,
+    pub data: u64,
+    /// What is kept of it in the model file.
+    pub findings: Findings,
+    /// The effects that were added.
+    pub effects: Vec<String>,
+    /// What the page shows.
+    pub body: Value,
+}
+
+/// What the page shows of a diagnosis.
+pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
+    let words = EffectWords::of(&model.base, &model.candidates);
+    let one = |id: &String| json!({ "effect": id, "placed": words.placed(id), "physics": words.physics(id) });
+    let groups = found.groups.iter().filter_map(|group| {
+        let (first, others) = group.split_first()?;
+        let mut shown = one(first);
+        shown["sizes"] = json!(sizes(found, first));
+        shown["others"] = others.iter().map(one).collect();
+        Some(shown)
+    });
+    let errors = |step: &Step| -> Vec<String> {
+        let values = step.rmse_per_output.values();
+        values.map(|rmse| numbers::significant(*rmse, 3)).collect()
+    };
+    let units = |name: &String| {
+        let spec = &model.base;
+        let mut outputs = spec
+            .outputs
+            .iter()
+            .map(|output| spec.about(output.variable));
+        outputs
+            .find(|about| about.name == *name)
+            .map_or(String::new(), |about| about.unit.clone())
+    };
+    let steps = found.steps.iter().map(|step| {
+        let name = step
+            .added
+            .as_ref()
+            .map_or_else(|| found.model.clone(), |effect| format!("+ {effect}"));
+        json!({ "name": name, "errors": errors(step) })
+    });
+    let outputs: Vec<&String> = found
+        .steps
+        .first()
+        .map_or_else(Vec::new, |step| step.rmse_per_output.keys().collect());
+    json!({
+        "headline": diagnosis_heading(found),
+        "sentences": diagnosis_remaining(found),
+        "groups": groups.collect::<Vec<_>>(),
+        "outputs": outputs.iter().map(|name| json!({ "name": name, "unit": units(name) })).collect::<Vec<_>>(),
+        "steps": steps.collect::<Vec<_>>(),
+        "candidates": found.candidates,
+        "seconds": found.seconds,
+    })
+}
+
+/// The ports of a model, each with the effects that are on there and those that were found there.
+pub(super) fn ports(model: &OwnModelFile, found: &[String]) -> Value {
+    let spec = &model.base;
+    let words = EffectWords::of(spec, &model.candidates);
+    let ports = listed(spec);
+    let ports = ports.iter().map(|(site, about)| {
+        let here = |ids: &[String]| -> Vec<String> {
+            let sits = |id: &&String| words.sites(id).contains(site);
+            ids.iter().filter(sits).cloned().collect()
+        };
+        json!({
+            "kind": site.kind(),
+            "name": about.name,
+            "unit": about.unit,
+            "description": about.description,
+            "on": here(&model.effects.on),
+            "found": here(found),
+        })
+    });
+    ports.collect()
+}
+
+fn listed(spec: &ModelSpec) -> Vec<(Site, &About)> {
+    let inputs = (0..spec.inputs.len()).map(Variable::Input);
+    let inputs = inputs.map(|v| (Site::Input(spec.about(v).name.clone()), spec.about(v)));
+    let outputs = spec
+        .outputs
+        .iter()
+        .map(|output| spec.about(output.variable));
+    let outputs = outputs.map(|about| (Site::Output(about.name.clone()), about));
+    let states = spec.states.iter().map(|state| &state.about);
+    let states = states.map(|about| (Site::Equation(about.name.clone()), about));
+    let values = spec.ports().values;
+    let values = values.into_iter().filter_map(|port| match port {
+        ct_model::effects::Port::Value(v) => {
+            Some((Site::Value(spec.about(v).name.clone()), spec.about(v)))
+        }
+        _ => None,
+    });
+    inputs.chain(outputs).chain(states).chain(values).collect()
+}

@@ -1,0 +1,541 @@
+//! Effects at the ports of a model of its user's own: added, kept, seen in every command, removed; and what is refused.
+
+use std::fmt::Write;
+
+use serde_json::Value;
+
+use crate::common::Place;
+
+const BLOCK: &str = r#"model Block "a block with a heater, in a room"
+  parameter Real k(unit="W/K", min=0) = 0.8;
+  parameter Real g(unit="W/%", min=0) = 1.6;
+  final parameter Real C(unit="J/K") = 50;
+  input Real u(unit="%") "power of the heater";
+  input Real Ta(unit="degC") "room";
+  output Real y(unit="degC") = T;
+  Real T(unit="degC", start=20) "block";
+equation
+  C*der(T) = g*u - k*(T - Ta);
+end Block;
+"#;
+
+const MODEL: &str = "model = \"block.mo\"   # the block on the bench\neffects = []          # nothing yet\n\n[columns]\ntime = \"t [s]\"\n";
+
+/// Time constant of the sensor that the model lacks [s].
+const LAG: f64 = 25.0;
+
+/// A record of the block whose sensor lags, in steps of 5 s; levels of the heater up to `most`.
+fn record(rows: usize, most: f64, sigma: f64) -> String {
+    let mut text = String::from("t [s],u [%],Ta [degC],y [degC]\n");
+    let (mut block, mut sensor) = (20.0, 20.0);
+    // A sequence that is the same everywhere.
+    let mut state = 7_u64;
+    let mut uniform = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+    };
+    for k in 0..rows {
+        let u = (((k / 17) * 7919) % 13) as f64 * most / 12.0;
+        let room = 15.0 + 4.0 * (0.013 * k as f64).sin();
+        let noise = sigma * 2.0 * (uniform() + uniform() + uniform());
+        writeln!(text, "{},{u:.4},{room:.4},{:.4}", 5 * k, sensor + noise).unwrap();
+        for _ in 0..500 {
+            let step = 0.01;
+            let rate = (2.0 * u - 0.6 * (block - room)) / 50.0;
+            sensor += step * (block - sensor) / LAG;
+            block += step * rate;
+        }
+    }
+    text
+}
+
+fn place() -> Place {
+    let place = Place::empty();
+    place.write("block.mo", BLOCK);
+    place.write("m.toml", MODEL);
+    place.write("a.csv", record(400, 36.0, 0.1));
+    place
+}
+
+fn last(result: &Value) -> &Value {
+    result["steps"].as_array().unwrap().last().unwrap()
+}
+
+fn parameter(step: &Value, name: &str) -> (f64, Option<f64>) {
+    let parameters = step["parameters"].as_array().unwrap();
+    let one = parameters.iter().find(|one| one["name"] == name).unwrap();
+    (one["value"].as_f64().unwrap(), one["std_error"].as_f64())
+}
+
+#[test]
+fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
+    let place = place();
+    let bare = place.result("compare a.csv --model m.toml");
+    place.succeeds("diagnose a.csv --model m.toml --json found.json");
+    let found = place.json("found.json");
+    let groups = found["groups"].as_array().unwrap();
+    assert_eq!(groups.len(), 1, "{groups:?}");
+    let named = groups[0].as_array().unwrap();
+    assert!(named.iter().any(|id| id == "lag(y)"), "{named:?}");
+    let said = place.succeeds("add lag(y) --model m.toml --from found.json");
+    assert!(said.contains("added lag(y) with tau = "), "{said}");
+    let text = place.read("m.toml");
+    assert!(
+        text.starts_with("model = \"block.mo\"   # the block on the bench\neffects = [\"lag(y)\"]          # nothing yet\n"),
+        "{text}"
+    );
+    let table: toml::Table = text.parse().unwrap();
+    let kept = &table["effect"]["lag(y)"];
+    assert_eq!(kept["record"]["duration"].as_float(), Some(1995.0));
+    assert_eq!(kept["record"]["interval"].as_float(), Some(5.0));
+
+    // The error falls to the noise, and what is fitted is what was hidden.
+    let mended = place.result("compare a.csv --model m.toml");
+    assert_eq!(mended["effects"][0], "lag(y)");
+    let (before, after) = (&bare["steps"][0], &mended["steps"][0]);
+    let [before, after] = [before, after].map(|step| step["rmse"].as_f64().unwrap());
+    assert!(before > 10.0 * after && after < 0.11, "{before} {after}");
+    let (tau, error) = parameter(&mended["steps"][0], "lag_y_tau");
+    assert!((tau - LAG).abs() < 4.0 * error.unwrap(), "{tau} {error:?}");
+    let sizes = [("k", 0.6), ("g", 2.0)];
+    for (name, value) in sizes {
+        let (fitted, error) = parameter(&mended["steps"][0], name);
+        assert!(
+            (fitted - value).abs() < 4.0 * error.unwrap(),
+            "{name} {fitted}"
+        );
+    }
+    // The effect belongs to the believed model now: nothing more is missing.
+    let again = place.result("diagnose a.csv --model m.toml");
+    assert_eq!(again["verdict"], "adequate");
+    let rmse = again["steps"][0]["rmse"].as_f64().unwrap();
+    assert!((rmse / after - 1.0).abs() < 0.01, "{rmse} {after}");
+
+    // Taken out, the table waits, and the model is what it was.
+    let said = place.succeeds("remove lag(y) --model m.toml");
+    assert!(
+        said.contains("effects = []") && said.contains("stays for the day"),
+        "{said}"
+    );
+    let again = place.result("compare a.csv --model m.toml");
+    let rmse = again["steps"][0]["rmse"].as_f64().unwrap();
+    assert!((rmse / before - 1.0).abs() < 1e-6, "{rmse} {before}");
+    place.succeeds("add lag(y) --model m.toml");
+    assert_eq!(place.read("m.toml"), text);
+}
+
+#[test]
+fn without_a_result_the_effect_is_fitted_from_its_own_starts() {
+    let place = place();
+    place.succeeds("add lag(y) --model m.toml");
+    assert_eq!(
+        place.read("m.toml"),
+        MODEL.replace("effects = []", "effects = [\"lag(y)\"]")
+    );
+    let mended = place.result("compare a.csv --model m.toml");
+    assert!(mended["steps"][0]["rmse"].as_f64().unwrap() < 0.11);
+    assert_eq!(mended["record_numbers"]["lag(y)"]["duration"], 1995.0);
+    let said = place.succeeds("compare a.csv --model m.toml");
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(said.contains("note: lag(y) is written in numbers of these records (duration = 1995, interval = 5.000)"), "{said}");
+    // A comparison says what a diagnosis says of it.
+    place.succeeds("compare a.csv --model m.toml --json fit.json");
+    place.succeeds("add lag(y) --model m.toml --from fit.json");
+    assert!(
+        !place
+            .succeeds("compare a.csv --model m.toml")
+            .contains("lag(y) is written in")
+    );
+    let table: toml::Table = place.read("m.toml").parse().unwrap();
+    let tau = table["effect"]["lag(y)"]["tau"].as_float().unwrap();
+    let (fitted, _) = parameter(&mended["steps"][0], "lag_y_tau");
+    assert!((tau / fitted - 1.0).abs() < 1e-4, "{tau} {fitted}");
+    // Fixed, it is not fitted.
+    let fixed = place
+        .read("m.toml")
+        .replace("tau = ", "fixed = [\"tau\"]\ntau = ");
+    place.write(
+        "m.toml",
+        fixed.replace(&format!("tau = {tau}"), "tau = 20.0"),
+    );
+    let held = place.result("compare a.csv --model m.toml");
+    assert_eq!(parameter(&held["steps"][0], "lag_y_tau"), (20.0, None));
+}
+
+#[test]
+fn the_mended_model_is_written_and_read_and_runs() {
+    let place = place();
+    place.succeeds("add lag(y) --model m.toml");
+    let mended = place.result("compare a.csv --model m.toml");
+    place.succeeds("export m.toml a.csv --modelica mended.mo --csv fit.csv");
+    let said = place.succeeds("check mended.mo");
+    assert!(said.contains("lag_y_tau"), "{said}");
+    // Its text is a model of its own, with the fitted values.
+    place.write(
+        "mended.toml",
+        "model = \"mended.mo\"\n[columns]\ntime = \"t [s]\"\n",
+    );
+    let alone = place.result("compare a.csv --model mended.toml");
+    let rmse = |result: &Value| result["steps"][0]["rmse"].as_f64().unwrap();
+    assert!((rmse(&alone) / rmse(&mended) - 1.0).abs() < 1e-3);
+    // Unfitted, it gives the curves of the fit.
+    place.succeeds("simulate mended.toml a.csv --out y.csv");
+    let column = |name: &str, at: usize| -> Vec<f64> {
+        let text = place.read(name);
+        let rows = text.lines().skip(1);
+        rows.map(|row| row.split(',').nth(at).unwrap().parse().unwrap())
+            .collect()
+    };
+    let at = place
+        .read("fit.csv")
+        .lines()
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|c| c.starts_with("y model"))
+        .unwrap();
+    let (fit, run) = (column("fit.csv", at), column("y.csv", 1));
+    assert_eq!(fit.len(), run.len());
+    for (a, b) in fit.iter().zip(&run).skip(40) {
+        assert!((a - b).abs() < 0.05, "{a} {b}");
+    }
+}
+
+#[test]
+fn an_effect_means_the_same_beside_another_record() {
+    let place = place();
+    place.write("b.csv", record(200, 24.0, 0.0));
+    let bent = |record: &str| {
+        format!(
+            "model = \"block.mo\"\neffects = [\"nonlinearity(u)\"]\n[columns]\ntime = \"t [s]\"\n[effect.\"nonlinearity(u)\"]\nbend = 0.2\n{record}"
+        )
+    };
+    let runs = |record: &str, inputs: &str| -> Vec<f64> {
+        place.write("m.toml", bent(record));
+        place.succeeds(&format!("simulate m.toml {inputs} --out y.csv"));
+        let text = place.read("y.csv");
+        std::fs::remove_file(place.path("y.csv")).unwrap();
+        let rows = text.lines().skip(1);
+        rows.map(|row| row.split(',').nth(1).unwrap().parse().unwrap())
+            .collect()
+    };
+    let kept = "record = { high = 36.0, low = 0.0, width = 36.0 }\n";
+    let whole = runs(kept, "a.csv");
+    // The same first rows alone visit less; the bend is that of the whole record.
+    let first: String = place
+        .read("a.csv")
+        .lines()
+        .take(60)
+        .collect::<Vec<_>>()
+        .join("\n");
+    place.write("first.csv", first + "\n");
+    let part = runs(kept, "first.csv");
+    assert!(part.len() == 59 && part.iter().zip(&whole).all(|(a, b)| (a - b).abs() < 1e-6));
+    // Other numbers are another bend.
+    let other = runs(
+        "record = { high = 24.0, low = 0.0, width = 24.0 }\n",
+        "b.csv",
+    );
+    let same = runs(kept, "b.csv");
+    assert!(other.iter().zip(&same).any(|(a, b)| (a - b).abs() > 0.5));
+    // Without them nothing says what the bend is.
+    place.write("m.toml", bent(""));
+    place.refuses(
+        "simulate m.toml b.csv --out z.csv",
+        &[
+            "m.toml: nonlinearity(u) is written in numbers of a record (high, low, width)",
+            "--from",
+        ],
+    );
+}
+
+#[test]
+fn a_candidate_of_the_file_is_added_by_its_name() {
+    let place = place();
+    let file = format!(
+        "{MODEL}[candidates.second_store]\nparameters = {{ h = {{ start = 0.1, min = 0.0 }}, c2 = {{ start = 20.0, min = 0.1 }} }}\n\
+         states = {{ Tw = {{ unit = \"degC\", start = 20.0, equation = \"c2*der(Tw) = h*(T - Tw)\" }} }}\nterms = {{ T = \"-h*(T - Tw)\" }}\n"
+    );
+    place.write("m.toml", &file);
+    place.succeeds("add second_store --model m.toml");
+    assert_eq!(
+        place.read("m.toml"),
+        file.replace("effects = []", "effects = [\"second_store\"]")
+    );
+    let mended = place.result("compare a.csv --model m.toml");
+    let (bare, _) = (place.succeeds("remove second_store --model m.toml"), 0);
+    assert!(bare.contains("effects = []"));
+    let before = place.result("compare a.csv --model m.toml");
+    let rmse = |result: &Value| result["steps"][0]["rmse"].as_f64().unwrap();
+    assert!(
+        rmse(&mended) <= rmse(&before),
+        "{} {}",
+        rmse(&mended),
+        rmse(&before)
+    );
+    assert!(parameter(last(&mended), "second_store_h").0 >= 0.0);
+}
+
+#[test]
+fn what_cannot_be_added_is_refused_in_a_line() {
+    let place = place();
+    place.refuses(
+        "add lagg(y) --model m.toml",
+        &[
+            "\"lagg(y)\" is no effect that can act in Block",
+            "did you mean lag(y)?",
+        ],
+    );
+    place.refuses(
+        "add lag(q) --model m.toml",
+        &["lag may act here: lag(u), lag(Ta), lag(y)"],
+    );
+    place.refuses(
+        "add lag(y) --model m.toml --where upper",
+        &["--where is of the plants"],
+    );
+    place.refuses(
+        "remove lag(y) --model m.toml",
+        &["lag(y) is not on", "effects = []"],
+    );
+    place.refuses(
+        "add lag(y) --model m.toml --from a.csv",
+        &["a.csv: this is no result of a model of your own"],
+    );
+    place.succeeds("compare a.csv --model m.toml --json bare.json");
+    place.refuses(
+        "add lag(y) --model m.toml --from bare.json",
+        &["the result says nothing of lag(y)"],
+    );
+    place.succeeds("add lag(y) --model m.toml");
+    place.refuses("add lag(y) --model m.toml", &["lag(y) is on already"]);
+    place.write("other.mo", BLOCK.replace("Block", "Other"));
+    place.write("other.toml", MODEL.replace("block.mo", "other.mo"));
+    place.refuses(
+        "add lag(y) --model other.toml --from bare.json",
+        &["the result is of the model Block, and this file has Other"],
+    );
+    let refused = |lines: &str, says: &[&str]| {
+        let text = MODEL.replace("effects = []          # nothing yet", lines);
+        place.write("bad.toml", text);
+        place.refuses("compare a.csv --model bad.toml", says);
+    };
+    refused(
+        "effects = [\"lag(y)\",\n \"lagg(u)\"]",
+        &[
+            "bad.toml:3: \"lagg(u)\" is no effect",
+            "did you mean lag(u)?",
+        ],
+    );
+    refused(
+        "effects = [\"lag(y)\", \"lag( y )\"]",
+        &["bad.toml:2: lag(y) is listed twice"],
+    );
+    refused(
+        "effect.\"lag(y)\".tua = 3.0",
+        &["bad.toml:2: tua is no parameter of lag(y): there are tau; did you mean tau?"],
+    );
+    refused(
+        "effect.\"lag(y)\".record = { durations = 3.0 }",
+        &[
+            "bad.toml:2: durations is no number of the record of lag(y)",
+            "did you mean duration?",
+        ],
+    );
+    refused(
+        "effect.\"lag(y)\".tau = nan",
+        &["bad.toml:2: tau has to be a finite number"],
+    );
+    refused(
+        "effect.\"lag(y)\".fixed = [\"tau\"]",
+        &["bad.toml:2: tau is fixed and has no value"],
+    );
+}
+
+#[test]
+fn a_candidate_that_cannot_be_is_refused_with_its_line_and_the_mend() {
+    let place = place();
+    let refused = |candidates: &str, says: &[&str]| {
+        place.write("bad.toml", format!("{MODEL}\n{candidates}\n"));
+        for command in ["compare", "diagnose"] {
+            place.refuses(&format!("{command} a.csv --model bad.toml"), says);
+        }
+    };
+    let one = |name: &str, parameters: &str, terms: &str| {
+        format!("[candidates.{name}]\nparameters = {{ {parameters} }}\nterms = {{ {terms} }}\n")
+    };
+    refused(
+        &one("draught", "c = { start = 0.1 }", "T = \"-c*(T - Tq)\""),
+        &[
+            "bad.toml:9: candidates.draught.terms.T: 1:9: `Tq` is not declared",
+            "did you mean `Ta`?",
+        ],
+    );
+    refused(
+        &one("draught", "c = { start = 0.1 }", "Tq = \"-c*T\""),
+        &[
+            "bad.toml:9: candidates.draught.terms.Tq: `Tq` is no state, named flow or output of Block",
+            "T, y",
+        ],
+    );
+    let twins = one("draught", "c = { start = 0.1 }", "T = \"-c*(T - Ta)^2\"")
+        + &one("wind", "w = { start = 3.0 }", "T = \"-w*(T - Ta)^2\"");
+    refused(
+        &twins,
+        &["bad.toml:10: candidates.wind: it is the same as draught: keep one of them"],
+    );
+    refused(
+        &one("draught", "", "T = \"-0.1*(T - Ta)\""),
+        &["bad.toml:7: candidates.draught: it has no parameter: give it one"],
+    );
+    refused(
+        &one("draught", "c = { start = 0.1 }", ""),
+        &["bad.toml:7: candidates.draught: it has no terms: write"],
+    );
+}
+
+#[test]
+fn a_thousand_candidates_end_in_bounded_time() {
+    let place = place();
+    let mut file = MODEL.to_string();
+    for k in 1..=1000 {
+        let term = format!("a*sin({}*time)", f64::from(k) / 1000.0);
+        write!(file, "\n[candidates.c{k}]\nparameters = {{ a = {{ start = 1.0 }} }}\nterms = {{ T = \"{term}\" }}\n").unwrap();
+    }
+    place.write("m.toml", file);
+    let said = place.succeeds("compare a.csv --model m.toml");
+    let notes: Vec<&str> = said
+        .lines()
+        .filter(|line| line.contains("no part in"))
+        .collect();
+    assert!(
+        said.contains("[candidates.c1], [candidates.c10], [candidates.c100] and 997 more"),
+        "{notes:?}"
+    );
+    let begun = std::time::Instant::now();
+    place.succeeds("diagnose a.csv --model m.toml --effort quick --json found.json");
+    // The limit of this effort is 5 s; what had begun then is ended.
+    assert!(begun.elapsed().as_secs() < 40, "{:?}", begun.elapsed());
+    let found = place.json("found.json");
+    assert!(found["candidates"].as_u64().unwrap() > 1000);
+}
+
+#[test]
+fn the_report_shows_the_ports_the_sizes_and_every_output_in_its_unit() {
+    let place = place();
+    place.write("b.csv", record(200, 24.0, 0.1));
+    place.succeeds(
+        "diagnose a.csv --test b.csv --model m.toml --report found.html --json found.json",
+    );
+    let page = place.read("found.html");
+    let (_, after) = page.split_once("id=\"data\">").unwrap();
+    let data: Value = serde_json::from_str(after.split_once("</script>").unwrap().0).unwrap();
+    let found = place.json("found.json");
+    assert_eq!(data["outputs"][0]["name"], "y");
+    assert_eq!(data["outputs"][0]["unit"], "degC");
+    let inputs = data["records"][0]["inputs"].as_array().unwrap();
+    let units: Vec<&str> = inputs
+        .iter()
+        .map(|one| one["unit"].as_str().unwrap())
+        .collect();
+    assert_eq!(units, ["%", "degC"]);
+    let steps = data["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), 2);
+    for (step, of) in steps.iter().zip(found["steps"].as_array().unwrap()) {
+        assert_eq!(step["outputs"][0]["rmse"], of["rmse_per_output"]["y"]);
+        assert_eq!(
+            step["outputs"][0]["rmse_test"],
+            of["rmse_test_per_output"]["y"]
+        );
+        // Curves and residuals over both records.
+        let runs = step["outputs"][0]["runs"].as_array().unwrap();
+        let lengths: Vec<usize> = runs
+            .iter()
+            .map(|run| run["residual"]["y"].as_array().unwrap().len())
+            .collect();
+        assert_eq!(lengths, [400, 200]);
+    }
+    assert_eq!(data["scores"][0]["effect"], found["ranked"][0]);
+    let text = page.split_once("<main>").unwrap().0;
+    assert!(
+        text.contains("lag(y) at the output y, which reads T (block)"),
+        "{text}"
+    );
+    let (tau, _) = parameter(last(&found), "lag_y_tau");
+    assert!(text.contains(&format!("lag_y_tau = {tau:.2}")), "{text}");
+    // A comparison has a page too.
+    place.succeeds("compare a.csv --model m.toml --report fit.html");
+    assert!(place.read("fit.html").contains("Model against measurement"));
+}
+
+#[test]
+fn effects_are_found_by_what_is_seen() {
+    let place = place();
+    let first = |words: &str| {
+        let said = place.succeeds(words);
+        said.split([',', ' ', '\n'])
+            .find(|word| !word.is_empty())
+            .unwrap()
+            .to_string()
+    };
+    for (word, effect) in [
+        ("late", "delay(u)"),
+        ("drift", "gain_drift(u)"),
+        ("clog", "drift(k)"),
+        ("leak", "constant(T)"),
+        ("noisy", "quantisation(y)"),
+    ] {
+        assert_eq!(
+            first(&format!("effects --like {word} --model m.toml")),
+            effect,
+            "{word}"
+        );
+    }
+    assert_eq!(first("effects --like clog"), "valve_drift");
+    place.refuses(
+        "effects --like xyzzy",
+        &["no effect is described by \"xyzzy\": try one of clog, drift, leak, stick, late, noisy"],
+    );
+}
+
+#[test]
+fn identify_takes_a_model_with_effects_where_it_is_linear() {
+    let place = place();
+    place.write(
+        "m.toml",
+        format!("{}\n[effect.\"lag(y)\"]\ntau = 25.0\nrecord = {{ duration = 1995.0, interval = 5.0 }}\n", MODEL.replace("effects = []", "effects = [\"lag(y)\"]")),
+    );
+    place.succeeds(
+        "identify a.csv --model m.toml --method srivc --order 2,0 --input u --json i.json",
+    );
+    let own = &place.json("i.json")["own_model"];
+    let number = |value: &Value| value.as_f64().unwrap();
+    // (50/0.8 s + 1)(25 s + 1) of the text and the table, and 1.6/0.8.
+    for (k, a) in [1.0, 87.5, 1562.5].into_iter().enumerate() {
+        assert!((number(&own["a"][k]) / a - 1.0).abs() < 1e-9, "{own}");
+    }
+    assert!(
+        own["b"].as_array().unwrap().len() == 1 && (number(&own["b"][0]) - 2.0).abs() < 1e-9,
+        "{own}"
+    );
+    let said = place.succeeds("check m.toml");
+    assert!(said.contains("lag_y_tau"), "{said}");
+    // One that bends makes it nonlinear.
+    let bent = place
+        .read("m.toml")
+        .replace("lag(y)", "nonlinearity(u)")
+        .replace("tau = 25.0", "bend = 0.1");
+    place.write(
+        "bent.toml",
+        bent.replace(
+            "{ duration = 1995.0, interval = 5.0 }",
+            "{ high = 36.0, low = 0.0, width = 36.0 }",
+        ),
+    );
+    place.refuses(
+        "identify a.csv --model bent.toml --method srivc --input u",
+        &["is not linear in the equation of"],
+    );
+}

@@ -1,0 +1,138 @@
+//! The believed model, with the effects that the model file has already, fitted to the records; and the candidates beside it.
+//!
+//! The candidates follow from what the model without effects visits. The listed effects are added one after the other, each from its best
+//! start, as the search would add them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ct_model::effects::{Candidate, Visited, candidates_keeping, own_candidates};
+use ct_model::{Model, ModelSpec};
+use estimation::{Fit, Noise, Residuals, within};
+use greybox::{FitOptions, ModelSetup};
+
+use crate::Error;
+use crate::node::{Context, FINE, Node};
+use crate::problem::{Limit, Options, Problem};
+
+/// The believed model with the effects of the model file in it.
+#[derive(Debug, Clone)]
+pub struct Believed {
+    /// The model; the values of its parameters are fitted ones, in white noise.
+    pub spec: ModelSpec,
+    /// What of the records its effects are written in, by their identifiers.
+    pub record_numbers: BTreeMap<String, BTreeMap<&'static str, f64>>,
+}
+
+/// Fits the believed model, then adds the effects of [`Problem::effects`] one after the other.
+///
+/// # Errors
+/// Where the records, the model or the fit do not allow it, or an effect cannot act in the model.
+pub fn believed(problem: &Problem, options: &Options) -> Result<Believed, Error> {
+    let (context, node) = begin(problem, options, Limit::new(options))?;
+    let mut spec = node.spec().clone();
+    for (parameter, value) in spec.parameters.iter_mut().zip(&node.fit.x) {
+        parameter.value = *value;
+    }
+    let record_numbers = node.added.iter().map(|&i| &context.candidates[i]);
+    let record_numbers = record_numbers.map(|c| (c.id.clone(), c.record_numbers.clone()));
+    Ok(Believed {
+        spec,
+        record_numbers: record_numbers.collect(),
+    })
+}
+
+/// The believed model fitted, and the candidates.
+pub(crate) fn begin<'a>(
+    problem: &'a Problem,
+    options: &Options<'a>,
+    limit: Limit<'a>,
+) -> Result<(Context<'a>, Node), Error> {
+    let mut context = Context {
+        problem,
+        candidates: Vec::new(),
+        scales: None,
+        limit,
+    };
+    let fit_options = FitOptions {
+        starts: options.starts,
+        seed: options.seed,
+        ..FitOptions::default()
+    };
+    let model = Arc::new(Model::new(problem.spec.clone()));
+    let (fit, visited) = {
+        let setup = context.setup(&model)?;
+        let fit = setup.fit(&fit_options)?;
+        let visited = visited(problem, &setup, &fit)?;
+        (fit, visited)
+    };
+    let numbers = problem.kept.iter();
+    let numbers = numbers.map(|(id, kept)| (id.clone(), kept.numbers.clone()));
+    context.candidates = candidates_keeping(&problem.spec, &visited, &numbers.collect());
+    let own: Vec<Candidate> = own_candidates(&problem.spec, &problem.candidates)?;
+    context.candidates.extend(own);
+    let bare = Node {
+        added: Vec::new(),
+        model,
+        fit,
+    };
+    let mut node = bare;
+    for id in &problem.effects {
+        node = context.with_listed(node, id)?;
+    }
+    Ok((context, node))
+}
+
+impl Context<'_> {
+    /// A set with one more effect of the model file, fitted from its best start and from the one that the file has.
+    fn with_listed(&self, node: Node, id: &str) -> Result<Node, Error> {
+        let white = Noise::white(self.problem.spec.outputs.len());
+        let Some(i) = self.candidates.iter().position(|c| c.id == *id) else {
+            return Err(Error::UnknownEffect { id: id.to_string() });
+        };
+        let no_start = || Error::NoStart { id: id.to_string() };
+        let trial = self.trial(&node, i, &white)?.ok_or_else(no_start)?;
+        let mut starts = trial.starts;
+        if let Some(kept) = self.problem.kept.get(id) {
+            let mut start = starts.first().ok_or_else(no_start)?.clone();
+            let bounds = self.setup(&trial.model)?.bounds().to_vec();
+            let parameters = trial.model.spec().parameters.iter();
+            for (at, parameter) in parameters.enumerate() {
+                let mut own = self.candidates[i].parameters.iter();
+                let own = own.find(|own| own.name == parameter.about.name);
+                if let Some(value) = own.and_then(|own| kept.start.get(&own.short)) {
+                    start[at] = within(*value, bounds[at]);
+                }
+            }
+            starts.insert(0, start);
+        }
+        let mut added = node.added.clone();
+        added.push(i);
+        self.fitted(added, trial.model, starts, &white, FINE)
+    }
+}
+
+/// What the fitted model visits in all records.
+fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
+    let (count, states) = (setup.parameter_count(), problem.spec.states.len());
+    let mut all: Option<Visited> = None;
+    for (r, record) in problem.records.iter().enumerate() {
+        let time = setup.model_time(r);
+        let inputs: Vec<Vec<f64>> = (0..record.len())
+            .map(|k| record.inputs.iter().map(|input| input.values[k]).collect())
+            .collect();
+        let initial = &fit.x[count + r * states..count + (r + 1) * states];
+        let own = Visited::of_simulation(
+            &problem.spec,
+            (&fit.x[..count], initial),
+            &time,
+            &inputs,
+            &problem.time_unit_name,
+        )?;
+        match &mut all {
+            None => all = Some(own),
+            Some(all) => all.join(&own),
+        }
+    }
+    all.ok_or_else(|| greybox::Error::NoRecord.into())
+}

@@ -123,7 +123,7 @@ pub(crate) fn compare(
         std_error: errors[i],
         unit: unit.clone(),
         known: !free.contains(&i),
-        effect: None,
+        effect: file.effects.parameters.get(name).cloned(),
     });
     let step = Step {
         added: None,

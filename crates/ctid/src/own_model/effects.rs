@@ -42,8 +42,8 @@ pub(crate) struct OwnEffects {
     pub kept: BTreeMap<String, Kept>,
     /// Parameters of theirs that are not fitted, and their values.
     pub fixed: BTreeMap<String, f64>,
-    /// Names of all their parameters in the model that they are in.
-    pub parameters: Vec<String>,
+    /// All their parameters, by the names in the model that they are in, with the effect of each.
+    pub parameters: BTreeMap<String, String>,
     /// Tables of effects that are not on.
     pub waiting: Vec<String>,
 }
@@ -94,8 +94,11 @@ pub(super) fn read(
         effects.kept.insert(candidate.id.clone(), kept);
         effects.fixed.extend(fixed);
     }
-    let parameters = on.iter().flat_map(|candidate| &candidate.parameters);
-    effects.parameters = parameters.map(|p| p.name.clone()).collect();
+    let parameters = on.iter().flat_map(|candidate| {
+        let names = candidate.parameters.iter().map(|p| p.name.clone());
+        names.map(|name| (name, candidate.id.clone()))
+    });
+    effects.parameters = parameters.collect();
     effects.on = on.iter().map(|candidate| candidate.id.clone()).collect();
     Ok(effects)
 }

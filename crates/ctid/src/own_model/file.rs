@@ -162,7 +162,7 @@ impl OwnModelFile {
         let effects = effects::read(&spec, &own_candidates, listed, &source)?;
         let parameters = spec.parameters.iter().map(|p| p.about.name.as_str());
         let parameters: Vec<&str> = parameters
-            .chain(effects.parameters.iter().map(String::as_str))
+            .chain(effects.parameters.keys().map(String::as_str))
             .collect();
         let is_parameter = |name: &Spanned<String>| {
             if parameters.contains(&name.as_ref().as_str()) {

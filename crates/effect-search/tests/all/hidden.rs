@@ -292,7 +292,14 @@ fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
     assert_eq!(numbers["interval"], STEP);
     // It belongs to the believed model: nothing is missing beside it.
     let diagnosis = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
-    assert_eq!(diagnosis.verdict, Verdict::Adequate);
+    assert_eq!(
+        diagnosis.verdict,
+        Verdict::Adequate,
+        "{:?} {:?} {:?}",
+        diagnosis.groups,
+        diagnosis.left,
+        diagnosis.noise
+    );
     assert!(diagnosis.effects.is_empty());
     assert_eq!(&diagnosis.record_numbers["lag(y)"], numbers);
     // Numbers of an earlier record stay, and a start is tried beside the effect's own.

@@ -8,6 +8,7 @@
 //! `E[(sum x[t] x[t+k])^2] = n_k (sum x^2)^2/(n (n+2))` whatever the pattern (to the mean's removal): `n_k` takes the place of
 //! `n - k` in the sums below. Lags with fewer than 5 pairs do not count, nor as degrees of freedom.
 
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::ar::check_not_infinite;
@@ -18,6 +19,9 @@ const MAX_PREWHITENING_ORDER: usize = 20;
 
 /// Lags with fewer pairs of samples do not count where samples are missing: their products are far from Gaussian.
 const FEWEST_PAIRS: usize = 5;
+
+/// Lags of an input count as distinct where the eigenvalues of their correlations are above this.
+const DISTINCT: f64 = 1e-8;
 
 /// Autocorrelation of `x`, mean removed, at lags `0..=max_lag`; 1 at lag 0.
 ///
@@ -122,15 +126,16 @@ pub fn ljung_box(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
 ///
 /// The correlation of two smooth signals is large by chance alone, so both are first made white,
 /// each by an autoregressive filter fitted to it (Haugh's test). The order is at most 20, by BIC,
-/// and 0 for a residual that is white already. The sum
-/// `n (n+2) sum_{k=1}^{lags} r_k^2/(n-k)` is then chi-square with `lags` degrees of freedom.
+/// and 0 for a residual that is white already. The share of `e` that its regression on `u` at lags `1..=lags` explains, times `n`, is then
+/// chi-square with as many degrees of freedom as lags are distinct. Haugh's sum of squared correlations is the same where `u` is white; a filter
+/// leaves the moves of an input that steps at regular times periodic, and its correlations at lags a period apart are then one and
+/// the same.
 ///
 /// Lag 0 is reported but does not count: `y[k]` is read before `u[k]` acts, so the input cannot
 /// show there, while a controller that reads `y[k]` can.
 ///
-/// Missing samples of either are NaN. The filters are then those of [`ArModel::fit`] and [`ArModel::whiten`] for such series, and
-/// the sum is that of `n_k r_k^2`, `r_k` the correlation over the `n_k` pairs that are there: given the input, it has the
-/// right mean whichever of the input's moves are missing.
+/// Missing samples of either are NaN. The filters are then those of [`ArModel::fit`] and [`ArModel::whiten`] for such series; rows that `e`
+/// lacks do not count, and a missing sample of `u` is its mean.
 ///
 /// Reference: L. D. Haugh, *Checking the independence of two covariance-stationary time series*,
 /// J. American Statistical Association 71 (1976) 378-385.
@@ -159,15 +164,55 @@ pub fn prewhitened_input_test(u: &[f64], e: &[f64], lags: usize) -> Result<(Vec<
     check_not_infinite(TASK, "e", e)?;
     let (u, e) = (whitened(u)?, whitened(e)?);
     let correlation = cross_correlation(&u, &e, lags);
-    if has_missing(&u) || has_missing(&e) {
-        let term = |sums: &Pairs| {
-            sums.count as f64 * sums.product * sums.product / (sums.of_u * sums.of_e)
-        };
-        let p = portmanteau_of_pairs(TASK, &centred(&u), &centred(&e), lags, 0, term)?;
-        return Ok((correlation, p));
+    Ok((correlation, regression_on_lags(TASK, &u, &e, lags)?))
+}
+
+/// The probability that white `e` is explained that well by `u` at lags `1..=lags`. What is missing of `u` is its mean, rows that `e` lacks
+/// do not count.
+fn regression_on_lags(task: &'static str, u: &[f64], e: &[f64], lags: usize) -> Result<f64, Error> {
+    let (u, e) = (centred(u), centred(e));
+    let counted: Vec<usize> = (1..=lags)
+        .filter(|&lag| Pairs::at(&u, &e, lag).count >= FEWEST_PAIRS)
+        .collect();
+    if counted.is_empty() {
+        return Err(Error::TooFewSamples {
+            task,
+            found: present(&u).min(present(&e)),
+            needed: 2 * FEWEST_PAIRS,
+        });
     }
-    let p = portmanteau(u.len(), &correlation[1..], lags)?;
-    Ok((correlation, p))
+    let rows = (0..e.len()).filter(|&t| !e[t].is_nan());
+    let regressors: Vec<Vec<f64>> = counted
+        .iter()
+        .map(|&lag| {
+            let at = |t: usize| t.checked_sub(lag).map_or(0.0, |before| u[before]);
+            let column: Vec<f64> = rows
+                .clone()
+                .map(|t| Some(at(t)).filter(|u| !u.is_nan()).unwrap_or(0.0))
+                .collect();
+            let size = sum_of_products(&column, &column).sqrt();
+            let scale = if size > 0.0 { 1.0 / size } else { 0.0 };
+            column.iter().map(|u| u * scale).collect()
+        })
+        .collect();
+    let e: Vec<f64> = rows.clone().map(|t| e[t]).collect();
+    let squares = sum_of_products(&e, &e);
+    let n = counted.len();
+    let gram = DMatrix::from_fn(n, n, |i, j| sum_of_products(&regressors[i], &regressors[j]));
+    let moment = DVector::from_fn(n, |i, _| sum_of_products(&regressors[i], &e));
+    let parts = gram.symmetric_eigen();
+    let (mut explained, mut rank) = (0.0, 0);
+    for (i, &size) in parts.eigenvalues.iter().enumerate() {
+        if size > DISTINCT {
+            explained += parts.eigenvectors.column(i).dot(&moment).powi(2) / size;
+            rank += 1;
+        }
+    }
+    if rank == 0 || squares <= 0.0 {
+        // A series that does not vary is correlated with nothing.
+        return Ok(1.0);
+    }
+    exceedance(e.len() as f64 * explained / squares, rank)
 }
 
 fn whitened(x: &[f64]) -> Result<Vec<f64>, Error> {

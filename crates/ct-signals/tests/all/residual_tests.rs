@@ -99,7 +99,21 @@ fn ljung_box_counts_fitted_coefficients() {
 #[test]
 fn input_test_is_even_where_nothing_is_left() {
     type Input = fn(&mut ChaCha8Rng) -> Vec<f64>;
-    let inputs: [(&str, Input); 3] = [
+    // The moves of an input that steps every twelve samples.
+    let moves = |rng: &mut ChaCha8Rng| {
+        let sizes = noise::white(N, 1.0, rng);
+        (0..N)
+            .map(|k| {
+                if k % 12 == 5 {
+                    sizes[k].abs() + 2.0
+                } else {
+                    0.0
+                }
+            })
+            .collect()
+    };
+    let inputs: [(&str, Input); 4] = [
+        ("regular moves", moves),
         ("steps", steps),
         ("smooth", |rng| noise::ar1(N, 1.0, 0.95, rng)),
         ("binary", |_| excitation::prbs(N, 4, 0.0, 5.0, 9).unwrap()),
@@ -285,8 +299,9 @@ fn tests_are_even_where_samples_are_missing_and_see_what_is_there() {
         sized(all(&unexplained(0.0, 0.0)), "white beside steps");
         sized(all(&unexplained(0.0, 0.9)), "noise of 0.9 beside steps");
         let seen = all(&unexplained(0.16, 0.0));
+        // Three samples of ten are missing: of whole records 0.8 are asked for.
         assert!(
-            share_below(&seen, 0.01) > 0.8,
+            share_below(&seen, 0.01) > 0.75,
             "{}",
             share_below(&seen, 0.01)
         );

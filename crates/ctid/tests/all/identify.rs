@@ -483,14 +483,6 @@ fn what_cannot_be_is_refused() {
         "dead.csv --method stabilized-oe",
         &["the output is 1.5 in all 200 rows"],
     );
-    place.write(
-        "nan.csv",
-        format!("t,u,y\n{still}").replace("\n7,1.5,", "\n7,NaN,"),
-    );
-    bad(
-        "nan.csv --method stabilized-oe",
-        &["nan.csv: column \"u\": 1 of 200 samples", "--resample"],
-    );
 }
 
 /// What is advised can be done: of the first order there is no lower one.
@@ -542,34 +534,4 @@ fn a_record_that_stands_still_is_refused() {
     let error = identify(&record, &request).unwrap_err().to_string();
     assert!(error.contains("\"u\" stands at 1.5"), "{error}");
     assert!(error.contains("record at least a step"), "{error}");
-}
-
-#[test]
-fn what_is_missing_is_named_with_its_first_place_and_the_mend() {
-    let place = Place::empty();
-    let record = |leave_out: &[usize], empty: &[usize]| {
-        let mut text = "t [s],u [V],y [cm]\n".to_string();
-        for k in (0..60).filter(|k| !leave_out.contains(k)) {
-            let y = if empty.contains(&k) {
-                String::new()
-            } else {
-                (10 + k % 7).to_string()
-            };
-            text += &format!("{},{},{y}\n", 2 * k, k / 10 % 2);
-        }
-        text
-    };
-    let mends = ["--from and --to", "--resample"];
-    place.write("a.csv", record(&[], &[30, 41]));
-    let said = place.refuses("identify a.csv --method ls", &mends);
-    assert!(
-        said.contains("a.csv: column \"y [cm]\": 2 of 60 samples are missing, the first at 60 s"),
-        "{said}"
-    );
-    place.write("b.csv", record(&[21, 22, 40], &[]));
-    let said = place.refuses("identify b.csv --method ls", &mends);
-    assert!(
-        said.contains("b.csv: 3 rows are missing, the first behind 40 s"),
-        "{said}"
-    );
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::Error;
 use crate::accept::NOISE_ORDER;
 use crate::node::{Context, Node};
-use crate::residual::{instant, level_p, of_command, period, standardised};
+use crate::residual::{harmonics_p, instant, level_p, of_command, period, standardised};
 
 /// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
 const NOT_NOISE: f64 = 1e-4;
@@ -105,6 +105,12 @@ impl Context<'_> {
                 output: name(i),
             }));
         }
+        if let Some((period, i)) = self.harmonics(node, own, &residuals)? {
+            return Ok(Some(Left::Period {
+                output: name(i),
+                period: period * self.problem.time_unit,
+            }));
+        }
         let level = NOT_NOISE / residuals.len() as f64;
         for (i, residual) in residuals.iter().enumerate() {
             if samples(residual) < 8 {
@@ -130,6 +136,42 @@ impl Context<'_> {
             }
             if level_p(&models[i], &white) < level {
                 return Ok(Some(Left::Level { output: name(i) }));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Half the period of an effect of a set whose harmonics a residual holds \[unit of the model's time\], and which residual.
+    fn harmonics(
+        &self,
+        node: &Node,
+        own: &Fit,
+        residuals: &[Vec<f64>],
+    ) -> Result<Option<(f64, usize)>, Error> {
+        let setup = self.setup(&node.model)?;
+        let outputs = self.problem.records[0].outputs.len();
+        let parameters = node
+            .added
+            .iter()
+            .flat_map(|&i| &self.candidates[i].parameters);
+        let named = parameters.filter(|parameter| parameter.short == "period");
+        let periods: Vec<f64> = named
+            .filter_map(|parameter| {
+                let position = setup
+                    .names()
+                    .iter()
+                    .position(|name| *name == parameter.name)?;
+                Some(own.x[position])
+            })
+            .collect();
+        let level = NOT_NOISE / (residuals.len() * periods.len().max(1)) as f64;
+        for period in periods {
+            for (i, residual) in residuals.iter().enumerate() {
+                let time = setup.model_time(i / outputs);
+                let p = harmonics_p(&time, residual, period, NOISE_ORDER);
+                if p.is_ok_and(|p| p < level) {
+                    return Ok(Some((0.5 * period, i)));
+                }
             }
         }
         Ok(None)

@@ -2,6 +2,7 @@
 //!
 //! - **an input**: signals made of its past against the residual whitened by its own noise model ([`of_command`]);
 //! - **a period**: a line of the spectrum that stands out of its neighbours ([`period`]);
+//! - **harmonics** of a period that has been named: a disturbance of another shape than a sine ([`harmonics_p`]);
 //! - **an instant**: windows of 1, 2, 4, ... samples whose sums over the root of their length are standard normal ([`instant`]);
 //! - **a level**: the whitened residual against functions of what the model gave a sample before ([`level_p`]). As it is white and independent
 //!   of the past, its regression on any past is chi-square, whatever the colour of the regressors.
@@ -9,7 +10,7 @@
 //! **References**: L. D. Haugh, J. American Statistical Association 71 (1976) 378-385; S. A. Billings, W. S. F. Voon, Int. J. Control 44 (1986)
 //! 235-244.
 
-use std::f64::consts::SQRT_2;
+use std::f64::consts::{SQRT_2, TAU};
 
 use ct_signals::{ArModel, Error};
 use nalgebra::{DMatrix, DVector};
@@ -125,6 +126,60 @@ pub fn period(residual: &[f64], level: f64) -> Result<Option<usize>, Error> {
     Ok(line.map(|line| line.cycles))
 }
 
+/// Harmonics that are looked at.
+const HARMONICS: [f64; 2] = [2.0, 3.0];
+
+/// The probability that noise has as much at the second and third harmonic of a period as a residual: by the fall of -2 log likelihood of
+/// autoregressive noise of at most this order where they are taken out. `time` and `period` in one unit.
+///
+/// # Errors
+/// Where the residual is too short for a noise model.
+pub fn harmonics_p(
+    time: &[f64],
+    residual: &[f64],
+    period: f64,
+    order: usize,
+) -> Result<f64, Error> {
+    let rows: Vec<usize> = (0..residual.len())
+        .filter(|&k| !residual[k].is_nan())
+        .collect();
+    let columns = 1 + 2 * HARMONICS.len();
+    let waves = |k: usize, column: usize| {
+        let Some(wave) = column.checked_sub(1) else {
+            return 1.0;
+        };
+        let angle = TAU * HARMONICS[wave / 2] * time[k] / period;
+        if wave % 2 == 0 {
+            angle.cos()
+        } else {
+            angle.sin()
+        }
+    };
+    let regressors = DMatrix::from_fn(rows.len(), columns, |i, column| waves(rows[i], column));
+    let of_residual = DVector::from_iterator(rows.len(), rows.iter().map(|&k| residual[k]));
+    let gram = regressors.transpose() * &regressors;
+    let Some(factor) = gram.cholesky() else {
+        return Ok(1.0);
+    };
+    let sizes = factor.solve(&(regressors.transpose() * of_residual));
+    let less = |columns: usize| -> Vec<f64> {
+        let without = |k: usize| {
+            let wave: f64 = (0..columns)
+                .map(|column| sizes[column] * waves(k, column))
+                .sum();
+            residual[k] - wave
+        };
+        (0..residual.len()).map(without).collect()
+    };
+    let with = ArModel::fit(&[&less(1)], order)?;
+    let without = ArModel::fit(&[&less(columns)], order)?;
+    let n = rows.len() as f64;
+    // The orders follow from BIC: a coefficient counts as there.
+    let coefficients = with.order() as f64 - without.order() as f64;
+    let fall = 2.0 * n * (with.sigma() / without.sigma()).ln() + coefficients * n.ln();
+    Ok(ChiSquared::new((columns - 1) as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0))))
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
@@ -204,5 +259,34 @@ mod tests {
             panic!("nothing was found");
         };
         assert!(from.abs_diff(500) < 10 && (to - from).abs_diff(20) < 15);
+    }
+
+    /// A square wave beside which its sine has been named leaves harmonics; noise has none, whatever its colour.
+    #[test]
+    fn harmonics_are_found_beside_a_named_period_and_not_in_noise() {
+        let period = 90.0;
+        let time: Vec<f64> = (0..SAMPLES).map(|k| k as f64).collect();
+        let mut chance = 0;
+        for seed in 0..60 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            for correlation in [0.0, 0.8, 0.95] {
+                let noise = noise::ar1(SAMPLES, 1.0, correlation, &mut rng);
+                let p = harmonics_p(&time, &noise, period, 6).unwrap();
+                chance += usize::from(p < 0.01);
+            }
+            let white = noise::white(SAMPLES, 1.0, &mut rng);
+            let square = |t: f64| {
+                let sine = (2.0 * PI * t / period).sin();
+                sine.signum() - 4.0 / PI * sine
+            };
+            let residual: Vec<f64> = time
+                .iter()
+                .zip(&white)
+                .map(|(t, e)| square(*t) + e)
+                .collect();
+            assert!(harmonics_p(&time, &residual, period, 6).unwrap() < NOT_NOISE);
+        }
+        // One in a hundred is asked for, of 180.
+        assert!(chance <= 8, "{chance}");
     }
 }

@@ -128,6 +128,10 @@ pub(crate) struct Tape {
     pub plays: Vec<Play>,
     /// States whose initial value is that of their start at the first row.
     pub settled: Vec<usize>,
+    /// What steps read: derivatives and the differences of guards.
+    read_by_steps: Vec<Register>,
+    /// What anything reads.
+    read_by_all: Vec<Register>,
     first_delayed: Register,
     first_constant: Register,
     first_operation: Register,
@@ -251,11 +255,14 @@ impl Tape {
             settled: (0..spec.states.len())
                 .filter(|&i| spec.is_settled(i))
                 .collect(),
+            read_by_steps: Vec::new(),
+            read_by_all: Vec::new(),
             first_delayed,
             first_constant: compiler.first_constant,
             first_operation: compiler.first_operation,
         };
         tape.parameters_first();
+        tape.note_results();
         tape
     }
 
@@ -336,16 +343,24 @@ impl Tape {
         registers
     }
 
-    /// Leaves out what only branches need that are not taken.
-    fn choose_operations<T>(&self, registers: &mut Registers<T>) {
+    /// Which registers are read once everything has its place.
+    fn note_results(&mut self) {
         let guards = self.guards.iter().map(|guard| guard.difference);
-        let slopes: Vec<Register> = self.derivatives.iter().copied().chain(guards).collect();
+        self.read_by_steps = self.derivatives.iter().copied().chain(guards).collect();
         let delays = self.delays.iter().flat_map(|&(what, by)| [what, by]);
         let plays = self.plays.iter().flat_map(|play| [play.from, play.to]);
-        let all = slopes.iter().chain(&self.outputs).chain(&self.starts);
-        let all: Vec<Register> = all.copied().chain(delays).chain(plays).collect();
-        self.needed(&slopes, &registers.taken, &mut registers.slopes);
-        self.needed(&all, &registers.taken, &mut registers.all);
+        let all = self.read_by_steps.iter().chain(&self.outputs);
+        let all = all.chain(&self.starts).copied();
+        self.read_by_all = all.chain(delays).chain(plays).collect();
+    }
+
+    /// Leaves out what only branches need that are not taken.
+    fn choose_operations<T>(&self, registers: &mut Registers<T>) {
+        let Registers {
+            taken, slopes, all, ..
+        } = registers;
+        self.needed(&self.read_by_steps, taken, slopes);
+        self.needed(&self.read_by_all, taken, all);
     }
 
     /// The operations that results need, in order; what reads a choice reads the one that is chosen.

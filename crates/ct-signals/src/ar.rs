@@ -133,14 +133,7 @@ impl ArModel {
             parts.push(&segment[first..end]);
             n += segment.iter().filter(|v| there(v)).count();
         }
-        if n == 0 {
-            return Err(Error::TooFewSamples {
-                task: "autoregressive fit",
-                found: 0,
-                needed: 1,
-            });
-        }
-        let max_order = max_order.min(n / SAMPLES_PER_COEFFICIENT);
+        let max_order = largest_order(max_order, n)?;
         if n < parts.iter().map(|part| part.len()).sum() {
             return Ok(ar_missing::fit(&parts, n, max_order));
         }
@@ -183,14 +176,7 @@ impl ArModel {
         }
         let there = segments.iter().copied().flatten().filter(|v| !v.is_nan());
         let n = there.count();
-        if n == 0 {
-            return Err(Error::TooFewSamples {
-                task: "autoregressive fit",
-                found: 0,
-                needed: 1,
-            });
-        }
-        let max_order = max_order.min(n / SAMPLES_PER_COEFFICIENT);
+        let max_order = largest_order(max_order, n)?;
         Ok(ar_missing::fit_behind(segments, n, max_order, process))
     }
 
@@ -372,6 +358,18 @@ impl ArModel {
         }
         self.log_det(whole) + sum.log()
     }
+}
+
+/// The largest order for so many samples.
+fn largest_order(asked: usize, samples: usize) -> Result<usize, Error> {
+    if samples == 0 {
+        return Err(Error::TooFewSamples {
+            task: "autoregressive fit",
+            found: 0,
+            needed: 1,
+        });
+    }
+    Ok(asked.min(samples / SAMPLES_PER_COEFFICIENT))
 }
 
 /// NaN stands for a missing sample; no value may be infinite.

@@ -20,6 +20,8 @@ const MAX_PREWHITENING_ORDER: usize = 20;
 /// Lags with fewer pairs of samples do not count where samples are missing: their products are far from Gaussian.
 const FEWEST_PAIRS: usize = 5;
 
+const LJUNG_BOX: &str = "Ljung-Box test";
+
 /// Lags of an input count as distinct where the eigenvalues of their correlations are above this.
 const DISTINCT: f64 = 1e-8;
 
@@ -98,7 +100,6 @@ pub fn pairs(u: &[f64], e: &[f64], max_lag: usize) -> Vec<usize> {
 /// [`Error::InvalidSetting`] unless `fitted < lags`, [`Error::TooFewSamples`] unless there are more
 /// samples than lags and more lags with pairs than `fitted`, [`Error::ValueNotFinite`] for an infinite value.
 pub fn ljung_box(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
-    const TASK: &str = "Ljung-Box test";
     if fitted >= lags {
         return Err(Error::InvalidSetting {
             setting: "lags",
@@ -106,17 +107,10 @@ pub fn ljung_box(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
             range: format!("more than the {fitted} fitted noise coefficients"),
         });
     }
-    check_length(TASK, present(x), lags)?;
-    check_not_infinite(TASK, "x", x)?;
+    check_length(LJUNG_BOX, present(x), lags)?;
+    check_not_infinite(LJUNG_BOX, "x", x)?;
     if has_missing(x) {
-        let x = centred(x);
-        let n = present(&x) as f64;
-        let squares: f64 = x.iter().filter(|x| !x.is_nan()).map(|x| x * x).sum();
-        let term = |sums: &Pairs| {
-            let rho = sums.product / squares;
-            n * (n + 2.0) * rho * rho / sums.count as f64
-        };
-        return portmanteau_of_pairs(TASK, &x, &x, lags, fitted, term);
+        return ljung_box_of_pairs(&centred(x), lags, fitted);
     }
     portmanteau(x.len(), &autocorrelation(x, lags)[1..], lags - fitted)
 }
@@ -231,25 +225,25 @@ fn portmanteau(n: usize, correlation: &[f64], freedom: usize) -> Result<f64, Err
     exceedance(q, freedom)
 }
 
-/// The same from the pairs at lags `1..=lags` that are there, each with its term of the sum, less `fitted` degrees of freedom.
-fn portmanteau_of_pairs(
-    task: &'static str,
-    u: &[f64],
-    e: &[f64],
-    lags: usize,
-    fitted: usize,
-    term: impl Fn(&Pairs) -> f64,
-) -> Result<f64, Error> {
-    let counted: Vec<f64> = (1..=lags)
-        .map(|lag| Pairs::at(u, e, lag))
-        .filter(|sums| sums.count >= FEWEST_PAIRS)
+/// The test of a series whose mean is removed, from the pairs that are there at lags `1..=lags`.
+fn ljung_box_of_pairs(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
+    let n = present(x) as f64;
+    let squares: f64 = x.iter().filter(|x| !x.is_nan()).map(|x| x * x).sum();
+    let term = |sums: Pairs| {
+        let rho = sums.product / squares;
+        let term = n * (n + 2.0) * rho * rho / sums.count as f64;
         // A series that does not vary is correlated with nothing.
-        .map(|sums| Some(term(&sums)).filter(|q| q.is_finite()).unwrap_or(0.0))
+        if term.is_finite() { term } else { 0.0 }
+    };
+    let counted: Vec<f64> = (1..=lags)
+        .map(|lag| Pairs::at(x, x, lag))
+        .filter(|sums| sums.count >= FEWEST_PAIRS)
+        .map(term)
         .collect();
     if counted.len() <= fitted {
         return Err(Error::TooFewSamples {
-            task,
-            found: present(u).min(present(e)),
+            task: LJUNG_BOX,
+            found: present(x),
             needed: 2 * FEWEST_PAIRS * (fitted + 1),
         });
     }

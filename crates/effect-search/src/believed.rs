@@ -6,14 +6,16 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use ct_model::effects::{Candidate, Visited, candidates_keeping, own_candidates};
+use ct_model::effects::{
+    Candidate, OwnCandidate, OwnError, Visited, candidates_keeping, own_candidates,
+};
 use ct_model::{Model, ModelSpec};
 use estimation::{Fit, Noise, Residuals, within};
 use greybox::{FitOptions, ModelSetup};
 
 use crate::Error;
 use crate::node::{Context, FINE, Node};
-use crate::problem::{Limit, Options, Problem};
+use crate::problem::{Kept, Limit, Options, Problem};
 
 /// The believed model with the effects of the model file in it.
 #[derive(Debug, Clone)]
@@ -42,6 +44,24 @@ pub fn believed(problem: &Problem, options: &Options) -> Result<Believed, Error>
     })
 }
 
+/// All that can act in a model where its records visit this, those of the catalogue with what is kept of earlier records, then those of the user's own.
+///
+/// # Errors
+/// As [`own_candidates`].
+pub fn all_candidates(
+    spec: &ModelSpec,
+    visited: &Visited,
+    kept: &BTreeMap<String, Kept>,
+    own: &BTreeMap<String, OwnCandidate>,
+) -> Result<Vec<Candidate>, OwnError> {
+    let numbers = kept
+        .iter()
+        .map(|(id, kept)| (id.clone(), kept.numbers.clone()));
+    let mut all = candidates_keeping(spec, visited, &numbers.collect());
+    all.extend(own_candidates(spec, own)?);
+    Ok(all)
+}
+
 /// The believed model fitted, and the candidates.
 pub(crate) fn begin<'a>(
     problem: &'a Problem,
@@ -66,11 +86,8 @@ pub(crate) fn begin<'a>(
         let visited = visited(problem, &setup, &fit)?;
         (fit, visited)
     };
-    let numbers = problem.kept.iter();
-    let numbers = numbers.map(|(id, kept)| (id.clone(), kept.numbers.clone()));
-    context.candidates = candidates_keeping(&problem.spec, &visited, &numbers.collect());
-    let own: Vec<Candidate> = own_candidates(&problem.spec, &problem.candidates)?;
-    context.candidates.extend(own);
+    context.candidates =
+        all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
     let bare = Node {
         added: Vec::new(),
         model,

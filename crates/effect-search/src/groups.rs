@@ -15,9 +15,9 @@ const REFITS: usize = 20;
 /// Those whose first fit is within this are fitted to the end.
 const NEAR: f64 = 60.0;
 
-/// A stand-in is fitted where one step promises at least this share of what the effect itself explains, but for this much.
-const PROMISE: f64 = 0.3;
-const SPARE: f64 = 10.0;
+/// A stand-in is fitted where the fall of the deviance that one step predicts is at least this share of the effect's own, less this margin.
+const PREDICTED_SHARE: f64 = 0.3;
+const PREDICTED_MARGIN: f64 = 10.0;
 
 impl Context<'_> {
     /// For each effect that the search added itself, then all that can stand in for it, best first.
@@ -38,7 +38,7 @@ impl Context<'_> {
                 let trials: Vec<_> = trials
                     .into_iter()
                     .filter(|trial| !last.added.contains(&trial.candidate))
-                    .filter(|trial| trial.fall > PROMISE * fall - SPARE)
+                    .filter(|trial| trial.fall > PREDICTED_SHARE * fall - PREDICTED_MARGIN)
                     .take(REFITS)
                     .collect();
                 let near = |node: &Node| node.fit.bic() - last.fit.bic() < NEAR;

@@ -3,6 +3,7 @@
 use ct_signals::ArModel;
 use ct_signals::residual_tests::prewhitened_input_test;
 use estimation::Fit;
+use greybox::ModelSetup;
 use serde::Serialize;
 
 use crate::Error;
@@ -105,7 +106,7 @@ impl Context<'_> {
                 output: name(i),
             }));
         }
-        if let Some((period, i)) = self.harmonics(node, own, &residuals)? {
+        if let Some((period, i)) = self.harmonics(node, (&setup, own), &residuals) {
             return Ok(Some(Left::Period {
                 output: name(i),
                 period: period * self.problem.time_unit,
@@ -145,10 +146,9 @@ impl Context<'_> {
     fn harmonics(
         &self,
         node: &Node,
-        own: &Fit,
+        (setup, own): (&ModelSetup, &Fit),
         residuals: &[Vec<f64>],
-    ) -> Result<Option<(f64, usize)>, Error> {
-        let setup = self.setup(&node.model)?;
+    ) -> Option<(f64, usize)> {
         let outputs = self.problem.records[0].outputs.len();
         let parameters = node
             .added
@@ -170,10 +170,10 @@ impl Context<'_> {
                 let time = setup.model_time(i / outputs);
                 let p = harmonics_p(&time, residual, period, NOISE_ORDER);
                 if p.is_ok_and(|p| p < level) {
-                    return Ok(Some((0.5 * period, i)));
+                    return Some((0.5 * period, i));
                 }
             }
         }
-        Ok(None)
+        None
     }
 }

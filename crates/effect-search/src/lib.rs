@@ -24,7 +24,7 @@ mod score;
 mod search;
 mod spectral_line;
 
-pub use believed::{Believed, believed};
+pub use believed::{Believed, all_candidates, believed};
 pub use diagnose::{Progress, diagnose};
 pub use error::Error;
 pub use held_out::{HeldOut, held_out};

@@ -22,11 +22,11 @@ const ALWAYS: usize = 40;
 /// Sets that grow side by side.
 const BEAM: usize = 4;
 /// A set grows where it lowers the criterion by this share of what the best one does.
-const WORTH: f64 = 0.6;
-/// A candidate is fitted beside a set where so many times its predicted fall of the deviance, and this much more, would pay for it: the
-/// prediction of one step falls short where an effect is far from linear.
-const OPTIMISM: f64 = 2.0;
-const SPARE: f64 = 6.0;
+const SHARE_OF_BEST: f64 = 0.6;
+/// A candidate is fitted beside a set where so many times its predicted fall of the deviance, and this margin, would lower the criterion: the
+/// prediction of one step is too small where an effect is far from linear.
+const FALL_FACTOR: f64 = 2.0;
+const FALL_MARGIN: f64 = 6.0;
 /// A larger set has to lower the criterion by this, or the search ends.
 const PAYS: f64 = 2.0;
 
@@ -135,7 +135,7 @@ impl Context<'_> {
                 break;
             }
             size += 1;
-            let enough = WORTH * beam[0].gain_over(&base);
+            let enough = SHARE_OF_BEST * beam[0].gain_over(&base);
             let parents: Vec<Node> = beam
                 .iter()
                 .filter(|node| node.added.len() < base.added.len() + max_effects)
@@ -150,7 +150,7 @@ impl Context<'_> {
                 let trials = self.trials_among(parent, &among, noise);
                 let promising: Vec<Trial> = trials
                     .into_iter()
-                    .filter(|trial| self.may_pay(trial))
+                    .filter(|trial| self.may_lower_the_criterion(trial))
                     .take(REFITS)
                     .collect();
                 for child in self.refits(parent, &promising, noise) {
@@ -173,9 +173,9 @@ impl Context<'_> {
     }
 
     /// Whether a candidate might lower the criterion.
-    fn may_pay(&self, trial: &Trial) -> bool {
+    fn may_lower_the_criterion(&self, trial: &Trial) -> bool {
         let fitted = self.candidates[trial.candidate].fitted().max(1) as f64;
-        OPTIMISM * trial.fall + SPARE > fitted * self.samples().ln()
+        FALL_FACTOR * trial.fall + FALL_MARGIN > fitted * self.samples().ln()
     }
 
     /// A pair of candidates beside a set, from the best starts of each.

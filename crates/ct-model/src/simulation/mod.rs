@@ -347,12 +347,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let bends = rise.iter().any(|rise| *rise != 0.0);
         if !delays.all.is_empty() {
             if first {
-                let drive = Drive {
-                    begin,
-                    from,
-                    rise,
-                    delays,
-                };
+                let drive = Drive::new(begin, (from, rise), delays);
                 drive.load(tape, &mut self.work, self.time, &self.state);
                 self.before_the_record();
                 for (delay, &(what, _)) in delays.all.iter_mut().zip(&tape.delays) {
@@ -371,12 +366,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         }
         self.begun = true;
         if !self.is_computed(from) {
-            let drive = Drive {
-                begin,
-                from,
-                rise,
-                delays,
-            };
+            let drive = Drive::new(begin, (from, rise), delays);
             drive.load(tape, &mut self.work, self.time, &self.state);
             tape.evaluate_with_guards(&mut self.work.registers);
             self.remember();
@@ -419,12 +409,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                     _ => explicit::within(&self.work, &self.state, length, share, &mut state),
                 }
             }
-            let drive = Drive {
-                begin,
-                from,
-                rise,
-                delays,
-            };
+            let drive = Drive::new(begin, (from, rise), delays);
             drive.load(tape, &mut self.work, self.time + length * share, &state);
             if ahead {
                 tape.evaluate_with_guards(&mut self.work.registers);
@@ -531,12 +516,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 return Ok(());
             }
             if let Some(Event { guards, .. }) = event {
-                let drive = Drive {
-                    begin,
-                    from,
-                    rise,
-                    delays,
-                };
+                let drive = Drive::new(begin, (from, rise), delays);
                 drive.load(tape, &mut self.work, self.time, &self.state);
                 for guard in guards {
                     let answer = &mut self.work.registers.answers[guard];
@@ -551,12 +531,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 delays.all[out].let_out();
                 self.work.begun = false;
                 // A branch may stand on what jumps.
-                let drive = Drive {
-                    begin,
-                    from,
-                    rise,
-                    delays,
-                };
+                let drive = Drive::new(begin, (from, rise), delays);
                 drive.load(tape, &mut self.work, self.time, &self.state);
                 tape.evaluate_with_guards(&mut self.work.registers);
                 for (i, delay) in delays.all.iter_mut().enumerate() {
@@ -606,12 +581,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         left: T,
         delays: &Delays<T>,
     ) {
-        let drive = Drive {
-            begin,
-            from,
-            rise,
-            delays,
-        };
+        let drive = Drive::new(begin, (from, rise), delays);
         drive.load(tape, &mut self.work, self.time, &self.state);
         tape.evaluate_slopes(&mut self.work.registers);
         for (x, &register) in self.state.iter_mut().zip(&tape.derivatives) {
@@ -643,12 +613,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         h: T,
         delays: &Delays<T>,
     ) -> f64 {
-        let drive = Drive {
-            begin,
-            from,
-            rise,
-            delays,
-        };
+        let drive = Drive::new(begin, (from, rise), delays);
         for (i, scale) in self.scale.iter_mut().enumerate() {
             let slope = self.work.slopes.get(i).map_or(0.0, |k| k.value().abs());
             let moved = if slope.is_finite() {

@@ -57,14 +57,19 @@ pub(super) struct Drive<'a, T> {
 }
 
 impl<'a, T: Scalar> Drive<'a, T> {
-    /// Inputs that are held; `still`: a zero for each.
-    pub fn held(inputs: &'a [f64], still: &'a [f64], delays: &'a Delays<T>) -> Self {
+    /// Inputs that go from `from` at `begin` in straight lines, by `rise` per unit of time.
+    pub fn new(begin: f64, (from, rise): (&'a [f64], &'a [f64]), delays: &'a Delays<T>) -> Self {
         Self {
-            begin: 0.0,
-            from: inputs,
-            rise: still,
+            begin,
+            from,
+            rise,
             delays,
         }
+    }
+
+    /// Inputs that are held; `still`: a zero for each.
+    pub fn held(inputs: &'a [f64], still: &'a [f64], delays: &'a Delays<T>) -> Self {
+        Self::new(0.0, (inputs, still), delays)
     }
 
     /// Writes time, inputs, states and delayed values into the registers.

@@ -58,9 +58,9 @@ pub fn mend(
     order: Order,
     integrator: bool,
 ) -> Result<(Vec<Mended>, Vec<Mended>), Error> {
-    let gappy =
+    let has_gaps =
         |record: &Record| record.has_gaps() || record.references.iter().any(|r| r.missing() > 0);
-    if !fitted.iter().chain(&others).any(gappy) {
+    if !fitted.iter().chain(&others).any(has_gaps) {
         let untouched = |record: Record| Mended {
             parts: vec![record.clone()],
             whole: record,

@@ -3,11 +3,9 @@
 use std::collections::BTreeMap;
 
 use ct_model::ModelSpec;
-use ct_model::effects::{
-    Candidate, OwnCandidate, Visited, all_effects, apply, candidates, own_candidates,
-};
+use ct_model::effects::{Candidate, OwnCandidate, Visited, all_effects, apply};
 use ct_signals::quoted;
-use effect_search::Kept;
+use effect_search::{Kept, all_candidates};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -106,15 +104,13 @@ pub(super) fn read(
 /// All that can act in a model, of the catalogue and of the model file.
 ///
 /// # Errors
-/// As [`own_candidates`], which a model file passes first.
+/// As [`all_candidates`], which a model file passes first.
 pub(crate) fn every_candidate(
     spec: &ModelSpec,
     own: &BTreeMap<String, OwnCandidate>,
 ) -> Result<Vec<Candidate>, Error> {
-    let mut all = candidates(spec, &Visited::nominal(spec));
-    let own = own_candidates(spec, own);
-    all.extend(own.map_err(|error| Error::Columns(error.to_string()))?);
-    Ok(all)
+    all_candidates(spec, &Visited::nominal(spec), &BTreeMap::new(), own)
+        .map_err(|error| Error::Columns(error.to_string()))
 }
 
 /// The candidate of an identifier.

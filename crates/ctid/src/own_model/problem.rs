@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use ct_model::effects::{Candidate, Role, Visited, apply, candidates_keeping, own_candidates};
-use ct_model::{Model, ModelSpec};
-use effect_search::{Believed, Options, Problem, believed};
+use ct_model::Model;
+use ct_model::effects::{Role, Visited, apply};
+use effect_search::{Believed, Options, Problem, all_candidates, believed};
 
 use super::file::{OwnModelFile, Records};
 use crate::{Error, numbers};
@@ -77,7 +77,9 @@ impl OwnModelFile {
             time_unit: unit_of(time_unit.unwrap_or(1.0)).to_string(),
             ..Visited::nominal(&self.base)
         };
-        let all = self.candidates_of(&self.base, &visited)?;
+        let (kept, own) = (&self.effects.kept, &self.candidates);
+        let all = all_candidates(&self.base, &visited, kept, own)
+            .map_err(|error| Error::Columns(error.to_string()))?;
         let mut on = Vec::new();
         for id in &self.effects.on {
             let candidate = all.iter().find(|candidate| candidate.id == *id);
@@ -143,23 +145,6 @@ impl OwnModelFile {
                 )
             })
             .collect()
-    }
-
-    /// All candidates of a model where a record visits this, with what the file keeps.
-    ///
-    /// # Errors
-    /// As [`own_candidates`], which the file has passed.
-    pub(super) fn candidates_of(
-        &self,
-        spec: &ModelSpec,
-        visited: &Visited,
-    ) -> Result<Vec<Candidate>, Error> {
-        let kept = self.effects.kept.iter();
-        let kept = kept.map(|(id, kept)| (id.clone(), kept.numbers.clone()));
-        let mut all = candidates_keeping(spec, visited, &kept.collect());
-        let own = own_candidates(spec, &self.candidates);
-        all.extend(own.map_err(|error| Error::Columns(error.to_string()))?);
-        Ok(all)
     }
 }
 

@@ -104,11 +104,11 @@ fn only(values: &[f64]) -> f64 {
     }
 }
 
-/// Root mean square of the errors, each divided by its output's noise.
+/// Root mean square of the errors, each divided by its output's noise; each output counts as one.
 fn weighted(outputs: &[String], errors: &BTreeMap<String, f64>, floors: &[f64]) -> f64 {
-    let each = outputs.iter().zip(floors);
-    let squares = each.filter_map(|(name, floor)| Some((errors.get(name)? / floor).powi(2)));
-    (squares.sum::<f64>() / outputs.len().max(1) as f64).sqrt()
+    let errors = outputs.iter().filter_map(|name| errors.get(name).copied());
+    let errors: Vec<f64> = errors.collect();
+    greybox::weighted_rms(&errors, floors, &vec![1; errors.len()])
 }
 
 fn parameter(estimate: &Estimate) -> Parameter {

@@ -147,14 +147,19 @@ fn block(equation: &str) -> String {
         .replace("g*u - k*(T - Ta)", equation)
 }
 
-#[test]
-fn what_is_hidden_is_named() {
-    let lagging = block("g*u - k*(T - Ta)")
+/// The block behind a sensor with a time constant of 25 s.
+fn lagging() -> String {
+    block("g*u - k*(T - Ta)")
         .replace(
             "output Real y(unit=\"degC\") = T;",
             "output Real y(unit=\"degC\") = s;\n  Real s(start=20);",
         )
-        .replace("end Block", "  25*der(s) = T - s;\nend Block");
+        .replace("end Block", "  25*der(s) = T - s;\nend Block")
+}
+
+#[test]
+fn what_is_hidden_is_named() {
+    let lagging = lagging();
     for (hidden, text) in [
         ("lag(y)", lagging),
         ("saturation(u)", block("g*min(u, 27) - k*(T - Ta)")),
@@ -270,12 +275,7 @@ fn an_effect_that_the_model_cannot_have_is_refused() {
 
 #[test]
 fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
-    let lagging = block("g*u - k*(T - Ta)")
-        .replace(
-            "output Real y(unit=\"degC\") = T;",
-            "output Real y(unit=\"degC\") = s;\n  Real s(start=20);",
-        )
-        .replace("end Block", "  25*der(s) = T - s;\nend Block");
+    let lagging = lagging();
     let mut problem = problem(BLOCK, record(&lagging, 0.0, 0.2, 3));
     problem.effects.push("lag(y)".to_string());
     let found = believed(&problem, &Options::default()).unwrap();

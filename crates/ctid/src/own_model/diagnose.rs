@@ -4,7 +4,7 @@ use effect_search::{Diagnosis, Left, Options, Step, Verdict};
 
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
-use super::words::EffectWords;
+use super::words::{EffectWords, shown_unit};
 use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::numbers;
@@ -119,7 +119,7 @@ pub(crate) fn sizes(diagnosis: &Diagnosis, effect: &str) -> Vec<String> {
     own.map(|p| {
         let (value, error) = numbers::value_and_error(p.value, p.std_error);
         let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-        format!("{} = {value}{error} {}", p.name, p.unit)
+        format!("{} = {value}{error} {}", p.name, shown_unit(&p.unit))
             .trim_end()
             .to_string()
     })
@@ -239,7 +239,8 @@ fn estimates(step: &Step, look: Look) -> String {
                 None if parameter.known => "(known)".to_string(),
                 None => "(at a bound, or not determined)".to_string(),
             };
-            vec![parameter.name.clone(), value, error, parameter.unit.clone()]
+            let unit = shown_unit(&parameter.unit).to_string();
+            vec![parameter.name.clone(), value, error, unit]
         })
         .collect();
     for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {

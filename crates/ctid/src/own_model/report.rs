@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::compare::Comparison;
 use super::diagnose::sentences;
 use super::file::{OwnModelFile, Records};
-use super::words::EffectWords;
+use super::words::{EffectWords, shown_unit};
 use crate::output::Found;
 use crate::report;
 
@@ -116,7 +116,7 @@ fn parameter(estimate: &Estimate) -> Parameter {
         name: estimate.name.clone(),
         value: estimate.value,
         std_error: estimate.std_error,
-        unit: estimate.unit.clone(),
+        unit: shown_unit(&estimate.unit).to_string(),
         prior: None,
     }
 }

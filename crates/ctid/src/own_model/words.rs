@@ -58,7 +58,7 @@ impl EffectWords {
             },
             physics: candidate
                 .effect
-                .map_or("a term of the model file", |effect| effect.physics),
+                .map_or("A term of the model file", |effect| effect.physics),
         };
         Self(all.iter().map(|c| (c.id.clone(), words(c))).collect())
     }
@@ -97,6 +97,11 @@ fn sites(spec: &ModelSpec, port: Port) -> Vec<Site> {
         Port::InputAndBalance(u, x) => vec![input(u), equation(x)],
         Port::Own => Vec::new(),
     }
+}
+
+/// A unit as it is shown: nothing behind a number without dimension.
+pub(crate) fn shown_unit(unit: &str) -> &str {
+    if unit == "1" { "" } else { unit }
 }
 
 /// What a term of the model file is added to.

@@ -1,5 +1,6 @@
 //! The acceptance test: which effects of a set stay when the noise may explain what they explain.
 
+use ct_signals::Record;
 use estimation::{Fit, Noise, coloured};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -67,14 +68,25 @@ impl Context<'_> {
     }
 
     /// The noise model of a set's residual, with a memory of at most a part of the longest record: a root near one takes every slow effect
-    /// for noise.
-    pub fn noise_of(&self, node: &Node) -> Result<Noise, Error> {
+    /// for noise. And whether the memory had to be limited: then what remains may be slow physics.
+    pub fn noise_of(&self, node: &Node) -> Result<(Noise, bool), Error> {
+        let setup = self.setup(&node.model)?;
+        let noise = estimation::noise_of(&setup, &node.fit, NOISE_ORDER)?;
+        let limited = noise.with_memory_at_most(self.longest_memory());
+        let slow = limited != noise;
+        Ok((limited, slow))
+    }
+
+    /// Whether the memory of a noise model is longer than that of noise that a search may trust.
+    pub fn is_slow(&self, noise: &Noise) -> bool {
+        noise.with_memory_at_most(self.longest_memory()) != *noise
+    }
+
+    /// The longest memory of a noise model in whose metric effects are searched \[samples\].
+    pub fn longest_memory(&self) -> f64 {
         /// Noise whose memory is longer has left fewer than some ten independent samples.
         const LONGEST_MEMORY: f64 = 1.0 / 15.0;
-        let setup = self.setup(&node.model)?;
-        let longest = self.problem.records.iter().map(|r| r.len()).max();
-        let memory = LONGEST_MEMORY * longest.unwrap_or(1) as f64;
-        let noise = estimation::noise_of(&setup, &node.fit, NOISE_ORDER)?;
-        Ok(noise.with_memory_at_most(memory))
+        let longest = self.problem.records.iter().map(Record::len).max();
+        LONGEST_MEMORY * longest.unwrap_or(1) as f64
     }
 }

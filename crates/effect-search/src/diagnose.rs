@@ -18,6 +18,7 @@ use greybox::{Robust, weighted_rms};
 use crate::accept::{BIC_MARGIN, NOISE_ORDER};
 use crate::believed::begin;
 use crate::node::{Context, FINE, Node};
+use crate::partial::{PART, explained};
 use crate::problem::{Limit, Options, Problem};
 use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
@@ -28,8 +29,6 @@ const SEARCHED_WHITE: f64 = 0.5;
 const SEARCHED: f64 = 0.8;
 /// So many effects are searched in white noise before the noise model is taken from what they leave: more of them explain noise.
 const BEFORE_NOISE: usize = 2;
-/// Effects that leave more than noise are a part of the answer where they explain this share of the error above the noise.
-const PART: f64 = 0.38;
 /// Noise models whose coefficients differ by less are one.
 const SAME_NOISE: f64 = 0.05;
 
@@ -55,15 +54,28 @@ pub fn diagnose(
     let (context, base) = begin(problem, options, limit)?;
     tell("searching the effects");
     let white = Noise::white(problem.spec.outputs.len());
+    let all: Vec<usize> = (0..context.candidates.len()).collect();
     let few = options.max_effects.min(BEFORE_NOISE);
-    let mut by_error = context.grow(base.clone(), &white, few, SEARCHED_WHITE)?;
-    let mut noise = context.noise_of(&by_error.best)?;
+    let mut by_error = context.grow(base.clone(), &all, &white, few, SEARCHED_WHITE)?;
+    let (mut noise, slow) = context.noise_of(&by_error.best)?;
     let full = by_error.best.added.len() >= base.added.len() + few;
     if noise.order() == 0 && full && few < options.max_effects {
         by_error = context.grow_on(by_error, &white, options.max_effects, SEARCHED_WHITE)?;
-        noise = context.noise_of(&by_error.best)?;
+        (noise, _) = context.noise_of(&by_error.best)?;
     }
-    let (grown, noise) = in_metric(&context, by_error, noise, options)?;
+    let mut by_error_sets = by_error.fitted.clone();
+    by_error_sets.push(by_error.best.clone());
+    if slow {
+        // What follows time alone imitates any slow disturbance, and leaves no room for others.
+        let mut timeless = all.clone();
+        timeless.retain(|&i| !context.candidates[i].follows_time());
+        let most = options.max_effects;
+        let grown = context.grow(base.clone(), &timeless, &white, most, SEARCHED_WHITE)?;
+        by_error_sets.extend(grown.fitted);
+        by_error_sets.push(grown.best);
+    }
+    let by_error_singles = (by_error.singles.clone(), by_error.base.clone());
+    let (mut grown, mut noise) = in_metric(&context, by_error, noise, options)?;
     tell("confirming");
     let mut confirmed = context.confirm(grown.best.clone(), &grown.base, &noise)?;
     if grown.cut_short && confirmed.added.len() == grown.base.added.len() {
@@ -80,14 +92,34 @@ pub fn diagnose(
             confirmed = grown.base.clone();
         }
     }
-    let own = context.in_own_noise(&confirmed)?;
+    let mut own = context.in_own_noise(&confirmed)?;
+    let mut slowness = 1.0;
+    if context.is_slow(&own.noise) {
+        // In the metric of such a noise the simulation drifts off: sets are compared by their simulation error.
+        let mut sets = by_error_sets;
+        sets.extend(grown.fitted.iter().cloned());
+        sets.extend([grown.best.clone(), confirmed.clone()]);
+        if let Some((part, _)) = context.largest_part(&base, &sets)? {
+            confirmed = part;
+            own = context.in_own_noise(&confirmed)?;
+            noise = white.clone();
+            slowness = context.slowness(&own.noise);
+            (grown.singles, grown.base) = by_error_singles;
+        }
+    }
     let left = context.left(&confirmed, &own)?;
     tell("telling apart");
     let found = confirmed.added.len() > grown.base.added.len();
     // What a search did not reach its noise model explains: then the effects are a part of the answer at most.
     let open = grown.cut_short && own.noise.order() > 0;
     let whole = left.is_none() && !open;
-    let share = found.then(|| explained(&base, &confirmed, &own, whole));
+    // All that remains is noise, or else what its past does not predict.
+    let floors: Vec<f64> = if whole {
+        own.noise.iter().map(ArModel::stationary_std).collect()
+    } else {
+        own.noise.iter().map(ArModel::sigma).collect()
+    };
+    let share = found.then(|| explained(&base.fit, &confirmed.fit, &floors));
     let verdict_of = |groups: &[Vec<usize>]| match (found, &left, share) {
         (true, None, _) if open => Verdict::Partial,
         (false, None, _) => Verdict::Adequate,
@@ -100,7 +132,7 @@ pub fn diagnose(
     if verdict_of(&[]) == Verdict::Unexplained {
         confirmed = grown.base.clone();
     }
-    let groups = context.groups(&confirmed, &grown.base, &noise)?;
+    let groups = context.groups(&confirmed, &grown.base, &noise, slowness)?;
     let verdict = verdict_of(&groups);
     let last = if verdict == Verdict::Unexplained {
         context.in_own_noise(&base)?
@@ -159,7 +191,8 @@ fn in_metric(
         }
         return Ok((grown, Noise::white(noise.outputs())));
     }
-    let grown = context.grow(begin, &noise, options.max_effects, SEARCHED)?;
+    let all: Vec<usize> = (0..context.candidates.len()).collect();
+    let grown = context.grow(begin, &all, &noise, options.max_effects, SEARCHED)?;
     // The rich set of white noise may be the better one here too.
     let other = context.refitted(&by_error.best, &noise, FINE);
     let mut grown = grown;
@@ -168,7 +201,7 @@ fn in_metric(
     {
         grown.best = other;
     }
-    let own = context.noise_of(&grown.best)?;
+    let (own, _) = context.noise_of(&grown.best)?;
     if own.order() > 0 && own.difference(&noise) > SAME_NOISE && !context.limit.passed(SEARCHED) {
         let base = context.refitted(&grown.base, &own, FINE);
         let best = context.refitted(&grown.best, &own, FINE);
@@ -178,27 +211,6 @@ fn in_metric(
         }
     }
     Ok((grown, noise))
-}
-
-/// The share of the mean squared error above the noise that a set explains, outputs in units of their noise; `whole`: all that remains is noise,
-/// and otherwise what its past does not predict.
-fn explained(base: &Node, last: &Node, own: &Fit, whole: bool) -> f64 {
-    let floors: Vec<f64> = if whole {
-        own.noise.iter().map(ArModel::stationary_std).collect()
-    } else {
-        own.noise.iter().map(ArModel::sigma).collect()
-    };
-    let squares = |fit: &Fit| -> f64 {
-        let each = fit.rmse.iter().zip(&floors);
-        each.map(|(rmse, floor)| (rmse / floor.max(f64::MIN_POSITIVE)).powi(2))
-            .sum::<f64>()
-            / floors.len() as f64
-    };
-    let (before, after) = (squares(&base.fit), squares(&last.fit));
-    if before <= 1.0 {
-        return 0.0;
-    }
-    ((before - after.max(1.0)) / (before - 1.0)).clamp(0.0, 1.0)
 }
 
 fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosis, Error> {
@@ -213,7 +225,15 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
     } = finding;
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
-    let floors: Vec<f64> = own.noise.iter().map(ArModel::stationary_std).collect();
+    let level = |noise: &ArModel| {
+        // The deviation of what is slower than noise is not known from so short a record.
+        if context.is_slow(&own.noise) {
+            noise.sigma()
+        } else {
+            noise.stationary_std()
+        }
+    };
+    let floors: Vec<f64> = own.noise.iter().map(level).collect();
     // Outputs count by their noise. Errors are compared in one metric, that of the simulation error; the last model has its own where it
     // leaves noise.
     let white = Noise::white(outputs.len());
@@ -257,7 +277,7 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
     let noise = outputs.iter().zip(own.noise.iter());
     let noise = noise.map(|(output, noise)| NoiseFloor {
         output: output.name.clone(),
-        level: noise.stationary_std(),
+        level: level(noise),
         innovation: noise.sigma(),
         coefficients: noise.coefficients().to_vec(),
     });
@@ -353,7 +373,12 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
     let errors = if node.fit.noise.order() > 0 {
         node.fit.std_errors()
     } else {
-        let robust: Result<Robust, _> = estimation::robust(&setup, &node.fit, NOISE_ORDER);
+        let robust: Result<Robust, _> = estimation::robust_with_memory(
+            &setup,
+            &node.fit,
+            NOISE_ORDER,
+            context.longest_memory(),
+        );
         robust.map_or_else(|_| node.fit.std_errors(), |robust| robust.std_errors)
     };
     let spec = node.spec();

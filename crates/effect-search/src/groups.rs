@@ -20,12 +20,14 @@ const PREDICTED_SHARE: f64 = 0.3;
 const PREDICTED_MARGIN: f64 = 10.0;
 
 impl Context<'_> {
-    /// For each effect that the search added itself, then all that can stand in for it, best first.
+    /// For each effect that the search added itself, then all that can stand in for it, best first. `slowness`: samples over independent
+    /// ones, where the metric of `noise` is not that of the noise ([`Context::slowness`]).
     pub fn groups(
         &self,
         last: &Node,
         base: &Node,
         noise: &Noise,
+        slowness: f64,
     ) -> Result<Vec<Vec<usize>>, Error> {
         let mut groups = Vec::new();
         for position in base.added.len()..last.added.len() {
@@ -41,15 +43,16 @@ impl Context<'_> {
                     .filter(|trial| trial.fall > PREDICTED_SHARE * fall - PREDICTED_MARGIN)
                     .take(REFITS)
                     .collect();
-                let near = |node: &Node| node.fit.bic() - last.fit.bic() < NEAR;
+                let near = |node: &Node| node.fit.bic() - last.fit.bic() < NEAR * slowness;
                 let rough = self.refits(&without, &trials, noise);
                 let fine = rough
                     .into_iter()
                     .filter(near)
                     .filter_map(|node| self.refitted(&node, noise, FINE).ok());
                 for node in best_first(fine.collect()) {
-                    let deviance = node.fit.deviance - last.fit.deviance;
-                    let bic = node.fit.bic() - last.fit.bic();
+                    let deviance = (node.fit.deviance - last.fit.deviance) / slowness;
+                    let further = node.fit.parameters as f64 - last.fit.parameters as f64;
+                    let bic = deviance + further * (self.samples() / slowness).ln();
                     // As many parameters or fewer: the deviance decides; more have to pay for themselves.
                     let same = bic < SAME_BIC
                         || deviance < SAME_DEVIANCE && node.fit.parameters <= last.fit.parameters;

@@ -48,6 +48,11 @@ pub enum Left {
         /// The output.
         output: String,
     },
+    /// It wanders so slowly that the records hold too few independent samples of it to be taken for noise.
+    Slow {
+        /// The output.
+        output: String,
+    },
 }
 
 /// A signal whose past predicts all but this share of its standard deviation has no innovations that a residual could depend on: what
@@ -139,7 +144,10 @@ impl Context<'_> {
                 return Ok(Some(Left::Level { output: name(i) }));
             }
         }
-        Ok(None)
+        let limited = own.noise.with_memory_at_most(self.longest_memory());
+        let mut pairs = own.noise.iter().zip(limited.iter());
+        let slow = pairs.position(|(own, limited)| own != limited);
+        Ok(slow.map(|o| Left::Slow { output: name(o) }))
     }
 
     /// Half the period of an effect of a set whose harmonics a residual holds \[unit of the model's time\], and which residual.

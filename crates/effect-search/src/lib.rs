@@ -17,6 +17,7 @@ mod joined;
 mod left;
 mod node;
 mod pairs;
+mod partial;
 mod problem;
 pub mod residual;
 mod result;

@@ -42,6 +42,8 @@ pub(crate) struct Grown {
     among: Vec<usize>,
     /// Sets that may grow, best first.
     beam: Vec<Node>,
+    /// All sets that were fitted.
+    pub fitted: Vec<Node>,
     /// The time ended the search.
     pub cut_short: bool,
 }
@@ -64,21 +66,23 @@ impl Context<'_> {
         best_first(fits.collect())
     }
 
-    /// The search of sets of up to so many effects.
+    /// The search of sets of up to so many effects. `of`: positions of the candidates.
     pub fn grow(
         &self,
         base: Node,
+        of: &[usize],
         noise: &Noise,
         max_effects: usize,
         share: f64,
     ) -> Result<Grown, Error> {
-        let trials = self.trials(&base, noise);
+        let trials = self.trials_among(&base, of, noise);
         let promising = &trials[..trials.len().min(FIRST_REFITS)];
         let singles = self.refits(&base, promising, noise);
         let mut beam: Vec<Node> = Vec::new();
         if max_effects > 0 {
             beam.extend(singles.iter().take(BEAM).cloned());
         }
+        let few = beam.len();
         if max_effects > 1 && !self.limit.passed(share) {
             let pairs = joint_scores(self, &base, &trials, noise, PAIRS);
             let fits: Vec<Node> = pairs
@@ -93,6 +97,7 @@ impl Context<'_> {
             among: trials[..many].iter().map(|t| t.candidate).collect(),
             cut_short: self.limit.passed(share),
             base,
+            fitted: singles.iter().chain(&beam[few..]).cloned().collect(),
             singles,
             beam,
         };
@@ -113,6 +118,7 @@ impl Context<'_> {
             mut best,
             among,
             mut beam,
+            mut fitted,
             mut cut_short,
         } = grown;
         let first_size = base.added.len() + 1;
@@ -156,6 +162,7 @@ impl Context<'_> {
                 for child in self.refits(parent, &promising, noise) {
                     let same = |known: &Node| same_set(known, &child);
                     if !beam.iter().any(same) {
+                        fitted.push(child.clone());
                         beam.push(child);
                     }
                 }
@@ -168,6 +175,7 @@ impl Context<'_> {
             best,
             among,
             beam,
+            fitted,
             cut_short,
         })
     }

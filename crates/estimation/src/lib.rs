@@ -76,6 +76,6 @@ pub use residuals::{
     Residuals, Sample, costs_more, linearise, linearise_below, residuals, rows, squares,
 };
 pub use rows::Rows;
-pub use sandwich::{Robust, robust};
+pub use sandwich::{Robust, robust, robust_with_memory};
 pub use triangle::Triangle;
 pub use weights::Squares;

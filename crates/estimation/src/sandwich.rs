@@ -47,8 +47,22 @@ impl Robust {
 /// # Errors
 /// Where the model is not finite at the fit.
 pub fn robust(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Robust, Error> {
+    robust_with_memory(model, fit, order, f64::INFINITY)
+}
+
+/// The same, the memory of the noise model at most so many samples ([`ct_signals::ArModel::with_memory_at_most`]): where a residual holds slow
+/// physics, no record says how large a noise with a root near one is.
+///
+/// # Errors
+/// As [`robust`].
+pub fn robust_with_memory(
+    model: &impl Residuals,
+    fit: &Fit,
+    order: usize,
+    memory: f64,
+) -> Result<Robust, Error> {
     let rows = rows(model, &fit.x).ok_or(Error::NoFiniteStart { starts: 1 })?;
-    let noise = marginal::noise(&rows, fit.interior(), order)?;
+    let noise = marginal::noise(&rows, fit.interior(), order)?.with_memory_at_most(memory);
     let own = fit.triangle.clone().with_prior_weight(fit.prior_weight());
     let bread = own.covariance(fit.interior());
     let mut sandwich = Sandwich::new(&rows, fit.interior(), (&fit.noise, &fit.weights), bread);

@@ -335,8 +335,9 @@ impl<'a> ModelSetup<'a> {
         self.records.iter().map(first).collect()
     }
 
-    /// The same model, entries and starts against other records of the same number and outputs.
-    pub(crate) fn against<'b>(&self, records: &'b [Record]) -> ModelSetup<'b>
+    /// The same model, entries and starts against other records of the same number, outputs and time.
+    #[must_use]
+    pub fn against<'b>(&self, records: &'b [Record]) -> ModelSetup<'b>
     where
         'a: 'b,
     {

@@ -68,6 +68,13 @@ impl Candidate {
         roles.filter(|role| *role != Role::Choice).count()
     }
 
+    /// Whether it goes with time and with nothing else: a drift, a step, a period. It can imitate any slow disturbance.
+    #[must_use]
+    pub fn follows_time(&self) -> bool {
+        // What happens at an instant is written in the record's first one.
+        self.record_numbers.contains_key("begin")
+    }
+
     /// Every combination of the starts, a value for each parameter.
     #[must_use]
     pub fn starts(&self) -> Vec<Vec<f64>> {

@@ -146,6 +146,9 @@ fn said_of(left: &Left) -> String {
         Left::Level { output } => {
             format!("the residual of {output} depends on what the model gives there")
         }
+        Left::Slow { output } => format!(
+            "the residual of {output} wanders too slowly to be taken for noise in records of this length"
+        ),
     }
 }
 

@@ -1,0 +1,230 @@
+//! The largest part of the error that effects explain, where what they leave is slower than noise that a search may trust.
+//!
+//! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory looks at changes from
+//! sample to sample alone: it takes every slow effect for noise, and a fit in its metric lets the simulation drift off. There sets are compared
+//! by their simulation error. A set is a part of the answer where
+//! - it explains [`PART`] of the mean squared error above the noise, what its past does not predict; an effect that follows time alone, which
+//!   imitates any slow disturbance, [`WHOLE`] of it, and without others beside it, as those then bend to any disturbance;
+//! - several effects are called for where each model has a noise model of its own, of limited memory;
+//! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
+//! - what is fitted to three quarters of the records predicts the fourth (cross-validation);
+//! - no size of its effects is at a bound.
+//!
+//! A larger set is taken where each further effect leaves at most a half of what a smaller set leaves.
+
+use ct_signals::{ArModel, Record};
+use estimation::{Fit, Noise, fit_from, prewhitened};
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::accept::{BIC_MARGIN, NOISE_ORDER};
+use crate::node::{Context, FINE, Node, ROUGH};
+use crate::search::{best_first, same_set};
+
+/// Effects that leave more than noise are a part of the answer where they explain this share of the error above the noise.
+pub(crate) const PART: f64 = 0.38;
+/// This share is asked of an effect that follows time alone.
+const WHOLE: f64 = 0.9;
+/// So many sets of one size are tested, those with the least criterion.
+const TESTED: usize = 6;
+/// Each further effect leaves at most this part of what a smaller set leaves of the error above the noise.
+const LEFT: f64 = 0.5;
+/// A set explains this part of the mean squared error at least on parts of the records that it was not fitted to.
+const CARRIED_OVER: f64 = 0.3;
+/// Parts of a record, each of which is left out in turn.
+const FOLDS: usize = 4;
+/// The innovations beside a set are at most so many times as large as those beside the model without it: what imitates a slow course by
+/// moves of its own is rougher than the record.
+const ROUGHER: f64 = 1.05;
+/// The share of the time limit after which no further sizes are tested.
+const TIME: f64 = 0.9;
+
+impl Context<'_> {
+    /// The set that explains the largest part of the error, fitted in white noise, and that part; `None` where no set is a part of the answer.
+    /// `sets`: fitted in whatever metric; `base`: fitted in white noise.
+    pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
+        let white = Noise::white(self.problem.records[0].outputs.len());
+        let own_base = self.in_limited_noise(base)?;
+        let most = sets.iter().map(|set| set.added.len()).max().unwrap_or(0);
+        let mut best: Option<(Node, f64)> = None;
+        let mut smaller: Vec<(Node, f64)> = Vec::new();
+        for size in base.added.len() + 1..=most {
+            if self.limit.passed(TIME) {
+                break;
+            }
+            let mut of_size: Vec<Node> = Vec::new();
+            for set in sets.iter().filter(|set| set.added.len() == size) {
+                if !of_size.iter().any(|known| same_set(known, set)) {
+                    of_size.push(set.clone());
+                }
+            }
+            let fits = of_size
+                .into_par_iter()
+                .filter_map(|set| self.refitted(&set, &white, ROUGH).ok());
+            let mut fits = best_first(fits.collect());
+            fits.truncate(TESTED);
+            let tested: Vec<(Node, f64, bool)> = fits
+                .into_par_iter()
+                .filter_map(|set| self.refitted(&set, &white, FINE).ok())
+                .filter_map(|set| {
+                    let (share, accepted) = self.is_part(base, &own_base, &set).ok()?;
+                    Some((set, share, accepted))
+                })
+                .collect();
+            let pays = |(set, share): (&Node, f64), (less, of_less): (&Node, f64)| {
+                let further = set.added.len() - less.added.len();
+                1.0 - share <= LEFT.powi(further as i32) * (1.0 - of_less)
+            };
+            let says_more = |set: &Node, share: f64| {
+                smaller.iter().all(|(subset, of_subset)| {
+                    let within = subset.added.iter().all(|i| set.added.contains(i));
+                    !within || pays((set, share), (subset, *of_subset))
+                })
+            };
+            let more = tested
+                .iter()
+                .filter(|(set, share, _)| says_more(set, *share));
+            let accepted = more.filter(|(.., accepted)| *accepted);
+            let largest = accepted.max_by(|a, b| a.1.total_cmp(&b.1)).cloned();
+            if let Some((set, share, _)) = largest
+                && best
+                    .as_ref()
+                    .is_none_or(|(less, of_less)| pays((&set, share), (less, *of_less)))
+            {
+                best = Some((set, share));
+            }
+            smaller.extend(tested.into_iter().map(|(set, share, _)| (set, share)));
+        }
+        Ok(best)
+    }
+
+    /// The share of the error above the noise that a set explains, and whether it is a part of the answer.
+    fn is_part(&self, base: &Node, own_base: &Fit, set: &Node) -> Result<(f64, bool), Error> {
+        let own = self.in_limited_noise(set)?;
+        let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+        let share = explained(&base.fit, &set.fit, &floors);
+        let new = &set.added[base.added.len()..];
+        let in_time = new.iter().any(|&i| self.candidates[i].follows_time());
+        let accepted = share >= if in_time { WHOLE } else { PART }
+            && !(in_time && new.len() > 1)
+            && !self.at_a_bound(set, new)
+            && (new.len() == 1 || own_base.bic() - own.bic() > BIC_MARGIN)
+            && own
+                .noise
+                .iter()
+                .zip(own_base.noise.iter())
+                .all(|(own, base)| own.sigma() <= ROUGHER * base.sigma())
+            && self.carried_over(base, set)? >= CARRIED_OVER;
+        Ok((share, accepted))
+    }
+
+    /// The fit of a set with a noise model of its own residual whose memory is limited.
+    fn in_limited_noise(&self, node: &Node) -> Result<Fit, Error> {
+        let setup = self.setup(&node.model)?;
+        let memory = Some(self.longest_memory());
+        Ok(prewhitened(
+            &setup,
+            node.fit.clone(),
+            NOISE_ORDER,
+            memory,
+            FINE,
+        )?)
+    }
+
+    /// Samples over independent samples of a noise whose memory is limited: by how much slow parameters, and differences of the deviance in
+    /// white noise, are less certain than under white noise of the same size.
+    pub fn slowness(&self, noise: &Noise) -> f64 {
+        let limited = noise.with_memory_at_most(self.longest_memory());
+        let outputs = limited.iter().zip(&self.problem.records[0].outputs);
+        let (mut all, mut independent) = (0.0, 0.0);
+        for (o, (noise, _)) in outputs.enumerate() {
+            let records = self.problem.records.iter().map(|r| &r.outputs[o]);
+            let samples = records.map(|y| y.values.len() - y.missing()).sum::<usize>() as f64;
+            all += samples;
+            independent += samples * noise.slow_gain().powi(2).min(1.0);
+        }
+        all / independent.max(f64::MIN_POSITIVE)
+    }
+
+    /// Whether a parameter of these effects is at a bound.
+    fn at_a_bound(&self, node: &Node, effects: &[usize]) -> bool {
+        let errors = node.fit.std_errors();
+        let parameters = effects.iter().flat_map(|&i| {
+            let fitted = self.candidates[i].parameters.iter();
+            fitted.filter(|p| p.role != ct_model::effects::Role::Choice)
+        });
+        let names: Vec<&String> = parameters.map(|p| &p.name).collect();
+        let mut all = node.spec().parameters.iter().zip(errors);
+        all.any(|(parameter, error)| error.is_none() && names.contains(&&parameter.about.name))
+    }
+
+    /// The part of the mean squared error that a set explains on parts of the records that it was not fitted to: a quarter of each record is
+    /// left out in turn (cross-validation). Negative where the set does harm.
+    fn carried_over(&self, base: &Node, set: &Node) -> Result<f64, Error> {
+        let outputs = self.problem.records[0].outputs.len();
+        let mut squares = [vec![0.0; outputs], vec![0.0; outputs]];
+        for fold in 0..FOLDS {
+            for (node, squares) in [base, set].into_iter().zip(&mut squares) {
+                let Some(of_fold) = self.left_out(node, fold)? else {
+                    return Ok(0.0);
+                };
+                for (sum, square) in squares.iter_mut().zip(of_fold) {
+                    *sum += square;
+                }
+            }
+        }
+        // Outputs count by what the base leaves of them; one without an error says nothing.
+        let pairs = squares[0].iter().zip(&squares[1]);
+        let ratios: Vec<f64> = pairs
+            .filter(|(before, _)| **before > 0.0)
+            .map(|(before, after)| after / before)
+            .collect();
+        Ok(1.0 - ratios.iter().sum::<f64>() / ratios.len().max(1) as f64)
+    }
+
+    /// The squared error of each output on a part of all records, when the readings of this part take no part in the fit; `None` where the
+    /// simulation is not finite.
+    fn left_out(&self, node: &Node, fold: usize) -> Result<Option<Vec<f64>>, Error> {
+        let part = |record: &Record| {
+            let row = |fold: usize| record.len() * fold / FOLDS;
+            row(fold)..row(fold + 1)
+        };
+        let mut fitted = self.problem.records.clone();
+        for record in &mut fitted {
+            let rows = part(record);
+            for output in &mut record.outputs {
+                output.values[rows.clone()].fill(f64::NAN);
+            }
+        }
+        let setup = self.setup(&node.model)?;
+        let others = setup.against(&fitted);
+        let white = Noise::white(setup.outputs());
+        let fit = fit_from(&others, vec![node.fit.x.clone().into()], &white, ROUGH)?;
+        let Some(residuals) = estimation::residuals(&setup, &fit.x) else {
+            return Ok(None);
+        };
+        let mut squares = vec![0.0; setup.outputs()];
+        for (i, residual) in residuals.iter().enumerate() {
+            let rows = part(&self.problem.records[i / setup.outputs()]);
+            let present = residual[rows].iter().filter(|e| !e.is_nan());
+            squares[i % setup.outputs()] += present.map(|e| e * e).sum::<f64>();
+        }
+        Ok(Some(squares))
+    }
+}
+
+/// The share of the mean squared error above the noise that a set explains. `floors`: standard deviation of each output's noise \[output
+/// unit\].
+pub(crate) fn explained(base: &Fit, last: &Fit, floors: &[f64]) -> f64 {
+    let squares = |fit: &Fit| -> f64 {
+        let each = fit.rmse.iter().zip(floors);
+        each.map(|(rmse, floor)| (rmse / floor.max(f64::MIN_POSITIVE)).powi(2))
+            .sum::<f64>()
+            / floors.len() as f64
+    };
+    let (before, after) = (squares(base), squares(last));
+    if before <= 1.0 {
+        return 0.0;
+    }
+    ((before - after.max(1.0)) / (before - 1.0)).clamp(0.0, 1.0)
+}

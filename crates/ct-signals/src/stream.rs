@@ -192,9 +192,11 @@ impl Rows {
         };
         if is_row(&cells, columns) {
             let outputs = columns.outputs.len().max(1);
-            let input = match cells.len().checked_sub(outputs) {
-                Some(2) => 1,
-                Some(3) => 2,
+            // Where the first channel stands: behind the time, or behind the reference that follows it.
+            let inputs = usize::from(!columns.without_inputs);
+            let first = match cells.len().checked_sub(outputs + inputs) {
+                Some(1) => 1,
+                Some(2) if inputs > 0 => 2,
                 _ => {
                     return Err(Error::NoOrder {
                         file: file.into(),
@@ -204,15 +206,16 @@ impl Rows {
                     });
                 }
             };
-            rows.at = std::iter::once(0).chain(input..=input + outputs).collect();
+            rows.inputs = inputs;
+            let channels = inputs + outputs;
+            rows.at = std::iter::once(0).chain(first..first + channels).collect();
             let named = |names: &[String], at: usize| {
                 let name = names.get(at).filter(|name| !name.is_empty());
                 name.cloned().unwrap_or_default()
             };
-            rows.names = vec![
-                columns.time.clone().unwrap_or_default(),
-                named(&columns.inputs, 0),
-            ];
+            rows.names = vec![columns.time.clone().unwrap_or_default()];
+            rows.names
+                .extend((0..inputs).map(|input| named(&columns.inputs, input)));
             rows.names
                 .extend((0..outputs).map(|output| named(&columns.outputs, output)));
             let units = rows.names[1..].iter();
@@ -224,7 +227,7 @@ impl Rows {
                     *name = ROLES[i.min(ROLES.len() - 1)].to_string();
                 }
             }
-            rows.conversions = vec![None; outputs + 1];
+            rows.conversions = vec![None; channels];
             rows.seconds = columns.time_header().1;
             rows.values = vec![Ok(f64::NAN); rows.at.len()];
             return Ok((rows, true));

@@ -459,5 +459,6 @@ fn columns(spec: &ModelSpec, raw: &Raw, source: &Source) -> Result<Columns, Erro
         time_format: one("time_format")?,
         time_zone,
         missing,
+        without_inputs: inputs.is_empty(),
     })
 }

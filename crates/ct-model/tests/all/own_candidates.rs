@@ -181,10 +181,6 @@ fn what_is_wrong_is_said_with_its_place() {
         "radiation.parameters.e: it is used nowhere",
     );
     refused(
-        &own(&e, &[("T", "-(1 + e)*T")]),
-        "radiation: no values of its parameters make its terms vanish",
-    );
-    refused(
         &own(&[("k", 1.0)], &[("T", "-k*T")]),
         "radiation.parameters.k: `k` is a variable of Block",
     );

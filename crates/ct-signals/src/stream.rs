@@ -224,7 +224,8 @@ impl Rows {
                 .collect();
             for (i, name) in rows.names.iter_mut().enumerate() {
                 if name.is_empty() {
-                    *name = ROLES[i.min(ROLES.len() - 1)].to_string();
+                    let role = if i > inputs { ROLES.len() - 1 } else { i };
+                    *name = ROLES[role].to_string();
                 }
             }
             rows.conversions = vec![None; channels];
@@ -345,15 +346,14 @@ impl Rows {
                 let names = names.iter().map(|name| format!("\"{}\"", quoted(name)));
                 names.collect::<Vec<_>>().join(", ")
             };
-            let command = if inputs.len() == 1 {
-                "command"
-            } else {
-                "inputs"
+            let inputs = match inputs.len() {
+                0 => String::new(),
+                1 => format!(" {} the command,", list(inputs)),
+                _ => format!(" {} the inputs,", list(inputs)),
             };
             return format!(
-                "a header: \"{}\" is the time, {} the {command}, {} the {readings}",
+                "a header: \"{}\" is the time,{inputs} {} the {readings}",
                 quoted(&self.names[0]),
-                list(inputs),
                 list(outputs)
             );
         }
@@ -362,8 +362,12 @@ impl Rows {
         } else {
             ("", "")
         };
+        let (command, u) = match inputs.len() {
+            0 => ("", ""),
+            _ => (" command,", " u,"),
+        };
         format!(
-            "no header: the columns are taken as time,{reference} command, {readings} (t,{r} u, {})",
+            "no header: the columns are taken as time,{reference}{command} {readings} (t,{r}{u} {})",
             letters(outputs.len(), ", ")
         )
     }

@@ -56,10 +56,9 @@ impl Context<'_> {
             .iter()
             .filter_map(|own| parameters.iter().position(|p| p.about.name == own.name))
             .collect();
-        let (Some((&factor, own)), true) = (
-            places.split_last(),
-            places.len() == scored.parameters.len(),
-        ) else {
+        let (Some((&factor, own)), true) =
+            (places.split_last(), places.len() == scored.parameters.len())
+        else {
             return Ok(None);
         };
         let set = self.setup(&node.model)?;
@@ -110,7 +109,10 @@ impl Context<'_> {
         let fall = self.samples() * (node.fit.cost / best.predicted.max(f64::MIN_POSITIVE)).ln();
         scored.truncate(PLACES);
         // Without the factor every entry behind it is one place nearer.
-        let own: Vec<usize> = own.iter().map(|&at| at - usize::from(at > factor)).collect();
+        let own: Vec<usize> = own
+            .iter()
+            .map(|&at| at - usize::from(at > factor))
+            .collect();
         let setup = self.setup(&model)?;
         let cost = |x: &[f64]| {
             let squares = estimation::squares(&setup, x, noise);
@@ -149,7 +151,11 @@ impl Context<'_> {
 fn scalings(parameters: usize, factor: f64) -> impl Iterator<Item = Vec<f64>> {
     let usable = factor.is_finite() && factor != 0.0 && parameters <= SCALED;
     let each = [1.0, factor, factor.recip()];
-    let count = if usable { 3_usize.pow(parameters as u32) } else { 1 };
+    let count = if usable {
+        3_usize.pow(parameters as u32)
+    } else {
+        1
+    };
     (0..count).map(move |mut number| {
         (0..parameters)
             .map(|_| {

@@ -6,10 +6,13 @@ mod names;
 mod parser;
 mod resolve;
 mod sort;
+mod start_division;
 mod syntax;
+mod unit_words;
 mod writer;
 
 pub use error::{Position, TextError};
+pub use unit_words::unknown_units;
 
 pub(crate) use names::is_reserved;
 pub(crate) use resolve::Scope;

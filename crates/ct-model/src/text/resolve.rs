@@ -6,6 +6,7 @@ use super::{
     error::{TextError, shown},
     names::{Names, differentiated, is_near},
     sort::sorted,
+    start_division::start_division,
     syntax::{Attribute, Declaration, Equation, Kept, Kind, Node, Syntax},
 };
 use crate::expression::{Condition, Expression, Function, Variable};
@@ -215,7 +216,32 @@ impl Builder<'_> {
             self.unused(declarations)?;
         }
         self.sort(&froms)?;
+        if self.all_used {
+            self.starts(declarations)?;
+        }
         Ok(self.spec)
+    }
+
+    /// A simulation has to begin: no state that starts at zero may be a divisor.
+    fn starts(&self, declarations: &[Declaration]) -> Result<(), TextError> {
+        let Some(division) = start_division(&self.spec) else {
+            return Ok(());
+        };
+        let name = &self.spec.states[division.state].about.name;
+        let mut all = declarations.iter();
+        let declaration = all.find(|declaration| declaration.name == *name);
+        let from = declaration.map_or(0, |declaration| {
+            let mut attributes = declaration.attributes.iter();
+            let start = attributes.find(|(name, ..)| name == "start");
+            start.map_or(declaration.from, |(_, from, _)| *from)
+        });
+        let what = format!(
+            "{} starts at 0, and the equation of {} divides by it, {}: give it another start, `Real {name}(start=...)`",
+            shown(name),
+            shown(&division.of),
+            shown(&division.quotient)
+        );
+        self.error(from, what)
     }
 
     /// The expression that defines each flow, and coefficient and right-hand side of each state, by name.

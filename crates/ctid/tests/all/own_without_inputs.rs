@@ -197,4 +197,8 @@ fn a_column_for_an_output_is_still_asked_for() {
         "compare a.csv --model p.toml",
         &["set theta = \"...\" under [columns]"],
     );
+    place.refuses(
+        "identify a.csv --model ball.toml --method all",
+        &["Ball has no input, and identify fits one output to one input"],
+    );
 }

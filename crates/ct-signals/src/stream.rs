@@ -72,7 +72,7 @@ pub struct Rows {
 /// What a line holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Line {
-    /// Time \[s\] and the first input; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
+    /// Time \[s\] and the first input, NaN where there is none; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
     Row([f64; 2]),
     /// Nothing: it is blank, a comment, or the header again.
     Nothing,
@@ -413,7 +413,12 @@ impl Rows {
         for role in 2..=self.inputs {
             value(role)?;
         }
-        Ok(Line::Row([value(0)?, value(1)?]))
+        let command = if self.inputs == 0 {
+            f64::NAN
+        } else {
+            value(1)?
+        };
+        Ok(Line::Row([value(0)?, command]))
     }
 
     fn check_count(&self, found: usize) -> Result<(), BadLine> {
@@ -673,6 +678,37 @@ mod tests {
         let message = begin("0,4.5,14.8").unwrap_err().to_string();
         assert!(message.contains("3 numbers and no header"), "{message}");
         assert!(message.contains("t,u,y1,y2"), "{message}");
+    }
+
+    #[test]
+    fn rows_of_a_model_without_inputs_have_a_time_and_outputs() {
+        let columns = Columns {
+            without_inputs: true,
+            ..Columns::default()
+        };
+        for (first, order) in [
+            (
+                "t,y [rad]",
+                "a header: \"t\" is the time, \"y [rad]\" the reading",
+            ),
+            (
+                "0,1.5",
+                "no header: the columns are taken as time, reading (t, y)",
+            ),
+        ] {
+            let (mut rows, is_row) = Rows::begin("input", 1, first, &columns).unwrap();
+            assert_eq!(is_row, first == "0,1.5");
+            assert_eq!(rows.order(), order);
+            assert!(matches!(read(&mut rows, "1,2.5"), Ok(Line::Row([1.0, _]))));
+            assert_eq!(rows.outputs(), [Ok(2.5)]);
+            assert_eq!(rows.inputs().count(), 0);
+            // The row stays where its reading is missing.
+            assert!(matches!(read(&mut rows, "2,"), Ok(Line::Row([2.0, _]))));
+            assert!(rows.outputs()[0].is_err());
+        }
+        let (mut rows, _) = Rows::begin("input", 1, "u,t,y", &columns).unwrap();
+        read(&mut rows, "7,1,2.5").unwrap();
+        assert_eq!(rows.outputs(), [Ok(2.5)]);
     }
 
     #[test]

@@ -57,13 +57,13 @@ fn unknown_word(unit: &str) -> Option<&str> {
         (word, word.trim_end_matches(|c: char| c.is_ascii_digit()))
     });
     let known = |word: &str| {
-        let prefixed = |prefix: &&str| {
-            let rest = word.strip_prefix(*prefix);
+        let prefixed = |prefix: &str| {
+            let rest = word.strip_prefix(prefix);
             rest.is_some_and(|rest| OTHER.contains(&rest))
         };
         Unit::parse(word).is_some()
             || OTHER.contains(&word)
-            || PREFIXES.iter().any(|p| prefixed(&p))
+            || PREFIXES.iter().any(|prefix| prefixed(prefix))
     };
     words
         .filter(|(word, _)| !word.is_empty())

@@ -52,4 +52,12 @@ impl ModelSpec {
     pub fn parse(text: &str) -> Result<Self, TextError> {
         resolve::resolve(text, parser::parse(text)?)
     }
+
+    /// The same, of a model that is to be simulated from its declared starts: a division by a state that starts at zero is refused.
+    ///
+    /// # Errors
+    /// As [`ModelSpec::parse`].
+    pub fn parse_to_simulate(text: &str) -> Result<Self, TextError> {
+        resolve::resolve_to_simulate(text, parser::parse(text)?)
+    }
 }

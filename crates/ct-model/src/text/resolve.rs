@@ -13,21 +13,32 @@ use crate::expression::{Condition, Expression, Function, Variable};
 use crate::spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
 
 pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
-    resolve_with(text, syntax, true)
+    resolve_with(text, syntax, true, false)
+}
+
+/// The same, and what cannot be simulated from its declared starts is refused.
+pub(crate) fn resolve_to_simulate(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
+    resolve_with(text, syntax, true, true)
 }
 
 /// The text of an effect: it may declare what it does not use.
 pub(crate) fn resolve_effect(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
-    resolve_with(text, syntax, false)
+    resolve_with(text, syntax, false, false)
 }
 
-fn resolve_with(text: &str, syntax: Syntax, all_used: bool) -> Result<ModelSpec, TextError> {
+fn resolve_with(
+    text: &str,
+    syntax: Syntax,
+    all_used: bool,
+    begins: bool,
+) -> Result<ModelSpec, TextError> {
     let names = Names::of(text, &syntax)?;
     let builder = Builder {
         text,
         names,
         used: BTreeSet::new(),
         all_used,
+        begins,
         spec: ModelSpec {
             name: syntax.name,
             description: syntax.description,
@@ -48,6 +59,8 @@ struct Builder<'a> {
     used: BTreeSet<Variable>,
     /// What is declared has to be used.
     all_used: bool,
+    /// A simulation has to begin at the declared starts.
+    begins: bool,
     spec: ModelSpec,
 }
 
@@ -68,6 +81,7 @@ impl<'a> Scope<'a> {
             names: Names::of_model(self.spec),
             used: BTreeSet::new(),
             all_used: false,
+            begins: false,
             spec: self.spec.clone(),
         }
     }
@@ -216,7 +230,7 @@ impl Builder<'_> {
             self.unused(declarations)?;
         }
         self.sort(&froms)?;
-        if self.all_used {
+        if self.begins {
             self.starts(declarations)?;
         }
         Ok(self.spec)

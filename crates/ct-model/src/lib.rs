@@ -39,7 +39,8 @@
 //!   are read and mean nothing more.
 //! - Everything else is refused ([`TextError`]). An unknown name is an error, never zero.
 //!
-//! [`ModelSpec`] prints as text that reads back as the same model ([`ModelSpec::parse`]). [`unit_warnings`] says where units do not fit together.
+//! [`ModelSpec`] prints as text that reads back as the same model ([`ModelSpec::parse`]). [`unit_warnings`] says where units do not fit together,
+//! [`unknown_units`] which are none.
 //!
 //! **Reference**: Modelica Association, Modelica - A Unified Object-Oriented Language for Systems Modeling, Language Specification 3.6, 2023:
 //! appendix A for the grammar of expressions.
@@ -61,5 +62,5 @@ pub use linearity::Linearity;
 pub use scalar::{Dual, Scalar};
 pub use simulation::{Method, Model, NoSolution, Simulation};
 pub use spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
-pub use text::{Position, TextError};
+pub use text::{Position, TextError, unknown_units};
 pub use units::{UnitWarning, unit_warnings};

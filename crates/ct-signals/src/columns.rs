@@ -30,6 +30,8 @@ pub struct Columns {
     pub time_zone: Option<String>,
     /// Words and numbers that stand in cells whose sample is missing, beside the usual ones: `-999`, `Offline`.
     pub missing: Vec<String>,
+    /// The model has no inputs: none is guessed. It follows from the model and is not written down.
+    pub without_inputs: bool,
 }
 
 /// The same as a model file writes it: one name or a list of them.
@@ -109,6 +111,7 @@ impl From<Named> for Columns {
             time_format: named.time_format,
             time_zone: named.time_zone,
             missing: named.missing,
+            without_inputs: false,
         }
     }
 }
@@ -351,6 +354,9 @@ impl Columns {
         ] {
             let first_input = self.inputs.first().is_some_and(String::is_empty);
             let optional = role.name == OUTPUT.name && purpose == Purpose::Simulation;
+            if role.name == INPUT.name && self.without_inputs {
+                continue;
+            }
             if optional && columns.is_empty() {
                 if self.outputs.is_empty() {
                     columns.extend(header.guess(role, &taken).ok().flatten());

@@ -72,7 +72,7 @@ pub struct Rows {
 /// What a line holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Line {
-    /// Time \[s\] and the first input; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
+    /// Time \[s\] and the first input, NaN where there is none; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
     Row([f64; 2]),
     /// Nothing: it is blank, a comment, or the header again.
     Nothing,
@@ -192,9 +192,11 @@ impl Rows {
         };
         if is_row(&cells, columns) {
             let outputs = columns.outputs.len().max(1);
-            let input = match cells.len().checked_sub(outputs) {
-                Some(2) => 1,
-                Some(3) => 2,
+            // Where the first channel stands: behind the time, or behind the reference that follows it.
+            let inputs = usize::from(!columns.without_inputs);
+            let first = match cells.len().checked_sub(outputs + inputs) {
+                Some(1) => 1,
+                Some(2) if inputs > 0 => 2,
                 _ => {
                     return Err(Error::NoOrder {
                         file: file.into(),
@@ -204,15 +206,16 @@ impl Rows {
                     });
                 }
             };
-            rows.at = std::iter::once(0).chain(input..=input + outputs).collect();
+            rows.inputs = inputs;
+            let channels = inputs + outputs;
+            rows.at = std::iter::once(0).chain(first..first + channels).collect();
             let named = |names: &[String], at: usize| {
                 let name = names.get(at).filter(|name| !name.is_empty());
                 name.cloned().unwrap_or_default()
             };
-            rows.names = vec![
-                columns.time.clone().unwrap_or_default(),
-                named(&columns.inputs, 0),
-            ];
+            rows.names = vec![columns.time.clone().unwrap_or_default()];
+            rows.names
+                .extend((0..inputs).map(|input| named(&columns.inputs, input)));
             rows.names
                 .extend((0..outputs).map(|output| named(&columns.outputs, output)));
             let units = rows.names[1..].iter();
@@ -221,10 +224,11 @@ impl Rows {
                 .collect();
             for (i, name) in rows.names.iter_mut().enumerate() {
                 if name.is_empty() {
-                    *name = ROLES[i.min(ROLES.len() - 1)].to_string();
+                    let role = if i > inputs { ROLES.len() - 1 } else { i };
+                    *name = ROLES[role].to_string();
                 }
             }
-            rows.conversions = vec![None; outputs + 1];
+            rows.conversions = vec![None; channels];
             rows.seconds = columns.time_header().1;
             rows.values = vec![Ok(f64::NAN); rows.at.len()];
             return Ok((rows, true));
@@ -342,15 +346,14 @@ impl Rows {
                 let names = names.iter().map(|name| format!("\"{}\"", quoted(name)));
                 names.collect::<Vec<_>>().join(", ")
             };
-            let command = if inputs.len() == 1 {
-                "command"
-            } else {
-                "inputs"
+            let inputs = match inputs.len() {
+                0 => String::new(),
+                1 => format!(" {} the command,", list(inputs)),
+                _ => format!(" {} the inputs,", list(inputs)),
             };
             return format!(
-                "a header: \"{}\" is the time, {} the {command}, {} the {readings}",
+                "a header: \"{}\" is the time,{inputs} {} the {readings}",
                 quoted(&self.names[0]),
-                list(inputs),
                 list(outputs)
             );
         }
@@ -359,8 +362,12 @@ impl Rows {
         } else {
             ("", "")
         };
+        let (command, u) = match inputs.len() {
+            0 => ("", ""),
+            _ => (" command,", " u,"),
+        };
         format!(
-            "no header: the columns are taken as time,{reference} command, {readings} (t,{r} u, {})",
+            "no header: the columns are taken as time,{reference}{command} {readings} (t,{r}{u} {})",
             letters(outputs.len(), ", ")
         )
     }
@@ -406,7 +413,12 @@ impl Rows {
         for role in 2..=self.inputs {
             value(role)?;
         }
-        Ok(Line::Row([value(0)?, value(1)?]))
+        let command = if self.inputs == 0 {
+            f64::NAN
+        } else {
+            value(1)?
+        };
+        Ok(Line::Row([value(0)?, command]))
     }
 
     fn check_count(&self, found: usize) -> Result<(), BadLine> {
@@ -666,6 +678,37 @@ mod tests {
         let message = begin("0,4.5,14.8").unwrap_err().to_string();
         assert!(message.contains("3 numbers and no header"), "{message}");
         assert!(message.contains("t,u,y1,y2"), "{message}");
+    }
+
+    #[test]
+    fn rows_of_a_model_without_inputs_have_a_time_and_outputs() {
+        let columns = Columns {
+            without_inputs: true,
+            ..Columns::default()
+        };
+        for (first, order) in [
+            (
+                "t,y [rad]",
+                "a header: \"t\" is the time, \"y [rad]\" the reading",
+            ),
+            (
+                "0,1.5",
+                "no header: the columns are taken as time, reading (t, y)",
+            ),
+        ] {
+            let (mut rows, is_row) = Rows::begin("input", 1, first, &columns).unwrap();
+            assert_eq!(is_row, first == "0,1.5");
+            assert_eq!(rows.order(), order);
+            assert!(matches!(read(&mut rows, "1,2.5"), Ok(Line::Row([1.0, _]))));
+            assert_eq!(rows.outputs(), [Ok(2.5)]);
+            assert_eq!(rows.inputs().count(), 0);
+            // The row stays where its reading is missing.
+            assert!(matches!(read(&mut rows, "2,"), Ok(Line::Row([2.0, _]))));
+            assert!(rows.outputs()[0].is_err());
+        }
+        let (mut rows, _) = Rows::begin("input", 1, "u,t,y", &columns).unwrap();
+        read(&mut rows, "7,1,2.5").unwrap();
+        assert_eq!(rows.outputs(), [Ok(2.5)]);
     }
 
     #[test]

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use ct_model::{About, Given, Linearity, ModelSpec, Variable, unit_warnings};
+use ct_model::{About, Given, Linearity, ModelSpec, Variable, unit_warnings, unknown_units};
 use ct_signals::{escaped, shown};
 
 use crate::Error;
 use crate::look::{Look, Side, table};
+use crate::model_file;
 use crate::own_model::{self, AnyModelFile};
 
 /// Reads a model and says what it holds; of a model file the model that it names, with its effects in it.
@@ -15,15 +16,30 @@ use crate::own_model::{self, AnyModelFile};
 /// One line that names the file, line and column, what is wrong and the mend.
 pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     if path.extension().is_none_or(|kind| kind != "toml") {
-        return Ok(said(&own_model::read_model(path)?, look));
+        return Ok(said(&own_model::read_model(path)?, look) + &unknown(path, look));
     }
     match AnyModelFile::read(path)?.with_effects()? {
-        AnyModelFile::Own(file) => Ok(said(file.model.spec(), look)),
+        AnyModelFile::Own(file) => Ok(said(file.model.spec(), look) + &unknown(&file.text, look)),
         AnyModelFile::Plant(_) => Err(Error::file(
             path,
             "it names one of the plants, which has no text to check: `ctid effects --model` lists what may be added to it",
         )),
     }
+}
+
+/// Warnings of units that are none, each with its place in the text.
+fn unknown(path: &Path, look: Look) -> String {
+    // What cannot be read twice, as a pipe, was read as a model.
+    let Ok(text) = model_file::read_text(path) else {
+        return String::new();
+    };
+    let file = path.display();
+    let all = unknown_units(&text).unwrap_or_default();
+    let lines = all.iter().map(|unit| {
+        let words = format!("warning: {file}:{unit}");
+        look.warning(&words) + "\n"
+    });
+    lines.collect()
 }
 
 /// What a model holds, in words.

@@ -40,6 +40,7 @@ impl Context<'_> {
                 let trials: Vec<_> = trials
                     .into_iter()
                     .filter(|trial| !last.added.contains(&trial.candidate))
+                    .filter(|trial| !self.repeats_one_of(trial.candidate, &last.added))
                     .filter(|trial| trial.fall > PREDICTED_SHARE * fall - PREDICTED_MARGIN)
                     .take(REFITS)
                     .collect();

@@ -11,6 +11,7 @@ mod accept;
 mod believed;
 mod diagnose;
 mod error;
+mod factor_score;
 mod groups;
 mod held_out;
 mod joined;

@@ -184,6 +184,26 @@ impl Context<'_> {
             .collect()
     }
 
+    /// Whether a candidate may be added to a set: one that repeats another only beside that one, as alone the two are the same.
+    pub fn may_stand_beside(&self, candidate: usize, added: &[usize]) -> bool {
+        let repeated = self.candidates[candidate].repeats.as_ref();
+        repeated.is_none_or(|id| added.iter().any(|&i| self.candidates[i].id == *id))
+    }
+
+    /// Whether a candidate is, under another name, one of a set.
+    pub fn repeats_one_of(&self, candidate: usize, added: &[usize]) -> bool {
+        let first = |mut i: usize| {
+            // A candidate repeats one that stands before it.
+            while let Some(id) = &self.candidates[i].repeats
+                && let Some(before) = self.candidates[..i].iter().position(|c| c.id == *id)
+            {
+                i = before;
+            }
+            i
+        };
+        added.iter().any(|&i| first(i) == first(candidate))
+    }
+
     pub fn samples(&self) -> f64 {
         let outputs = self.problem.records.iter().flat_map(|r| &r.outputs);
         outputs.map(|y| y.values.len() - y.missing()).sum::<usize>() as f64

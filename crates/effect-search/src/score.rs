@@ -22,7 +22,7 @@ use crate::spectral_line::strongest_line;
 /// More starts of a candidate than this are thinned out.
 const MOST_STARTS: usize = 24;
 /// Damping of the predicted step, against what the data do not determine.
-const DAMPING: f64 = 1e-9;
+pub(crate) const DAMPING: f64 = 1e-9;
 /// From so many of the best starts of a threshold or a shape a candidate is fitted.
 const PLACES: usize = 2;
 /// So many of the best starts of a threshold are linearised by all parameters.
@@ -38,6 +38,17 @@ pub(crate) struct Trial {
     pub starts: Vec<Vec<f64>>,
     /// Predicted fall of the deviance.
     pub fall: f64,
+}
+
+/// The starts, or as many of them as are linearised.
+pub(crate) fn thinned(starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    if starts.len() <= MOST_STARTS {
+        return starts;
+    }
+    let every = starts.len() as f64 / MOST_STARTS as f64;
+    (0..MOST_STARTS)
+        .map(|k| starts[(k as f64 * every) as usize].clone())
+        .collect()
 }
 
 /// A start of a candidate's fit.
@@ -86,7 +97,7 @@ impl Context<'_> {
         let others: Vec<usize> = among
             .iter()
             .copied()
-            .filter(|i| !node.added.contains(i))
+            .filter(|i| !node.added.contains(i) && self.may_stand_beside(*i, &node.added))
             .collect();
         let Some(known) = self.rows_of(node) else {
             return Vec::new();
@@ -126,6 +137,9 @@ impl Context<'_> {
         noise: &Noise,
     ) -> Result<Option<Trial>, Error> {
         let candidate = &self.candidates[i];
+        if let Some(scored) = candidate.with_factor(&self.problem.spec) {
+            return self.trial_by_factor(node, known, i, &scored, noise);
+        }
         let mut added = node.added.clone();
         added.push(i);
         let model = Arc::new(self.model(&added)?);
@@ -171,13 +185,7 @@ impl Context<'_> {
                 }
             }
         }
-        let ways = starts.len();
-        if ways > MOST_STARTS {
-            let every = ways as f64 / MOST_STARTS as f64;
-            starts = (0..MOST_STARTS)
-                .map(|k| starts[(k as f64 * every) as usize].clone())
-                .collect();
-        }
+        let starts = thinned(starts);
         let count = self.samples();
         let set = self.setup(&node.model)?;
         let columns = self.columns_beside(node, &set, &setup);

@@ -92,9 +92,19 @@ impl Context<'_> {
             beam.extend(fits);
         }
         let many = (trials.len() / 2).max(ALWAYS).min(trials.len());
+        let mut among: Vec<usize> = trials[..many].iter().map(|t| t.candidate).collect();
+        // What repeats one of them has no score before that is there.
+        for i in 0..self.candidates.len() {
+            if self.candidates[i].repeats.is_some()
+                && !among.contains(&i)
+                && self.may_stand_beside(i, &among)
+            {
+                among.push(i);
+            }
+        }
         let grown = Grown {
             best: base.clone(),
-            among: trials[..many].iter().map(|t| t.candidate).collect(),
+            among,
             cut_short: self.limit.passed(share),
             base,
             fitted: singles.iter().chain(&beam[few..]).cloned().collect(),

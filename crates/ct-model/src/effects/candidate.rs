@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::effect::{Effect, Place, Role, Starts};
-use super::fragment::{Counts, Fragment, instance};
+use super::fragment::{Action, Counts, Fragment, instance};
 use super::port::Port;
 use super::scale::{Scales, balance_unit, divided};
 use super::visited::{Span, Visited};
 use super::{all_effects, domain};
-use crate::expression::Variable;
-use crate::spec::{Given, ModelSpec};
+use crate::expression::{Expression, Operator, Variable};
+use crate::spec::{About, Given, ModelSpec, Parameter};
 use crate::text::is_reserved;
 
 /// A parameter of an effect at a port.
@@ -47,6 +47,9 @@ pub struct Candidate {
     /// What of the record it is written in, by the names of its text ([`Effect::record_numbers`]): given again to [`candidates_keeping`] it
     /// means the same beside another record.
     pub record_numbers: BTreeMap<&'static str, f64>,
+    /// The candidate of the model file, by its identifier, that this one repeats with states and parameters of its own: a second RC pair. Alone
+    /// the two are the same.
+    pub repeats: Option<String>,
     pub(super) fragment: Fragment,
     /// Names of its variables begin with this.
     pub(super) stem: String,
@@ -59,6 +62,63 @@ impl Candidate {
     pub fn is_smooth(&self) -> bool {
         let mut roles = self.parameters.iter().map(|parameter| parameter.role);
         roles.all(|role| matches!(role, Role::Size | Role::Shape))
+    }
+
+    /// The candidate with a factor before every term, which is zero where the effect is not there and one where it is; `None` where the
+    /// parameters of the candidate have such values themselves.
+    ///
+    /// No values of resistance and capacity take an RC pair out of a model: only their limit does. The factor makes the score test possible; it
+    /// is not fitted, and stands in no model but that of the score. It is the last parameter, and may be negative where another one may.
+    #[must_use]
+    pub fn with_factor(&self, spec: &ModelSpec) -> Option<Self> {
+        let mut roles = self.parameters.iter().map(|parameter| parameter.role);
+        let Action::Add(terms) = &self.fragment.action else {
+            return None;
+        };
+        if self.effect.is_some() || !roles.all(|role| role == Role::Shape) {
+            return None;
+        }
+        let own = self.parameters.iter();
+        let signed = own.clone().any(|parameter| parameter.bounds.0 < 0.0);
+        let mut name = format!("{}_factor", self.stem);
+        let taken = |name: &str| own.clone().any(|parameter| parameter.name == name);
+        while taken(&name) || spec.find(&name).is_some() {
+            name.push('_');
+        }
+        let about = About {
+            name: name.clone(),
+            min: if signed { f64::NEG_INFINITY } else { 0.0 },
+            max: f64::INFINITY,
+            ..About::default()
+        };
+        let factor = Variable::Parameter(spec.parameters.len() + self.fragment.parameters.len());
+        let scaled = |term: &Expression| {
+            Expression::Binary(
+                Operator::Multiply,
+                Box::new(Expression::Variable(factor)),
+                Box::new(term.clone()),
+            )
+        };
+        let terms = terms.iter().map(|(target, term)| (*target, scaled(term)));
+        let mut candidate = self.clone();
+        candidate.fragment.action = Action::Add(terms.collect());
+        candidate.parameters.push(EffectParameter {
+            name,
+            short: "factor".to_string(),
+            unit: String::new(),
+            description: String::new(),
+            role: Role::Size,
+            absent: 0.0,
+            bounds: (about.min, about.max),
+            starts: vec![1.0],
+        });
+        candidate.fragment.parameters.push(Parameter {
+            about,
+            value: 0.0,
+            definition: None,
+            given: Given::Fitted,
+        });
+        Some(candidate)
     }
 
     /// How many parameters are fitted.
@@ -363,6 +423,7 @@ fn candidate(
         effect: Some(effect),
         parameters: parameters.collect(),
         record_numbers,
+        repeats: None,
         fragment,
         stem: String::new(),
     };

@@ -10,6 +10,10 @@ use crate::expression::{Expression, Variable};
 use crate::spec::{About, Given, ModelSpec, Parameter, State};
 use crate::text::{Scope, TextError, is_reserved};
 
+/// Parameters of an effect that is absent only in a limit start so many times smaller and larger too: a time constant that is a product or a
+/// quotient of two is then scored over four decades.
+const DECADE: f64 = 10.0;
+
 /// A candidate as the model file has it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OwnCandidate {
@@ -57,7 +61,8 @@ pub struct OwnError {
     pub what: String,
 }
 
-/// Reads candidates of the model file in the scope of a model, and says where two are the same.
+/// Reads candidates of the model file in the scope of a model, and refuses two that are the same. One that brings a state may stand there
+/// again, under another name: two RC pairs are more than one ([`Candidate::repeats`]).
 ///
 /// # Errors
 /// The place in the model file and in the expression, what is wrong and the mend.
@@ -67,7 +72,7 @@ pub fn own_candidates(
 ) -> Result<Vec<Candidate>, OwnError> {
     let mut read: Vec<Candidate> = Vec::new();
     for (name, own) in all {
-        let candidate = own_candidate(spec, name, own)?;
+        let mut candidate = own_candidate(spec, name, own)?;
         let same = |other: &&Candidate| {
             let (a, b) = (&other.fragment, &candidate.fragment);
             let rights = |fragment: &Fragment| -> Vec<(Option<Expression>, Expression)> {
@@ -78,11 +83,14 @@ pub fn own_candidates(
             };
             a.action == b.action && rights(a) == rights(b)
         };
-        if let Some(other) = read.iter().find(same) {
-            return Err(OwnError {
-                place: vec![name.clone()],
-                what: format!("it is the same as {}: keep one of them", other.id),
-            });
+        if let Some(other) = read.iter().rfind(same) {
+            if candidate.fragment.states.is_empty() {
+                return Err(OwnError {
+                    place: vec![name.clone()],
+                    what: format!("it is the same as {}: keep one of them", other.id),
+                });
+            }
+            candidate.repeats = Some(other.id.clone());
         }
         read.push(candidate);
     }
@@ -219,11 +227,10 @@ pub fn own_candidate(
             "it has no parameter: give it one that makes its terms vanish at zero, as a factor";
         return Err(error(&[], what.to_string()));
     }
+    // Without such values every parameter is a shape: the effect is absent only in a limit ([`Candidate::with_factor`]).
     let sizes = sizes(&scope, counts, &states, &terms);
-    let Some(sizes) = sizes else {
-        let what = "no values of its parameters make its terms vanish: give every term a parameter as a factor, which is zero where the effect is not there";
-        return Err(error(&[], what.to_string()));
-    };
+    let in_limit = sizes.is_none();
+    let sizes = sizes.unwrap_or_else(|| vec![false; own.parameters.len()]);
     if let Some(i) = (0..sizes.len()).find(|&i| {
         let about = &scope.parameters[counts.parameters + i].about;
         sizes[i] && (about.min > 0.0 || about.max < 0.0)
@@ -242,7 +249,9 @@ pub fn own_candidate(
             if is_size {
                 parameter.value = 0.0;
             }
-            let starts = if !is_size {
+            let starts = if in_limit {
+                vec![start, start / DECADE, start * DECADE]
+            } else if !is_size {
                 vec![start, start / 4.0, start * 4.0]
             } else if about.min < 0.0 {
                 vec![start, -start]
@@ -269,6 +278,7 @@ pub fn own_candidate(
         effect: None,
         parameters: effect.collect(),
         record_numbers: BTreeMap::new(),
+        repeats: None,
         fragment: Fragment {
             parameters,
             states,

@@ -6,10 +6,13 @@ mod names;
 mod parser;
 mod resolve;
 mod sort;
+mod start_division;
 mod syntax;
+mod unit_words;
 mod writer;
 
 pub use error::{Position, TextError};
+pub use unit_words::unknown_units;
 
 pub(crate) use names::is_reserved;
 pub(crate) use resolve::Scope;
@@ -48,5 +51,13 @@ impl ModelSpec {
     /// One line with the place in the text, what is wrong and the mend.
     pub fn parse(text: &str) -> Result<Self, TextError> {
         resolve::resolve(text, parser::parse(text)?)
+    }
+
+    /// The same, of a model that is to be simulated from its declared starts: a division by a state that starts at zero is refused.
+    ///
+    /// # Errors
+    /// As [`ModelSpec::parse`].
+    pub fn parse_to_simulate(text: &str) -> Result<Self, TextError> {
+        resolve::resolve_to_simulate(text, parser::parse(text)?)
     }
 }

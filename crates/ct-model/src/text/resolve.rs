@@ -6,27 +6,39 @@ use super::{
     error::{TextError, shown},
     names::{Names, differentiated, is_near},
     sort::sorted,
+    start_division::start_division,
     syntax::{Attribute, Declaration, Equation, Kept, Kind, Node, Syntax},
 };
 use crate::expression::{Condition, Expression, Function, Variable};
 use crate::spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
 
 pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
-    resolve_with(text, syntax, true)
+    resolve_with(text, syntax, true, false)
+}
+
+/// The same, and what cannot be simulated from its declared starts is refused.
+pub(crate) fn resolve_to_simulate(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
+    resolve_with(text, syntax, true, true)
 }
 
 /// The text of an effect: it may declare what it does not use.
 pub(crate) fn resolve_effect(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
-    resolve_with(text, syntax, false)
+    resolve_with(text, syntax, false, false)
 }
 
-fn resolve_with(text: &str, syntax: Syntax, all_used: bool) -> Result<ModelSpec, TextError> {
+fn resolve_with(
+    text: &str,
+    syntax: Syntax,
+    all_used: bool,
+    begins: bool,
+) -> Result<ModelSpec, TextError> {
     let names = Names::of(text, &syntax)?;
     let builder = Builder {
         text,
         names,
         used: BTreeSet::new(),
         all_used,
+        begins,
         spec: ModelSpec {
             name: syntax.name,
             description: syntax.description,
@@ -47,6 +59,8 @@ struct Builder<'a> {
     used: BTreeSet<Variable>,
     /// What is declared has to be used.
     all_used: bool,
+    /// A simulation has to begin at the declared starts.
+    begins: bool,
     spec: ModelSpec,
 }
 
@@ -67,6 +81,7 @@ impl<'a> Scope<'a> {
             names: Names::of_model(self.spec),
             used: BTreeSet::new(),
             all_used: false,
+            begins: false,
             spec: self.spec.clone(),
         }
     }
@@ -215,7 +230,32 @@ impl Builder<'_> {
             self.unused(declarations)?;
         }
         self.sort(&froms)?;
+        if self.begins {
+            self.starts(declarations)?;
+        }
         Ok(self.spec)
+    }
+
+    /// A simulation has to begin: no state that starts at zero may be a divisor.
+    fn starts(&self, declarations: &[Declaration]) -> Result<(), TextError> {
+        let Some(division) = start_division(&self.spec) else {
+            return Ok(());
+        };
+        let name = &self.spec.states[division.state].about.name;
+        let mut all = declarations.iter();
+        let declaration = all.find(|declaration| declaration.name == *name);
+        let from = declaration.map_or(0, |declaration| {
+            let mut attributes = declaration.attributes.iter();
+            let start = attributes.find(|(name, ..)| name == "start");
+            start.map_or(declaration.from, |(_, from, _)| *from)
+        });
+        let what = format!(
+            "{} starts at 0, and the equation of {} divides by it, {}: give it another start, `Real {name}(start=...)`",
+            shown(name),
+            shown(&division.of),
+            shown(&division.quotient)
+        );
+        self.error(from, what)
     }
 
     /// The expression that defines each flow, and coefficient and right-hand side of each state, by name.

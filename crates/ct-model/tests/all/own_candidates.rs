@@ -181,10 +181,6 @@ fn what_is_wrong_is_said_with_its_place() {
         "radiation.parameters.e: it is used nowhere",
     );
     refused(
-        &own(&e, &[("T", "-(1 + e)*T")]),
-        "radiation: no values of its parameters make its terms vanish",
-    );
-    refused(
         &own(&[("k", 1.0)], &[("T", "-k*T")]),
         "radiation.parameters.k: `k` is a variable of Block",
     );
@@ -228,4 +224,53 @@ fn two_candidates_that_are_the_same_are_refused() {
     assert_eq!(error, "other: it is the same as one: keep one of them");
     let all = BTreeMap::from([("one".to_string(), one)]);
     assert_eq!(own_candidates(&block(), &all).unwrap().len(), 1);
+}
+
+/// A store whose exchange with the block has no values at which it is absent: its resistance is a divisor.
+fn pair() -> OwnCandidate {
+    let mut pair = own(&[("C1", 100.0), ("R1", 2.0)], &[("y", "-v1")]);
+    let state = OwnState {
+        equation: "C1*der(v1) = u - v1/R1".to_string(),
+        ..OwnState::default()
+    };
+    pair.states.insert("v1".to_string(), state);
+    pair
+}
+
+#[test]
+fn a_candidate_whose_absence_is_a_limit_is_scored_with_a_factor() {
+    let block = block();
+    let candidate = own_candidate(&block, "pair", &pair()).unwrap();
+    assert!(candidate.parameters.iter().all(|p| p.role == Role::Shape));
+    assert_eq!(candidate.parameters[1].starts, [2.0, 0.2, 20.0]);
+    let scored = candidate.with_factor(&block).unwrap();
+    assert_eq!(scored.parameters.len(), 3);
+    let factor = &scored.parameters[2];
+    assert_eq!((factor.role, factor.absent), (Role::Size, 0.0));
+    assert_eq!(factor.bounds, (0.0, f64::INFINITY));
+    // The factor is in the model of the score alone.
+    let text = apply(&block, &[&scored]).unwrap().to_string();
+    assert!(
+        text.contains("y = y_true + pair_factor*(-pair_v1);"),
+        "{text}"
+    );
+    let text = apply(&block, &[&candidate]).unwrap().to_string();
+    assert!(text.contains("y = y_true - pair_v1;"), "{text}");
+    assert!(!text.contains("factor"), "{text}");
+    // What its own parameters take out of the model needs none.
+    let size = own(&[("e", 1.0)], &[("T", "-e*T")]);
+    let size = own_candidate(&block, "radiation", &size).unwrap();
+    assert_eq!(size.with_factor(&block), None);
+    let term = own(&[("e", 1.0)], &[("T", "-(1 + e)*T")]);
+    let term = own_candidate(&block, "term", &term).unwrap();
+    assert!(term.with_factor(&block).is_some());
+}
+
+#[test]
+fn a_candidate_with_a_state_may_be_repeated() {
+    let names = ["one", "two", "three"].map(|name| (name.to_string(), pair()));
+    let all = own_candidates(&block(), &BTreeMap::from(names)).unwrap();
+    let repeats: Vec<Option<&str>> = all.iter().map(|c| c.repeats.as_deref()).collect();
+    // In the order of their names.
+    assert_eq!(repeats, [None, Some("one"), Some("three")]);
 }

@@ -390,7 +390,7 @@ pub(crate) fn conversion(
 /// One line that names the file, line and column, what is wrong and the mend.
 pub(crate) fn read_model(path: &Path) -> Result<ModelSpec, Error> {
     let text = model_file::read_text(path)?;
-    ModelSpec::parse(&text).map_err(|source| Error::Text {
+    ModelSpec::parse_to_simulate(&text).map_err(|source| Error::Text {
         file: path.display().to_string(),
         source,
     })
@@ -459,5 +459,6 @@ fn columns(spec: &ModelSpec, raw: &Raw, source: &Source) -> Result<Columns, Erro
         time_format: one("time_format")?,
         time_zone,
         missing,
+        without_inputs: inputs.is_empty(),
     })
 }

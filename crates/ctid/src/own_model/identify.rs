@@ -86,6 +86,13 @@ impl<'f> OneByOne<'f> {
             .map(|output| spec.about(output.variable).name.as_str())
             .collect();
         let chosen = |what: &str, names: &[&str], wanted: Option<&str>| match (wanted, names) {
+            (_, []) => Err(Error::file(
+                path,
+                format!(
+                    "{} has no {what}, and identify fits one output to one input: fit it with `ctid compare`, or give the columns by --columns",
+                    spec.name
+                ),
+            )),
             (None, [_]) => Ok(0),
             (None, _) => Err(Error::file(
                 path,

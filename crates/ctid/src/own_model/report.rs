@@ -240,10 +240,7 @@ fn of_step(
         let series = fitted.iter().enumerate().map(|(r, record)| Series {
             name: &record.name,
             time: &record.time,
-            input: record
-                .inputs
-                .first()
-                .map_or(&record.time, |input| &input.values),
+            input: record.inputs.first().map_or(&[][..], |input| &input.values),
             model: &step.simulated[r * count + o],
             residual: &residuals[r * count + o],
         });

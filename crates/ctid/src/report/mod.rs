@@ -414,6 +414,17 @@ fn residual_tests(diagnosis: &Diagnosis) -> String {
         });
         escape(&said.collect::<Vec<_>>().join(" "))
     };
+    // A model may have no input.
+    let records = &diagnosis.records;
+    let has_input = records.is_empty() || records.iter().any(|one| !one.inputs.is_empty());
+    let input = figure_with(
+        "cross-correlation",
+        "Residual against past input",
+        &format!(
+            "<span id=\"input-test\">{}</span> Both were whitened first.",
+            said(|tests| text::input_test(tests.input_p))
+        ),
+    );
     section(
         "tests",
         "Is anything left in the residual?",
@@ -429,14 +440,7 @@ fn residual_tests(diagnosis: &Diagnosis) -> String {
                     said(|tests| text::whiteness(tests.whiteness_p))
                 )
             ),
-            figure_with(
-                "cross-correlation",
-                "Residual against past input",
-                &format!(
-                    "<span id=\"input-test\">{}</span> Both were whitened first.",
-                    said(|tests| text::input_test(tests.input_p))
-                )
-            )
+            if has_input { input } else { String::new() }
         ),
     )
 }

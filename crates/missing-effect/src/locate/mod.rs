@@ -24,7 +24,7 @@ pub struct Series<'a> {
     pub name: &'a str,
     /// Sampling instants, rising \[s\].
     pub time: &'a [f64],
-    /// The input that the residual is shown against \[`input_unit`\].
+    /// The input that the residual is shown against \[`input_unit`\]; empty where the model has none.
     pub input: &'a [f64],
     /// What the model gives \[`output_unit`\].
     pub model: &'a [f64],
@@ -214,7 +214,12 @@ pub fn locate(located: &Located) -> Failures {
         |signal: fn(&Series) -> Vec<f64>| series.iter().flat_map(signal).collect::<Vec<f64>>();
     let residual = of_all(|one| one.residual.to_vec());
     let by_level = by(&of_all(|one| one.model.to_vec()), &residual, longest);
-    let by_flow = by(&of_all(|one| one.input.to_vec()), &residual, longest);
+    let input = of_all(|one| one.input.to_vec());
+    let by_flow = if input.is_empty() {
+        Vec::new()
+    } else {
+        by(&input, &residual, longest)
+    };
     let by_direction = by_direction(&of_all(|one| rates(one).collect()), &residual, longest);
     let mut failures = Failures {
         by_time,

@@ -1,0 +1,72 @@
+//! Units of a text that are no units.
+
+use ct_signals::Unit;
+
+use super::error::{TextError, shown};
+use super::parser;
+use super::syntax::Attribute;
+
+/// Units that are known as words beside those that are converted. Prefixes of the SI may stand before them.
+const OTHER: [&str; 33] = [
+    "H", "S", "T", "Wb", "F", "C", "cd", "lm", "lx", "Bq", "Gy", "Sv", "kat", "sr", "dB", "B",
+    "pH", "mmHg", "inHg", "Torr", "torr", "mmH2O", "inH2O", "mH2O", "cal", "BTU", "Btu", "eV", "M",
+    "ppb", "var", "VAr", "kgf",
+];
+const PREFIXES: [&str; 14] = [
+    "da", "n", "u", "\u{b5}", "\u{3bc}", "m", "c", "d", "h", "k", "M", "G", "T", "p",
+];
+
+/// The words in units of a model's text that are no units, with their places: a slip of the pen as a rule. Such a unit fits everything, so that
+/// nothing is checked or converted by it.
+///
+/// # Errors
+/// As [`crate::ModelSpec::parse`].
+pub fn unknown_units(text: &str) -> Result<Vec<TextError>, TextError> {
+    let syntax = parser::parse(text)?;
+    let attributes = syntax.declarations.iter().flat_map(|d| &d.attributes);
+    let unknown = attributes.filter_map(|(name, from, attribute)| match attribute {
+        Attribute::Text(unit) if name == "unit" => {
+            let word = unknown_word(unit)?;
+            let what = if word == *unit {
+                format!("unit {} is no unit that is known", shown(unit))
+            } else {
+                format!(
+                    "{} in the unit {} is no unit that is known",
+                    shown(word),
+                    shown(unit)
+                )
+            };
+            let mend = "write one, as `W/(m2.K)`, or leave it out";
+            Some(TextError::at(text, *from, format!("{what}: {mend}")))
+        }
+        _ => None,
+    });
+    Ok(unknown.collect())
+}
+
+/// The first word of a unit that is none.
+fn unknown_word(unit: &str) -> Option<&str> {
+    if Unit::parse(unit).is_some() || unit.trim().is_empty() {
+        return None;
+    }
+    let is_letter = |c: char| c.is_alphabetic() || "%°‰_".contains(c);
+    let words = unit.split(|c: char| !is_letter(c) && !c.is_ascii_digit());
+    // A power stands behind its unit: `m2`.
+    let words = words.map(|word| {
+        let word = word.trim_start_matches(|c: char| c.is_ascii_digit());
+        (word, word.trim_end_matches(|c: char| c.is_ascii_digit()))
+    });
+    let known = |word: &str| {
+        let prefixed = |prefix: &str| {
+            let rest = word.strip_prefix(prefix);
+            rest.is_some_and(|rest| OTHER.contains(&rest))
+        };
+        Unit::parse(word).is_some()
+            || OTHER.contains(&word)
+            || PREFIXES.iter().any(|prefix| prefixed(prefix))
+    };
+    words
+        .filter(|(word, _)| !word.is_empty())
+        .find(|(word, bare)| !known(word) && !known(bare))
+        .map(|(_, bare)| bare)
+}

@@ -72,21 +72,40 @@ impl Context<'_> {
     pub fn noise_of(&self, node: &Node) -> Result<(Noise, bool), Error> {
         let setup = self.setup(&node.model)?;
         let noise = estimation::noise_of(&setup, &node.fit, NOISE_ORDER)?;
-        let limited = noise.with_memory_at_most(self.longest_memory());
-        let slow = limited != noise;
-        Ok((limited, slow))
+        let slow = self.slow_output(&noise).is_some();
+        Ok((noise.with_memory_at_most(self.longest_memory()), slow))
+    }
+
+    /// The first output whose noise has a longer memory than noise that a search may trust.
+    pub fn slow_output(&self, noise: &Noise) -> Option<usize> {
+        /// Noise of an ordinary colour forgets within so many samples, however short the record is.
+        const ORDINARY_MEMORY: f64 = 12.0;
+        /// Records that hold fewer times this memory do not tell slow physics from noise.
+        const TIMES: f64 = 10.0;
+        if self.longest_record() < TIMES * ORDINARY_MEMORY {
+            return None;
+        }
+        let longest = self.longest_memory().max(ORDINARY_MEMORY);
+        let limited = noise.with_memory_at_most(longest);
+        let mut pairs = noise.iter().zip(limited.iter());
+        pairs.position(|(noise, limited)| noise != limited)
     }
 
     /// Whether the memory of a noise model is longer than that of noise that a search may trust.
     pub fn is_slow(&self, noise: &Noise) -> bool {
-        noise.with_memory_at_most(self.longest_memory()) != *noise
+        self.slow_output(noise).is_some()
     }
 
     /// The longest memory of a noise model in whose metric effects are searched \[samples\].
     pub fn longest_memory(&self) -> f64 {
         /// Noise whose memory is longer has left fewer than some ten independent samples.
         const LONGEST_MEMORY: f64 = 1.0 / 15.0;
-        let longest = self.problem.records.iter().map(Record::len).max();
-        LONGEST_MEMORY * longest.unwrap_or(1) as f64
+        LONGEST_MEMORY * self.longest_record()
+    }
+
+    /// Rows of the longest record.
+    fn longest_record(&self) -> f64 {
+        let lengths = self.problem.records.iter().map(Record::len);
+        lengths.max().unwrap_or(1) as f64
     }
 }

@@ -1,9 +1,12 @@
 //! Which candidates cannot be told from an effect of the answer: each is put in its place, and everything is fitted again.
 
-use estimation::Noise;
+use ct_signals::ArModel;
+use estimation::{Fit, Noise};
 
 use crate::Error;
+use crate::accept::BIC_MARGIN;
 use crate::node::{Context, FINE, Node};
+use crate::partial::explained;
 use crate::search::best_first;
 
 /// A candidate can stand in where the deviance is within this of the best: the 99 % quantile of chi-square with two degrees of freedom ...
@@ -18,6 +21,9 @@ const NEAR: f64 = 60.0;
 /// A stand-in is fitted where the fall of the deviance that one step predicts is at least this share of the effect's own, less this margin.
 const PREDICTED_SHARE: f64 = 0.3;
 const PREDICTED_MARGIN: f64 = 10.0;
+
+/// A candidate of the user's own stands in where it explains this part of what the effect does, and what it leaves may be noise.
+const NEARLY_ALL: f64 = 0.9;
 
 impl Context<'_> {
     /// For each effect that the search added itself, then all that can stand in for it, best first. `slowness`: samples over independent
@@ -44,12 +50,15 @@ impl Context<'_> {
                     .filter(|trial| trial.fall > PREDICTED_SHARE * fall - PREDICTED_MARGIN)
                     .take(REFITS)
                     .collect();
-                let near = |node: &Node| node.fit.bic() - last.fit.bic() < NEAR * slowness;
+                let near = |node: &Node| {
+                    node.fit.bic() - last.fit.bic() < NEAR * slowness || self.ends_in_own(node)
+                };
                 let rough = self.refits(&without, &trials, noise);
                 let fine = rough
                     .into_iter()
                     .filter(near)
                     .filter_map(|node| self.refitted(&node, noise, FINE).ok());
+                let own_last = self.in_limited_noise(last)?;
                 for node in best_first(fine.collect()) {
                     let deviance = (node.fit.deviance - last.fit.deviance) / slowness;
                     let further = node.fit.parameters as f64 - last.fit.parameters as f64;
@@ -57,6 +66,9 @@ impl Context<'_> {
                     // As many parameters or fewer: the deviance decides; more have to pay for themselves.
                     let same = bic < SAME_BIC
                         || deviance < SAME_DEVIANCE && node.fit.parameters <= last.fit.parameters;
+                    let same = same
+                        || self.ends_in_own(&node)
+                            && self.nearly_explains((&node, last), &without, &own_last)?;
                     if same && let Some(&other) = node.added.last() {
                         group.push(other);
                     }
@@ -65,5 +77,30 @@ impl Context<'_> {
             groups.push(group);
         }
         Ok(groups)
+    }
+
+    /// Whether the last effect of a set is a candidate of the user's own.
+    fn ends_in_own(&self, node: &Node) -> bool {
+        let last = node.added.last();
+        last.is_some_and(|&i| self.candidates[i].effect.is_none())
+    }
+
+    /// Whether a set explains nearly all that another one does of what a third leaves, and leaves what may be noise of another colour: with a
+    /// noise model of its own, what the other one gains is not beyond chance. The users of a model name its likely physics, and it is rarely all that acts in a measured
+    /// record: an effect of the catalogue that bends further wins by the rest.
+    fn nearly_explains(
+        &self,
+        (set, last): (&Node, &Node),
+        without: &Node,
+        own_last: &Fit,
+    ) -> Result<bool, Error> {
+        let floors: Vec<f64> = own_last.noise.iter().map(ArModel::sigma).collect();
+        let of_last = explained(&without.fit, &last.fit, &floors);
+        if explained(&without.fit, &set.fit, &floors) < NEARLY_ALL * of_last {
+            return Ok(false);
+        }
+        let own = self.in_limited_noise(set)?;
+        let gained = own_last.bic() - own.bic() > BIC_MARGIN;
+        Ok(!(gained && self.beyond_chance((last, own_last), (set, &own))))
     }
 }

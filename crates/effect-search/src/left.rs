@@ -144,9 +144,7 @@ impl Context<'_> {
                 return Ok(Some(Left::Level { output: name(i) }));
             }
         }
-        let limited = own.noise.with_memory_at_most(self.longest_memory());
-        let mut pairs = own.noise.iter().zip(limited.iter());
-        let slow = pairs.position(|(own, limited)| own != limited);
+        let slow = self.slow_output(&own.noise);
         Ok(slow.map(|o| Left::Slow { output: name(o) }))
     }
 

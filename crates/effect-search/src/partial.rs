@@ -119,7 +119,7 @@ impl Context<'_> {
     }
 
     /// The fit of a set with a noise model of its own residual whose memory is limited.
-    fn in_limited_noise(&self, node: &Node) -> Result<Fit, Error> {
+    pub fn in_limited_noise(&self, node: &Node) -> Result<Fit, Error> {
         let setup = self.setup(&node.model)?;
         let memory = Some(self.longest_memory());
         Ok(prewhitened(

@@ -19,14 +19,11 @@ use crate::accept::{BIC_MARGIN, NOISE_ORDER};
 use crate::believed::begin;
 use crate::node::{Context, FINE, Node};
 use crate::partial::{PART, explained};
-use crate::problem::{Limit, Options, Problem};
+use crate::problem::{Limit, Options, Phase, Problem};
 use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
 use crate::{Error, held_out};
 
-/// Shares of the time limit after which the phases end.
-const SEARCHED_WHITE: f64 = 0.5;
-const SEARCHED: f64 = 0.8;
 /// So many effects are searched in white noise before the noise model is taken from what they leave: more of them explain noise.
 const BEFORE_NOISE: usize = 2;
 /// Noise models whose coefficients differ by less are one.
@@ -51,16 +48,18 @@ pub fn diagnose(
     let tell = |phase| progress(Progress { phase });
     tell("fitting the model");
     let limit = Limit::new(options);
+    limit.begin(Phase::Believed);
     let (context, base) = begin(problem, options, limit)?;
     tell("searching the effects");
+    context.limit.begin(Phase::White);
     let white = Noise::white(problem.spec.outputs.len());
     let all: Vec<usize> = (0..context.candidates.len()).collect();
     let few = options.max_effects.min(BEFORE_NOISE);
-    let mut by_error = context.grow(base.clone(), &all, &white, few, SEARCHED_WHITE)?;
+    let mut by_error = context.grow(base.clone(), &all, &white, few)?;
     let (mut noise, slow) = context.noise_of(&by_error.best)?;
     let full = by_error.best.added.len() >= base.added.len() + few;
     if noise.order() == 0 && full && few < options.max_effects {
-        by_error = context.grow_on(by_error, &white, options.max_effects, SEARCHED_WHITE)?;
+        by_error = context.grow_on(by_error, &white, options.max_effects)?;
         (noise, _) = context.noise_of(&by_error.best)?;
     }
     let mut by_error_sets = by_error.fitted.clone();
@@ -70,13 +69,14 @@ pub fn diagnose(
         let mut timeless = all.clone();
         timeless.retain(|&i| !context.candidates[i].follows_time());
         let most = options.max_effects;
-        let grown = context.grow(base.clone(), &timeless, &white, most, SEARCHED_WHITE)?;
+        let grown = context.grow(base.clone(), &timeless, &white, most)?;
         by_error_sets.extend(grown.fitted);
         by_error_sets.push(grown.best);
     }
     let by_error_singles = (by_error.singles.clone(), by_error.base.clone());
     let (mut grown, mut noise) = in_metric(&context, by_error, noise, options)?;
     tell("confirming");
+    context.limit.begin(Phase::Confirm);
     let mut confirmed = context.confirm(grown.best.clone(), &grown.base, &noise)?;
     if grown.cut_short && confirmed.added.len() == grown.base.added.len() {
         // The noise model of a search that was cut short explains what was not reached: the test below decides without it.
@@ -107,8 +107,10 @@ pub fn diagnose(
             (grown.singles, grown.base) = by_error_singles;
         }
     }
+    grown.cut_short |= context.limit.passed();
     let left = context.left(&confirmed, &own)?;
     tell("telling apart");
+    context.limit.begin(Phase::Groups);
     let found = confirmed.added.len() > grown.base.added.len();
     // What a search did not reach its noise model explains: then the effects are a part of the answer at most.
     let open = grown.cut_short && own.noise.order() > 0;
@@ -139,6 +141,12 @@ pub fn diagnose(
     } else {
         own
     };
+    grown.cut_short |= context.limit.passed();
+    let seconds = context.limit.seconds();
+    let context = Context {
+        limit: context.limit.of_report(),
+        ..context
+    };
     report(
         &context,
         &grown,
@@ -150,6 +158,7 @@ pub fn diagnose(
             groups,
             left,
             share,
+            seconds,
         },
     )
 }
@@ -165,6 +174,8 @@ struct Finding<'a> {
     groups: Vec<Vec<usize>>,
     left: Option<crate::Left>,
     share: Option<f64>,
+    /// Time of the search \[s\].
+    seconds: f64,
 }
 
 /// The search in the metric of a noise model, where that is not white.
@@ -177,11 +188,13 @@ fn in_metric(
     if noise.order() == 0 {
         return Ok((by_error, noise));
     }
+    let late = by_error.cut_short || context.limit.passed();
+    context.limit.begin(Phase::Coloured);
     let begin = context.refitted(&by_error.base, &noise, FINE);
     let Ok(begin) = begin else {
         return Ok((by_error, Noise::white(noise.outputs())));
     };
-    if context.limit.passed(SEARCHED_WHITE) {
+    if late {
         // Sets are compared in one metric, whatever time is left.
         let mut grown = by_error;
         if let Ok(best) = context.refitted(&grown.best, &noise, FINE) {
@@ -192,7 +205,7 @@ fn in_metric(
         return Ok((grown, Noise::white(noise.outputs())));
     }
     let all: Vec<usize> = (0..context.candidates.len()).collect();
-    let grown = context.grow(begin, &all, &noise, options.max_effects, SEARCHED)?;
+    let grown = context.grow(begin, &all, &noise, options.max_effects)?;
     // The rich set of white noise may be the better one here too.
     let other = context.refitted(&by_error.best, &noise, FINE);
     let mut grown = grown;
@@ -202,7 +215,7 @@ fn in_metric(
         grown.best = other;
     }
     let (own, _) = context.noise_of(&grown.best)?;
-    if own.order() > 0 && own.difference(&noise) > SAME_NOISE && !context.limit.passed(SEARCHED) {
+    if own.order() > 0 && own.difference(&noise) > SAME_NOISE && !context.limit.passed() {
         let base = context.refitted(&grown.base, &own, FINE);
         let best = context.refitted(&grown.best, &own, FINE);
         if let (Ok(base), Ok(best)) = (base, best) {
@@ -222,6 +235,7 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         groups,
         left,
         share,
+        seconds,
     } = finding;
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
@@ -308,8 +322,8 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         singles,
         record_numbers,
         candidates: context.candidates.len(),
-        cut_short: grown.cut_short || context.limit.passed(SEARCHED),
-        seconds: context.limit.seconds(),
+        cut_short: grown.cut_short,
+        seconds: seconds + context.limit.seconds(),
     })
 }
 

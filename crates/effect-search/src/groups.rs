@@ -39,7 +39,7 @@ impl Context<'_> {
         for position in base.added.len()..last.added.len() {
             let own = last.added[position];
             let mut group = vec![own];
-            if !self.limit.passed(0.95) {
+            if !self.limit.passed() {
                 let without = self.without(last, position, noise, FINE)?;
                 let fall = without.fit.deviance - last.fit.deviance;
                 let trials = self.trials(&without, noise);

@@ -81,7 +81,7 @@ impl Context<'_> {
         let known = of_model(model, &problem.known);
         let priors = of_model(model, &problem.priors);
         let setup = ModelSetup::new(model, &problem.records, &known, problem.time_unit)?;
-        let setup = setup.with_priors(&priors)?;
+        let setup = self.limit.on(setup.with_priors(&priors)?);
         Ok(match &self.scales {
             Some(scales) => setup.with_scales(scales.clone()),
             None => setup,

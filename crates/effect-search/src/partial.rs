@@ -36,8 +36,6 @@ const FOLDS: usize = 4;
 /// The innovations beside a set are at most so many times as large as those beside the model without it: what imitates a slow course by
 /// moves of its own is rougher than the record.
 const ROUGHER: f64 = 1.05;
-/// The share of the time limit after which no further sizes are tested.
-const TIME: f64 = 0.9;
 
 impl Context<'_> {
     /// The set that explains the largest part of the error, fitted in white noise, and that part; `None` where no set is a part of the answer.
@@ -49,7 +47,7 @@ impl Context<'_> {
         let mut best: Option<(Node, f64)> = None;
         let mut smaller: Vec<(Node, f64)> = Vec::new();
         for size in base.added.len() + 1..=most {
-            if self.limit.passed(TIME) {
+            if self.limit.passed() {
                 break;
             }
             let mut of_size: Vec<Node> = Vec::new();

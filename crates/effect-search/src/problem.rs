@@ -1,13 +1,14 @@
 //! What is diagnosed: a model as text, records, what is known, and candidates.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use ct_model::ModelSpec;
 use ct_model::effects::OwnCandidate;
 use ct_signals::Record;
-use greybox::PriorValue;
+use greybox::{ModelSetup, PriorValue, TimeLimit};
 
 /// A model and the records that it is held against.
 #[derive(Debug, Clone)]
@@ -71,32 +72,82 @@ impl Default for Options<'_> {
 }
 
 /// When a search has to end.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Limit<'a> {
-    begun: Instant,
-    limit: Option<Duration>,
+    time: Arc<TimeLimit>,
+    whole: Option<Duration>,
     interrupt: Option<&'a AtomicBool>,
+}
+
+/// A phase of a search, which ends when a share of the whole time has passed since the beginning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Phase {
+    /// The fit of the believed model.
+    Believed,
+    /// The search in white noise.
+    White,
+    /// The search in the metric of a noise model.
+    Coloured,
+    /// What of the effects stays.
+    Confirm,
+    /// What can stand in for them.
+    Groups,
+}
+
+impl Phase {
+    fn share(self) -> f64 {
+        match self {
+            Self::Believed => 0.2,
+            Self::White => 0.5,
+            Self::Coloured => 0.75,
+            Self::Confirm => 0.9,
+            Self::Groups => 1.0,
+        }
+    }
 }
 
 impl<'a> Limit<'a> {
     pub fn new(options: &Options<'a>) -> Self {
         Self {
-            begun: Instant::now(),
-            limit: options.time_limit,
+            time: Arc::new(TimeLimit::new(options.time_limit)),
+            whole: options.time_limit,
             interrupt: options.interrupt,
         }
     }
 
-    /// Whether this share of the time has passed.
-    pub fn passed(&self, share: f64) -> bool {
+    /// From now on fits take steps until the time of this phase has passed.
+    pub fn begin(&self, phase: Phase) {
+        self.time.allow(phase.share());
+    }
+
+    /// Whether the time of the phase has passed.
+    pub fn passed(&self) -> bool {
         self.interrupt
             .is_some_and(|flag| flag.load(Ordering::Relaxed))
-            || self
-                .limit
-                .is_some_and(|limit| self.begun.elapsed() > limit.mul_f64(share))
+            || self.time.passed()
+    }
+
+    /// What is found is fitted once more and shown, whatever time the search took, and interrupted or not: a limit of its own.
+    pub fn of_report(&self) -> Self {
+        /// Share of the time of the search.
+        const REPORT: f64 = 0.4;
+        let whole = self.whole.map(|whole| whole.mul_f64(REPORT));
+        Self {
+            time: Arc::new(TimeLimit::new(whole)),
+            whole,
+            interrupt: None,
+        }
+    }
+
+    /// Ends the fits of a model when the time of the phase has passed.
+    pub fn on<'b>(&self, setup: ModelSetup<'b>) -> ModelSetup<'b>
+    where
+        'a: 'b,
+    {
+        setup.with_time_limit(self.time.clone(), self.interrupt)
     }
 
     pub fn seconds(&self) -> f64 {
-        self.begun.elapsed().as_secs_f64()
+        self.time.elapsed().as_secs_f64()
     }
 }

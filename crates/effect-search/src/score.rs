@@ -104,7 +104,7 @@ impl Context<'_> {
         };
         let mut trials: Vec<Trial> = others
             .into_par_iter()
-            .filter(|_| !self.limit.passed(1.0))
+            .filter(|_| !self.limit.passed())
             .filter_map(|i| self.trial_beside(node, &known, i, noise).ok().flatten())
             .collect();
         trials.sort_by(|a, b| {

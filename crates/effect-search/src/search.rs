@@ -52,6 +52,9 @@ impl Context<'_> {
     /// Fits of candidates beside a set.
     pub fn refits(&self, node: &Node, trials: &[Trial], noise: &Noise) -> Vec<Node> {
         let fits = trials.par_iter().filter_map(|trial| {
+            if self.limit.passed() {
+                return None;
+            }
             let mut added = node.added.clone();
             added.push(trial.candidate);
             self.fitted(
@@ -73,7 +76,6 @@ impl Context<'_> {
         of: &[usize],
         noise: &Noise,
         max_effects: usize,
-        share: f64,
     ) -> Result<Grown, Error> {
         let trials = self.trials_among(&base, of, noise);
         let promising = &trials[..trials.len().min(FIRST_REFITS)];
@@ -83,10 +85,11 @@ impl Context<'_> {
             beam.extend(singles.iter().take(BEAM).cloned());
         }
         let few = beam.len();
-        if max_effects > 1 && !self.limit.passed(share) {
+        if max_effects > 1 && !self.limit.passed() {
             let pairs = joint_scores(self, &base, &trials, noise, PAIRS);
             let fits: Vec<Node> = pairs
                 .par_iter()
+                .filter(|_| !self.limit.passed())
                 .filter_map(|&(a, b)| self.pair(&base, (a, b), &trials, noise).ok().flatten())
                 .collect();
             beam.extend(fits);
@@ -105,23 +108,17 @@ impl Context<'_> {
         let grown = Grown {
             best: base.clone(),
             among,
-            cut_short: self.limit.passed(share),
+            cut_short: self.limit.passed(),
             base,
             fitted: singles.iter().chain(&beam[few..]).cloned().collect(),
             singles,
             beam,
         };
-        self.grow_on(grown, noise, max_effects, share)
+        self.grow_on(grown, noise, max_effects)
     }
 
     /// The search goes on, to sets of up to so many effects.
-    pub fn grow_on(
-        &self,
-        grown: Grown,
-        noise: &Noise,
-        max_effects: usize,
-        share: f64,
-    ) -> Result<Grown, Error> {
+    pub fn grow_on(&self, grown: Grown, noise: &Noise, max_effects: usize) -> Result<Grown, Error> {
         let Grown {
             base,
             singles,
@@ -146,7 +143,7 @@ impl Context<'_> {
             {
                 break;
             }
-            if self.limit.passed(share) {
+            if self.limit.passed() {
                 cut_short = true;
                 break;
             }
@@ -159,7 +156,7 @@ impl Context<'_> {
                 .cloned()
                 .collect();
             for parent in &parents {
-                if self.limit.passed(share) {
+                if self.limit.passed() {
                     cut_short = true;
                     break;
                 }

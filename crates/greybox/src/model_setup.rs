@@ -5,12 +5,14 @@
 //! their channels say; an output of a row is read with the inputs of that row.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_model::{About, Dual, Given, Model, Simulation, Variable};
 use ct_signals::{Hold, Record};
 use estimation::{Fit, Noise, Prior, Residuals, Sample, Start, within};
 
-use crate::{Error, FitOptions, PriorValue, clock::Clock, output_noise::output_noise};
+use crate::{Error, FitOptions, PriorValue, TimeLimit, clock::Clock, output_noise::output_noise};
 
 /// A model, the records, and which parameters are free.
 #[derive(Debug, Clone)]
@@ -29,6 +31,8 @@ pub struct ModelSetup<'a> {
     floors: Vec<f64>,
     priors: Vec<Prior>,
     known_scales: Option<Vec<f64>>,
+    time_limit: Option<Arc<TimeLimit>>,
+    interrupt: Option<&'a AtomicBool>,
 }
 
 /// Where the text sets no bound a parameter stays within this factor of its value there, ...
@@ -174,7 +178,19 @@ impl<'a> ModelSetup<'a> {
             free,
             priors: Vec::new(),
             known_scales: None,
+            time_limit: None,
+            interrupt: None,
         })
+    }
+
+    /// The same with a limit: once it has passed, or `interrupt` is set, fits take no further steps.
+    #[must_use]
+    pub fn with_time_limit(self, limit: Arc<TimeLimit>, interrupt: Option<&'a AtomicBool>) -> Self {
+        Self {
+            time_limit: Some(limit),
+            interrupt,
+            ..self
+        }
     }
 
     /// The same with what is known of parameters beside the records.
@@ -200,6 +216,8 @@ impl<'a> ModelSetup<'a> {
         let known: BTreeMap<String, f64> = known.zip(x.iter().copied()).collect();
         let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
         setup.clock = self.clock.with_records(records);
+        setup.time_limit.clone_from(&self.time_limit);
+        setup.interrupt = self.interrupt;
         Ok(setup)
     }
 
@@ -216,6 +234,8 @@ impl<'a> ModelSetup<'a> {
         let known: BTreeMap<String, f64> = known.collect();
         let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
         setup.clock = self.clock.with_records(records);
+        setup.time_limit.clone_from(&self.time_limit);
+        setup.interrupt = self.interrupt;
         Ok(setup)
     }
 
@@ -565,5 +585,11 @@ impl Residuals for ModelSetup<'_> {
 
     fn priors(&self) -> &[Prior] {
         &self.priors
+    }
+
+    fn out_of_time(&self) -> bool {
+        let interrupted = |flag: &AtomicBool| flag.load(Ordering::Relaxed);
+        self.interrupt.is_some_and(interrupted)
+            || self.time_limit.as_ref().is_some_and(|limit| limit.passed())
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! The points are a scrambled Sobol sequence (A. B. Owen, Journal of Complexity 14 (1998) 466-489), in the logarithm of what has a sign.
 
-use estimation::{Noise, Start, Stopping, fit_from, squares, within};
+use estimation::{Noise, Residuals, Start, Stopping, fit_from, squares, within};
 use rayon::prelude::*;
 use sobol_burley::sample;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -34,6 +34,9 @@ impl ModelSetup<'_> {
         let mut points = self.points(n * POINTS, seed);
         let white = Noise::white(self.outputs());
         let cost = |x: &Vec<f64>| {
+            if self.out_of_time() {
+                return f64::INFINITY;
+            }
             let cost = squares(self, x, &white).map(|squares| squares.cost());
             cost.filter(|cost| cost.is_finite())
                 .unwrap_or(f64::INFINITY)

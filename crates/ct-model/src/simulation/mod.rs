@@ -32,9 +32,11 @@ const TOLERANCE: f64 = 1e-10;
 /// The shortest step, as a share of an interval between rows.
 const SHORTEST: f64 = 1e-9;
 /// Two events of one guard that lie nearer to each other than this share of an interval slide: from there a step of this length is taken.
-const SLIDE: f64 = 1e-3;
-/// Steps in an interval beyond which the simulation has failed.
+const SLIDE: f64 = 1e-2;
+/// Steps in an interval beyond which the simulation has failed, ...
 const MOST_STEPS: usize = 50_000;
+/// ... and those that every interval adds to what is left of them: a trial whose steps are short all along ends within seconds.
+const STEPS_PER_INTERVAL: usize = 300;
 /// Steps in an interval from which on the model may be stiff.
 const MANY_STEPS: usize = 40;
 /// It is where the length of such steps times the norm of the Jacobian is above this: the stability of the method, and not its error, limits
@@ -132,6 +134,8 @@ pub struct Simulation<'a, T> {
     /// The largest absolute value that each state has had, times the tolerance.
     scale: Vec<f64>,
     largest: Vec<f64>,
+    /// Steps that may be taken beside [`STEPS_PER_INTERVAL`].
+    steps_left: usize,
     /// Length of the last step that the error allowed.
     length: f64,
     rise: Vec<f64>,
@@ -190,6 +194,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             changed: vec![f64::NEG_INFINITY; tape.guards.len()],
             scale: vec![0.0; tape.states],
             largest: initial.iter().map(|x| x.value().abs()).collect(),
+            steps_left: MOST_STEPS,
             length: f64::INFINITY,
             rise: vec![0.0; tape.inputs],
             last: vec![0.0; tape.inputs],
@@ -438,6 +443,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let interval = until - begin;
         let shortest = SHORTEST * interval;
         let mut taken = 0;
+        let most = self.steps_left + STEPS_PER_INTERVAL;
         loop {
             let now = self.time.value();
             let left = T::constant(until) - self.time;
@@ -459,7 +465,8 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 return Ok(());
             }
             taken += 1;
-            if taken > MOST_STEPS {
+            self.steps_left = (most - taken).min(MOST_STEPS);
+            if taken == most {
                 return Err(NoSolution { time: now });
             }
             let mut longest = self.length;

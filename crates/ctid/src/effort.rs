@@ -11,7 +11,7 @@ use serde::Deserialize;
 pub(crate) enum EffortLevel {
     /// 5 s
     Quick,
-    /// 20 s
+    /// 20 s; 40 s for a model of your own
     #[default]
     Normal,
     /// 10 min
@@ -25,6 +25,14 @@ impl EffortLevel {
             Self::Quick => Duration::from_secs(5),
             Self::Normal => missing_effect::TIME_LIMIT,
             Self::Thorough => Duration::from_secs(600),
+        }
+    }
+
+    /// The limit for a model of its user's text, which is simulated in small steps beside more candidates.
+    pub(crate) fn limit_of_own_model(self) -> Duration {
+        match self {
+            Self::Normal => 2 * self.limit(),
+            other => other.limit(),
         }
     }
 }
@@ -51,7 +59,15 @@ mod tests {
         for (level, limit) in EffortLevel::value_variants().iter().zip(limits) {
             let value = level.to_possible_value().expect("none is skipped");
             let help = value.get_help().map(ToString::to_string);
-            assert_eq!(help, Some(limit_text(limit.as_secs_f64())));
+            let mut said = limit_text(limit.as_secs_f64());
+            let own = level.limit_of_own_model();
+            if own != limit {
+                said += &format!(
+                    "; {} for a model of your own",
+                    limit_text(own.as_secs_f64())
+                );
+            }
+            assert_eq!(help, Some(said));
         }
     }
 }

@@ -50,6 +50,9 @@ pub fn diagnose(
     let limit = Limit::new(options);
     limit.begin(Phase::Believed);
     let (context, base) = begin(problem, options, limit)?;
+    if context.limit.passed() {
+        context.limit.leave_out("starts of the model's fit");
+    }
     tell("searching the effects");
     context.limit.begin(Phase::White);
     let white = Noise::white(problem.spec.outputs.len());
@@ -93,9 +96,11 @@ pub fn diagnose(
         }
     }
     let mut own = context.in_own_noise(&confirmed)?;
+    let mut left = context.left(&confirmed, &own)?;
     let mut slowness = 1.0;
-    if context.is_slow(&own.noise) {
-        // In the metric of such a noise the simulation drifts off: sets are compared by their simulation error.
+    if left.is_some() {
+        // Its noise model takes physics for noise, and where that is slow the simulation drifts off in its metric: sets are compared by
+        // their simulation error.
         let mut sets = by_error_sets;
         sets.extend(grown.fitted.iter().cloned());
         sets.extend([grown.best.clone(), confirmed.clone()]);
@@ -105,10 +110,13 @@ pub fn diagnose(
             noise = white.clone();
             slowness = context.slowness(&own.noise);
             (grown.singles, grown.base) = by_error_singles;
+            left = context.left(&confirmed, &own)?;
         }
     }
-    grown.cut_short |= context.limit.passed();
-    let left = context.left(&confirmed, &own)?;
+    if context.limit.passed() {
+        context.limit.leave_out("tests of the effects one by one");
+        grown.cut_short = true;
+    }
     tell("telling apart");
     context.limit.begin(Phase::Groups);
     let found = confirmed.added.len() > grown.base.added.len();
@@ -134,15 +142,14 @@ pub fn diagnose(
     if verdict_of(&[]) == Verdict::Unexplained {
         confirmed = grown.base.clone();
     }
-    let groups = context.groups(&confirmed, &grown.base, &noise, slowness)?;
+    let (confirmed, groups) = context.groups(confirmed, &grown.base, &noise, slowness)?;
     let verdict = verdict_of(&groups);
     let last = if verdict == Verdict::Unexplained {
         context.in_own_noise(&base)?
     } else {
         own
     };
-    grown.cut_short |= context.limit.passed();
-    let seconds = context.limit.seconds();
+    let (seconds, left_out) = (context.limit.seconds(), context.limit.left_out());
     let context = Context {
         limit: context.limit.of_report(),
         ..context
@@ -159,6 +166,7 @@ pub fn diagnose(
             left,
             share,
             seconds,
+            left_out,
         },
     )
 }
@@ -176,6 +184,7 @@ struct Finding<'a> {
     share: Option<f64>,
     /// Time of the search \[s\].
     seconds: f64,
+    left_out: Vec<String>,
 }
 
 /// The search in the metric of a noise model, where that is not white.
@@ -236,6 +245,7 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         left,
         share,
         seconds,
+        left_out,
     } = finding;
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
@@ -322,7 +332,7 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         singles,
         record_numbers,
         candidates: context.candidates.len(),
-        cut_short: grown.cut_short,
+        left_out,
         seconds: seconds + context.limit.seconds(),
     })
 }

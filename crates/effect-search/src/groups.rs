@@ -2,6 +2,7 @@
 
 use ct_signals::ArModel;
 use estimation::{Fit, Noise};
+use rayon::prelude::*;
 
 use crate::Error;
 use crate::accept::BIC_MARGIN;
@@ -22,61 +23,99 @@ const NEAR: f64 = 60.0;
 const PREDICTED_SHARE: f64 = 0.3;
 const PREDICTED_MARGIN: f64 = 10.0;
 
+/// Two effects are one where the deviances of the sets differ by less.
+const SAME_EFFECT: f64 = 0.1;
+
+/// What is left out where the time has passed.
+const OTHERS: &str = "other effects that may explain the same";
+
 /// A candidate of the user's own stands in where it explains this part of what the effect does, and what it leaves may be noise.
 const NEARLY_ALL: f64 = 0.9;
 
 impl Context<'_> {
-    /// For each effect that the search added itself, then all that can stand in for it, best first. `slowness`: samples over independent
-    /// ones, where the metric of `noise` is not that of the noise ([`Context::slowness`]).
+    /// For each effect that the search added itself, then all that can stand in for it, best first; and the set, in which a candidate of the
+    /// user's own has the place of an effect of the catalogue that is the same. `slowness`: samples over independent ones, where the metric
+    /// of `noise` is not that of the noise ([`Context::slowness`]).
     pub fn groups(
         &self,
-        last: &Node,
+        mut last: Node,
         base: &Node,
         noise: &Noise,
         slowness: f64,
-    ) -> Result<Vec<Vec<usize>>, Error> {
+    ) -> Result<(Node, Vec<Vec<usize>>), Error> {
         let mut groups = Vec::new();
-        for position in base.added.len()..last.added.len() {
-            let own = last.added[position];
+        let found = last.added[base.added.len()..].to_vec();
+        for own in found {
             let mut group = vec![own];
-            if !self.limit.passed() {
-                let without = self.without(last, position, noise, FINE)?;
-                let fall = without.fit.deviance - last.fit.deviance;
-                let trials = self.trials(&without, noise);
-                let trials: Vec<_> = trials
-                    .into_iter()
-                    .filter(|trial| !last.added.contains(&trial.candidate))
-                    .filter(|trial| !self.repeats_one_of(trial.candidate, &last.added))
-                    .filter(|trial| trial.fall > PREDICTED_SHARE * fall - PREDICTED_MARGIN)
-                    .take(REFITS)
-                    .collect();
-                let near = |node: &Node| {
-                    node.fit.bic() - last.fit.bic() < NEAR * slowness || self.ends_in_own(node)
+            let position = last.added.iter().position(|i| *i == own);
+            if self.limit.passed() {
+                self.limit.leave_out(OTHERS);
+            } else if let Some(position) = position {
+                let others = self.stand_ins(&last, position, noise, slowness)?;
+                let is_same = |node: &&Node| {
+                    let further = node.fit.parameters > last.fit.parameters;
+                    let worse = node.fit.deviance - last.fit.deviance;
+                    self.ends_in_own(node) && !further && worse / slowness < SAME_EFFECT
                 };
-                let rough = self.refits(&without, &trials, noise);
-                let fine = rough
-                    .into_iter()
-                    .filter(near)
-                    .filter_map(|node| self.refitted(&node, noise, FINE).ok());
-                let own_last = self.in_limited_noise(last)?;
-                for node in best_first(fine.collect()) {
-                    let deviance = (node.fit.deviance - last.fit.deviance) / slowness;
-                    let further = node.fit.parameters as f64 - last.fit.parameters as f64;
-                    let bic = deviance + further * (self.samples() / slowness).ln();
-                    // As many parameters or fewer: the deviance decides; more have to pay for themselves.
-                    let same = bic < SAME_BIC
-                        || deviance < SAME_DEVIANCE && node.fit.parameters <= last.fit.parameters;
-                    let same = same
-                        || self.ends_in_own(&node)
-                            && self.nearly_explains((&node, last), &without, &own_last)?;
-                    if same && let Some(&other) = node.added.last() {
-                        group.push(other);
-                    }
+                let same = others.iter().find(is_same).cloned();
+                group.extend(others.iter().filter_map(|node| node.added.last()));
+                if let Some(same) = same.filter(|_| self.candidates[own].effect.is_some())
+                    && let Some(at) = group.iter().position(|i| Some(i) == same.added.last())
+                {
+                    let users = group.remove(at);
+                    group.insert(0, users);
+                    last = same;
                 }
             }
             groups.push(group);
         }
-        Ok(groups)
+        Ok((last, groups))
+    }
+
+    /// The sets in which something else stands in the place of an effect and explains the data as well, best first.
+    fn stand_ins(
+        &self,
+        last: &Node,
+        position: usize,
+        noise: &Noise,
+        slowness: f64,
+    ) -> Result<Vec<Node>, Error> {
+        let without = self.without(last, position, noise, FINE)?;
+        let fall = without.fit.deviance - last.fit.deviance;
+        let trials = self.trials(&without, noise);
+        let trials: Vec<_> = trials
+            .into_iter()
+            .filter(|trial| !last.added.contains(&trial.candidate))
+            .filter(|trial| !self.repeats_one_of(trial.candidate, &last.added))
+            .filter(|trial| trial.fall > PREDICTED_SHARE * fall - PREDICTED_MARGIN)
+            .take(REFITS)
+            .collect();
+        let near = |node: &Node| {
+            node.fit.bic() - last.fit.bic() < NEAR * slowness || self.ends_in_own(node)
+        };
+        let rough = self.refits(&without, &trials, noise);
+        let fine = rough
+            .into_par_iter()
+            .filter(near)
+            .filter_map(|node| self.refitted(&node, noise, FINE).ok());
+        let mut others = best_first(fine.collect());
+        let own_last = self.in_limited_noise(last)?;
+        others.retain(|node| {
+            let deviance = (node.fit.deviance - last.fit.deviance) / slowness;
+            let further = node.fit.parameters as f64 - last.fit.parameters as f64;
+            let bic = deviance + further * (self.samples() / slowness).ln();
+            // As many parameters or fewer: the deviance decides; more have to pay for themselves.
+            bic < SAME_BIC
+                || deviance < SAME_DEVIANCE && node.fit.parameters <= last.fit.parameters
+                || self.ends_in_own(node)
+                    && self
+                        .nearly_explains((node, last), &without, &own_last)
+                        .unwrap_or(false)
+        });
+        if self.limit.passed() {
+            self.limit.leave_out(OTHERS);
+        }
+        Ok(others)
     }
 
     /// Whether the last effect of a set is a candidate of the user's own.
@@ -86,8 +125,8 @@ impl Context<'_> {
     }
 
     /// Whether a set explains nearly all that another one does of what a third leaves, and leaves what may be noise of another colour: with a
-    /// noise model of its own, what the other one gains is not beyond chance. The users of a model name its likely physics, and it is rarely all that acts in a measured
-    /// record: an effect of the catalogue that bends further wins by the rest.
+    /// noise model of its own, what the other one gains is not beyond chance. The users of a model name its likely physics, and it is rarely
+    /// all that acts in a measured record: an effect of the catalogue that bends further wins by the rest.
     fn nearly_explains(
         &self,
         (set, last): (&Node, &Node),

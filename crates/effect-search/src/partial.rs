@@ -43,15 +43,15 @@ impl Context<'_> {
     pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
-        let most = sets.iter().map(|set| set.added.len()).max().unwrap_or(0);
+        let most = sets.iter().map(|set| self.size(set)).max().unwrap_or(0);
         let mut best: Option<(Node, f64)> = None;
         let mut smaller: Vec<(Node, f64)> = Vec::new();
-        for size in base.added.len() + 1..=most {
+        for size in self.size(base) + 1..=most {
             if self.limit.passed() {
                 break;
             }
             let mut of_size: Vec<Node> = Vec::new();
-            for set in sets.iter().filter(|set| set.added.len() == size) {
+            for set in sets.iter().filter(|set| self.size(set) == size) {
                 if !of_size.iter().any(|known| same_set(known, set)) {
                     of_size.push(set.clone());
                 }
@@ -70,7 +70,7 @@ impl Context<'_> {
                 })
                 .collect();
             let pays = |(set, share): (&Node, f64), (less, of_less): (&Node, f64)| {
-                let further = set.added.len() - less.added.len();
+                let further = self.size(set) - self.size(less);
                 1.0 - share <= LEFT.powi(further as i32) * (1.0 - of_less)
             };
             let says_more = |set: &Node, share: f64| {
@@ -94,6 +94,12 @@ impl Context<'_> {
             smaller.extend(tested.into_iter().map(|(set, share, _)| (set, share)));
         }
         Ok(best)
+    }
+
+    /// Effects of a set; those that follow time count twice, as they imitate more.
+    fn size(&self, set: &Node) -> usize {
+        let in_time = |&&i: &&usize| self.candidates[i].follows_time();
+        set.added.len() + set.added.iter().filter(in_time).count()
     }
 
     /// The share of the error above the noise that a set explains, and whether it is a part of the answer.

@@ -98,9 +98,9 @@ impl Phase {
     fn share(self) -> f64 {
         match self {
             Self::Believed => 0.2,
-            Self::White => 0.5,
-            Self::Coloured => 0.75,
-            Self::Confirm => 0.9,
+            Self::White => 0.45,
+            Self::Coloured => 0.7,
+            Self::Confirm => 0.8,
             Self::Groups => 1.0,
         }
     }
@@ -125,6 +125,16 @@ impl<'a> Limit<'a> {
         self.interrupt
             .is_some_and(|flag| flag.load(Ordering::Relaxed))
             || self.time.passed()
+    }
+
+    /// Notes a part of the search that was left out or cut short.
+    pub fn leave_out(&self, part: &str) {
+        self.time.leave_out(part);
+    }
+
+    /// What was left out, in order.
+    pub fn left_out(&self) -> Vec<String> {
+        self.time.left_out()
     }
 
     /// What is found is fitted once more and shown, whatever time the search took, and interrupted or not: a limit of its own.

@@ -124,8 +124,8 @@ pub struct Diagnosis {
     pub record_numbers: BTreeMap<String, BTreeMap<&'static str, f64>>,
     /// How many candidates were scored.
     pub candidates: usize,
-    /// The time limit ended the search.
-    pub cut_short: bool,
+    /// What the time limit left out of the search; empty where it is complete.
+    pub left_out: Vec<String>,
     /// How long it took \[s\].
     pub seconds: f64,
 }

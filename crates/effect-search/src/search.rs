@@ -108,7 +108,7 @@ impl Context<'_> {
         let grown = Grown {
             best: base.clone(),
             among,
-            cut_short: self.limit.passed(),
+            cut_short: self.limit.passed() && self.note_cut(),
             base,
             fitted: singles.iter().chain(&beam[few..]).cloned().collect(),
             singles,
@@ -144,7 +144,7 @@ impl Context<'_> {
                 break;
             }
             if self.limit.passed() {
-                cut_short = true;
+                cut_short = self.note_cut();
                 break;
             }
             size += 1;
@@ -157,7 +157,7 @@ impl Context<'_> {
                 .collect();
             for parent in &parents {
                 if self.limit.passed() {
-                    cut_short = true;
+                    cut_short = self.note_cut();
                     break;
                 }
                 let trials = self.trials_among(parent, &among, noise);
@@ -185,6 +185,12 @@ impl Context<'_> {
             fitted,
             cut_short,
         })
+    }
+
+    /// Notes that the search was cut short.
+    fn note_cut(&self) -> bool {
+        self.limit.leave_out("larger sets of effects");
+        true
     }
 
     /// Whether a candidate might lower the criterion.

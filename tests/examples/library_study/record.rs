@@ -613,7 +613,11 @@ pub fn outcome(
         gap.unwrap_or(f64::NAN),
         base.bic() - best.bic(),
         found.seconds,
-        if found.cut_short { ", cut short" } else { "" },
+        if !found.left_out.is_empty() {
+            ", cut short"
+        } else {
+            ""
+        },
         if verbose {
             format!(
                 "\n    singles {:?}\n    weights {:?}\n    truth {:?}",
@@ -647,7 +651,7 @@ pub fn outcome(
         verdict: found.verdict,
         right,
         seconds,
-        cut_short: found.cut_short,
+        cut_short: !found.left_out.is_empty(),
         told,
     })
 }

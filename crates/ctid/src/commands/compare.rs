@@ -234,7 +234,7 @@ impl Diagnose {
         let records = model.records(files)?;
         let outputs = self.compare.results.plan(&files.all(), None)?;
         let mut options = effect_search::Options {
-            time_limit: Some(self.compare.effort.limit()),
+            time_limit: Some(self.compare.effort.limit_of_own_model()),
             interrupt: Some(interrupt::flag()),
             ..effect_search::Options::default()
         };

@@ -102,10 +102,11 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
         }
         (None, _) => all.push("What remains looks like noise.".to_string()),
     }
-    if diagnosis.cut_short {
-        all.push(
-            "The limit on the time ended the search: --effort thorough goes on longer.".to_string(),
-        );
+    if !diagnosis.left_out.is_empty() {
+        all.push(format!(
+            "Left out by the time limit: {}; --effort thorough goes on longer.",
+            diagnosis.left_out.join(", ")
+        ));
     }
     all
 }

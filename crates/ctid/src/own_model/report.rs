@@ -89,9 +89,7 @@ pub(crate) fn diagnosed(
     });
     shown.scores = singles.collect();
     shown.sentences = sentences(found, &words);
-    if found.cut_short {
-        shown.effort.left_out = vec!["larger sets of effects".to_string()];
-    }
+    shown.effort.left_out.clone_from(&found.left_out);
     shown.seconds = found.seconds;
     shown
 }

@@ -180,7 +180,10 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
         },
         begun: Instant::now(),
         limit: match task {
-            Task::Diagnose { effort, .. } => Some(effort.limit()),
+            Task::Diagnose { effort, .. } => Some(match &work {
+                Input::Plant(_) => effort.limit(),
+                Input::Own(_) => effort.limit_of_own_model(),
+            }),
             Task::Design { .. } => Some(missing_effect::TIME_LIMIT),
             _ => None,
         },

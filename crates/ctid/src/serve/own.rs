@@ -379,7 +379,7 @@ impl Work {
             "telling apart",
         ];
         let mut options = Options {
-            time_limit: Some(effort.limit()),
+            time_limit: Some(effort.limit_of_own_model()),
             interrupt: Some(interrupt),
             ..Options::default()
         };

@@ -26,6 +26,8 @@ use crate::{Error, held_out};
 
 /// So many effects are searched in white noise before the noise model is taken from what they leave: more of them explain noise.
 const BEFORE_NOISE: usize = 2;
+/// So many effects or more together may imitate one that no candidate holds: they are called a part of the answer.
+pub const MANY: usize = 3;
 /// Noise models whose coefficients differ by less are one.
 const SAME_NOISE: f64 = 0.05;
 
@@ -123,6 +125,7 @@ pub fn diagnose(
     // What a search did not reach its noise model explains: then the effects are a part of the answer at most.
     let open = grown.cut_short && own.noise.order() > 0;
     let whole = left.is_none() && !open;
+    let many = confirmed.added.len() >= base.added.len() + MANY;
     // All that remains is noise, or else what its past does not predict.
     let floors: Vec<f64> = if whole {
         own.noise.iter().map(ArModel::stationary_std).collect()
@@ -131,7 +134,7 @@ pub fn diagnose(
     };
     let share = found.then(|| explained(&base.fit, &confirmed.fit, &floors));
     let verdict_of = |groups: &[Vec<usize>]| match (found, &left, share) {
-        (true, None, _) if open => Verdict::Partial,
+        (true, None, _) if open || many => Verdict::Partial,
         (false, None, _) => Verdict::Adequate,
         (false, Some(_), _) => Verdict::Unexplained,
         (true, Some(_), Some(share)) if share >= PART => Verdict::Partial,
@@ -440,6 +443,7 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
         }),
         rmse: (outputs.len() == 1).then(|| node.fit.rmse[0]),
         rmse_per_output: named(&node.fit.rmse),
+        state_rows: test.as_ref().map(|test| test.state_rows.clone()),
         rmse_test_per_output: test.map(|test| named(&test.rmse)),
         weighted_rmse: weighted_rms(&node.fit.rmse, floors, &node.fit.samples_per_output),
         bic: node.fit.bic(),

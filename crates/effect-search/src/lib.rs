@@ -27,7 +27,7 @@ mod search;
 mod spectral_line;
 
 pub use believed::{Believed, all_candidates, believed};
-pub use diagnose::{Progress, diagnose};
+pub use diagnose::{MANY, Progress, diagnose};
 pub use error::Error;
 pub use held_out::{HeldOut, held_out};
 pub use left::Left;

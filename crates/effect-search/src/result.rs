@@ -53,6 +53,9 @@ pub struct Step {
     /// The same on the held-out records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse_test_per_output: Option<BTreeMap<String, f64>>,
+    /// First rows of each held-out record, to which its initial states were fitted and which are not scored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state_rows: Option<Vec<usize>>,
     /// Simulation error, each output divided by its noise: 1 is the noise.
     pub weighted_rmse: f64,
     /// Bayesian information criterion, in the metric in which the effects were confirmed.

@@ -52,7 +52,7 @@ struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Time limit of a diagnosis \[s\].
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long, default_value_t = 40.0)]
     limit: f64,
     /// Says more of each record.
     #[arg(long)]

@@ -130,6 +130,7 @@ pub(crate) fn compare(
         rmse: (outputs.len() == 1).then(|| fit.rmse[0]),
         rmse_per_output: named(&fit.rmse),
         rmse_test_per_output: test.as_ref().map(|test| named(&test.rmse)),
+        state_rows: test.as_ref().map(|test| test.state_rows.clone()),
         weighted_rmse: weighted_rms(&fit.rmse, &noise, &fit.samples_per_output),
         bic: fit.bic(),
         parameters: estimates.collect(),

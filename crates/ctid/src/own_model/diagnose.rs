@@ -1,6 +1,6 @@
 //! What a model of its user's own is missing.
 
-use effect_search::{Diagnosis, Left, Options, Step, Verdict};
+use effect_search::{Diagnosis, Left, MANY, Options, Step, Verdict};
 
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
@@ -101,6 +101,11 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
             all.push("What the model leaves looks like noise.".to_string())
         }
         (None, _) => all.push("What remains looks like noise.".to_string()),
+    }
+    if diagnosis.effects.len() >= MANY {
+        all.push(format!(
+            "{MANY} effects or more together often imitate one that no candidate holds: take them for a description of the records until each is confirmed."
+        ));
     }
     if !diagnosis.left_out.is_empty() {
         all.push(format!(
@@ -225,7 +230,21 @@ fn errors(diagnosis: &Diagnosis, look: Look) -> String {
     for line in table(&sides, &rows) {
         text += &format!("  {}\n", line.trim_end());
     }
-    text
+    text + &state_rows(first)
+}
+
+/// On how many rows the initial states of held-out records were fitted.
+pub(super) fn state_rows(step: &Step) -> String {
+    let Some(rows) = &step.state_rows else {
+        return String::new();
+    };
+    let rows: Vec<String> = rows.iter().map(usize::to_string).collect();
+    let whose = if let [only] = &rows[..] {
+        format!("its first {only} rows")
+    } else {
+        format!("the first {} rows of the records", rows.join(", "))
+    };
+    format!("  held out: without {whose}, to which the initial states are fitted\n")
 }
 
 fn estimates(step: &Step, look: Look) -> String {

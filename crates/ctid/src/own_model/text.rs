@@ -1,6 +1,7 @@
 //! What a person reads of a comparison.
 
 use super::compare::{Comparison, Curves};
+use super::diagnose::state_rows;
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
@@ -42,6 +43,7 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     for line in table(&[Side::Left, Side::Right, Side::Right], &rows) {
         text += &format!("  {}\n", line.trim_end());
     }
+    text += &state_rows(step);
     if step.rmse_per_output.len() > 1 {
         text += &format!(
             "  together {} times the noise, which is what a linear prediction from the past leaves\n",

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ct_model::effects::{
-    Candidate, OwnCandidate, OwnError, Visited, candidates_keeping, own_candidates,
+    Candidate, OwnCandidate, OwnError, Visited, candidates_keeping, own_candidates, shapes_keeping,
 };
 use ct_model::{Model, ModelSpec};
 use estimation::{Fit, Noise, Residuals, within};
@@ -44,7 +44,8 @@ pub fn believed(problem: &Problem, options: &Options) -> Result<Believed, Error>
     })
 }
 
-/// All that can act in a model where its records visit this, those of the catalogue with what is kept of earlier records, then those of the user's own.
+/// All that can act in a model where its records visit this, those of the catalogue with what is kept of earlier records, then those of the
+/// user's own, then smooth functions ([`Candidate::is_shape`]), which no search looks at.
 ///
 /// # Errors
 /// As [`own_candidates`].
@@ -57,8 +58,10 @@ pub fn all_candidates(
     let numbers = kept
         .iter()
         .map(|(id, kept)| (id.clone(), kept.numbers.clone()));
-    let mut all = candidates_keeping(spec, visited, &numbers.collect());
+    let numbers = numbers.collect();
+    let mut all = candidates_keeping(spec, visited, &numbers);
     all.extend(own_candidates(spec, own)?);
+    all.extend(shapes_keeping(spec, visited, &numbers));
     Ok(all)
 }
 
@@ -71,6 +74,7 @@ pub(crate) fn begin<'a>(
     let mut context = Context {
         problem,
         candidates: Vec::new(),
+        shapes: Vec::new(),
         scales: None,
         limit,
     };
@@ -86,8 +90,10 @@ pub(crate) fn begin<'a>(
         let visited = visited(problem, &setup, &fit)?;
         (fit, visited)
     };
-    context.candidates =
-        all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
+    let all = all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
+    let is_searched =
+        |candidate: &Candidate| !candidate.is_shape() || problem.effects.contains(&candidate.id);
+    (context.candidates, context.shapes) = all.into_iter().partition(is_searched);
     let bare = Node {
         added: Vec::new(),
         model,

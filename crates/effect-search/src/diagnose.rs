@@ -147,10 +147,27 @@ pub fn diagnose(
     }
     let (confirmed, groups) = context.groups(confirmed, &grown.base, &noise, slowness)?;
     let verdict = verdict_of(&groups);
-    let last = if verdict == Verdict::Unexplained {
+    let last_fit = if verdict == Verdict::Unexplained {
         context.in_own_noise(&base)?
     } else {
         own
+    };
+    let last_set = if verdict == Verdict::Unexplained {
+        &base
+    } else {
+        &confirmed
+    };
+    let unknown = match verdict {
+        Verdict::Unexplained | Verdict::Partial => {
+            tell("the shape of what is missing");
+            let context = Context {
+                limit: context.limit.of_report(),
+                ..context.clone()
+            };
+            let floors: Vec<f64> = last_fit.noise.iter().map(ArModel::sigma).collect();
+            context.unknown(last_set, &floors)?
+        }
+        _ => None,
     };
     let (seconds, left_out) = (context.limit.seconds(), context.limit.left_out());
     let context = Context {
@@ -163,7 +180,8 @@ pub fn diagnose(
         Finding {
             base: &base,
             last: &confirmed,
-            own: &last,
+            own: &last_fit,
+            unknown,
             verdict,
             groups,
             left,
@@ -184,6 +202,7 @@ struct Finding<'a> {
     verdict: Verdict,
     groups: Vec<Vec<usize>>,
     left: Option<crate::Left>,
+    unknown: Option<crate::Unknown>,
     share: Option<f64>,
     /// Time of the search \[s\].
     seconds: f64,
@@ -246,6 +265,7 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         verdict,
         groups,
         left,
+        unknown,
         share,
         seconds,
         left_out,
@@ -317,8 +337,10 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         .collect();
     let said = groups.iter().flatten().chain(&problem.effects);
     let said = said.chain(singles.iter().map(|single| &single.effect));
+    let said = said.chain(unknown.iter().map(|unknown| &unknown.effect));
+    let all = || context.candidates.iter().chain(&context.shapes);
     let record_numbers = said
-        .filter_map(|id| context.candidates.iter().find(|c| c.id == *id))
+        .filter_map(|id| all().find(|c| c.id == *id))
         .map(|candidate| (candidate.id.clone(), candidate.record_numbers.clone()))
         .collect();
     Ok(Diagnosis {
@@ -331,6 +353,7 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
         steps,
         share: share.filter(|_| !order.is_empty()),
         left,
+        unknown,
         noise: noise.collect(),
         singles,
         record_numbers,
@@ -373,7 +396,7 @@ fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<
 }
 
 /// What was found of the parameters of an effect in a set.
-fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
+pub(crate) fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
     let errors = node.fit.std_errors();
     let parameters = node.spec().parameters.iter().enumerate();
     let own =

@@ -25,6 +25,7 @@ mod result;
 mod score;
 mod search;
 mod spectral_line;
+mod unknown;
 
 pub use believed::{Believed, all_candidates, believed};
 pub use diagnose::{MANY, Progress, diagnose};
@@ -34,3 +35,4 @@ pub use left::Left;
 pub use problem::{Kept, Options, Problem};
 pub use result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 pub use spectral_line::{Line, strongest_line};
+pub use unknown::{Place, Unknown};

@@ -165,25 +165,26 @@ impl Context<'_> {
     /// The part of the mean squared error that a set explains on parts of the records that it was not fitted to: a quarter of each record is
     /// left out in turn (cross-validation). Negative where the set does harm.
     fn carried_over(&self, base: &Node, set: &Node) -> Result<f64, Error> {
-        let outputs = self.problem.records[0].outputs.len();
-        let mut squares = [vec![0.0; outputs], vec![0.0; outputs]];
+        let before = self.left_out_squares(base)?;
+        let after = self.left_out_squares(set)?;
+        Ok(match (before, after) {
+            (Some(before), Some(after)) => fall(&before, &after),
+            _ => 0.0,
+        })
+    }
+
+    /// The squared error of each output on parts of the records that take no part in the fit; `None` where a simulation is not finite.
+    pub fn left_out_squares(&self, node: &Node) -> Result<Option<Vec<f64>>, Error> {
+        let mut squares = vec![0.0; self.problem.records[0].outputs.len()];
         for fold in 0..FOLDS {
-            for (node, squares) in [base, set].into_iter().zip(&mut squares) {
-                let Some(of_fold) = self.left_out(node, fold)? else {
-                    return Ok(0.0);
-                };
-                for (sum, square) in squares.iter_mut().zip(of_fold) {
-                    *sum += square;
-                }
+            let Some(of_fold) = self.left_out(node, fold)? else {
+                return Ok(None);
+            };
+            for (sum, square) in squares.iter_mut().zip(of_fold) {
+                *sum += square;
             }
         }
-        // Outputs count by what the base leaves of them; one without an error says nothing.
-        let pairs = squares[0].iter().zip(&squares[1]);
-        let ratios: Vec<f64> = pairs
-            .filter(|(before, _)| **before > 0.0)
-            .map(|(before, after)| after / before)
-            .collect();
-        Ok(1.0 - ratios.iter().sum::<f64>() / ratios.len().max(1) as f64)
+        Ok(Some(squares))
     }
 
     /// The squared error of each output on a part of all records, when the readings of this part take no part in the fit; `None` where the
@@ -215,6 +216,16 @@ impl Context<'_> {
         }
         Ok(Some(squares))
     }
+}
+
+/// The relative fall of squared errors. Outputs count alike; one without an error before says nothing.
+pub(crate) fn fall(before: &[f64], after: &[f64]) -> f64 {
+    let pairs = before.iter().zip(after);
+    let ratios: Vec<f64> = pairs
+        .filter(|(before, _)| **before > 0.0)
+        .map(|(before, after)| after / before)
+        .collect();
+    1.0 - ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
 }
 
 /// The share of the mean squared error above the noise that a set explains. `floors`: standard deviation of each output's noise \[output

@@ -140,7 +140,7 @@ impl<'a> Limit<'a> {
     /// What is found is fitted once more and shown, whatever time the search took, and interrupted or not: a limit of its own.
     pub fn of_report(&self) -> Self {
         /// Share of the time of the search.
-        const REPORT: f64 = 0.4;
+        const REPORT: f64 = 0.25;
         let whole = self.whole.map(|whole| whole.mul_f64(REPORT));
         Self {
             time: Arc::new(TimeLimit::new(whole)),

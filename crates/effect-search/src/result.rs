@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::left::Left;
+use crate::unknown::Unknown;
 
 /// The finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -118,6 +119,8 @@ pub struct Diagnosis {
     pub share: Option<f64>,
     /// What the last model leaves that is not noise.
     pub left: Option<Left>,
+    /// The shape of what no candidate explains, beside the last model; `None` where nothing is left to explain.
+    pub unknown: Option<Unknown>,
     /// The noise of each output, of the last model's residual.
     pub noise: Vec<NoiseFloor>,
     /// Single effects that were fitted, best first.

@@ -7,7 +7,7 @@ use super::fragment::{Action, Counts, Fragment, instance};
 use super::port::Port;
 use super::scale::{Scales, balance_unit, divided};
 use super::visited::{Span, Visited};
-use super::{all_effects, domain};
+use super::{all_effects, domain, shape};
 use crate::expression::{Expression, Operator, Variable};
 use crate::spec::{About, Given, ModelSpec, Parameter};
 use crate::text::is_reserved;
@@ -135,6 +135,13 @@ impl Candidate {
         self.record_numbers.contains_key("begin")
     }
 
+    /// Whether it is a smooth function without physics, no candidate of a search ([`shapes_keeping`]).
+    #[must_use]
+    pub fn is_shape(&self) -> bool {
+        self.effect
+            .is_some_and(|effect| shape::EFFECTS.contains(effect))
+    }
+
     /// Every combination of the starts, a value for each parameter.
     #[must_use]
     pub fn starts(&self) -> Vec<Vec<f64>> {
@@ -211,9 +218,29 @@ pub fn candidates_keeping(
     visited: &Visited,
     kept: &BTreeMap<String, BTreeMap<String, f64>>,
 ) -> Vec<Candidate> {
+    of_effects(all_effects(), spec, visited, kept)
+}
+
+/// Smooth functions of what the records visit, at all ports of a model: `shape(x,u)`, `course(x)`. They are no candidates of a search. `kept`: as
+/// [`candidates_keeping`] has it.
+#[must_use]
+pub fn shapes_keeping(
+    spec: &ModelSpec,
+    visited: &Visited,
+    kept: &BTreeMap<String, BTreeMap<String, f64>>,
+) -> Vec<Candidate> {
+    of_effects(shape::EFFECTS.iter(), spec, visited, kept)
+}
+
+fn of_effects(
+    effects: impl Iterator<Item = &'static Effect>,
+    spec: &ModelSpec,
+    visited: &Visited,
+    kept: &BTreeMap<String, BTreeMap<String, f64>>,
+) -> Vec<Candidate> {
     let ports = spec.ports();
     let mut all = Vec::new();
-    for effect in all_effects() {
+    for effect in effects {
         for port in ports_of(spec, visited, effect, &ports) {
             all.extend(candidate(spec, visited, effect, port, kept));
         }
@@ -229,6 +256,15 @@ fn ports_of(
 ) -> Vec<Port> {
     let single = || ports.single.iter().copied();
     let states = 0..spec.states.len();
+    let signals = || -> Vec<Variable> {
+        let inputs = (0..spec.inputs.len()).map(Variable::Input);
+        let signals = states.clone().map(Variable::State).chain(inputs);
+        let moves = |signal: &Variable| {
+            let span = visited.spans.get(signal);
+            span.is_none_or(|span| span.high > span.low)
+        };
+        signals.filter(moves).collect()
+    };
     let balances = || states.clone().filter(|&i| spec.speed_of(i).is_none());
     match effect.place {
         Place::Input => single()
@@ -241,13 +277,7 @@ fn ports_of(
         Place::Balance => balances().map(Port::Balance).collect(),
         Place::Parameter => ports.values.clone(),
         Place::ParameterAndSignal => {
-            let inputs = (0..spec.inputs.len()).map(Variable::Input);
-            let signals = states.map(Variable::State).chain(inputs);
-            let moves = |signal: &Variable| {
-                let span = visited.spans.get(signal);
-                span.is_none_or(|span| span.high > span.low)
-            };
-            let signals: Vec<Variable> = signals.filter(moves).collect();
+            let signals = signals();
             let of = |port: &Port| match port {
                 Port::Value(value) => Some(*value),
                 _ => None,
@@ -255,6 +285,12 @@ fn ports_of(
             let values = ports.values.iter().filter_map(of);
             values
                 .flat_map(|value| signals.iter().map(move |x| Port::Dependence(value, *x)))
+                .collect()
+        }
+        Place::BalanceAndSignal => {
+            let signals = signals();
+            balances()
+                .flat_map(|x| signals.iter().map(move |s| Port::BalanceAnd(x, *s)))
                 .collect()
         }
         Place::States => {
@@ -315,6 +351,9 @@ fn candidate(
             vec![(a, true), (b, false)],
         ),
         Port::InputAndBalance(u, x) => (vec![("u", Variable::Input(u))], vec![(x, false)]),
+        Port::BalanceAnd(x, a) if effect.place == Place::BalanceAndSignal => {
+            (vec![("x", a)], vec![(x, false)])
+        }
         Port::BalanceAnd(x, a) => (vec![("x", state(x)), ("a", a)], vec![(x, false)]),
         Port::OutputAnd(y, a) => (vec![("a", a), ("y", spec.outputs[y].variable)], Vec::new()),
         Port::Own => return None,

@@ -24,6 +24,8 @@ pub enum Place {
     InputAndBalance,
     /// The equation of a state `x`, to which a surrounding of the same quantity `a` (a state or an input) belongs.
     BalanceAndSurrounding,
+    /// The equation of a state, and a state or an input `x` that it depends on.
+    BalanceAndSignal,
     /// The equation of a speed `x`.
     Motion,
     /// A voltage that is read, `y`, with a current that is an input, `a`.

@@ -41,14 +41,16 @@ mod own;
 mod parameter;
 mod port;
 mod scale;
+mod shape;
 mod thermal;
 mod visited;
 
 pub use apply::{ApplyError, apply};
-pub use candidate::{Candidate, EffectParameter, candidates, candidates_keeping};
+pub use candidate::{Candidate, EffectParameter, candidates, candidates_keeping, shapes_keeping};
 pub use effect::{Effect, Place, Role, Starts};
 pub use own::{OwnCandidate, OwnError, OwnParameter, OwnState, own_candidate, own_candidates};
 pub use port::{Port, Ports};
+pub use shape::bells;
 pub use visited::{Span, Visited};
 
 /// All effects, by place; those of a chain in its order.

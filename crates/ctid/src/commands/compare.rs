@@ -226,13 +226,9 @@ impl Diagnose {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
-        if self.unknown.is_some() {
-            return Err(Error::Usage(
-                "--unknown cannot be written of a model of your own yet; leave it out, or write --report".to_string(),
-            ));
-        }
         let records = model.records(files)?;
-        let outputs = self.compare.results.plan(&files.all(), None)?;
+        let unknown = self.unknown.as_deref();
+        let outputs = self.compare.results.plan(&files.all(), unknown)?;
         let mut options = effect_search::Options {
             time_limit: Some(self.compare.effort.limit_of_own_model()),
             interrupt: Some(interrupt::flag()),
@@ -252,7 +248,8 @@ impl Diagnose {
             + &own_model::diagnosis_said(model, &diagnosis, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);
         let page = page.then(|| report::diagnosed(model, &records, &diagnosis));
-        let found = Paged::new(&diagnosis, page.as_ref());
+        let unknown = diagnosis.unknown.as_ref().map(own_model::unknown_file);
+        let found = Paged::new(&diagnosis, page.as_ref()).with_unknown(unknown);
         finish(&found, &text, &outputs, out, look)
     }
 }

@@ -24,6 +24,7 @@ pub(crate) type ReadText<'r> = &'r dyn Fn(&Path) -> Result<ModelSpec, Error>;
 pub(crate) struct Findings {
     model: String,
     steps: Vec<FoundStep>,
+    unknown: Option<FoundStep>,
     record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
@@ -64,9 +65,10 @@ impl Findings {
         self.record_numbers.contains_key(id)
     }
 
-    /// The value of a parameter in the last model that has it.
+    /// The value of a parameter in the last model that has it, or of the shape of what no candidate explains.
     fn value(&self, name: &str) -> Option<f64> {
-        let steps = self.steps.iter().rev().flat_map(|step| &step.parameters);
+        let steps = self.steps.iter().rev().chain(&self.unknown);
+        let steps = steps.flat_map(|step| &step.parameters);
         let mut named = steps.filter(|parameter| parameter.name == name);
         named.find_map(|parameter| parameter.value)
     }

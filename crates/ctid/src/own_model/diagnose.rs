@@ -4,6 +4,7 @@ use effect_search::{Diagnosis, Left, MANY, Options, Step, Verdict};
 
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
+use super::unknown;
 use super::words::{EffectWords, shown_unit};
 use crate::Error;
 use crate::look::{Look, Side, table};
@@ -38,6 +39,9 @@ pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> St
     text += &format!("\n{}\n", look.heading(&heading(diagnosis)));
     for sentence in sentences(diagnosis, &words) {
         text += &look.paragraph("  ", &sentence);
+    }
+    if let Some(unknown) = &diagnosis.unknown {
+        text += &unknown::drawn(unknown, look);
     }
     text
 }
@@ -79,6 +83,12 @@ pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<Strin
         }
     }
     all.extend(remaining(diagnosis));
+    all.extend(
+        diagnosis
+            .unknown
+            .as_ref()
+            .map(|unknown| unknown::said(unknown, words)),
+    );
     all
 }
 

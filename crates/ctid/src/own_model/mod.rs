@@ -12,6 +12,7 @@ mod problem;
 pub(crate) mod report;
 mod simulate;
 mod text;
+mod unknown;
 pub(crate) mod words;
 
 pub(crate) use self::compare::{Comparison, compare};
@@ -25,3 +26,4 @@ pub(crate) use self::identify::{Beside, OneByOne};
 pub(crate) use self::problem::RecordNumbers;
 pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;
+pub(crate) use self::unknown::file as unknown_file;

@@ -39,7 +39,8 @@ fn group(candidate: &Candidate) -> usize {
 /// As [`own_candidates`], which the model file has passed.
 pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
     let spec = &file.base;
-    let all = every_candidate(spec, &file.candidates)?;
+    let mut all = every_candidate(spec, &file.candidates)?;
+    all.retain(|candidate| !candidate.is_shape());
     let mut text = String::new();
     for (i, heading) in HEADINGS.into_iter().enumerate() {
         let here: Vec<&Candidate> = all.iter().filter(|c| group(c) == i).collect();
@@ -74,7 +75,8 @@ fn by_effect(all: &[&Candidate], look: Look) -> String {
 /// # Errors
 /// Where none does.
 pub(crate) fn like(file: &OwnModelFile, sought: &Sought, look: Look) -> Result<String, Error> {
-    let all = every_candidate(&file.base, &file.candidates)?;
+    let mut all = every_candidate(&file.base, &file.candidates)?;
+    all.retain(|candidate| !candidate.is_shape());
     let found = best(all.iter(), |candidate| sought.score_of(candidate));
     if found.is_empty() {
         return Err(sought.nothing());

@@ -25,6 +25,8 @@ pub(crate) struct Paged<'t, T> {
     found: &'t T,
     #[serde(skip)]
     page: String,
+    #[serde(skip)]
+    unknown: Option<String>,
 }
 
 impl<'t, T> Paged<'t, T> {
@@ -33,13 +35,23 @@ impl<'t, T> Paged<'t, T> {
         Self {
             found,
             page: shown.map(report::html).unwrap_or_default(),
+            unknown: None,
         }
+    }
+
+    /// With the shape of what no candidate explains as a file.
+    pub fn with_unknown(self, unknown: Option<String>) -> Self {
+        Self { unknown, ..self }
     }
 }
 
 impl<T: Serialize> Found for Paged<'_, T> {
     fn page(&self) -> String {
         self.page.clone()
+    }
+
+    fn unknown(&self) -> Option<String> {
+        self.unknown.clone()
     }
 }
 

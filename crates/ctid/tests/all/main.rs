@@ -18,6 +18,7 @@ mod outputs;
 mod own_effects;
 mod own_limits;
 mod own_term;
+mod own_unknown;
 mod own_without_inputs;
 mod prior;
 mod program;

@@ -1,0 +1,160 @@
+//! Smooth functions of what a model visits: no physics, but the shape of a term that no effect of the catalogue holds.
+//!
+//! `shape` depends on a state or an input, `course` on time. A function is a sum of bells (Gaussian radial basis) at equal distances over the
+//! visited range, as wide as their distance: linear in its parameters, smooth, and of any form that is not much narrower than a bell. These
+//! are no candidates of a search: one of them bends to whatever there is.
+//!
+//! **Reference**: S. Chen, S. A. Billings, P. M. Grant, Int. J. Control 55 (1992) 1051-1070 (radial basis functions in identification).
+
+use super::{Effect, Place, Role, Starts};
+
+/// The value of a sum of bells at a share of the range, of their heights in order.
+#[must_use]
+pub fn bells(heights: &[f64], share: f64) -> f64 {
+    let z = share * heights.len().saturating_sub(1) as f64;
+    let bell = |(k, height): (usize, &f64)| height * (-0.5 * (z - k as f64).powi(2)).exp();
+    heights.iter().enumerate().map(bell).sum()
+}
+
+/// Heights of bells as parameters, of a unit and within a bound.
+macro_rules! heights {
+    ($unit:literal, $bound:literal, $($name:literal),+) => {
+        concat!($(
+            "  parameter Real ", $name, "(unit=\"", $unit, "\", min=-", $bound, ", max=", $bound, ") = 0 \"height of a bell\";\n",
+        )+)
+    };
+}
+
+/// A function of the signal `x` (or `u`): where it begins, the unit and bound of its heights, and what stands before and behind the sum.
+macro_rules! of_signal {
+    ($inputs:literal, $x:literal, $unit:literal, $bound:literal, $before:literal, $behind:literal) => {
+        concat!(
+            "model shape\n",
+            $inputs,
+            "  constant Real low(unit=\"signal\") = 0;\n",
+            "  constant Real width(unit=\"signal\") = 1;\n",
+            "  constant Real balance(unit=\"balance\") = 1;\n",
+            heights!($unit, $bound, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
+            "  Real z = (",
+            $x,
+            " - low)/width;\n  output Real v = ",
+            $before,
+            "h0*exp(-18*(z - 0/6)^2) + h1*exp(-18*(z - 1/6)^2) + h2*exp(-18*(z - 2/6)^2) + h3*exp(-18*(z - 3/6)^2) + h4*exp(-18*(z - 4/6)^2) + h5*exp(-18*(z - 5/6)^2) + h6*exp(-18*(z - 6/6)^2)",
+            $behind,
+            ";\nend shape;\n"
+        )
+    };
+}
+
+/// The same of time, from the beginning of the record to its end.
+macro_rules! of_time {
+    ($inputs:literal, $unit:literal, $bound:literal, $before:literal, $behind:literal) => {
+        concat!(
+            "model course\n",
+            $inputs,
+            "  constant Real begin(unit=\"time\") = 0;\n",
+            "  constant Real duration(unit=\"time\") = 1;\n",
+            "  constant Real width(unit=\"signal\") = 1;\n",
+            "  constant Real balance(unit=\"balance\") = 1;\n",
+            heights!($unit, $bound, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"),
+            "  Real z = (time - begin)/duration;\n  output Real v = ",
+            $before,
+            "h0*exp(-60.5*(z - 0/11)^2) + h1*exp(-60.5*(z - 1/11)^2) + h2*exp(-60.5*(z - 2/11)^2) + h3*exp(-60.5*(z - 3/11)^2) + h4*exp(-60.5*(z - 4/11)^2) + h5*exp(-60.5*(z - 5/11)^2) + h6*exp(-60.5*(z - 6/11)^2) + h7*exp(-60.5*(z - 7/11)^2) + h8*exp(-60.5*(z - 8/11)^2) + h9*exp(-60.5*(z - 9/11)^2) + h10*exp(-60.5*(z - 10/11)^2) + h11*exp(-60.5*(z - 11/11)^2)",
+            $behind,
+            ";\nend course;\n"
+        )
+    };
+}
+
+macro_rules! sizes {
+    ($starts:expr, $($name:literal),+) => { &[$(($name, Role::Size, $starts)),+] };
+}
+
+const OF_BALANCE: Starts = Starts::Balances(&[0.1]);
+const OF_WIDTH: Starts = Starts::Widths(&[0.1]);
+const RELATIVE: Starts = Starts::Values(&[0.1]);
+
+const SHAPE: Effect = Effect {
+    id: "shape",
+    place: Place::BalanceAndSignal,
+    text: of_signal!("  input Real x;\n", "x", "balance", "20*balance", "", ""),
+    parameters: sizes!(OF_BALANCE, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
+    physics: "A term of this equation that depends on the signal in some smooth way.",
+    confused_with: &["loss(x)", "varies_with(p,x)"],
+    confirm: "Look at its shape, and write the physics that has it as a candidate of your own.",
+    symptoms: &["nobody knows what it is"],
+};
+
+const COURSE: Effect = Effect {
+    id: "course",
+    place: Place::Balance,
+    text: of_time!("  input Real x;\n", "balance", "20*balance", "", ""),
+    parameters: sizes!(
+        OF_BALANCE, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"
+    ),
+    physics: "A disturbance of this balance that follows time in some smooth way.",
+    confused_with: &["periodic(x)", "step(x)", "constant(x)"],
+    confirm: "Hold its course against the log of the plant: what happened when it changes?",
+    symptoms: &["nobody knows what it is"],
+};
+
+/// All of them: of a balance, an input, an output, and a parameter or a named flow.
+pub(super) const EFFECTS: [Effect; 8] = [
+    SHAPE,
+    Effect {
+        place: Place::Input,
+        text: of_signal!("  input Real u;\n", "u", "port", "3*width", "u + ", ""),
+        parameters: sizes!(OF_WIDTH, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
+        physics: "What the actuator gives is another function of the command.",
+        ..SHAPE
+    },
+    Effect {
+        place: Place::Output,
+        text: of_signal!("  input Real u;\n", "u", "port", "3*width", "u + ", ""),
+        parameters: sizes!(OF_WIDTH, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
+        physics: "What the sensor gives is another function of what it measures.",
+        ..SHAPE
+    },
+    Effect {
+        place: Place::ParameterAndSignal,
+        text: of_signal!(
+            "  input Real p;\n  input Real x;\n",
+            "x",
+            "1",
+            "3",
+            "p*(1 + ",
+            ")"
+        ),
+        parameters: sizes!(RELATIVE, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
+        physics: "It is no constant, but some smooth function of the signal.",
+        ..SHAPE
+    },
+    COURSE,
+    Effect {
+        place: Place::Input,
+        text: of_time!("  input Real u;\n", "port", "3*width", "u + ", ""),
+        parameters: sizes!(
+            OF_WIDTH, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"
+        ),
+        physics: "What acts is the input and a disturbance that follows time.",
+        ..COURSE
+    },
+    Effect {
+        place: Place::Output,
+        text: of_time!("  input Real u;\n", "port", "3*width", "u + ", ""),
+        parameters: sizes!(
+            OF_WIDTH, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"
+        ),
+        physics: "The reading is off by an error that follows time.",
+        ..COURSE
+    },
+    Effect {
+        place: Place::Parameter,
+        text: of_time!("  input Real p;\n", "1", "3", "p*(1 + ", ")"),
+        parameters: sizes!(
+            RELATIVE, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"
+        ),
+        physics: "It changes over time in some smooth way.",
+        ..COURSE
+    },
+];

@@ -1,0 +1,79 @@
+//! The shape of what no candidate explains, as a person reads it and as a file.
+
+use effect_search::Unknown;
+
+use super::words::{EffectWords, shown_unit};
+use crate::look::{Look, Side, table};
+use crate::numbers;
+use crate::term_file::HEADER;
+
+/// What it is, in a sentence or two.
+pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
+    let left_out = unknown.share_left_out.map_or(String::new(), |share| {
+        if share > 0.0 {
+            format!(
+                ", and lowers it by {:.0} % on parts of the records that it was not fitted to",
+                100.0 * share
+            )
+        } else {
+            ", but does not lower it on parts of the records that it was not fitted to".to_string()
+        }
+    });
+    format!(
+        "Its shape was sought at every port against every state, input and time: the best is a function of {}. {} explains {:.0} % of the squared error above the noise{left_out}; `ctid add '{}' --from RESULT.json` keeps it until its physics is known.",
+        unknown.variable,
+        words.placed(&unknown.effect),
+        100.0 * unknown.share,
+        unknown.effect
+    )
+}
+
+/// Some of its values.
+pub(super) fn drawn(unknown: &Unknown, look: Look) -> String {
+    /// Every so many of them.
+    const EVERY: usize = 4;
+    let head = |name: &str, unit: &str| match shown_unit(unit) {
+        "" => name.to_string(),
+        unit => format!("{name} [{unit}]"),
+    };
+    let mut rows = vec![vec![
+        head(&unknown.variable, &unknown.variable_unit),
+        head("term", &unknown.unit),
+        "std. error".to_string(),
+    ]];
+    let values = unknown.at.iter().zip(&unknown.value);
+    for ((at, value), error) in values.zip(&unknown.std_error).step_by(EVERY) {
+        let error = error.map_or("not determined".to_string(), |error| {
+            numbers::significant(error, 2)
+        });
+        rows.push(vec![
+            numbers::significant(*at, 3),
+            numbers::significant(*value, 3),
+            error,
+        ]);
+    }
+    let mut text = format!("\n{}\n", look.heading(&unknown.effect));
+    for line in table(&[Side::Right; 3], &rows) {
+        text += &format!("  {}\n", line.trim_end());
+    }
+    text
+}
+
+/// The file that `ctid diagnose --unknown` writes.
+pub(crate) fn file(unknown: &Unknown) -> String {
+    let (at, of) = (&unknown.variable_unit, &unknown.unit);
+    let mut text = format!("{HEADER} [{at}],value [{of}],std_error [{of}]\n");
+    for ((at, value), error) in unknown
+        .at
+        .iter()
+        .zip(&unknown.value)
+        .zip(&unknown.std_error)
+    {
+        let error = error.map_or(String::new(), |error| error.to_string());
+        text += &format!(
+            "\"{}\",{},{at},{value},{error}\n",
+            unknown.effect, unknown.variable
+        );
+    }
+    text
+}

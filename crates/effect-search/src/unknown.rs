@@ -1,0 +1,249 @@
+//! The shape of what no candidate explains: where a missing term acts, what it depends on, and how.
+//!
+//! At every port a smooth function ([`ct_model::effects::shapes_keeping`]) of every state and input is added to the model and fitted with all
+//! other parameters. A function bends to whatever there is, so ports and variables are compared by the error that each leaves on quarters of
+//! the records that it was not fitted to, against that of the model without it on all it was fitted to. Where none lowers that error, functions
+//! of time take part too, and the criterion decides.
+
+use std::collections::BTreeMap;
+
+use ct_model::effects::{Candidate, Port, bells};
+use ct_model::{ModelSpec, Variable};
+use estimation::Noise;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::Error;
+use crate::diagnose::sizes;
+use crate::node::{Context, FINE, Node, ROUGH};
+use crate::partial::{explained, fall};
+use crate::result::Estimate;
+use crate::search::best_first;
+
+/// So many functions of those with the best scores are fitted, ...
+const FITTED: usize = 10;
+/// ... and so many of these are held against parts of the records that they were not fitted to.
+const CARRIED: usize = 5;
+/// A function of a signal explains this share of the error there, or it is none.
+const LEAST_SHARE: f64 = 0.2;
+/// Values of the shape are given at so many places.
+const PLACES: usize = 25;
+
+/// A smooth function at a port.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// Its identifier: `shape(T,u)`, `course(T)`.
+    pub effect: String,
+    /// Fall of the criterion against the last model, in white noise.
+    pub bic_gain: f64,
+    /// By how much the mean squared error falls on parts of the records that it was not fitted to; negative where it rises, `None` where that
+    /// was not computed.
+    pub share_left_out: Option<f64>,
+}
+
+/// A missing term.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unknown {
+    /// The smooth function that stands for it: `ctid add` takes it as it takes an effect.
+    pub effect: String,
+    /// What it depends on: a state or an input, or `time`.
+    pub variable: String,
+    /// Unit of the variable.
+    pub variable_unit: String,
+    /// Unit of the term.
+    pub unit: String,
+    /// Share of the mean squared error above the noise that it explains beside the last model.
+    pub share: f64,
+    /// By how much the mean squared error falls on parts of the records that it was not fitted to; `None` where that was not computed.
+    pub share_left_out: Option<f64>,
+    /// Simulation error with it, by output \[unit of the output\].
+    pub rmse_per_output: BTreeMap<String, f64>,
+    /// Where the shape is given, over the visited range \[unit of the variable\].
+    pub at: Vec<f64>,
+    /// The term there: what is added or, at a parameter, its relative change against its mean \[unit\].
+    pub value: Vec<f64>,
+    /// Its standard error; `None` where it is not determined.
+    pub std_error: Vec<Option<f64>>,
+    /// The heights of its bells, as `ctid add NAME --from` keeps them.
+    pub parameters: Vec<Estimate>,
+    /// Ports and variables, the best first.
+    pub places: Vec<Place>,
+}
+
+impl Context<'_> {
+    /// The missing term beside a set; `None` where no function lowers the criterion.
+    pub fn unknown(&self, node: &Node, floors: &[f64]) -> Result<Option<Unknown>, Error> {
+        let mut with_shapes = self.clone();
+        with_shapes.candidates.extend(self.shapes.iter().cloned());
+        let of: Vec<usize> = (self.candidates.len()..with_shapes.candidates.len()).collect();
+        with_shapes.unknown_among(node, &of, floors)
+    }
+
+    fn unknown_among(
+        &self,
+        node: &Node,
+        of: &[usize],
+        floors: &[f64],
+    ) -> Result<Option<Unknown>, Error> {
+        let white = Noise::white(node.spec().outputs.len());
+        let base = self.refitted(node, &white, FINE)?;
+        let (courses, shapes): (Vec<usize>, Vec<usize>) =
+            of.iter().partition(|&&i| self.candidates[i].follows_time());
+        let mut fitted = Vec::new();
+        for kind in [&shapes, &courses] {
+            let mut trials = self.trials_among(&base, kind, &white);
+            trials.truncate(FITTED);
+            fitted.extend(self.refits(&base, &trials, &white));
+        }
+        let fitted: Vec<Node> = best_first(fitted)
+            .into_iter()
+            .filter(|set| set.gain_over(&base) > 0.0)
+            .collect();
+        let is_course = |set: &Node| self.last_of(set).is_some_and(Candidate::follows_time);
+        let (courses, shapes): (Vec<Node>, Vec<Node>) =
+            fitted.into_iter().partition(|set| is_course(set));
+        let counts = base.fit.rmse.iter().zip(&base.fit.samples_per_output);
+        let before: Vec<f64> = counts.map(|(rmse, n)| rmse * rmse * *n as f64).collect();
+        let tested: Vec<Option<f64>> = shapes
+            .par_iter()
+            .take(CARRIED)
+            .map(|set| {
+                let squares = self.left_out_squares(set).ok().flatten()?;
+                Some(fall(&before, &squares))
+            })
+            .collect();
+        let tested = tested.into_iter().chain(std::iter::repeat(None));
+        let mut all: Vec<(Node, Option<f64>)> = shapes.into_iter().zip(tested).collect();
+        all.sort_by(|a, b| {
+            let share = |share: Option<f64>| share.unwrap_or(f64::NEG_INFINITY);
+            share(b.1).total_cmp(&share(a.1))
+        });
+        let carries = all.first().and_then(|(_, share)| *share);
+        let carries = carries.is_some_and(|share| share >= LEAST_SHARE);
+        all.extend(courses.into_iter().map(|set| (set, None)));
+        if !carries {
+            all.sort_by(|a, b| b.0.gain_over(&base).total_cmp(&a.0.gain_over(&base)));
+        }
+        let Some((best, share_left_out)) = all.first().cloned() else {
+            return Ok(None);
+        };
+        let best = self.refitted(&best, &white, ROUGH).unwrap_or(best);
+        let Some(candidate) = self.last_of(&best) else {
+            return Ok(None);
+        };
+        let outputs = node.spec().outputs.iter();
+        let names = outputs.map(|output| node.spec().about(output.variable).name.clone());
+        let places = all.iter().map(|(set, share)| Place {
+            effect: self.last_of(set).map_or_else(String::new, |c| c.id.clone()),
+            bic_gain: set.gain_over(&base),
+            share_left_out: *share,
+        });
+        let (at, value, std_error) = curve(&best, candidate);
+        let (variable, variable_unit) = self.variable_of(candidate);
+        Ok(Some(Unknown {
+            effect: candidate.id.clone(),
+            variable,
+            variable_unit,
+            unit: candidate
+                .parameters
+                .first()
+                .map_or_else(String::new, |p| p.unit.clone()),
+            share: explained(&base.fit, &best.fit, floors),
+            share_left_out,
+            rmse_per_output: names.zip(best.fit.rmse.iter().copied()).collect(),
+            at,
+            value,
+            std_error,
+            parameters: sizes(&best, candidate),
+            places: places.collect(),
+        }))
+    }
+
+    fn last_of(&self, set: &Node) -> Option<&Candidate> {
+        Some(&self.candidates[*set.added.last()?])
+    }
+
+    /// What a function depends on, and its unit.
+    fn variable_of(&self, candidate: &Candidate) -> (String, String) {
+        let spec: &ModelSpec = &self.problem.spec;
+        let variable = match candidate.port {
+            _ if candidate.follows_time() => None,
+            Port::Input(u) => Some(Variable::Input(u)),
+            Port::Output(y) => Some(spec.outputs[y].variable),
+            Port::Dependence(_, x) | Port::BalanceAnd(_, x) => Some(x),
+            _ => None,
+        };
+        match variable {
+            Some(variable) => {
+                let about = spec.about(variable);
+                (about.name.clone(), about.unit.clone())
+            }
+            None => ("time".to_string(), self.problem.time_unit_name.clone()),
+        }
+    }
+}
+
+/// The function over the range that it is written in, with standard errors.
+fn curve(set: &Node, candidate: &Candidate) -> (Vec<f64>, Vec<f64>, Vec<Option<f64>>) {
+    let numbers = &candidate.record_numbers;
+    let number = |name: &str, other: f64| numbers.get(name).copied().unwrap_or(other);
+    let (from, width) = if candidate.follows_time() {
+        (number("begin", 0.0), number("duration", 1.0))
+    } else {
+        (number("low", 0.0), number("width", 1.0))
+    };
+    let parameters = &set.spec().parameters;
+    let positions: Vec<usize> = candidate
+        .parameters
+        .iter()
+        .filter_map(|own| parameters.iter().position(|p| p.about.name == own.name))
+        .collect();
+    let heights: Vec<f64> = positions.iter().map(|&i| set.fit.x[i]).collect();
+    let errors = set.fit.std_errors();
+    let correlations = set.fit.correlations();
+    let share = |k: usize| k as f64 / (PLACES - 1) as f64;
+    let bell = |j: usize, k: usize| {
+        let mut unit = vec![0.0; heights.len()];
+        unit[j] = 1.0;
+        bells(&unit, share(k))
+    };
+    // The parameter itself imitates a relative change of its mean.
+    let of_parameter = matches!(candidate.port, Port::Value(_) | Port::Dependence(..));
+    let means: Vec<f64> = (0..heights.len())
+        .map(|j| {
+            let sum: f64 = (0..PLACES).map(|k| bell(j, k)).sum();
+            if of_parameter {
+                sum / PLACES as f64
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    let mut curve = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..PLACES {
+        let parts: Vec<f64> = (0..heights.len()).map(|j| bell(j, k) - means[j]).collect();
+        curve.0.push(from + share(k) * width);
+        curve
+            .1
+            .push(parts.iter().zip(&heights).map(|(a, b)| a * b).sum());
+        // Each bell's part, times its standard error.
+        let parts: Option<Vec<f64>> = parts
+            .iter()
+            .zip(&positions)
+            .map(|(part, &at)| Some(part * errors[at]?))
+            .collect();
+        let error = parts.zip(correlations.as_ref()).and_then(|(parts, all)| {
+            let (entries, matrix) = all;
+            let row = |j: usize| entries.iter().position(|i| *i == positions[j]);
+            let mut variance = 0.0;
+            for (a, part) in parts.iter().enumerate() {
+                for (b, other) in parts.iter().enumerate() {
+                    variance += part * other * matrix[row(a)?][row(b)?];
+                }
+            }
+            Some(variance.max(0.0).sqrt())
+        });
+        curve.2.push(error);
+    }
+    curve
+}

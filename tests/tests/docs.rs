@@ -85,6 +85,7 @@ fn links_lead_to_files() {
         "docs/design.md",
         "docs/gallery.md",
         "docs/hidden-dead-zone.md",
+        "docs/measured-models.md",
         "docs/model-file.md",
         "docs/monitor.md",
         "docs/page.md",

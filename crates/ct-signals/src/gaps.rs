@@ -22,6 +22,12 @@ const SINGLE: f64 = 0.6;
 const ROUNDED: f64 = 0.05;
 /// Of uneven steps a gap is one that is longer than 1.5 times the one that this share of them does not exceed.
 const USUAL: f64 = 0.95;
+/// Steps that belong to one rate of a logger with several differ by at most this part of each other ...
+const SAME_RATE: f64 = 0.2;
+/// ... and stand side by side, so many at least: rows that are lost leave steps of any length, one by one.
+const STAYS: usize = 3;
+/// A logger has several rates where this share of the long steps stands in such a row.
+const OF_A_RATE: f64 = 0.5;
 /// More rows are never put in.
 const MOST_PUT_IN: usize = 100_000;
 /// A part with fewer samples of an output says less than its initial states take.
@@ -69,8 +75,20 @@ struct Sampling {
 }
 
 impl Sampling {
-    /// Where the steps are whole multiples of one interval, that is the interval; otherwise their median.
+    /// Where the steps are whole multiples of one interval, that is the interval; otherwise their median. Of a logger that goes over to
+    /// longer steps where little happens, as a tester of batteries does, the steps of its slowest rate are no gaps.
     fn of(time: &[f64]) -> Self {
+        let plain = Self::of_one_rate(time);
+        match slowest_rate(time, plain.interval) {
+            Some(slowest) => Self {
+                usual: plain.usual.max(slowest),
+                ..plain
+            },
+            None => plain,
+        }
+    }
+
+    fn of_one_rate(time: &[f64]) -> Self {
         let short = quantile_of_steps(time, 0.1);
         let near: Vec<f64> = steps(time).filter(|step| *step < GAP * short).collect();
         let interval = near.iter().sum::<f64>() / near.len().max(1) as f64;
@@ -105,6 +123,21 @@ impl Sampling {
             0
         }
     }
+}
+
+/// The longest step of the slowest rate, where most of the steps that are longer than `interval` stand in rows of equal ones.
+fn slowest_rate(time: &[f64], interval: f64) -> Option<f64> {
+    let steps: Vec<f64> = steps(time).collect();
+    let long = |step: f64| step > GAP * interval;
+    let same = |a: f64, b: f64| (a - b).abs() <= SAME_RATE * a.min(b);
+    let of_a_rate = steps.chunk_by(|a, b| same(*a, *b) && long(*a) && long(*b));
+    let of_a_rate = of_a_rate.filter(|chunk| long(chunk[0]) && chunk.len() >= STAYS);
+    let (count, slowest) = of_a_rate.fold((0, 0.0_f64), |(count, slowest), chunk| {
+        let longest = chunk.iter().copied().fold(slowest, f64::max);
+        (count + chunk.len(), longest)
+    });
+    let all = steps.iter().filter(|step| long(**step)).count();
+    (count > 0 && count as f64 >= OF_A_RATE * all as f64).then_some(slowest)
 }
 
 /// The first row behind which rows are missing, and how many.
@@ -387,6 +420,41 @@ mod tests {
             *t += 0.9 * (k as f64 * 1.7).sin();
         }
         assert!(!uneven.has_gaps());
+    }
+
+    #[test]
+    fn a_logger_with_several_rates_loses_nothing() {
+        // As a tester of batteries writes: every 0.1 s while something happens, then every 1 s and every 10 s.
+        let steps = [
+            (300, 0.1),
+            (11, 10.0),
+            (300, 0.1),
+            (8, 1.0),
+            (60, 0.1),
+            (7, 10.0),
+        ];
+        let mut time = vec![0.0];
+        for (count, step) in steps {
+            for k in 0..count {
+                let last = time[time.len() - 1];
+                time.push(last + step + 0.004 * (k as f64 * 1.7).sin());
+            }
+        }
+        let with_time = |time: Vec<f64>| {
+            let mut record = record(0..time.len());
+            record.time = time;
+            record
+        };
+        assert!(!with_time(time.clone()).has_gaps());
+        // Behind it a minute is missing.
+        let last = time[time.len() - 1];
+        time.extend((0..20).map(|k| last + 60.0 + 0.1 * k as f64));
+        let gappy = with_time(time);
+        assert_eq!(gappy.before_missing_row(), Some(last));
+        assert_eq!(gappy.without_gaps(1.0).0.len(), 2);
+        // Rows are lost one by one: steps of two intervals stand side by side now and then, and most do not.
+        let lost = record((0..1000).filter(|k| (k * k * 31 + k * 17) % 101 > 10));
+        assert!(lost.missing_rows() > 110, "{}", lost.missing_rows());
     }
 
     #[test]

@@ -91,8 +91,13 @@ pub fn diagnose(
         // Each model with the noise model of its own residual: what coloured noise explains needs no effect.
         let own = context.in_own_noise(&confirmed)?;
         let bare = context.in_own_noise(&grown.base)?;
+        let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+        let error =
+            |node: &Node| weighted_rms(&node.fit.rmse, &floors, &node.fit.samples_per_output);
+        // And the simulation error falls: in the metric of coloured noise a single reading can ask for an effect.
         let needed = bare.bic() - own.bic() > BIC_MARGIN
-            && context.beyond_chance((&confirmed, &own), (&grown.base, &bare));
+            && context.beyond_chance((&confirmed, &own), (&grown.base, &bare))
+            && error(&confirmed) < error(&grown.base);
         if !needed {
             confirmed = grown.base.clone();
         }

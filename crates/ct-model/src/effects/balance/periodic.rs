@@ -14,7 +14,7 @@ model periodic
   constant Real turn = 6.283185307179586;
   parameter Real sine(unit="balance", min=-10*balance, max=10*balance) = 0 "amplitude of the sine";
   parameter Real cosine(unit="balance", min=-10*balance, max=10*balance) = 0 "amplitude of the cosine";
-  parameter Real period(unit="time", min=2*interval, max=2*duration) = 0.1*duration "period";
+  parameter Real period(unit="time", min=2*interval, max=0.5*duration) = 0.1*duration "period, two of which the record holds at least: what is longer is a trend";
   Real angle = turn*(time - begin)/period;
   output Real v(unit="balance") = sine*sin(angle) + cosine*cos(angle);
 end periodic;
@@ -26,7 +26,7 @@ end periodic;
             "period",
             Role::Shape,
             Starts::Durations(&[
-                0.5, 0.3, 0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025, 0.0175, 0.0125,
+                0.4, 0.3, 0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025, 0.0175, 0.0125,
             ]),
         ),
     ],

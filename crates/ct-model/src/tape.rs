@@ -475,6 +475,42 @@ impl Tape {
         }
     }
 
+    /// Has the guards that stand on a difference answer for one of its sides.
+    pub fn answer<T>(&self, registers: &mut Registers<T>, difference: Register, positive: bool) {
+        let side = if positive { 1.0 } else { -1.0 };
+        for (guard, answer) in self.guards.iter().zip(&mut registers.answers) {
+            if guard.difference == difference {
+                *answer = guard.holds(side);
+            }
+        }
+        self.answers_changed(registers);
+    }
+
+    /// The state that a difference is, less or from a number, and its sign.
+    pub fn state_of(&self, difference: Register) -> Option<(usize, f64)> {
+        let states = self.state(0)..self.state(self.states);
+        let state = |register: Register| {
+            let known = states.contains(&register);
+            known.then(|| register - states.start)
+        };
+        let is_number = |register: Register| {
+            let once = self.first_operation..self.first_operation + self.once;
+            let numbers = self.first_constant..self.first_operation;
+            let parameters = 1..self.input(0);
+            [once, numbers, parameters]
+                .iter()
+                .any(|of| of.contains(&register))
+        };
+        match self
+            .operations
+            .get(difference.checked_sub(self.first_operation)?)?
+        {
+            Operation::Subtract(a, b) if is_number(*b) => Some((state(*a)?, 1.0)),
+            Operation::Subtract(a, b) if is_number(*a) => Some((state(*b)?, -1.0)),
+            _ => None,
+        }
+    }
+
     /// Takes over the answers of other registers.
     pub fn copy_answers<T, S>(&self, from: &Registers<S>, to: &mut Registers<T>) {
         to.answers.copy_from_slice(&from.answers);

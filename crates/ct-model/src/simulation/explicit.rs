@@ -78,7 +78,7 @@ pub(super) fn step<T: Scalar>(
         let next = std::mem::take(&mut work.next);
         drive.load(tape, work, at, &next);
         work.next = next;
-        tape.evaluate_slopes(&mut work.registers);
+        work.evaluate_slopes(tape, drive);
         work.keep_slope(tape, stage);
     }
     work.begun = true;

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_model::{About, Dual, Given, Model, Simulation, Variable};
 use ct_signals::{Hold, Record};
-use estimation::{Fit, Noise, Prior, Residuals, Sample, Start, within};
+use estimation::{Fit, Noise, Prior, Residuals, Robust, Sample, Start, within};
 
 use crate::{Error, FitOptions, PriorValue, TimeLimit, clock::Clock, output_noise::output_noise};
 
@@ -400,6 +400,15 @@ impl<'a> ModelSetup<'a> {
             fit = estimation::fit_from(&weighted, from, &white, options.stopping)?;
         }
         Ok(fit)
+    }
+
+    /// The uncertainty of a fit under the noise of its residual, of order zero to `order` at each output ([`estimation::robust`]): [`Self::fit`]
+    /// takes the noise for white.
+    ///
+    /// # Errors
+    /// Where the simulation is not finite at the fit.
+    pub fn robust(&self, fit: &Fit, order: usize) -> Result<Robust, Error> {
+        Ok(estimation::robust(self, fit, order)?)
     }
 
     /// The initial states that fit best with all else fixed, in white noise.

@@ -25,7 +25,7 @@ use self::step::{Drive, Interval, Step};
 use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
 use crate::spec::ModelSpec;
-use crate::tape::{Register, Tape};
+use crate::tape::{Register, Registers, Tape};
 
 /// Error of a step, as a share of the largest absolute value that a state has had. Derivatives are those of the steps that follow: at twice
 /// this they are off by some 1e-3 where a right-hand side bends sharply.
@@ -34,6 +34,10 @@ const TOLERANCE: f64 = 1e-10;
 const SHORTEST: f64 = 1e-9;
 /// After two events of one guard that lie nearer to each other than this share of an interval a step of this length is taken.
 const SLIDE: f64 = 1e-2;
+/// A step is at most so many times as long as the last one.
+const LONGER: f64 = 5.0;
+/// A step that is longer than the error asked for by this much is tried, where it is the last one of an interval.
+const STRETCH: f64 = 1.1;
 /// Steps in an interval beyond which the simulation has failed, ...
 const MOST_STEPS: usize = 50_000;
 /// ... and those that every interval adds to what is left of them: a trial whose steps are short all along ends within seconds.
@@ -154,6 +158,8 @@ pub struct Simulation<'a, T> {
     added: Vec<T>,
     scratch: Vec<T>,
     begun: bool,
+    /// The registers hold slopes and guards where the last interval ended, with inputs that were held in it.
+    ended_within: bool,
     /// Settled states have their initial values.
     settled: bool,
 }
@@ -208,6 +214,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             added: vec![zero; tape.states],
             scratch: vec![zero; tape.states],
             begun: false,
+            ended_within: false,
             settled: false,
             work,
             model,
@@ -233,13 +240,20 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         };
         let drive = Drive::held(inputs, &self.held, &delays);
         let tape = &self.model.tape;
-        drive.load(tape, &mut self.work, self.time, &self.state);
-        if self.begun {
-            self.let_through(&delays);
+        if self.ended_within && inputs == self.last {
+            // The last step's end is this reading.
+            tape.evaluate_outputs(&mut self.work.registers);
         } else {
-            self.before_the_record();
+            self.work.registers.held = false;
+            drive.load(tape, &mut self.work, self.time, &self.state);
+            if self.begun {
+                self.let_through(&delays);
+            } else {
+                self.before_the_record();
+            }
+            self.remember();
         }
-        self.remember();
+        self.ended_within = false;
         self.read.copy_from_slice(inputs);
         // A delay may let something through, and a play move, where the interval begins.
         self.computed = tape.delays.is_empty() && tape.plays.is_empty();
@@ -291,6 +305,8 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let begin = self.time.value();
         let length = until - begin;
         self.last_length = length;
+        self.ended_within = false;
+        self.work.registers.held = false;
         self.settle(from, delays);
         for ((rise, from), to) in self.rise.iter_mut().zip(from).zip(to) {
             *rise = (to - from) / length;
@@ -406,6 +422,8 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             self.remember();
             self.slide_on(tape, &drive);
         }
+        // Whatever made the registers, it was computed for the inputs of this interval.
+        self.work.registers.held = !bends;
         self.work.keep_slope(tape, 0);
         self.work.begun = true;
     }
@@ -501,7 +519,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             for delay in delays.all.iter().filter(|delay| !delay.known_ahead) {
                 longest = longest.min(delay.by.value().max(interval.length / 50.0));
             }
-            let whole = limit.value() <= longest * (1.0 + 1e-9);
+            let whole = limit.value() <= longest * STRETCH;
             let mut h = if whole { limit } else { T::constant(longest) };
             let mut error = self.attempt(tape, interval, h, delays);
             let mut beyond = None;
@@ -529,9 +547,9 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 Some((event, _)) => Some(event),
                 None => self.first_event(tape, interval, h, delays),
             };
-            let is_short = !whole || error > 0.5 || self.length.is_finite();
+            let is_short = !whole || error > 0.5 || self.length < h.value() * LONGER;
             if event.is_none() && is_short {
-                let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
+                let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, LONGER);
                 if !whole || error > 0.5 || grown > self.length {
                     self.length = grown.max(shortest);
                 }
@@ -551,6 +569,12 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             }
             self.note_largest();
             if event.is_none() && whole && out.is_none() {
+                let explicit = self.method == Method::Explicit;
+                self.ended_within = explicit
+                    && !sliding
+                    && self.work.registers.held
+                    && !tape.reads_time
+                    && tape.plays.is_empty();
                 return Ok(());
             }
             if let Some(Event { change, .. }) = event {
@@ -739,6 +763,16 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         if tape.guards.is_empty() || h.value() <= 0.0 {
             return None;
         }
+        tape.evaluate_guards(&mut self.work.registers);
+        let Registers {
+            values, answers, ..
+        } = &self.work.registers;
+        let guards = tape.guards.iter().zip(answers);
+        let mut stays = guards
+            .map(|(guard, &answer)| !guard.is_crossed(answer, values[guard.difference].value()));
+        if self.work.sliding.is_empty() && stays.all(|stays| stays) {
+            return None;
+        }
         let answers = self.work.registers.answers.clone();
         let is_crossed = |watched: Watched, value: f64| match watched {
             Watched::Guard(i) => tape.guards[i].is_crossed(answers[i], value),
@@ -761,6 +795,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let at = |own: &mut Self, watched: Watched, share: f64| {
             let part = T::constant(h.value() * share);
             own.attempt(tape, interval, part, delays);
+            tape.evaluate_guards(&mut own.work.registers);
             own.distance(watched)
         };
         let mut first: Option<(f64, Watched, bool)> = None;
@@ -802,6 +837,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             // It changes back at once, by rounding: to either side in turn.
             let after = T::constant(slide.min(h.value()));
             self.attempt(tape, interval, after, delays);
+            tape.evaluate_guards(&mut self.work.registers);
             let there = self.distance(watched).value();
             let change = if is_crossed(watched, there) {
                 Change::Crossed(difference, there > 0.0)

@@ -112,6 +112,7 @@ impl<T: Scalar> Sliding<T> {
         for side in 0..=m {
             if side == self.sides.len() {
                 self.sides.push(registers.clone());
+                self.sides[side].held = false;
             }
             tape.copy_answers(registers, &mut self.sides[side]);
             if let Some(own) = side.checked_sub(1) {
@@ -150,8 +151,8 @@ impl<T: Scalar> Sliding<T> {
         self.shares.copy_from_slice(&wanted);
         self.solve();
         for (i, &register) in tape.derivatives.iter().enumerate() {
-            // A slope that is a state or an input is the same on all sides.
-            if register >= up_to {
+            // What is a state or made of inputs alone is the same on all sides.
+            if register >= up_to && !tape.of_inputs[register] {
                 registers.values[register] = self.mean(i, n);
             }
         }
@@ -189,6 +190,7 @@ impl<T: Scalar> Sliding<T> {
                 own.values[tape.delayed(i)] = drive.delays.at(i, at.values[0] + by);
             }
             tape.evaluate_slopes(own);
+            tape.evaluate_guards(own);
             own.values[self.surfaces[guard].difference]
         });
         (ends[0] - ends[1]) * (0.5 / distance)

@@ -32,10 +32,11 @@ impl<T: Scalar> Step<T> {
         }
     }
 
-    /// Computes slopes and the differences of guards from what is loaded.
+    /// Computes slopes from what is loaded, and the differences of guards where states slide.
     pub fn evaluate_slopes(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
         tape.evaluate_slopes(&mut self.registers);
         if !self.sliding.is_empty() {
+            tape.evaluate_guards(&mut self.registers);
             self.sliding.mean_slopes(tape, &mut self.registers, drive);
         }
     }
@@ -96,19 +97,24 @@ impl<'a, T: Scalar> Drive<'a, T> {
         Self { interval, delays }
     }
 
-    /// Writes time, inputs, states and delayed values into the registers.
+    /// Writes time, inputs, states and delayed values into the registers; inputs that are held stand there.
     pub fn load(&self, tape: &Tape, work: &mut Step<T>, time: T, x: &[T]) {
+        let held = work.registers.held;
         let values = &mut work.registers.values;
-        values[0] = time;
+        if tape.reads_time {
+            values[0] = time;
+        }
         let Interval {
             begin, from, rise, ..
         } = self.interval;
-        for (i, (&from, &rise)) in from.iter().zip(rise).enumerate() {
-            values[tape.input(i)] = if rise == 0.0 {
-                T::constant(from)
-            } else {
-                (time - begin) * rise + from
-            };
+        if !held {
+            for (i, (&from, &rise)) in from.iter().zip(rise).enumerate() {
+                values[tape.input(i)] = if rise == 0.0 {
+                    T::constant(from)
+                } else {
+                    (time - begin) * rise + from
+                };
+            }
         }
         let first = tape.state(0);
         values[first..first + x.len()].copy_from_slice(x);

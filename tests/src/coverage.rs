@@ -94,7 +94,7 @@ pub fn of_record(driven: &DrivenModel, seed: u64) -> Vec<(String, bool)> {
     let records = [record(driven, seed)];
     let known = BTreeMap::new();
     let options = FitOptions {
-        starts: 3,
+        starts: 1,
         ..FitOptions::default()
     };
     let Ok(setup) = ModelSetup::new(&model, &records, &known, driven.time_unit.0) else {

@@ -18,11 +18,12 @@ fn intervals_hold_the_truth() {
     assert_eq!(all.len(), 8);
     let held: usize = all.iter().map(|coverage| coverage.held).sum();
     let of: usize = all.iter().map(|coverage| coverage.of).sum();
-    assert_eq!(of, 8 * records.len());
-    // Three standard deviations of 60 records; the numbers of one record hang together.
+    // An initial speed may be at a bound of its own, and have no interval.
+    assert!(of > 8 * records.len() * 19 / 20, "{all:?}");
+    // Sixty records, and the numbers of one record hang together.
     let share = held as f64 / of as f64;
     assert!((0.90..=0.99).contains(&share), "{share}: {all:?}");
     for coverage in &all {
-        assert!(coverage.held >= 51, "{coverage:?}");
+        assert!(coverage.held * 100 >= coverage.of * 85, "{coverage:?}");
     }
 }

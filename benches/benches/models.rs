@@ -1,4 +1,4 @@
-//! Time per sample of models as text: the plants next to their kernels, and models that are stiff, swing, meet a limit or have delays.
+//! Time per sample of models as text: the plants next to their kernels, and models that are stiff, swing, meet a limit, stick or have delays.
 #![allow(missing_docs)]
 
 use std::hint::black_box;
@@ -140,8 +140,8 @@ fn plants_both_ways(criterion: &mut Criterion) {
     }
 }
 
-/// Time constants of 1 ms and 1000 s; a swing of twenty samples a period; a limit that is met twice in each; delays of both kinds.
-const OTHERS: [(&str, f64, &str); 4] = [
+/// Time constants of 1 ms and 1000 s; a swing of twenty samples a period; a limit that is met twice in each; an arm that friction holds; delays of both kinds.
+const OTHERS: [(&str, f64, &str); 5] = [
     (
         "stiff",
         20.0,
@@ -156,6 +156,11 @@ const OTHERS: [(&str, f64, &str); 4] = [
         "limit",
         2.0,
         "model Saw parameter Real limit = 0.8; parameter Real w = 1; input Real u; output Real y = x; Real x(start=0); Real s(start=0); Real c(start=1); equation der(s) = w*c; der(c) = -w*s; der(x) = max(s - limit, 0) - 0.1*x + 0*u*x; end Saw;",
+    ),
+    (
+        "friction",
+        0.3,
+        "model Arm parameter Real f = 0.5; parameter Real k = 0.8; input Real u; output Real y = x; Real x(start=0.2); Real w(start=0.3); equation der(x) = w; der(w) = u - 4.5 - k*x - 0.3*w - f*sign(w); end Arm;",
     ),
     (
         "delay",

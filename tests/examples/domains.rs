@@ -2,8 +2,10 @@
 //! where it lies beside.
 //!
 //! ```sh
-//! cargo build --release && cargo run --release -p ctid-tests --example domains [-- CASE...]
+//! cargo build --release && cargo run --release -p ctid-tests --example domains [-- [--seeds N] CASE...]
 //! ```
+//! `--seeds 5` fits the believed models alone, from starts of five seeds each, and says how far their errors are from the answers'.
+//!
 //! Prints for each case the error of the believed model at each output as `compare` has it, against that of the answer, which was fitted in
 //! white noise or in the noise's own weighting, and the verdict of `diagnose`; then how many are right.
 #![allow(clippy::unwrap_used)]
@@ -29,48 +31,60 @@ fn main() {
         );
         return;
     }
-    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    let mut wanted: Vec<String> = std::env::args().skip(1).collect();
+    let seeds = wanted.iter().position(|word| word == "--seeds").map(|at| {
+        wanted.remove(at);
+        wanted.remove(at).parse::<u64>().unwrap()
+    });
     let mut cases: Vec<String> = folder
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .filter(|case| wanted.is_empty() || wanted.contains(case))
         .collect();
     cases.sort();
     let scratch = tempfile::tempdir().unwrap();
+    let run = |case: &str, command: &[&str]| -> (Value, f64) {
+        let own = root.join("public").join(case);
+        let json = scratch.path().join(format!("{case}-{}.json", command[0]));
+        let began = Instant::now();
+        let status = Command::new(&program)
+            .args(command)
+            .args(records(&own))
+            .arg("--model")
+            .arg(own.join("model.toml"))
+            .arg("--json")
+            .arg(&json)
+            .output()
+            .unwrap();
+        assert!(
+            status.status.success(),
+            "{case}: {}",
+            String::from_utf8_lossy(&status.stderr)
+        );
+        let text = std::fs::read_to_string(json).unwrap();
+        (
+            serde_json::from_str(&text).unwrap(),
+            began.elapsed().as_secs_f64(),
+        )
+    };
+    let answer_of = |case: &str| -> Option<Value> {
+        let text = std::fs::read_to_string(root.join(format!("answers/{case}.json"))).ok()?;
+        Some(serde_json::from_str(&text).unwrap())
+    };
+    if let Some(seeds) = seeds {
+        with_seeds(&cases, seeds, &run, &answer_of);
+        return;
+    }
     let mut right: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     for case in cases {
-        let own = root.join("public").join(&case);
-        let run = |command: &str| -> (Value, f64) {
-            let json = scratch.path().join(format!("{case}-{command}.json"));
-            let began = Instant::now();
-            let status = Command::new(&program)
-                .arg(command)
-                .args(records(&own))
-                .arg("--model")
-                .arg(own.join("model.toml"))
-                .arg("--json")
-                .arg(&json)
-                .output()
-                .unwrap();
-            assert!(
-                status.status.success(),
-                "{case}: {}",
-                String::from_utf8_lossy(&status.stderr)
-            );
-            let text = std::fs::read_to_string(json).unwrap();
-            (
-                serde_json::from_str(&text).unwrap(),
-                began.elapsed().as_secs_f64(),
-            )
-        };
-        let (compared, _) = run("compare");
-        let (found, seconds) = run("diagnose");
+        let (compared, _) = run(&case, &["compare"]);
+        let (found, seconds) = run(&case, &["diagnose"]);
         println!(
             "{case}: {} {} ({seconds:.1} s)",
             found["verdict"], found["groups"]
         );
-        let answer = std::fs::read_to_string(root.join(format!("answers/{case}.json")));
-        let Ok(answer) = answer else { continue };
-        let answer: Value = serde_json::from_str(&answer).unwrap();
+        let Some(answer) = answer_of(&case) else {
+            continue;
+        };
         println!("    hidden: {} {}", answer["type"], answer["truth"]);
         for (i, (output, rmse)) in compared["steps"][0]["rmse_per_output"]
             .as_object()
@@ -95,6 +109,66 @@ fn main() {
     for (kind, (right, of)) in right {
         println!("{kind}: {right} of {of} right");
     }
+}
+
+/// The errors of the believed models from starts of several seeds, against those of the answers' fits: of white noise, as `compare` fits.
+fn with_seeds(
+    cases: &[String],
+    seeds: u64,
+    run: &impl Fn(&str, &[&str]) -> (Value, f64),
+    answer_of: &impl Fn(&str) -> Option<Value>,
+) {
+    let (mut compared, mut within, mut unlike) = (0, [0, 0], 0);
+    for case in cases {
+        let errors: Vec<Vec<f64>> = (1..=seeds)
+            .map(|seed| {
+                let (found, _) = run(case, &["compare", "--seed", &seed.to_string()]);
+                let outputs = found["steps"][0]["rmse_per_output"].as_object().unwrap();
+                outputs
+                    .values()
+                    .map(|rmse| rmse.as_f64().unwrap())
+                    .collect()
+            })
+            .collect();
+        let spread = (0..errors[0].len()).map(|o| {
+            let of = |pick: fn(f64, f64) -> f64| errors.iter().map(|e| e[o]).reduce(pick);
+            of(f64::max).unwrap() / of(f64::min).unwrap() - 1.0
+        });
+        let spread = spread.fold(0.0, f64::max);
+        if spread > 1e-3 {
+            unlike += 1;
+            println!("{case}: {:.2} % between seeds", 100.0 * spread);
+        }
+        let Some(answer) = answer_of(case) else {
+            continue;
+        };
+        let keys = ["rmse_base", "rmse_base_white_fit"].map(|key| {
+            let worst = errors.iter().flat_map(|errors| {
+                let pairs = errors.iter().zip(answer[key].as_array().unwrap());
+                pairs.map(|(own, other)| own / other.as_f64().unwrap() - 1.0)
+            });
+            worst.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
+        });
+        compared += 1;
+        let near = keys.map(|off| off.abs() <= 0.01);
+        for (within, near) in within.iter_mut().zip(near) {
+            *within += usize::from(near);
+        }
+        if near != [true; 2] {
+            println!(
+                "{case}: at most {:+.2} % of the answer's fit in the noise's weighting, {:+.2} % of that in white noise",
+                100.0 * keys[0],
+                100.0 * keys[1]
+            );
+        }
+    }
+    println!(
+        "of {compared} cases with an answer {} are within 1 % of its fit in the noise's weighting, {} of that in white noise; {unlike} of {} depend on \
+         the seed by more than 0.1 %",
+        within[0],
+        within[1],
+        cases.len()
+    );
 }
 
 fn records(folder: &Path) -> Vec<PathBuf> {

@@ -1,5 +1,6 @@
 //! Simulated rigs for the tests: a plant with or without a hidden effect, in open or closed loop, under white or coloured noise.
 
+pub mod coverage;
 pub mod draw;
 pub mod fuzz;
 pub mod http;

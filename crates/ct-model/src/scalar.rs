@@ -145,8 +145,11 @@ impl<const N: usize> Scalar for Dual<N> {
     }
     #[inline]
     fn with_slopes<const K: usize>(value: f64, of: [(Self, f64); K]) -> Self {
-        let mut eps = [0.0; N];
-        for (by, slope) in &of {
+        let mut eps = match of.first() {
+            Some((by, slope)) => std::array::from_fn(|i| by.eps[i] * slope),
+            None => [0.0; N],
+        };
+        for (by, slope) in of.iter().skip(1) {
             for (eps, by) in eps.iter_mut().zip(&by.eps) {
                 *eps += by * slope;
             }

@@ -25,6 +25,10 @@ enum Operation {
     Subtract(Register, Register),
     Multiply(Register, Register),
     Divide(Register, Register),
+    /// Times a number without derivatives.
+    Scale(Register, Register),
+    /// One by it.
+    Reciprocal(Register),
     Power(Register, Register),
     /// To a whole number.
     WholePower(Register, i32),
@@ -128,8 +132,12 @@ pub(crate) struct Tape {
     pub plays: Vec<Play>,
     /// States whose initial value is that of their start at the first row.
     pub settled: Vec<usize>,
-    /// What steps read: derivatives and the differences of guards.
-    read_by_steps: Vec<Register>,
+    /// Something reads the time.
+    pub reads_time: bool,
+    /// What guards read.
+    read_by_guards: Vec<Register>,
+    /// Registers that are made of parameters and inputs alone.
+    pub of_inputs: Vec<bool>,
     /// What anything reads.
     read_by_all: Vec<Register>,
     first_delayed: Register,
@@ -154,9 +162,18 @@ pub(crate) struct Registers<T> {
     /// The answers of the guards.
     pub answers: Vec<bool>,
     taken: Vec<bool>,
-    /// The operations, and where their results go, that the taken branches leave: those that slopes and guards need, and all.
+    /// The operations, and where their results go, that the taken branches leave: those that slopes need, ...
     slopes: Vec<(Operation, Register)>,
+    /// ... of these what moves where all inputs are held, ...
+    moving: Vec<(Operation, Register)>,
+    /// ... what guards need beside the slopes, what outputs need beside both, and all.
+    guards: Vec<(Operation, Register)>,
+    outputs: Vec<(Operation, Register)>,
     all: Vec<(Operation, Register)>,
+    /// Numbers that have no derivatives: parameters, numbers of the text, and what is made of them.
+    plain: Vec<bool>,
+    /// All inputs are held, and what is made of them and of parameters stands computed.
+    pub held: bool,
     /// Roots, powers and logarithms that have no value are zero: beyond a branch that a step has to end at.
     pub extended: bool,
 }
@@ -225,7 +242,7 @@ impl Tape {
                 None => right,
                 Some(coefficient) => {
                     let coefficient = compiler.expression(coefficient);
-                    compiler.operation(Operation::Divide(right, coefficient))
+                    compiler.divided(right, coefficient)
                 }
             }
         });
@@ -255,7 +272,9 @@ impl Tape {
             settled: (0..spec.states.len())
                 .filter(|&i| spec.is_settled(i))
                 .collect(),
-            read_by_steps: Vec::new(),
+            reads_time: false,
+            read_by_guards: Vec::new(),
+            of_inputs: Vec::new(),
             read_by_all: Vec::new(),
             first_delayed,
             first_constant: compiler.first_constant,
@@ -336,9 +355,20 @@ impl Tape {
             taken: taken.collect(),
             answers,
             slopes: Vec::with_capacity(self.operations.len()),
+            moving: Vec::with_capacity(self.operations.len()),
+            guards: Vec::with_capacity(self.operations.len()),
+            outputs: Vec::with_capacity(self.operations.len()),
+            plain: Vec::new(),
+            held: false,
             all: Vec::with_capacity(self.operations.len()),
             extended: false,
         };
+        let numbers =
+            (1..=self.parameters).chain(self.first_constant..self.first_operation + self.once);
+        registers.plain = vec![false; registers.values.len()];
+        for register in numbers {
+            registers.plain[register] = registers.values[register].same_derivatives(zero);
+        }
         self.choose_operations(&mut registers);
         registers
     }
@@ -346,25 +376,59 @@ impl Tape {
     /// Which registers are read once everything has its place.
     fn note_results(&mut self) {
         let guards = self.guards.iter().map(|guard| guard.difference);
-        self.read_by_steps = self.derivatives.iter().copied().chain(guards).collect();
+        self.read_by_guards = guards.collect();
         let delays = self.delays.iter().flat_map(|&(what, by)| [what, by]);
         let plays = self.plays.iter().flat_map(|play| [play.from, play.to]);
-        let all = self.read_by_steps.iter().chain(&self.outputs);
-        let all = all.chain(&self.starts).copied();
+        let all = self.derivatives.iter().chain(&self.read_by_guards);
+        let all = all.chain(&self.outputs).chain(&self.starts).copied();
         self.read_by_all = all.chain(delays).chain(plays).collect();
+        let operations = self.operations.iter();
+        let mut read = operations.flat_map(|o| o.reads().into_iter().flatten());
+        self.reads_time = read.any(|register| register == 0)
+            || self.read_by_all.contains(&0)
+            || !self.delays.is_empty();
+        let moving = self.state(0)..self.first_constant;
+        self.of_inputs = self.made_of(|register| register != 0 && !moving.contains(&register));
     }
 
     /// Leaves out what only branches need that are not taken.
-    fn choose_operations<T>(&self, registers: &mut Registers<T>) {
+    fn choose_operations<T: Scalar>(&self, registers: &mut Registers<T>) {
         let Registers {
-            taken, slopes, all, ..
+            taken,
+            slopes,
+            moving,
+            guards,
+            outputs,
+            all,
+            plain,
+            ..
         } = registers;
-        self.needed(&self.read_by_steps, taken, slopes);
-        self.needed(&self.read_by_all, taken, all);
+        self.needed(&self.derivatives, (taken, plain), slopes);
+        self.needed(&self.read_by_guards, (taken, plain), guards);
+        self.needed(&self.read_by_all, (taken, plain), all);
+        guards.retain(|guard| !slopes.contains(guard));
+        self.needed(&self.outputs, (taken, plain), outputs);
+        outputs.retain(|output| !slopes.contains(output) && !guards.contains(output));
+        moving.clear();
+        moving.extend(slopes.iter().filter(|(_, to)| !self.of_inputs[*to]));
+        if registers.held {
+            for &(operation, to) in registers
+                .slopes
+                .iter()
+                .filter(|(_, to)| self.of_inputs[*to])
+            {
+                registers.values[to] = operation.result(&registers.values, registers.extended);
+            }
+        }
     }
 
     /// The operations that results need, in order; what reads a choice reads the one that is chosen.
-    fn needed(&self, results: &[Register], taken: &[bool], into: &mut Vec<(Operation, Register)>) {
+    fn needed(
+        &self,
+        results: &[Register],
+        (taken, plain): (&[bool], &[bool]),
+        into: &mut Vec<(Operation, Register)>,
+    ) {
         let first = self.first_operation;
         let chosen = |mut register: Register| {
             while let Some(i) = register.checked_sub(first)
@@ -387,7 +451,11 @@ impl Tape {
             }
             let operation = match self.operations[i] {
                 Operation::Select(..) => Operation::Copy(chosen(first + i)),
-                other => other.with(chosen),
+                other => match other.with(chosen) {
+                    Operation::Multiply(a, b) if plain[b] => Operation::Scale(a, b),
+                    Operation::Multiply(a, b) if plain[a] => Operation::Scale(b, a),
+                    other => other,
+                },
             };
             for register in operation.reads().into_iter().flatten() {
                 if let Some(i) = register.checked_sub(first) {
@@ -402,15 +470,21 @@ impl Tape {
     /// Of each delay, whether what is delayed is made of inputs, parameters and the time alone.
     pub fn known_ahead(&self) -> Vec<bool> {
         let by_states = self.state(0)..self.first_constant;
-        let mut known: Vec<bool> = (0..self.first_operation + self.operations.len())
-            .map(|register| !by_states.contains(&register))
+        let known = self.made_of(|register| !by_states.contains(&register));
+        self.delays.iter().map(|&(what, _)| known[what]).collect()
+    }
+
+    /// Which registers are made of these alone, whatever branches are taken.
+    fn made_of(&self, these: impl Fn(Register) -> bool) -> Vec<bool> {
+        let mut made: Vec<bool> = (0..self.first_operation + self.operations.len())
+            .map(these)
             .collect();
         for (i, operation) in self.operations.iter().enumerate() {
             let reads = operation.reads().into_iter().flatten();
-            known[self.first_operation + i] = reads.into_iter().all(|register| known[register])
+            made[self.first_operation + i] = reads.into_iter().all(|register| made[register])
                 && !matches!(operation, Operation::Select(..));
         }
-        self.delays.iter().map(|&(what, _)| known[what]).collect()
+        made
     }
 
     /// Where inputs stand.
@@ -436,10 +510,31 @@ impl Tape {
         }
     }
 
-    /// The same for the slopes of the states and the differences of the guards alone.
+    /// The same for the slopes of the states alone.
     pub fn evaluate_slopes<T: Scalar>(&self, registers: &mut Registers<T>) {
         let extended = registers.extended;
-        for &(operation, to) in &registers.slopes {
+        let operations = if registers.held {
+            &registers.moving
+        } else {
+            &registers.slopes
+        };
+        for &(operation, to) in operations {
+            registers.values[to] = operation.result(&registers.values, extended);
+        }
+    }
+
+    /// The differences of guards, where the slopes have been computed.
+    pub fn evaluate_guards<T: Scalar>(&self, registers: &mut Registers<T>) {
+        let extended = registers.extended;
+        for &(operation, to) in &registers.guards {
+            registers.values[to] = operation.result(&registers.values, extended);
+        }
+    }
+
+    /// The outputs, where slopes and guards have been computed.
+    pub fn evaluate_outputs<T: Scalar>(&self, registers: &mut Registers<T>) {
+        let extended = registers.extended;
+        for &(operation, to) in &registers.outputs {
             registers.values[to] = operation.result(&registers.values, extended);
         }
     }
@@ -463,7 +558,7 @@ impl Tape {
     }
 
     /// Has the branches follow the answers.
-    pub fn answers_changed<T>(&self, registers: &mut Registers<T>) {
+    pub fn answers_changed<T: Scalar>(&self, registers: &mut Registers<T>) {
         let mut changed = false;
         for (branch, taken) in self.branches.iter().zip(&mut registers.taken) {
             let now = branch.holds(&registers.answers);
@@ -475,8 +570,49 @@ impl Tape {
         }
     }
 
+    /// Has the guards that stand on a difference answer for one of its sides.
+    pub fn answer<T: Scalar>(
+        &self,
+        registers: &mut Registers<T>,
+        difference: Register,
+        positive: bool,
+    ) {
+        let side = if positive { 1.0 } else { -1.0 };
+        for (guard, answer) in self.guards.iter().zip(&mut registers.answers) {
+            if guard.difference == difference {
+                *answer = guard.holds(side);
+            }
+        }
+        self.answers_changed(registers);
+    }
+
+    /// The state that a difference is, less or from a number, and its sign.
+    pub fn state_of(&self, difference: Register) -> Option<(usize, f64)> {
+        let states = self.state(0)..self.state(self.states);
+        let state = |register: Register| {
+            let known = states.contains(&register);
+            known.then(|| register - states.start)
+        };
+        let is_number = |register: Register| {
+            let once = self.first_operation..self.first_operation + self.once;
+            let numbers = self.first_constant..self.first_operation;
+            let parameters = 1..self.input(0);
+            [once, numbers, parameters]
+                .iter()
+                .any(|of| of.contains(&register))
+        };
+        match self
+            .operations
+            .get(difference.checked_sub(self.first_operation)?)?
+        {
+            Operation::Subtract(a, b) if is_number(*b) => Some((state(*a)?, 1.0)),
+            Operation::Subtract(a, b) if is_number(*a) => Some((state(*b)?, -1.0)),
+            _ => None,
+        }
+    }
+
     /// Takes over the answers of other registers.
-    pub fn copy_answers<T, S>(&self, from: &Registers<S>, to: &mut Registers<T>) {
+    pub fn copy_answers<T: Scalar, S>(&self, from: &Registers<S>, to: &mut Registers<T>) {
         to.answers.copy_from_slice(&from.answers);
         self.answers_changed(to);
     }
@@ -498,6 +634,14 @@ fn power<T: Scalar>(a: T, b: T) -> T {
 
 fn whole_power<T: Scalar>(a: T, n: i32) -> T {
     let x = a.value();
+    if (2..=4).contains(&n) {
+        let before = match n {
+            2 => x,
+            3 => x * x,
+            _ => x * x * x,
+        };
+        return slope(a, before * x, f64::from(n) * before);
+    }
     slope(a, x.powi(n), f64::from(n) * x.powi(n - 1))
 }
 
@@ -512,6 +656,8 @@ impl Operation {
             Self::Subtract(a, b) => values[a] - values[b],
             Self::Multiply(a, b) => values[a] * values[b],
             Self::Divide(a, b) => values[a] / values[b],
+            Self::Scale(a, b) => values[a] * values[b].value(),
+            Self::Reciprocal(a) => T::constant(1.0) / values[a],
             Self::Power(a, _) | Self::Sqrt(a) | Self::Log(a) if no_value(values[a].value()) => {
                 T::constant(0.0)
             }
@@ -564,11 +710,13 @@ impl Operation {
             | Self::Subtract(a, b)
             | Self::Multiply(a, b)
             | Self::Divide(a, b)
+            | Self::Scale(a, b)
             | Self::Power(a, b)
             | Self::Atan2(a, b)
             | Self::Quantise(a, b)
             | Self::Select(_, a, b) => [Some(a), Some(b)],
             Self::Negative(a)
+            | Self::Reciprocal(a)
             | Self::WholePower(a, _)
             | Self::Sqrt(a)
             | Self::Exp(a)
@@ -590,6 +738,8 @@ impl Operation {
             Self::Subtract(a, b) => Self::Subtract(moved(a), moved(b)),
             Self::Multiply(a, b) => Self::Multiply(moved(a), moved(b)),
             Self::Divide(a, b) => Self::Divide(moved(a), moved(b)),
+            Self::Scale(a, b) => Self::Scale(moved(a), moved(b)),
+            Self::Reciprocal(a) => Self::Reciprocal(moved(a)),
             Self::Power(a, b) => Self::Power(moved(a), moved(b)),
             Self::WholePower(a, n) => Self::WholePower(moved(a), n),
             Self::Sqrt(a) => Self::Sqrt(moved(a)),
@@ -631,6 +781,26 @@ impl Compiler<'_> {
         self.operations.push(operation);
         self.known.insert(operation, register);
         register
+    }
+
+    /// By what parameters alone define: times its reciprocal, which is computed once.
+    fn divided(&mut self, a: Register, b: Register) -> Register {
+        if !self.is_fixed(b) || self.is_fixed(a) {
+            return self.operation(Operation::Divide(a, b));
+        }
+        let reciprocal = self.operation(Operation::Reciprocal(b));
+        self.operation(Operation::Multiply(a, reciprocal))
+    }
+
+    /// Whether parameters alone define it.
+    fn is_fixed(&self, register: Register) -> bool {
+        if let Some(i) = register.checked_sub(self.first_operation) {
+            let operation = self.operations[i];
+            let mut reads = operation.reads().into_iter().flatten();
+            return !matches!(operation, Operation::Select(..))
+                && reads.all(|register| self.is_fixed(register));
+        }
+        (1..=self.spec.parameters.len()).contains(&register) || register >= self.first_constant
     }
 
     fn number(&mut self, value: f64) -> Register {
@@ -687,7 +857,7 @@ impl Compiler<'_> {
                     Operator::Add => Operation::Add(a, b),
                     Operator::Subtract => Operation::Subtract(a, b),
                     Operator::Multiply => Operation::Multiply(a, b),
-                    Operator::Divide | Operator::Power => Operation::Divide(a, b),
+                    Operator::Divide | Operator::Power => return self.divided(a, b),
                 })
             }
             Expression::Call(function, arguments) => {

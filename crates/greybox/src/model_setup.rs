@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_model::{About, Dual, Given, Model, Simulation, Variable};
 use ct_signals::{Hold, Record};
-use estimation::{Fit, Noise, Prior, Residuals, Sample, Start, within};
+use estimation::{Fit, Noise, Prior, Residuals, Robust, Sample, Start, within};
 
 use crate::{Error, FitOptions, PriorValue, TimeLimit, clock::Clock, output_noise::output_noise};
 
@@ -38,7 +38,7 @@ pub struct ModelSetup<'a> {
 /// Where the text sets no bound a parameter stays within this factor of its value there, ...
 const REACH: f64 = 30.0;
 /// ... and an initial state within this one.
-const STATE_REACH: f64 = 30.0;
+const STATE_REACH: f64 = 300.0;
 /// Rounds in which outputs are weighted anew by their noise.
 const WEIGHTINGS: usize = 3;
 /// Scales of the noise have settled when none changes by more than this share.
@@ -400,6 +400,15 @@ impl<'a> ModelSetup<'a> {
             fit = estimation::fit_from(&weighted, from, &white, options.stopping)?;
         }
         Ok(fit)
+    }
+
+    /// The uncertainty of a fit under the noise of its residual, of order zero to `order` at each output ([`estimation::robust`]): [`Self::fit`]
+    /// takes the noise for white.
+    ///
+    /// # Errors
+    /// Where the simulation is not finite at the fit.
+    pub fn robust(&self, fit: &Fit, order: usize) -> Result<Robust, Error> {
+        Ok(estimation::robust(self, fit, order)?)
     }
 
     /// The initial states that fit best with all else fixed, in white noise.

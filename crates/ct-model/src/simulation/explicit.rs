@@ -65,23 +65,59 @@ pub(super) fn step<T: Scalar>(
     (time, x, h): (T, &[T], T),
 ) {
     let n = x.len();
+    // A length without derivatives, as most are.
+    let plain = h.same_derivatives(T::constant(0.0));
     // The slope at the beginning may be known from the end of the last step.
     for (stage, row) in A.iter().enumerate().skip(usize::from(work.begun)) {
-        for i in 0..n {
-            let mut sum = T::constant(0.0);
-            for (k, a) in work.slopes.chunks_exact(n.max(1)).zip(*row) {
-                sum = sum + k[i] * *a;
+        if plain {
+            combine(work, x, row, h.value());
+        } else {
+            for i in 0..n {
+                let mut sum = T::constant(0.0);
+                for (k, a) in work.slopes.chunks_exact(n.max(1)).zip(*row) {
+                    sum = sum + k[i] * *a;
+                }
+                work.next[i] = x[i] + h * sum;
             }
-            work.next[i] = x[i] + h * sum;
         }
-        let at = time + h * NODES[stage];
+        let at = if plain {
+            time + h.value() * NODES[stage]
+        } else {
+            time + h * NODES[stage]
+        };
         let next = std::mem::take(&mut work.next);
         drive.load(tape, work, at, &next);
         work.next = next;
-        tape.evaluate_slopes(&mut work.registers);
+        work.evaluate_slopes(tape, drive);
         work.keep_slope(tape, stage);
     }
     work.begun = true;
+}
+
+/// `next = x + h sum_k a_k slope_k`.
+fn combine<T: Scalar>(work: &mut Step<T>, x: &[T], row: &[f64], h: f64) {
+    match row.len() {
+        0 => work.next.copy_from_slice(x),
+        1 => combine_stages::<T, 1>(work, x, row, h),
+        2 => combine_stages::<T, 2>(work, x, row, h),
+        3 => combine_stages::<T, 3>(work, x, row, h),
+        4 => combine_stages::<T, 4>(work, x, row, h),
+        5 => combine_stages::<T, 5>(work, x, row, h),
+        _ => combine_stages::<T, 6>(work, x, row, h),
+    }
+}
+
+/// The same of a fixed number of stages, which the compiler writes out.
+fn combine_stages<T: Scalar, const K: usize>(work: &mut Step<T>, x: &[T], row: &[f64], h: f64) {
+    let n = x.len();
+    let weights: [f64; K] = std::array::from_fn(|k| row[k] * h);
+    for (i, (next, x)) in work.next.iter_mut().zip(x).enumerate() {
+        let mut sum = work.slopes[i] * weights[0];
+        for (k, weight) in weights.iter().enumerate().skip(1) {
+            sum = sum + work.slopes[k * n + i] * *weight;
+        }
+        *next = *x + sum;
+    }
 }
 
 /// The error of the step against the tolerance: at most one where it is good.

@@ -34,6 +34,9 @@ const NEWTON_STEPS: usize = 15;
 /// Values have converged below this share of the tolerance; derivatives follow in one step more.
 const CONVERGED: f64 = 1e-3;
 
+/// Distance of differences, in tolerances: some 1e-7 of a state's size.
+const DIFFERENCE: f64 = 1e3;
+
 /// Lanes in which columns of the Jacobian are computed.
 const LANES: usize = 4;
 
@@ -75,6 +78,29 @@ impl Jacobian {
         }
     }
 
+    /// Computes it by differences where states slide; the slopes there stand in the first stage.
+    fn compute_sliding<T: Scalar>(
+        &mut self,
+        tape: &Tape,
+        work: &mut Step<T>,
+        drive: &Drive<'_, T>,
+        (time, x): (T, &[T]),
+        scale: &[f64],
+    ) {
+        let mut moved = x.to_vec();
+        for (j, scale) in scale.iter().enumerate() {
+            let by = DIFFERENCE * scale;
+            moved[j] = x[j] + by;
+            drive.load(tape, work, time, &moved);
+            work.evaluate_slopes(tape, drive);
+            for (i, &register) in tape.derivatives.iter().enumerate() {
+                let rise = work.registers.values[register] - work.slopes[i];
+                self.matrix[(i, j)] = rise.value() / by;
+            }
+            moved[j] = x[j];
+        }
+    }
+
     /// The largest sum of a row's absolute values.
     pub fn norm(&self) -> f64 {
         let rows = self.matrix.row_iter();
@@ -94,10 +120,14 @@ pub(super) fn step<T: Scalar>(
 ) -> Option<f64> {
     let n = x.len();
     drive.load(tape, work, time, x);
-    tape.evaluate_slopes(&mut work.registers);
+    work.evaluate_slopes(tape, drive);
     work.keep_slope(tape, 0);
     work.begun = false;
-    jacobian.compute(tape, &work.registers);
+    if work.sliding.is_empty() {
+        jacobian.compute(tape, &work.registers);
+    } else {
+        jacobian.compute_sliding(tape, work, drive, (time, x), scale);
+    }
     let newton = DMatrix::identity(n, n) - &jacobian.matrix * (GAMMA * h.value());
     let inverse = newton.try_inverse()?;
     let mut slope = vec![T::constant(0.0); n];
@@ -117,7 +147,7 @@ pub(super) fn step<T: Scalar>(
             let next = std::mem::take(&mut work.next);
             drive.load(tape, work, time + h * NODES[stage], &next);
             work.next = next;
-            tape.evaluate_slopes(&mut work.registers);
+            work.evaluate_slopes(tape, drive);
             for (i, &register) in tape.derivatives.iter().enumerate() {
                 left[i] = work.registers.values[register] - slope[i];
             }

@@ -15,24 +15,29 @@ mod exact;
 mod explicit;
 mod implicit;
 mod memory;
+mod sliding;
 mod step;
 
 use self::delays::{Delay, Delays, POINTS};
 use self::exact::Exact;
 use self::implicit::Jacobian;
-use self::step::{Drive, Step};
+use self::step::{Drive, Interval, Step};
 use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
 use crate::spec::ModelSpec;
-use crate::tape::Tape;
+use crate::tape::{Register, Registers, Tape};
 
 /// Error of a step, as a share of the largest absolute value that a state has had. Derivatives are those of the steps that follow: at twice
 /// this they are off by some 1e-3 where a right-hand side bends sharply.
 const TOLERANCE: f64 = 1e-10;
 /// The shortest step, as a share of an interval between rows.
 const SHORTEST: f64 = 1e-9;
-/// Two events of one guard that lie nearer to each other than this share of an interval slide: from there a step of this length is taken.
+/// After two events of one guard that lie nearer to each other than this share of an interval a step of this length is taken.
 const SLIDE: f64 = 1e-2;
+/// A step is at most so many times as long as the last one.
+const LONGER: f64 = 5.0;
+/// A step that is longer than the error asked for by this much is tried, where it is the last one of an interval.
+const STRETCH: f64 = 1.1;
 /// Steps in an interval beyond which the simulation has failed, ...
 const MOST_STEPS: usize = 50_000;
 /// ... and those that every interval adds to what is left of them: a trial whose steps are short all along ends within seconds.
@@ -141,6 +146,8 @@ pub struct Simulation<'a, T> {
     rise: Vec<f64>,
     /// The inputs at the end of the last interval.
     last: Vec<f64>,
+    /// Length of the last interval.
+    last_length: f64,
     /// The inputs of the last reading.
     read: Vec<f64>,
     /// No rise.
@@ -151,6 +158,8 @@ pub struct Simulation<'a, T> {
     added: Vec<T>,
     scratch: Vec<T>,
     begun: bool,
+    /// The registers hold slopes and guards where the last interval ended, with inputs that were held in it.
+    ended_within: bool,
     /// Settled states have their initial values.
     settled: bool,
 }
@@ -198,12 +207,14 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             length: f64::INFINITY,
             rise: vec![0.0; tape.inputs],
             last: vec![0.0; tape.inputs],
+            last_length: 0.0,
             read: vec![0.0; tape.inputs],
             held: vec![0.0; tape.inputs],
             computed: false,
             added: vec![zero; tape.states],
             scratch: vec![zero; tape.states],
             begun: false,
+            ended_within: false,
             settled: false,
             work,
             model,
@@ -229,20 +240,43 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         };
         let drive = Drive::held(inputs, &self.held, &delays);
         let tape = &self.model.tape;
-        drive.load(tape, &mut self.work, self.time, &self.state);
-        if self.begun {
-            self.let_through(&delays);
+        if self.ended_within && inputs == self.last {
+            // The last step's end is this reading.
+            tape.evaluate_outputs(&mut self.work.registers);
         } else {
-            self.before_the_record();
+            self.work.registers.held = false;
+            drive.load(tape, &mut self.work, self.time, &self.state);
+            if self.begun {
+                self.let_through(&delays);
+            } else {
+                self.before_the_record();
+            }
+            self.remember();
         }
-        self.remember();
+        self.ended_within = false;
         self.read.copy_from_slice(inputs);
         // A delay may let something through, and a play move, where the interval begins.
         self.computed = tape.delays.is_empty() && tape.plays.is_empty();
-        self.delays = Some(delays);
         for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {
             *output = self.work.registers.values[register];
         }
+        if !self.work.sliding.is_empty() {
+            self.computed = false;
+            self.work.follow_sliding(tape);
+            let interval = Interval {
+                begin: self.time.value(),
+                length: self.last_length,
+                from: inputs,
+                rise: &self.rise,
+            };
+            self.work
+                .evaluate_slopes(tape, &Drive::new(interval, &delays));
+            let Step {
+                sliding, registers, ..
+            } = &mut self.work;
+            sliding.read(tape, registers, outputs);
+        }
+        self.delays = Some(delays);
     }
 
     /// Goes on to `until`, the inputs in straight lines from one value to the other (the same where they are held).
@@ -269,20 +303,29 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         let model = self.model;
         let tape = &model.tape;
         let begin = self.time.value();
-        let interval = until - begin;
+        let length = until - begin;
+        self.last_length = length;
+        self.ended_within = false;
+        self.work.registers.held = false;
         self.settle(from, delays);
         for ((rise, from), to) in self.rise.iter_mut().zip(from).zip(to) {
-            *rise = (to - from) / interval;
+            *rise = (to - from) / length;
         }
         let rise = std::mem::take(&mut self.rise);
+        let interval = Interval {
+            begin,
+            length,
+            from,
+            rise: &rise,
+        };
         if self.model.exact == ExactSteps::HeldInputs && rise.iter().any(|rise| *rise != 0.0) {
             self.go_on_in_steps();
         }
         let result = if self.exact.is_some() {
-            self.step_exactly(from, &rise, interval)
+            self.step_exactly(from, &rise, length)
         } else {
-            self.begin_interval(from, &rise, until, delays);
-            self.steps(tape, (from, &rise), (begin, until), delays)
+            self.begin_interval(interval, until, delays);
+            self.steps(tape, interval, until, delays)
         };
         self.rise = rise;
         self.computed = false;
@@ -344,15 +387,17 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     }
 
     /// The guards' answers where an interval begins, and what delays know of it.
-    fn begin_interval(&mut self, from: &[f64], rise: &[f64], until: f64, delays: &mut Delays<T>) {
+    fn begin_interval(&mut self, interval: Interval<'_>, until: f64, delays: &mut Delays<T>) {
         let tape = &self.model.tape;
-        let begin = self.time.value();
+        let Interval {
+            begin, from, rise, ..
+        } = interval;
         let first = !self.begun;
         let jumps = first || from != self.last;
         let bends = rise.iter().any(|rise| *rise != 0.0);
         if !delays.all.is_empty() {
             if first {
-                let drive = Drive::new(begin, (from, rise), delays);
+                let drive = Drive::new(interval, delays);
                 drive.load(tape, &mut self.work, self.time, &self.state);
                 self.before_the_record();
                 for (delay, &(what, _)) in delays.all.iter_mut().zip(&tape.delays) {
@@ -364,18 +409,21 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 }
             }
             let length = T::constant(until) - self.time;
-            self.keep_past(from, rise, (begin, length), delays, true);
+            self.keep_past(interval, length, delays, true);
             for delay in &mut delays.all {
                 delay.forget(begin);
             }
         }
         self.begun = true;
         if !self.is_computed(from) {
-            let drive = Drive::new(begin, (from, rise), delays);
+            let drive = Drive::new(interval, delays);
             drive.load(tape, &mut self.work, self.time, &self.state);
             tape.evaluate_with_guards(&mut self.work.registers);
             self.remember();
+            self.slide_on(tape, &drive);
         }
+        // Whatever made the registers, it was computed for the inputs of this interval.
+        self.work.registers.held = !bends;
         self.work.keep_slope(tape, 0);
         self.work.begun = true;
     }
@@ -388,9 +436,8 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     /// Keeps what is delayed over the next or the last step: what is known ahead for a whole interval, everything else after each step.
     fn keep_past(
         &mut self,
-        from: &[f64],
-        rise: &[f64],
-        (begin, length): (f64, T),
+        interval: Interval<'_>,
+        length: T,
         delays: &mut Delays<T>,
         ahead: bool,
     ) {
@@ -414,7 +461,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                     _ => explicit::within(&self.work, &self.state, length, share, &mut state),
                 }
             }
-            let drive = Drive::new(begin, (from, rise), delays);
+            let drive = Drive::new(interval, delays);
             drive.load(tape, &mut self.work, self.time + length * share, &state);
             if ahead {
                 tape.evaluate_with_guards(&mut self.work.registers);
@@ -436,12 +483,11 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     fn steps(
         &mut self,
         tape: &Tape,
-        (from, rise): (&[f64], &[f64]),
-        (begin, until): (f64, f64),
+        interval: Interval<'_>,
+        until: f64,
         delays: &mut Delays<T>,
     ) -> Result<(), NoSolution> {
-        let interval = until - begin;
-        let shortest = SHORTEST * interval;
+        let shortest = SHORTEST * interval.length;
         let mut taken = 0;
         let most = self.steps_left + STEPS_PER_INTERVAL;
         loop {
@@ -459,9 +505,9 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                     }
                 }
             }
-            if out.is_none() && left.value() <= 1e-14 * interval {
+            if out.is_none() && left.value() <= 1e-14 * interval.length {
                 // What is left of the interval has a derivative, where its last step ended at an event.
-                self.finish(tape, (from, rise), begin, left, delays);
+                self.finish(tape, interval, left, delays);
                 return Ok(());
             }
             taken += 1;
@@ -471,15 +517,14 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             }
             let mut longest = self.length;
             for delay in delays.all.iter().filter(|delay| !delay.known_ahead) {
-                longest = longest.min(delay.by.value().max(interval / 50.0));
+                longest = longest.min(delay.by.value().max(interval.length / 50.0));
             }
-            let whole = limit.value() <= longest * (1.0 + 1e-9);
+            let whole = limit.value() <= longest * STRETCH;
             let mut h = if whole { limit } else { T::constant(longest) };
-            let mut error = self.attempt(tape, (from, rise), begin, h, delays);
+            let mut error = self.attempt(tape, interval, h, delays);
             let mut beyond = None;
             if error.is_nan() {
-                let at = (begin, interval);
-                beyond = self.branch_before(tape, (from, rise), at, h, delays);
+                beyond = self.branch_before(tape, interval, h, delays);
             }
             if let Some((event, error_there)) = &beyond {
                 (h, error) = (event.after, *error_there);
@@ -500,37 +545,42 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             let is_new = beyond.is_none();
             let event = match beyond {
                 Some((event, _)) => Some(event),
-                None => self.first_event(tape, (from, rise), (begin, interval), h, delays),
+                None => self.first_event(tape, interval, h, delays),
             };
-            let is_short = !whole || error > 0.5 || self.length.is_finite();
+            let is_short = !whole || error > 0.5 || self.length < h.value() * LONGER;
             if event.is_none() && is_short {
-                let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
+                let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, LONGER);
                 if !whole || error > 0.5 || grown > self.length {
                     self.length = grown.max(shortest);
                 }
             }
             if let Some(Event { after, .. }) = event.as_ref().filter(|_| is_new) {
                 h = *after;
-                self.attempt(tape, (from, rise), begin, h, delays);
+                self.attempt(tape, interval, h, delays);
             }
-            self.keep_past(from, rise, (begin, h), delays, false);
+            self.keep_past(interval, h, delays, false);
+            let sliding = !self.work.sliding.is_empty();
             self.work
-                .go_on(event.is_none() && self.method == Method::Explicit);
+                .go_on(event.is_none() && !sliding && self.method == Method::Explicit);
             self.state.copy_from_slice(&self.work.next);
             self.time = self.time + h;
+            if sliding {
+                self.put_back(tape, &Drive::new(interval, delays));
+            }
             self.note_largest();
             if event.is_none() && whole && out.is_none() {
+                let explicit = self.method == Method::Explicit;
+                self.ended_within = explicit
+                    && !sliding
+                    && self.work.registers.held
+                    && !tape.reads_time
+                    && tape.plays.is_empty();
                 return Ok(());
             }
-            if let Some(Event { guards, .. }) = event {
-                let drive = Drive::new(begin, (from, rise), delays);
+            if let Some(Event { change, .. }) = event {
+                let drive = Drive::new(interval, delays);
                 drive.load(tape, &mut self.work, self.time, &self.state);
-                for guard in guards {
-                    let answer = &mut self.work.registers.answers[guard];
-                    *answer = !*answer;
-                    self.changed[guard] = self.time.value();
-                }
-                tape.answers_changed(&mut self.work.registers);
+                self.change(tape, &drive, change);
                 for delay in delays.all.iter_mut().filter(|delay| !delay.known_ahead) {
                     delay.jump(self.time);
                 }
@@ -538,9 +588,10 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 delays.all[out].let_out();
                 self.work.begun = false;
                 // A branch may stand on what jumps.
-                let drive = Drive::new(begin, (from, rise), delays);
+                let drive = Drive::new(interval, delays);
                 drive.load(tape, &mut self.work, self.time, &self.state);
                 tape.evaluate_with_guards(&mut self.work.registers);
+                self.slide_on(tape, &drive);
                 for (i, delay) in delays.all.iter_mut().enumerate() {
                     if i != out && !delay.known_ahead {
                         delay.jump(self.time);
@@ -558,20 +609,19 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     fn branch_before(
         &mut self,
         tape: &Tape,
-        inputs: (&[f64], &[f64]),
-        (begin, interval): (f64, f64),
+        interval: Interval<'_>,
         h: T,
         delays: &Delays<T>,
     ) -> Option<(Event<T>, f64)> {
         self.work.registers.extended = true;
         self.work.begun = false;
-        let error = self.attempt(tape, inputs, begin, h, delays);
+        let error = self.attempt(tape, interval, h, delays);
         let event = error
             .is_finite()
-            .then(|| self.first_event(tape, inputs, (begin, interval), h, delays))
+            .then(|| self.first_event(tape, interval, h, delays))
             .flatten();
         let found = event.map(|event| {
-            let error = self.attempt(tape, inputs, begin, event.after, delays);
+            let error = self.attempt(tape, interval, event.after, delays);
             (event, error)
         });
         self.work.registers.extended = false;
@@ -579,18 +629,69 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         found
     }
 
-    /// Carries the derivative of what is left of an interval whose last step ended at its very end.
-    fn finish(
-        &mut self,
-        tape: &Tape,
-        (from, rise): (&[f64], &[f64]),
-        begin: f64,
-        left: T,
-        delays: &Delays<T>,
-    ) {
-        let drive = Drive::new(begin, (from, rise), delays);
+    /// Changes branches where a step has ended at an event; what drives the model stands in the registers.
+    fn change(&mut self, tape: &Tape, drive: &Drive<'_, T>, change: Change) {
+        let Step {
+            sliding, registers, ..
+        } = &mut self.work;
+        let difference = match change {
+            Change::Crossed(difference, positive) => {
+                tape.answer(registers, difference, positive);
+                sliding.add(tape, registers, difference);
+                self.work.evaluate_slopes(tape, drive);
+                let length = drive.interval.length;
+                if self.work.sliding.is_attractive(length, &self.largest) {
+                    self.put_back(tape, drive);
+                } else {
+                    let Step {
+                        sliding, registers, ..
+                    } = &mut self.work;
+                    sliding.remove(tape, registers, sliding.len() - 1, positive);
+                }
+                difference
+            }
+            Change::LetGo(k, positive) => sliding.remove(tape, registers, k, positive),
+            Change::None => return,
+        };
+        for (guard, changed) in tape.guards.iter().zip(&mut self.changed) {
+            if guard.difference == difference {
+                *changed = self.time.value();
+            }
+        }
+    }
+
+    /// Puts states back onto the guards that stay at zero.
+    fn put_back(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
         drive.load(tape, &mut self.work, self.time, &self.state);
-        tape.evaluate_slopes(&mut self.work.registers);
+        self.work.evaluate_slopes(tape, drive);
+        let Step {
+            sliding, registers, ..
+        } = &mut self.work;
+        sliding.put_back(registers, &mut self.state);
+    }
+
+    /// Guards stay at zero where every guard has answered by its difference, but for those that an input has moved off or whose sides do not
+    /// both lead there any more.
+    fn slide_on(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
+        while !self.work.sliding.is_empty() {
+            self.work.follow_sliding(tape);
+            self.work.evaluate_slopes(tape, drive);
+            let Step {
+                sliding, registers, ..
+            } = &mut self.work;
+            let Some((k, positive)) = sliding.let_go(registers, drive.interval.length) else {
+                break;
+            };
+            sliding.remove(tape, registers, k, positive);
+            self.work.evaluate_slopes(tape, drive);
+        }
+    }
+
+    /// Carries the derivative of what is left of an interval whose last step ended at its very end.
+    fn finish(&mut self, tape: &Tape, interval: Interval<'_>, left: T, delays: &Delays<T>) {
+        let drive = Drive::new(interval, delays);
+        drive.load(tape, &mut self.work, self.time, &self.state);
+        self.work.evaluate_slopes(tape, &drive);
         for (x, &register) in self.state.iter_mut().zip(&tape.derivatives) {
             *x = *x + left * self.work.registers.values[register];
         }
@@ -612,15 +713,8 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     }
 
     /// Computes a step, with the answers of the guards as they are, and its error against the tolerance.
-    fn attempt(
-        &mut self,
-        tape: &Tape,
-        (from, rise): (&[f64], &[f64]),
-        begin: f64,
-        h: T,
-        delays: &Delays<T>,
-    ) -> f64 {
-        let drive = Drive::new(begin, (from, rise), delays);
+    fn attempt(&mut self, tape: &Tape, interval: Interval<'_>, h: T, delays: &Delays<T>) -> f64 {
+        let drive = Drive::new(interval, delays);
         for (i, scale) in self.scale.iter_mut().enumerate() {
             let slope = self.work.slopes.get(i).map_or(0.0, |k| k.value().abs());
             let moved = if slope.is_finite() {
@@ -643,94 +737,126 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         }
     }
 
-    /// The guards' differences at the end of the step that has been computed: its last stage stands there.
-    fn differences(&self) -> impl Iterator<Item = T> {
-        let guards = self.model.tape.guards.iter();
-        guards.map(|guard| self.work.registers.values[guard.difference])
+    /// What may change within a step: what of it has to stay above zero, where the registers are.
+    fn distance(&self, watched: Watched) -> T {
+        let Step {
+            sliding, registers, ..
+        } = &self.work;
+        match watched {
+            Watched::Guard(guard) => {
+                let difference = self.model.tape.guards[guard].difference;
+                registers.values[difference]
+            }
+            Watched::Share(k, true) => T::constant(1.0 - sliding.share(k)),
+            Watched::Share(k, false) => T::constant(sliding.share(k)),
+        }
     }
 
     /// The first change of a branch within the step that has been computed.
     fn first_event(
         &mut self,
         tape: &Tape,
-        inputs: (&[f64], &[f64]),
-        (begin, interval): (f64, f64),
+        interval: Interval<'_>,
         h: T,
         delays: &Delays<T>,
     ) -> Option<Event<T>> {
         if tape.guards.is_empty() || h.value() <= 0.0 {
             return None;
         }
-        let mut crossed = Vec::new();
-        for (i, (guard, difference)) in tape.guards.iter().zip(self.differences()).enumerate() {
-            if guard.is_crossed(self.work.registers.answers[i], difference.value()) {
-                crossed.push((i, difference.value()));
-            }
+        tape.evaluate_guards(&mut self.work.registers);
+        let Registers {
+            values, answers, ..
+        } = &self.work.registers;
+        let guards = tape.guards.iter().zip(answers);
+        let mut stays = guards
+            .map(|(guard, &answer)| !guard.is_crossed(answer, values[guard.difference].value()));
+        if self.work.sliding.is_empty() && stays.all(|stays| stays) {
+            return None;
         }
         let answers = self.work.registers.answers.clone();
-        let is_crossed = |i: usize, value: f64| tape.guards[i].is_crossed(answers[i], value);
-        let at = |own: &mut Self, guard: usize, share: f64| {
-            let part = T::constant(h.value() * share);
-            own.attempt(tape, inputs, begin, part, delays);
-            own.work.registers.values[tape.guards[guard].difference]
+        let is_crossed = |watched: Watched, value: f64| match watched {
+            Watched::Guard(i) => tape.guards[i].is_crossed(answers[i], value),
+            Watched::Share(..) => value < 0.0,
         };
-        let mut first: Option<(f64, usize)> = None;
-        for (guard, mut ends_with) in crossed {
-            let mut end = 1.0;
-            if let Some((share, _)) = first {
-                end = share;
-                ends_with = at(self, guard, share).value();
+        let sliding = &self.work.sliding;
+        let guards = (0..tape.guards.len()).map(Watched::Guard);
+        let shares =
+            (0..sliding.len()).flat_map(|k| [Watched::Share(k, false), Watched::Share(k, true)]);
+        let crossed = guards.chain(shares).filter_map(|watched| {
+            if let Watched::Guard(i) = watched
+                && sliding.holds(tape.guards[i].difference)
+            {
+                return None;
             }
-            if !is_crossed(guard, ends_with) {
+            let distance = self.distance(watched).value();
+            is_crossed(watched, distance).then_some((watched, distance))
+        });
+        let crossed: Vec<_> = crossed.collect();
+        let at = |own: &mut Self, watched: Watched, share: f64| {
+            let part = T::constant(h.value() * share);
+            own.attempt(tape, interval, part, delays);
+            tape.evaluate_guards(&mut own.work.registers);
+            own.distance(watched)
+        };
+        let mut first: Option<(f64, Watched, bool)> = None;
+        for (watched, mut ends_with) in crossed {
+            let mut end = 1.0;
+            if let Some((share, ..)) = first {
+                end = share;
+                ends_with = at(self, watched, share).value();
+            }
+            if !is_crossed(watched, ends_with) {
                 continue;
             }
-            let begins_with = at(self, guard, 0.0).value();
+            let begins_with = at(self, watched, 0.0).value();
             // It may have been on the other side when the step began.
-            let share = if is_crossed(guard, begins_with) || begins_with == 0.0 {
+            let share = if is_crossed(watched, begins_with) || begins_with == 0.0 {
                 0.0
             } else {
-                let difference = |share: f64| at(self, guard, share).value();
-                change_of_sign(difference, (0.0, begins_with), (end, ends_with))
+                let distance = |share: f64| at(self, watched, share).value();
+                change_of_sign(distance, (0.0, begins_with), (end, ends_with))
             };
-            first = Some((share, guard));
+            first = Some((share, watched, ends_with > 0.0));
         }
-        let (share, guard) = first?;
-        let slide = SLIDE * interval;
+        let (share, watched, positive) = first?;
+        let mut after = T::constant(h.value() * share);
+        let guard = match watched {
+            // Slopes are the same with the share at its end and without: the time needs no derivative.
+            Watched::Share(k, upper) => {
+                return Some(Event {
+                    after,
+                    change: Change::LetGo(k, upper),
+                });
+            }
+            Watched::Guard(guard) => guard,
+        };
+        let difference = tape.guards[guard].difference;
+        let slide = SLIDE * interval.length;
         let since = self.time.value() - self.changed[guard];
         if since < slide && share * h.value() < 1e-3 * slide {
-            // It changes back at once: the states slide along the guard, to either side of it in turn.
+            // It changes back at once, by rounding: to either side in turn.
             let after = T::constant(slide.min(h.value()));
-            self.attempt(tape, inputs, begin, after, delays);
-            let there = self.work.registers.values[tape.guards[guard].difference];
-            let together = if is_crossed(guard, there.value()) {
-                self.guards_of(guard)
+            self.attempt(tape, interval, after, delays);
+            tape.evaluate_guards(&mut self.work.registers);
+            let there = self.distance(watched).value();
+            let change = if is_crossed(watched, there) {
+                Change::Crossed(difference, there > 0.0)
             } else {
-                Vec::new()
+                Change::None
             };
-            return Some(Event {
-                after,
-                guards: together,
-            });
+            return Some(Event { after, change });
         }
-        let mut after = T::constant(h.value() * share);
-        let speed = (at(self, guard, share + SPEED).value()
-            - at(self, guard, share - SPEED).value())
+        let speed = (at(self, watched, share + SPEED).value()
+            - at(self, watched, share - SPEED).value())
             / (2.0 * SPEED * h.value());
         if speed != 0.0 && speed.is_finite() {
-            let here = at(self, guard, share);
+            let here = at(self, watched, share);
             after = T::with_slopes(after.value(), [(here, -1.0 / speed)]);
         }
         Some(Event {
             after,
-            guards: self.guards_of(guard),
+            change: Change::Crossed(difference, positive),
         })
-    }
-
-    /// The guards that stand on the same difference: they change together.
-    fn guards_of(&self, guard: usize) -> Vec<usize> {
-        let guards = &self.model.tape.guards;
-        let same = |&i: &usize| guards[i].difference == guards[guard].difference;
-        (0..guards.len()).filter(same).collect()
     }
 }
 
@@ -776,5 +902,22 @@ fn change_of_sign(
 struct Event<T> {
     /// How long after its beginning.
     after: T,
-    guards: Vec<usize>,
+    change: Change,
+}
+
+#[derive(Clone, Copy)]
+enum Change {
+    None,
+    /// A difference has changed its sign; whether to a positive one.
+    Crossed(Register, bool),
+    /// A guard that stayed at zero does so no more; whether it turns positive.
+    LetGo(usize, bool),
+}
+
+/// What is looked at after each step.
+#[derive(Clone, Copy)]
+enum Watched {
+    Guard(usize),
+    /// The share of a guard that stays at zero, at its upper or lower end.
+    Share(usize, bool),
 }

@@ -141,7 +141,7 @@ fn exchanged(draws: &[(usize, usize)]) -> String {
 }
 
 proptest! {
-    // A million take a minute: PROPTEST_CASES=1000000 cargo test --release -p ct-model mutated
+    // A million take some minutes: PROPTEST_CASES=1000000 cargo test --release -p ct-model mutated
     #![proptest_config(ProptestConfig { max_shrink_iters: 1000, ..ProptestConfig::default() })]
 
     #[test]

@@ -36,6 +36,9 @@ pub(super) struct Compare {
     /// Limit on the time of the search; Ctrl-C ends it earlier with the best result so far
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
+    /// Seed of the random starts of a model of one's own: another one must not give another result
+    #[arg(long, default_value_t = FitOptions::default().seed, value_name = "N", hide = true)]
+    seed: u64,
     #[command(flatten)]
     reading: ReadArguments,
     #[command(flatten)]
@@ -176,7 +179,11 @@ impl Compare {
         let outputs = self.results.plan(&files.all(), None)?;
         let bar = Bar::new();
         bar.phase("fitting the model");
-        let comparison = own_model::compare(model, &records, &FitOptions::default());
+        let options = FitOptions {
+            seed: self.seed,
+            ..FitOptions::default()
+        };
+        let comparison = own_model::compare(model, &records, &options);
         bar.clear();
         let notes = input::notes(&records.summaries, look) + &unused(&model.unused, look);
         let comparison = comparison?;
@@ -230,6 +237,7 @@ impl Diagnose {
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
         let mut options = effect_search::Options {
+            seed: self.compare.seed,
             time_limit: Some(self.compare.effort.limit_of_own_model()),
             interrupt: Some(interrupt::flag()),
             ..effect_search::Options::default()

@@ -114,7 +114,10 @@ pub(crate) fn compare(
             coefficients: Vec::new(),
         });
     let noise_floors = noise_floors.collect();
-    let errors = fit.std_errors();
+    // The fit is one by simulation error: its residual has the noise's colour.
+    let errors = setup
+        .robust(&fit, options.noise_order)
+        .map_or_else(|_| fit.std_errors(), |robust| robust.std_errors);
     let free = setup.free();
     let entries = setup.names().iter().zip(units.chain(states)).enumerate();
     let estimates = entries.map(|(i, (name, unit))| Estimate {

@@ -6,6 +6,7 @@ mod error;
 mod feedback;
 mod fit;
 mod many_starts;
+mod model_observer;
 mod model_setup;
 mod model_starts;
 mod output_noise;

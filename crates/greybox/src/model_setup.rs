@@ -229,14 +229,37 @@ impl<'a> ModelSetup<'a> {
     where
         'a: 'b,
     {
-        let fixed = (0..self.parameter_count()).filter(|i| !self.free.contains(i));
-        let known = fixed.map(|i| (self.names[i].clone(), self.start[i]));
-        let known: BTreeMap<String, f64> = known.collect();
+        let known = self.known();
         let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
         setup.clock = self.clock.with_records(records);
-        setup.time_limit.clone_from(&self.time_limit);
-        setup.interrupt = self.interrupt;
-        Ok(setup)
+        Ok(setup.limited_as(self))
+    }
+
+    /// Parameters that are not fitted.
+    pub(crate) fn known(&self) -> BTreeMap<String, f64> {
+        let fixed = (0..self.parameter_count()).filter(|i| !self.free.contains(i));
+        fixed
+            .map(|i| (self.names[i].clone(), self.start[i]))
+            .collect()
+    }
+
+    /// The same with the limits of another one.
+    pub(crate) fn limited_as(self, other: &ModelSetup<'a>) -> Self {
+        Self {
+            time_limit: other.time_limit.clone(),
+            interrupt: other.interrupt,
+            ..self
+        }
+    }
+
+    /// The records.
+    pub(crate) fn records(&self) -> &'a [Record] {
+        self.records
+    }
+
+    /// Seconds in one unit of the model's time.
+    pub(crate) fn time_unit(&self) -> f64 {
+        self.time_unit
     }
 
     /// Positions of the entries that are fitted.

@@ -1,8 +1,9 @@
 //! Where fits of a model of its user's text begin.
 //!
-//! What such a model is like nobody knows ahead, so starts are of three kinds: the values of the text; the best of many points around them, by
-//! a simulation of each without derivatives; and what fits of growing first parts of the records lead to, as a criterion over a long record
-//! has many local minima that one over a short record has not (L. Ljung, System Identification, 2nd ed., 1999, section 10.5).
+//! What such a model is like nobody knows ahead, so starts are of four kinds: the values of the text; the best of many points around them, by
+//! a simulation of each without derivatives; what fits beside observers lead to ([`crate::model_observer`]); and what fits of growing first
+//! parts of the records lead to, as a criterion over a long record has many local minima that one over a short record has not (L. Ljung,
+//! System Identification, 2nd ed., 1999, section 10.5).
 //!
 //! The points are a scrambled Sobol sequence (A. B. Owen, Journal of Complexity 14 (1998) 466-489), in the logarithm of what has a sign.
 
@@ -25,6 +26,8 @@ const HORIZONS: [f64; 3] = [0.03, 0.1, 0.3];
 const LEAST: usize = 4;
 /// From so many starts the first parts are fitted.
 const GROWING: usize = 4;
+/// From so many starts fits beside observers begin.
+const OBSERVED: usize = 2;
 /// The sequence has so many dimensions; what comes after them stays at its start.
 const DIMENSIONS: usize = 256;
 
@@ -53,11 +56,16 @@ impl ModelSetup<'_> {
                 .map(|(_, point)| point)
                 .take(n.max(1) - 1),
         );
+        let observed: Vec<Vec<f64>> = starts[..starts.len().min(OBSERVED)]
+            .par_iter()
+            .filter_map(|start| self.observed_from(start))
+            .collect();
         let grown: Vec<Vec<f64>> = starts[..starts.len().min(GROWING)]
             .par_iter()
             .filter_map(|start| self.grown(start, &white, stopping))
             .collect();
         starts.extend(grown);
+        starts.extend(observed);
         starts.into_iter().map(Start::from).collect()
     }
 

@@ -1,7 +1,7 @@
 //! How often intervals of 95 % hold the truth, on models of `examples/models` with two outputs in coloured noise, 30 % of the readings missing:
 //!
 //! ```sh
-//! cargo run --release -p ctid-tests --example coverage [-- --records 400 --models dc-motor,coupled-heaters]
+//! cargo run --release -p ctid-tests --example model_coverage [-- --records 400 --models dc-motor,coupled-heaters]
 //! ```
 #![allow(clippy::unwrap_used)]
 

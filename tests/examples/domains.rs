@@ -13,9 +13,20 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Instant;
 
+use clap::Parser;
+use ctid_tests::program::{program, result};
 use serde_json::Value;
+
+/// Diagnoses records with hidden effects.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// These cases alone.
+    cases: Vec<String>,
+    /// Fits the believed models alone, from starts of so many seeds each.
+    #[arg(long, value_name = "N")]
+    seeds: Option<u64>,
+}
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/domains");
@@ -23,48 +34,23 @@ fn main() {
         println!("skipped: {} is not there", root.display());
         return;
     };
-    let program = std::env::current_exe().unwrap().with_file_name("../ctid");
-    if !program.exists() {
-        println!(
-            "skipped: {} is not built: cargo build --release",
-            program.display()
-        );
-        return;
-    }
-    let mut wanted: Vec<String> = std::env::args().skip(1).collect();
-    let seeds = wanted.iter().position(|word| word == "--seeds").map(|at| {
-        wanted.remove(at);
-        wanted.remove(at).parse::<u64>().unwrap()
-    });
+    let Some(program) = program() else { return };
+    let Arguments {
+        cases: wanted,
+        seeds,
+    } = Arguments::parse();
     let mut cases: Vec<String> = folder
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .filter(|case| wanted.is_empty() || wanted.contains(case))
         .collect();
     cases.sort();
-    let scratch = tempfile::tempdir().unwrap();
     let run = |case: &str, command: &[&str]| -> (Value, f64) {
         let own = root.join("public").join(case);
-        let json = scratch.path().join(format!("{case}-{}.json", command[0]));
-        let began = Instant::now();
-        let status = Command::new(&program)
-            .args(command)
-            .args(records(&own))
-            .arg("--model")
-            .arg(own.join("model.toml"))
-            .arg("--json")
-            .arg(&json)
-            .output()
-            .unwrap();
-        assert!(
-            status.status.success(),
-            "{case}: {}",
-            String::from_utf8_lossy(&status.stderr)
-        );
-        let text = std::fs::read_to_string(json).unwrap();
-        (
-            serde_json::from_str(&text).unwrap(),
-            began.elapsed().as_secs_f64(),
-        )
+        let mut run = Command::new(&program);
+        run.args(command).args(records(&own));
+        run.arg("--model").arg(own.join("model.toml"));
+        let found = result(&mut run).map_err(|why| format!("{case}: {why}"));
+        found.unwrap()
     };
     let answer_of = |case: &str| -> Option<Value> {
         let text = std::fs::read_to_string(root.join(format!("answers/{case}.json"))).ok()?;

@@ -7,6 +7,7 @@ pub mod http;
 pub mod measured;
 pub mod onset;
 pub mod outside;
+pub mod program;
 pub mod three_tanks;
 
 use ct_signals::{Channel, Error, Record, excitation, noise};

@@ -504,39 +504,31 @@ impl Tape {
 
     /// Computes everything from the time, inputs, states and delayed values, with the answers of the guards that the registers hold.
     pub fn evaluate<T: Scalar>(&self, registers: &mut Registers<T>) {
-        let extended = registers.extended;
-        for &(operation, to) in &registers.all {
-            registers.values[to] = operation.result(&registers.values, extended);
-        }
+        run(&registers.all, &mut registers.values, registers.extended);
     }
 
     /// The same for the slopes of the states alone.
     pub fn evaluate_slopes<T: Scalar>(&self, registers: &mut Registers<T>) {
-        let extended = registers.extended;
         let operations = if registers.held {
             &registers.moving
         } else {
             &registers.slopes
         };
-        for &(operation, to) in operations {
-            registers.values[to] = operation.result(&registers.values, extended);
-        }
+        run(operations, &mut registers.values, registers.extended);
     }
 
     /// The differences of guards, where the slopes have been computed.
     pub fn evaluate_guards<T: Scalar>(&self, registers: &mut Registers<T>) {
-        let extended = registers.extended;
-        for &(operation, to) in &registers.guards {
-            registers.values[to] = operation.result(&registers.values, extended);
-        }
+        run(&registers.guards, &mut registers.values, registers.extended);
     }
 
     /// The outputs, where slopes and guards have been computed.
     pub fn evaluate_outputs<T: Scalar>(&self, registers: &mut Registers<T>) {
-        let extended = registers.extended;
-        for &(operation, to) in &registers.outputs {
-            registers.values[to] = operation.result(&registers.values, extended);
-        }
+        run(
+            &registers.outputs,
+            &mut registers.values,
+            registers.extended,
+        );
     }
 
     /// The same, where every guard answers by its difference.
@@ -630,6 +622,14 @@ fn power<T: Scalar>(a: T, b: T) -> T {
     // Below zero only whole powers are numbers, and these do not change.
     let by_power = if x > 0.0 { value * x.ln() } else { 0.0 };
     T::with_slopes(value, [(a, finite(n * x.powf(n - 1.0))), (b, by_power)])
+}
+
+/// Computes operations in order.
+#[inline]
+fn run<T: Scalar>(operations: &[(Operation, Register)], values: &mut [T], extended: bool) {
+    for &(operation, to) in operations {
+        values[to] = operation.result(values, extended);
+    }
 }
 
 fn whole_power<T: Scalar>(a: T, n: i32) -> T {

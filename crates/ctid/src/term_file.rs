@@ -118,14 +118,25 @@ pub(crate) fn is_own(text: &str) -> bool {
 /// The file of what a diagnosis found.
 #[must_use]
 pub fn text(unknown: &Unknown) -> String {
-    let (at, of) = (&unknown.variable_unit, &unknown.unit);
+    let values = unknown.knots.iter().zip(&unknown.ordinates);
+    let rows = values.zip(&unknown.ordinate_errors);
+    of_curve(
+        (&unknown.place, unknown.variable),
+        (&unknown.variable_unit, &unknown.unit),
+        rows.map(|((at, value), error)| (*at, *value, Some(*error))),
+    )
+}
+
+/// The file of a curve: its place and variable, the units of the variable and of the term, and where it is, its value and its standard error.
+pub(crate) fn of_curve(
+    (place, variable): (&str, &str),
+    (at, of): (&str, &str),
+    rows: impl Iterator<Item = (f64, f64, Option<f64>)>,
+) -> String {
     let mut text = format!("{HEADER} [{at}],value [{of}],std_error [{of}]\n");
-    let errors = unknown.ordinate_errors.iter();
-    for ((at, value), error) in unknown.knots.iter().zip(&unknown.ordinates).zip(errors) {
-        text += &format!(
-            "{},{},{at},{value},{error}\n",
-            unknown.place, unknown.variable
-        );
+    for (at, value, error) in rows {
+        let error = error.map_or(String::new(), |error| error.to_string());
+        text += &format!("{place},{variable},{at},{value},{error}\n");
     }
     text
 }

@@ -52,9 +52,7 @@ pub fn diagnose(
     let limit = Limit::new(options);
     limit.begin(Phase::Believed);
     let (context, base) = begin(problem, options, limit)?;
-    if context.limit.passed() {
-        context.limit.leave_out("starts of the model's fit");
-    }
+    context.limit.leaves_out("starts of the model's fit");
     tell("searching the effects");
     context.limit.begin(Phase::White);
     let white = Noise::white(problem.spec.outputs.len());
@@ -120,10 +118,7 @@ pub fn diagnose(
             left = context.left(&confirmed, &own)?;
         }
     }
-    if context.limit.passed() {
-        context.limit.leave_out("tests of the effects one by one");
-        grown.cut_short = true;
-    }
+    grown.cut_short |= context.limit.leaves_out("tests of the effects one by one");
     tell("telling apart");
     context.limit.begin(Phase::Groups);
     let found = confirmed.added.len() > grown.base.added.len();
@@ -152,21 +147,16 @@ pub fn diagnose(
     }
     let (confirmed, groups) = context.groups(confirmed, &grown.base, &noise, slowness)?;
     let verdict = verdict_of(&groups);
-    let last_fit = if verdict == Verdict::Unexplained {
-        context.in_own_noise(&base)?
+    let (last_set, last_fit) = if verdict == Verdict::Unexplained {
+        (&base, context.in_own_noise(&base)?)
     } else {
-        own
-    };
-    let last_set = if verdict == Verdict::Unexplained {
-        &base
-    } else {
-        &confirmed
+        (&confirmed, own)
     };
     let unknown = match verdict {
         Verdict::Unexplained | Verdict::Partial => {
             tell("the shape of what is missing");
             let context = Context {
-                limit: context.limit.of_report(),
+                limit: context.limit.afterwards(),
                 ..context.clone()
             };
             let floors: Vec<f64> = last_fit.noise.iter().map(ArModel::sigma).collect();

@@ -48,9 +48,7 @@ impl Context<'_> {
         for own in found {
             let mut group = vec![own];
             let position = last.added.iter().position(|i| *i == own);
-            if self.limit.passed() {
-                self.limit.leave_out(OTHERS);
-            } else if let Some(position) = position {
+            if let Some(position) = position.filter(|_| !self.limit.leaves_out(OTHERS)) {
                 let others = self.stand_ins(&last, position, noise, slowness)?;
                 let is_same = |node: &&Node| {
                     let further = node.fit.parameters > last.fit.parameters;
@@ -112,9 +110,7 @@ impl Context<'_> {
                         .nearly_explains((node, last), &without, &own_last)
                         .unwrap_or(false)
         });
-        if self.limit.passed() {
-            self.limit.leave_out(OTHERS);
-        }
+        self.limit.leaves_out(OTHERS);
         Ok(others)
     }
 

@@ -35,4 +35,4 @@ pub use left::Left;
 pub use problem::{Kept, Options, Problem};
 pub use result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 pub use spectral_line::{Line, strongest_line};
-pub use unknown::{Place, Unknown};
+pub use unknown::{PortScore, Unknown};

@@ -127,9 +127,13 @@ impl<'a> Limit<'a> {
             || self.time.passed()
     }
 
-    /// Notes a part of the search that was left out or cut short.
-    pub fn leave_out(&self, part: &str) {
-        self.time.leave_out(part);
+    /// Whether a part of the search has to be left out or cut short for want of time; it is noted then.
+    pub fn leaves_out(&self, part: &str) -> bool {
+        let out = self.passed();
+        if out {
+            self.time.leave_out(part);
+        }
+        out
     }
 
     /// What was left out, in order.
@@ -137,15 +141,23 @@ impl<'a> Limit<'a> {
         self.time.left_out()
     }
 
-    /// What is found is fitted once more and shown, whatever time the search took, and interrupted or not: a limit of its own.
-    pub fn of_report(&self) -> Self {
+    /// A limit of its own for what follows the search, whatever time that took.
+    pub fn afterwards(&self) -> Self {
         /// Share of the time of the search.
-        const REPORT: f64 = 0.25;
-        let whole = self.whole.map(|whole| whole.mul_f64(REPORT));
+        const SHARE: f64 = 0.25;
+        let whole = self.whole.map(|whole| whole.mul_f64(SHARE));
         Self {
             time: Arc::new(TimeLimit::new(whole)),
             whole,
+            interrupt: self.interrupt,
+        }
+    }
+
+    /// The same for what is found, which is fitted once more and shown, interrupted or not.
+    pub fn of_report(&self) -> Self {
+        Self {
             interrupt: None,
+            ..self.afterwards()
         }
     }
 

@@ -29,6 +29,8 @@ const FALL_FACTOR: f64 = 2.0;
 const FALL_MARGIN: f64 = 6.0;
 /// A larger set has to lower the criterion by this, or the search ends.
 const PAYS: f64 = 2.0;
+/// What is left out where the time has passed.
+const LARGER: &str = "larger sets of effects";
 
 /// What a search in one metric found.
 pub(crate) struct Grown {
@@ -108,7 +110,7 @@ impl Context<'_> {
         let grown = Grown {
             best: base.clone(),
             among,
-            cut_short: self.limit.passed() && self.note_cut(),
+            cut_short: self.limit.leaves_out(LARGER),
             base,
             fitted: singles.iter().chain(&beam[few..]).cloned().collect(),
             singles,
@@ -143,8 +145,8 @@ impl Context<'_> {
             {
                 break;
             }
-            if self.limit.passed() {
-                cut_short = self.note_cut();
+            if self.limit.leaves_out(LARGER) {
+                cut_short = true;
                 break;
             }
             size += 1;
@@ -156,8 +158,8 @@ impl Context<'_> {
                 .cloned()
                 .collect();
             for parent in &parents {
-                if self.limit.passed() {
-                    cut_short = self.note_cut();
+                if self.limit.leaves_out(LARGER) {
+                    cut_short = true;
                     break;
                 }
                 let trials = self.trials_among(parent, &among, noise);
@@ -185,12 +187,6 @@ impl Context<'_> {
             fitted,
             cut_short,
         })
-    }
-
-    /// Notes that the search was cut short.
-    fn note_cut(&self) -> bool {
-        self.limit.leave_out("larger sets of effects");
-        true
     }
 
     /// Whether a candidate might lower the criterion.

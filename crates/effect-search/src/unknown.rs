@@ -31,7 +31,7 @@ const PLACES: usize = 25;
 
 /// A smooth function at a port.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
+pub struct PortScore {
     /// Its identifier: `shape(T,u)`, `course(T)`.
     pub effect: String,
     /// Fall of the criterion against the last model, in white noise.
@@ -67,7 +67,7 @@ pub struct Unknown {
     /// The heights of its bells, as `ctid add NAME --from` keeps them.
     pub parameters: Vec<Estimate>,
     /// Ports and variables, the best first.
-    pub places: Vec<Place>,
+    pub places: Vec<PortScore>,
 }
 
 impl Context<'_> {
@@ -133,7 +133,7 @@ impl Context<'_> {
         };
         let outputs = node.spec().outputs.iter();
         let names = outputs.map(|output| node.spec().about(output.variable).name.clone());
-        let places = all.iter().map(|(set, share)| Place {
+        let places = all.iter().map(|(set, share)| PortScore {
             effect: self.last_of(set).map_or_else(String::new, |c| c.id.clone()),
             bic_gain: set.gain_over(&base),
             share_left_out: *share,

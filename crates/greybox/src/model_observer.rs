@@ -7,9 +7,7 @@
 //! **Reference**: L. Ljung, System Identification, 2nd ed. (1999), sections 4.3 (predictors with an observer) and 10.5 (initial values);
 //! H. G. Bock, in: Modelling of Chemical Reaction Systems, Springer (1981), 102-125 (shooting that is tied to the readings).
 
-use std::collections::BTreeMap;
-
-use ct_model::{About, Expression, Input, Model, ModelSpec, Operator, Variable};
+use ct_model::{About, Expression, Input, Model, ModelSpec, Operator, Output, Variable};
 use ct_signals::{Channel, Hold, Record};
 use estimation::{Noise, Stopping, fit_from, within};
 
@@ -23,33 +21,28 @@ const STOPPING: Stopping = Stopping {
     cost: 1e-4,
 };
 
-/// The state that an output shows as it is.
-fn shown(spec: &ModelSpec, mut variable: Variable) -> Option<usize> {
-    loop {
-        match variable {
-            Variable::State(i) => return Some(i),
-            Variable::Flow(i) => match &spec.flows[i].value {
-                Expression::Variable(behind) => variable = *behind,
-                _ => return None,
-            },
-            _ => return None,
-        }
-    }
-}
-
 fn product(a: Expression, b: Expression) -> Expression {
     Expression::Binary(Operator::Multiply, Box::new(a), Box::new(b))
 }
 
-/// The model in which every state that is read follows its reading, which is a further input; the outputs that are further inputs, in order.
-fn observed(spec: &ModelSpec, rate: f64) -> (ModelSpec, Vec<usize>) {
+/// Outputs that show a state as it is, each with its state.
+fn shown(spec: &ModelSpec) -> Vec<(usize, usize)> {
+    let outputs = spec.outputs.iter().enumerate();
+    let state = |(o, output): (usize, &Output)| {
+        let read = Expression::Variable(output.variable);
+        match spec.behind(&read) {
+            Expression::Variable(Variable::State(i)) => Some((o, *i)),
+            _ => None,
+        }
+    };
+    outputs.filter_map(state).collect()
+}
+
+/// The model in which these states follow the readings of their outputs, which are further inputs in this order.
+fn observed(spec: &ModelSpec, shown: &[(usize, usize)], rate: f64) -> ModelSpec {
     let mut observed = spec.clone();
-    let mut read = Vec::new();
-    for (o, output) in spec.outputs.iter().enumerate() {
-        let Some(i) = shown(spec, output.variable) else {
-            continue;
-        };
-        let mut name = format!("{}_reading", spec.about(output.variable).name);
+    for &(o, i) in shown {
+        let mut name = format!("{}_reading", spec.about(spec.outputs[o].variable).name);
         while observed.find(&name).is_some() {
             name.push('_');
         }
@@ -72,9 +65,8 @@ fn observed(spec: &ModelSpec, rate: f64) -> (ModelSpec, Vec<usize>) {
         }
         state.right =
             Expression::Binary(Operator::Add, Box::new(state.right.clone()), Box::new(pull));
-        read.push(o);
     }
-    (observed, read)
+    observed
 }
 
 impl ModelSetup<'_> {
@@ -83,33 +75,24 @@ impl ModelSetup<'_> {
         let rows: usize = self.records().iter().map(|record| record.len() - 1).sum();
         let duration: f64 = self.records().iter().map(Record::duration).sum();
         let interval = duration / rows.max(1) as f64 / self.time_unit();
-        if interval <= 0.0 {
+        let shown = shown(self.model().spec());
+        if interval <= 0.0 || shown.is_empty() {
             return None;
         }
-        let white = Noise::white(self.outputs());
+        let with_readings = |record: &Record| {
+            let mut record = record.clone();
+            for &(o, _) in &shown {
+                let output = &record.outputs[o];
+                let reading = Channel::new(output.name.clone(), "", output.interpolated());
+                record.inputs.push(reading.with_hold(Hold::First));
+            }
+            record
+        };
+        let records: Vec<Record> = self.records().iter().map(with_readings).collect();
+        let (known, white) = (self.known(), Noise::white(self.outputs()));
         let mut x = start.to_vec();
         for rate in RATES {
-            let (spec, read) = observed(self.model().spec(), rate / interval);
-            if read.is_empty() {
-                return None;
-            }
-            let records: Vec<Record> = self
-                .records()
-                .iter()
-                .map(|record| {
-                    let mut record = record.clone();
-                    for &o in &read {
-                        let output = &record.outputs[o];
-                        let mut reading =
-                            Channel::new(output.name.clone(), "", output.interpolated());
-                        reading.hold = Hold::First;
-                        record.inputs.push(reading);
-                    }
-                    record
-                })
-                .collect();
-            let model = Model::new(spec);
-            let known: BTreeMap<String, f64> = self.known();
+            let model = Model::new(observed(self.model().spec(), &shown, rate / interval));
             let setup = ModelSetup::new(&model, &records, &known, self.time_unit()).ok()?;
             let setup = setup.limited_as(self);
             if let Ok(fit) = fit_from(&setup, vec![x.clone().into()], &white, STOPPING) {

@@ -216,9 +216,7 @@ impl<'a> ModelSetup<'a> {
         let known: BTreeMap<String, f64> = known.zip(x.iter().copied()).collect();
         let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
         setup.clock = self.clock.with_records(records);
-        setup.time_limit.clone_from(&self.time_limit);
-        setup.interrupt = self.interrupt;
-        Ok(setup)
+        Ok(setup.limited_as(self))
     }
 
     /// The same model, clock and fitted parameters against other records, without priors.

@@ -13,9 +13,10 @@ mod expected;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Instant;
 
 use clap::Parser;
+use ctid_tests::measured::Mark;
+use ctid_tests::program::{program, result};
 use expected::{Case, cases};
 use serde_json::Value;
 
@@ -27,19 +28,6 @@ struct Arguments {
     /// Of the search, as `ctid diagnose --effort` has it.
     #[arg(long)]
     effort: Option<String>,
-}
-
-/// How an answer compares with what is known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Mark {
-    /// All that is known to be missing is named, nothing else, and the error is as low as it was reached by hand.
-    Right,
-    /// Some of it.
-    Partly,
-    /// Nothing is named.
-    Silent,
-    /// Something else is named.
-    Wrong,
 }
 
 /// An answer of the program.
@@ -56,19 +44,11 @@ fn main() {
         println!("skipped: {} is not there", records.display());
         return;
     }
-    let program = std::env::current_exe().unwrap().with_file_name("../ctid");
-    if !program.exists() {
-        println!(
-            "skipped: {} is not built: cargo build --release",
-            program.display()
-        );
-        return;
-    }
+    let Some(program) = program() else { return };
     let parts = &arguments.parts;
     let chosen = cases().into_iter().filter(|case| {
         parts.is_empty() || parts.iter().any(|part| case.name().contains(part.as_str()))
     });
-    let scratch = tempfile::tempdir().unwrap();
     let mut marks: BTreeMap<String, Vec<(Mark, f64)>> = BTreeMap::new();
     for case in chosen {
         let missing = case.records().find(|file| !records.join(file).exists());
@@ -76,8 +56,7 @@ fn main() {
             println!("{}: skipped: {file} is not there", case.name());
             continue;
         }
-        let json = scratch.path().join("found.json");
-        let answer = match diagnosed(&program, &arguments, &case, &[&records, &models], &json) {
+        let answer = match diagnosed(&program, &arguments, &case, &[&records, &models]) {
             Ok(answer) => answer,
             Err(why) => {
                 println!("{}: refused: {why}", case.name());
@@ -104,7 +83,6 @@ fn diagnosed(
     arguments: &Arguments,
     case: &Case,
     [records, models]: &[&Path; 2],
-    json: &Path,
 ) -> Result<Answer, String> {
     let in_folder = |file: &String| -> PathBuf { records.join(file) };
     let mut command = Command::new(program);
@@ -115,21 +93,11 @@ fn diagnosed(
         command.arg("--test").arg(in_folder(file));
     }
     command.arg("--model").arg(models.join(case.model));
-    command.arg("--json").arg(json);
     if let Some(effort) = &arguments.effort {
         command.arg("--effort").arg(effort);
     }
-    let began = Instant::now();
-    let out = command.output().unwrap();
-    let seconds = began.elapsed().as_secs_f64();
-    if !out.status.success() {
-        return Err(String::from_utf8_lossy(&out.stderr).trim().to_string());
-    }
-    let text = std::fs::read_to_string(json).unwrap();
-    Ok(Answer {
-        found: serde_json::from_str(&text).unwrap(),
-        seconds,
-    })
+    let (found, seconds) = result(&mut command)?;
+    Ok(Answer { found, seconds })
 }
 
 fn groups(found: &Value) -> Vec<Vec<&str>> {
@@ -153,6 +121,7 @@ fn errors(step: &Value, key: &str) -> Vec<f64> {
     })
 }
 
+/// Right: all that is known to be missing is named, nothing else, and the error is as low as it was reached by hand. Partly: some of it.
 fn mark(case: &Case, found: &Value) -> Mark {
     let claims = ["effect", "undecided", "partial"].contains(&found["verdict"].as_str().unwrap());
     let groups = groups(found);

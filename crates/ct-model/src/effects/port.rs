@@ -93,8 +93,9 @@ impl ModelSpec {
         }
     }
 
-    /// An expression, or what a flow that stands alone is equal to.
-    pub(super) fn behind<'a>(&'a self, mut expression: &'a Expression) -> &'a Expression {
+    /// An expression, or what a flow that stands alone is equal to: of an output that shows a state that state.
+    #[must_use]
+    pub fn behind<'a>(&'a self, mut expression: &'a Expression) -> &'a Expression {
         // Flows are sorted: no circle.
         while let Expression::Variable(Variable::Flow(i)) = expression {
             expression = &self.flows[*i].value;

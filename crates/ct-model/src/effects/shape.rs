@@ -66,54 +66,72 @@ macro_rules! of_time {
     };
 }
 
-macro_rules! sizes {
-    ($starts:expr, $($name:literal),+) => { &[$(($name, Role::Size, $starts)),+] };
+/// Names of the heights.
+const NAMES: [&str; 12] = [
+    "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11",
+];
+
+/// The first so many heights, with their starts.
+const fn heights<const N: usize>(starts: Starts) -> [(&'static str, Role, Starts); N] {
+    let mut all = [("", Role::Size, starts); N];
+    let mut k = 0;
+    while k < N {
+        all[k].0 = NAMES[k];
+        k += 1;
+    }
+    all
 }
 
 const OF_BALANCE: Starts = Starts::Balances(&[0.1]);
 const OF_WIDTH: Starts = Starts::Widths(&[0.1]);
 const RELATIVE: Starts = Starts::Values(&[0.1]);
 
-const SHAPE: Effect = Effect {
+const OF_EQUATION: Effect = Effect {
     id: "shape",
     place: Place::BalanceAndSignal,
     text: of_signal!("  input Real x;\n", "x", "balance", "20*balance", "", ""),
-    parameters: sizes!(OF_BALANCE, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
+    parameters: &heights::<7>(OF_BALANCE),
     physics: "A term of this equation that depends on the signal in some smooth way.",
     confused_with: &["loss(x)", "varies_with(p,x)"],
     confirm: "Look at its shape, and write the physics that has it as a candidate of your own.",
     symptoms: &["nobody knows what it is"],
 };
 
-const COURSE: Effect = Effect {
+const OF_INPUT: Effect = Effect {
+    place: Place::Input,
+    text: of_signal!("  input Real u;\n", "u", "port", "3*width", "u + ", ""),
+    parameters: &heights::<7>(OF_WIDTH),
+    physics: "What the actuator gives is another function of the command.",
+    ..OF_EQUATION
+};
+
+const EQUATION_IN_TIME: Effect = Effect {
     id: "course",
     place: Place::Balance,
     text: of_time!("  input Real x;\n", "balance", "20*balance", "", ""),
-    parameters: sizes!(
-        OF_BALANCE, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"
-    ),
+    parameters: &heights::<12>(OF_BALANCE),
     physics: "A disturbance of this balance that follows time in some smooth way.",
     confused_with: &["periodic(x)", "step(x)", "constant(x)"],
     confirm: "Hold its course against the log of the plant: what happened when it changes?",
     symptoms: &["nobody knows what it is"],
 };
 
+const INPUT_IN_TIME: Effect = Effect {
+    place: Place::Input,
+    text: of_time!("  input Real u;\n", "port", "3*width", "u + ", ""),
+    parameters: &heights::<12>(OF_WIDTH),
+    physics: "What acts is the input and a disturbance that follows time.",
+    ..EQUATION_IN_TIME
+};
+
 /// All of them: of a balance, an input, an output, and a parameter or a named flow.
 pub(super) const EFFECTS: [Effect; 8] = [
-    SHAPE,
-    Effect {
-        place: Place::Input,
-        text: of_signal!("  input Real u;\n", "u", "port", "3*width", "u + ", ""),
-        parameters: sizes!(OF_WIDTH, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
-        physics: "What the actuator gives is another function of the command.",
-        ..SHAPE
-    },
+    OF_EQUATION,
+    OF_INPUT,
     Effect {
         place: Place::Output,
-        text: of_signal!("  input Real u;\n", "u", "port", "3*width", "u + ", ""),
-        parameters: sizes!(OF_WIDTH, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
         physics: "What the sensor gives is another function of what it measures.",
-        ..SHAPE
+        ..OF_INPUT
     },
     Effect {
         place: Place::ParameterAndSignal,
@@ -125,36 +143,22 @@ pub(super) const EFFECTS: [Effect; 8] = [
             "p*(1 + ",
             ")"
         ),
-        parameters: sizes!(RELATIVE, "h0", "h1", "h2", "h3", "h4", "h5", "h6"),
+        parameters: &heights::<7>(RELATIVE),
         physics: "It is no constant, but some smooth function of the signal.",
-        ..SHAPE
+        ..OF_EQUATION
     },
-    COURSE,
-    Effect {
-        place: Place::Input,
-        text: of_time!("  input Real u;\n", "port", "3*width", "u + ", ""),
-        parameters: sizes!(
-            OF_WIDTH, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"
-        ),
-        physics: "What acts is the input and a disturbance that follows time.",
-        ..COURSE
-    },
+    EQUATION_IN_TIME,
+    INPUT_IN_TIME,
     Effect {
         place: Place::Output,
-        text: of_time!("  input Real u;\n", "port", "3*width", "u + ", ""),
-        parameters: sizes!(
-            OF_WIDTH, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"
-        ),
         physics: "The reading is off by an error that follows time.",
-        ..COURSE
+        ..INPUT_IN_TIME
     },
     Effect {
         place: Place::Parameter,
         text: of_time!("  input Real p;\n", "1", "3", "p*(1 + ", ")"),
-        parameters: sizes!(
-            RELATIVE, "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11"
-        ),
+        parameters: &heights::<12>(RELATIVE),
         physics: "It changes over time in some smooth way.",
-        ..COURSE
+        ..EQUATION_IN_TIME
     },
 ];

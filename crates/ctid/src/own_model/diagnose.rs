@@ -41,7 +41,7 @@ pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> St
         text += &look.paragraph("  ", &sentence);
     }
     if let Some(unknown) = &diagnosis.unknown {
-        text += &unknown::drawn(unknown, look);
+        text += &unknown::values(unknown, look);
     }
     text
 }
@@ -114,7 +114,7 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
     }
     if diagnosis.effects.len() >= MANY {
         all.push(format!(
-            "{MANY} effects or more together often imitate one that no candidate holds: take them for a description of the records until each is confirmed."
+            "{MANY} effects or more together may imitate one that no candidate holds: take them for a description of the records until each is confirmed."
         ));
     }
     if !diagnosis.left_out.is_empty() {

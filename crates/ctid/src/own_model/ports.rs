@@ -33,14 +33,19 @@ fn group(candidate: &Candidate) -> usize {
     }
 }
 
+/// All that a search looks at: of the catalogue and of the model file.
+fn searched(file: &OwnModelFile) -> Result<Vec<Candidate>, Error> {
+    let mut all = every_candidate(&file.base, &file.candidates)?;
+    all.retain(|candidate| !candidate.is_shape());
+    Ok(all)
+}
+
 /// `ctid effects --model M.toml`: every effect with the identifiers of its ports, by place.
 ///
 /// # Errors
 /// As [`own_candidates`], which the model file has passed.
 pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
-    let spec = &file.base;
-    let mut all = every_candidate(spec, &file.candidates)?;
-    all.retain(|candidate| !candidate.is_shape());
+    let all = searched(file)?;
     let mut text = String::new();
     for (i, heading) in HEADINGS.into_iter().enumerate() {
         let here: Vec<&Candidate> = all.iter().filter(|c| group(c) == i).collect();
@@ -75,8 +80,7 @@ fn by_effect(all: &[&Candidate], look: Look) -> String {
 /// # Errors
 /// Where none does.
 pub(crate) fn like(file: &OwnModelFile, sought: &Sought, look: Look) -> Result<String, Error> {
-    let mut all = every_candidate(&file.base, &file.candidates)?;
-    all.retain(|candidate| !candidate.is_shape());
+    let all = searched(file)?;
     let found = best(all.iter(), |candidate| sought.score_of(candidate));
     if found.is_empty() {
         return Err(sought.nothing());

@@ -5,7 +5,7 @@ use effect_search::Unknown;
 use super::words::{EffectWords, shown_unit};
 use crate::look::{Look, Side, table};
 use crate::numbers;
-use crate::term_file::HEADER;
+use crate::term_file::of_curve;
 
 /// What it is, in a sentence or two.
 pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
@@ -28,8 +28,8 @@ pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
     )
 }
 
-/// Some of its values.
-pub(super) fn drawn(unknown: &Unknown, look: Look) -> String {
+/// Some of its values, as a table.
+pub(super) fn values(unknown: &Unknown, look: Look) -> String {
     /// Every so many of them.
     const EVERY: usize = 4;
     let head = |name: &str, unit: &str| match shown_unit(unit) {
@@ -61,19 +61,12 @@ pub(super) fn drawn(unknown: &Unknown, look: Look) -> String {
 
 /// The file that `ctid diagnose --unknown` writes.
 pub(crate) fn file(unknown: &Unknown) -> String {
-    let (at, of) = (&unknown.variable_unit, &unknown.unit);
-    let mut text = format!("{HEADER} [{at}],value [{of}],std_error [{of}]\n");
-    for ((at, value), error) in unknown
-        .at
-        .iter()
-        .zip(&unknown.value)
-        .zip(&unknown.std_error)
-    {
-        let error = error.map_or(String::new(), |error| error.to_string());
-        text += &format!(
-            "\"{}\",{},{at},{value},{error}\n",
-            unknown.effect, unknown.variable
-        );
-    }
-    text
+    let values = unknown.at.iter().zip(&unknown.value);
+    let rows = values.zip(&unknown.std_error);
+    of_curve(
+        // Its ports are told apart by a comma.
+        (&format!("\"{}\"", unknown.effect), &unknown.variable),
+        (&unknown.variable_unit, &unknown.unit),
+        rows.map(|((at, value), error)| (*at, *value, *error)),
+    )
 }

@@ -58,7 +58,7 @@ pub fn diagnose(
     let white = Noise::white(problem.spec.outputs.len());
     let all: Vec<usize> = (0..context.candidates.len()).collect();
     let few = options.max_effects.min(BEFORE_NOISE);
-    let mut by_error = context.grow(base.clone(), &all, &white, few)?;
+    let mut by_error = context.grow(base.clone(), (&all, &[]), &white, few)?;
     let (mut noise, slow) = context.noise_of(&by_error.best)?;
     let full = by_error.best.added.len() >= base.added.len() + few;
     if noise.order() == 0 && full && few < options.max_effects {
@@ -72,7 +72,7 @@ pub fn diagnose(
         let mut timeless = all.clone();
         timeless.retain(|&i| !context.candidates[i].follows_time());
         let most = options.max_effects;
-        let grown = context.grow(base.clone(), &timeless, &white, most)?;
+        let grown = context.grow(base.clone(), (&timeless, &by_error.singles), &white, most)?;
         by_error_sets.extend(grown.fitted);
         by_error_sets.push(grown.best);
     }
@@ -231,7 +231,12 @@ fn in_metric(
         return Ok((grown, Noise::white(noise.outputs())));
     }
     let all: Vec<usize> = (0..context.candidates.len()).collect();
-    let grown = context.grow(begin, &all, &noise, options.max_effects)?;
+    let grown = context.grow(
+        begin,
+        (&all, &by_error.singles),
+        &noise,
+        options.max_effects,
+    )?;
     // The rich set of white noise may be the better one here too.
     let other = context.refitted(&by_error.best, &noise, FINE);
     let mut grown = grown;

@@ -22,6 +22,9 @@ pub enum Error {
     /// The simulation of the fitted model.
     #[error(transparent)]
     Simulation(#[from] ct_model::NoSolution),
+    /// An experiment that cannot be proposed.
+    #[error(transparent)]
+    Design(#[from] crate::design::Refused),
     /// An effect of the model file that the model cannot have.
     #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can")]
     UnknownEffect {

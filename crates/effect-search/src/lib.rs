@@ -9,6 +9,7 @@
 
 mod accept;
 mod believed;
+pub mod design;
 mod diagnose;
 mod error;
 mod factor_score;

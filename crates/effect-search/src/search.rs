@@ -5,6 +5,7 @@
 //! and pairs are looked at before any single effect is chosen.
 
 use estimation::Noise;
+use greybox::FitOptions;
 use rayon::prelude::*;
 
 use crate::Error;
@@ -15,6 +16,10 @@ use crate::score::Trial;
 /// So many candidates beside a set are fitted, those with the best scores; beside the believed model this many.
 const REFITS: usize = 8;
 const FIRST_REFITS: usize = 28;
+/// So many single effects, the best, are fitted from starts of their own too, ...
+const OWN_STARTS: usize = 8;
+/// ... and from so many each.
+const STARTS: usize = 4;
 /// So many pairs are fitted.
 const PAIRS: usize = 8;
 /// So many candidates, the best beside the believed model, are scored beside larger sets at least; half of all where there are more.
@@ -71,17 +76,60 @@ impl Context<'_> {
         best_first(fits.collect())
     }
 
-    /// The search of sets of up to so many effects. `of`: positions of the candidates.
+    /// Whether a fit has a parameter at a bound, or one that the records do not determine.
+    fn is_open(&self, node: &Node) -> bool {
+        let errors = node.fit.std_errors();
+        let free = self.setup(&node.model).map(|setup| setup.free().to_vec());
+        free.is_ok_and(|free| free.iter().any(|&i| errors[i].is_none()))
+    }
+
+    /// The best single effects fitted again from starts of their own: where the believed model has no minimum within its bounds, an effect
+    /// beside it begins there, and that may be a place that it has no part in. `known`: fits of single effects in another metric.
+    fn refit_from_own_starts(&self, nodes: &mut [Node], known: &[Node], noise: &Noise) {
+        nodes.par_iter_mut().take(OWN_STARTS).for_each(|node| {
+            if self.limit.passed() {
+                return;
+            }
+            let start = match known.iter().find(|known| known.added == node.added) {
+                Some(known) => Ok(known.fit.x.clone()),
+                None => self.own_minimum(node),
+            };
+            let added = node.added.clone();
+            let model = node.model.clone();
+            let again = start.and_then(|x| self.fitted(added, model, vec![x], noise, ROUGH));
+            if let Ok(again) = again
+                && again.fit.cost < node.fit.cost
+            {
+                *node = again;
+            }
+        });
+        sort_by_criterion(nodes);
+    }
+
+    /// Where a set ends that is fitted from starts of its own, in white noise.
+    fn own_minimum(&self, node: &Node) -> Result<Vec<f64>, Error> {
+        let options = FitOptions {
+            starts: STARTS,
+            stopping: ROUGH,
+            ..FitOptions::default()
+        };
+        Ok(self.setup(&node.model)?.fit(&options)?.x)
+    }
+
+    /// The search of sets of up to so many effects. `of`: positions of the candidates; `known`: fits of single effects in another metric.
     pub fn grow(
         &self,
         base: Node,
-        of: &[usize],
+        (of, known): (&[usize], &[Node]),
         noise: &Noise,
         max_effects: usize,
     ) -> Result<Grown, Error> {
         let trials = self.trials_among(&base, of, noise);
         let promising = &trials[..trials.len().min(FIRST_REFITS)];
-        let singles = self.refits(&base, promising, noise);
+        let mut singles = self.refits(&base, promising, noise);
+        if self.is_open(&base) {
+            self.refit_from_own_starts(&mut singles, known, noise);
+        }
         let mut beam: Vec<Node> = Vec::new();
         if max_effects > 0 {
             beam.extend(singles.iter().take(BEAM).cloned());
@@ -235,6 +283,10 @@ pub(crate) fn same_set(a: &Node, b: &Node) -> bool {
 
 /// By the criterion.
 pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
-    nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+    sort_by_criterion(&mut nodes);
     nodes
+}
+
+fn sort_by_criterion(nodes: &mut [Node]) {
+    nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
 }

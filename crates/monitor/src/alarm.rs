@@ -127,7 +127,7 @@ pub(crate) fn alarm(
 ) -> Alarm {
     let best = suspects
         .first()
-        .filter(|best| best.plausible && best.evidence > 0.0 && !best.leaves_more_than_noise());
+        .filter(|best| best.plausible && best.evidence > 0.0 && !best.left.is_more_than_noise());
     let output = structure.known.output_name(structure.plant, raised.output);
     let mut alarm = Alarm::unexplained(raised, output.map(str::to_string));
     let mut place = Place::Vessel;
@@ -167,30 +167,35 @@ pub(crate) fn alarm(
 
 /// `place`: of the best effect.
 fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain, axis: &TimeAxis) -> String {
-    let (Some(since), Some(evidence), Some(size)) = (alarm.since, alarm.evidence, &alarm.size)
-    else {
-        let most = alarm.output.as_ref().map_or(String::new(), |output| {
-            format!("; it shows most at the {}", domain.sensor_words(output))
-        });
-        return format!(
-            "The model does not fit since about {} or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
-            axis.at(raised),
-            alarm.score,
-            alarm.threshold
-        );
-    };
-    let unit = if size.unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {}", size.unit)
-    };
-    let vessel = size.vessel.as_ref().map_or(String::new(), |vessel| {
+    let vessel = alarm.size.as_ref().and_then(|size| size.vessel.as_ref());
+    let vessel = vessel.map_or(String::new(), |vessel| {
         if place == Place::Sensor {
             return format!(", {}", domain.sensor_words(vessel));
         }
         let (which, kind) = domain.vessel_words(vessel);
         format!(", {which} {kind}")
     });
+    consistent(alarm, &vessel, axis).unwrap_or_else(|| {
+        let most = alarm.output.as_ref().map_or(String::new(), |output| {
+            format!("; it shows most at the {}", domain.sensor_words(output))
+        });
+        format!(
+            "The model does not fit since about {} or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
+            axis.at(raised),
+            alarm.score,
+            alarm.threshold
+        )
+    })
+}
+
+/// What the rows are consistent with, `place` in words behind the size; `None` where nothing explains them.
+pub(crate) fn consistent(alarm: &Alarm, place: &str, axis: &TimeAxis) -> Option<String> {
+    let (since, evidence, size) = (alarm.since?, alarm.evidence?, alarm.size.as_ref()?);
+    let unit = if size.unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {}", size.unit)
+    };
     let against = alarm.next.as_ref().map_or(String::new(), |next| {
         format!(
             ", {:.1} against {:.1} for {}",
@@ -203,11 +208,11 @@ fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain, axis: &Tim
         }
         _ => String::new(),
     };
-    format!(
-        "Consistent with {} ({} = {}{unit}{vessel}) since {}{against}{group}.",
+    Some(format!(
+        "Consistent with {} ({} = {}{unit}{place}) since {}{against}{group}.",
         alarm.effects.first().map_or("", String::as_str),
         size.name,
         significant(size.value, 3),
         axis.at(since),
-    )
+    ))
 }

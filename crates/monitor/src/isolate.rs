@@ -50,10 +50,10 @@ const ONSETS: [f64; 13] = [
 /// At every such onset the catalogue's starts are tried again.
 const AFRESH: usize = 4;
 /// An onset has at least so many rows behind it.
-const FEWEST: usize = 8;
+pub(crate) const FEWEST: usize = 8;
 /// A drift of the pump is even where its settling takes as long as it may.
 const EVEN: (&str, &str) = ("pump_gain_drift", "time_constant");
-const ROUGH: Stopping = Stopping {
+pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 8,
     cost: 1e-3,
 };
@@ -98,20 +98,29 @@ pub(crate) struct Suspect {
     pub size: (&'static str, f64, Unit),
     /// The size lies inside its plausible range.
     pub plausible: bool,
-    /// Whitened squares from its onset on, in the noise's variance: what the learned model leaves, and what is left with it; and rows
-    /// there times outputs.
-    squares: (f64, f64),
-    samples: usize,
+    pub(crate) left: Left,
+}
+
+/// Whitened squares from an onset on, in the noise's variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Left {
+    /// What the learned model leaves.
+    pub before: f64,
+    /// What is left with an effect.
+    pub left: f64,
+    /// Rows there times outputs.
+    pub samples: usize,
+}
+
+impl Left {
+    /// What an effect leaves is more than noise.
+    pub(crate) fn is_more_than_noise(self) -> bool {
+        let n = self.samples as f64;
+        self.left > n + BEYOND * (2.0 * n).sqrt() && self.left - n > LEFT * (self.before - n)
+    }
 }
 
 impl Suspect {
-    /// What it leaves is more than noise.
-    pub(crate) fn leaves_more_than_noise(&self) -> bool {
-        let (before, left) = self.squares;
-        let n = self.samples as f64;
-        left > n + BEYOND * (2.0 * n).sqrt() && left - n > LEFT * (before - n)
-    }
-
     /// Belongs to the group of the best.
     pub(crate) fn near(&self, best: &Self) -> bool {
         self.plausible && best.evidence - self.evidence < GROUP_MARGIN
@@ -436,8 +445,11 @@ impl Search<'_> {
                 since: rows[0].sample.time,
                 size: (leading.name, size, leading.unit),
                 plausible: size > leading.lower + room && size < leading.upper - room,
-                squares: (self.squares[length - 1], squares),
-                samples: length * self.read,
+                left: Left {
+                    before: self.squares[length - 1],
+                    left: squares,
+                    samples: length * self.read,
+                },
             },
             values,
         ))

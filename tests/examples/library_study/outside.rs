@@ -58,7 +58,7 @@ pub fn candidate(
         2 => {
             let (first, last) = (rng.random_range(2.0..5.0), rng.random_range(15.0..30.0));
             format!(
-                "sin(TAU*({first:e}*{part} + {:e}*{part}^2))",
+                "sin({TAU:e}*({first:e}*{part} + {:e}*{part}^2))",
                 0.5 * (last - first)
             )
         }

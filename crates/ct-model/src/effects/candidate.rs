@@ -314,9 +314,11 @@ fn ports_of(
                 .map(|(u, x)| Port::InputAndBalance(u, x))
                 .collect()
         }
-        Place::BalanceAndSurrounding | Place::Motion | Place::Terminal => {
-            domain::ports(spec, effect)
-        }
+        Place::BalanceAndSurrounding
+        | Place::Motion
+        | Place::Level
+        | Place::TankAndTankBelow
+        | Place::Terminal => domain::ports(spec, effect),
     }
 }
 

@@ -11,6 +11,8 @@ pub(super) fn ports(spec: &ModelSpec, effect: &Effect) -> Vec<Port> {
     match effect.place {
         Place::BalanceAndSurrounding => thermal(spec),
         Place::Motion => mechanical(spec),
+        Place::Level => levels(spec).map(Port::Balance).collect(),
+        Place::TankAndTankBelow => tanks(spec),
         Place::Terminal => electrical(spec),
         _ => Vec::new(),
     }
@@ -49,6 +51,23 @@ fn mechanical(spec: &ModelSpec) -> Vec<Port> {
     };
     let balances = states.filter(|&x| spec.speed_of(x).is_none());
     balances.filter(is_speed).map(Port::Balance).collect()
+}
+
+/// Levels: lengths that are no positions, as no state is their speed.
+fn levels(spec: &ModelSpec) -> impl Iterator<Item = usize> {
+    let states = 0..spec.states.len();
+    states.filter(|&x| is(spec, Variable::State(x), "m") && spec.speed_of(x).is_none())
+}
+
+/// Pairs of tanks of which the first one drains into the other.
+fn tanks(spec: &ModelSpec) -> Vec<Port> {
+    let pairs = levels(spec).flat_map(|a| levels(spec).map(move |b| (a, b)));
+    let drains = |&(a, b): &(usize, usize)| {
+        let (into, back) = (Variable::State(a), Variable::State(b));
+        a != b && spec.depends_on(b, into) && !spec.depends_on(a, back)
+    };
+    let drained = pairs.filter(drains);
+    drained.map(|(a, b)| Port::Between(a, b)).collect()
 }
 
 /// Voltages that are read, with each current that is an input.

@@ -28,6 +28,10 @@ pub enum Place {
     BalanceAndSignal,
     /// The equation of a speed `x`.
     Motion,
+    /// The equation of a level `x`.
+    Level,
+    /// A flow from a tank of level `x1` to one of level `x2` that it drains into.
+    TankAndTankBelow,
     /// A voltage that is read, `y`, with a current that is an input, `a`.
     Terminal,
 }

@@ -34,6 +34,7 @@ mod domain;
 mod effect;
 mod electrical;
 mod fragment;
+mod hydraulic;
 mod input;
 mod mechanical;
 mod output;
@@ -55,12 +56,13 @@ pub use visited::{Span, Visited};
 
 /// All effects, by place; those of a chain in its order.
 pub fn all_effects() -> impl Iterator<Item = &'static Effect> {
-    const GROUPS: [&[Effect]; 8] = [
+    const GROUPS: [&[Effect]; 9] = [
         &input::EFFECTS,
         &electrical::EFFECTS,
         &output::EFFECTS,
         &thermal::EFFECTS,
         &mechanical::EFFECTS,
+        &hydraulic::EFFECTS,
         &balance::EFFECTS,
         &parameter::EFFECTS,
         &between::EFFECTS,

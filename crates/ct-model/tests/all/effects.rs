@@ -242,6 +242,10 @@ fn all_candidates_are_listed_with_their_ports() {
     assert!(has(&spring, "coulomb(v)") && !has(&spring, "coulomb(s)"));
     assert!(has(&all, "radiation(T,Ta)") && !has(&tanks, "coulomb(h1)"));
     assert!(has(&Driven::all()[3].candidates(), "second_rc(v,i)"));
+    // Levels are lengths without a speed; the upper tank spills into the lower one.
+    assert!(has(&tanks, "leak_at_height(h2)") && !has(&spring, "leak_at_height(s)"));
+    assert!(has(&tanks, "overflow(h1,h2)") && !has(&tanks, "overflow(h2,h1)"));
+    assert!(!has(&all, "leak_at_height(T)") && !has(&all, "overflow(T,T)"));
     assert!(!spring.iter().any(|c| c.id == "constant(s)"));
     assert!(spring.iter().any(|c| c.id == "limit(s)"));
 }

@@ -172,11 +172,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Check(Check { model })) => say(out, &check::run(&model, look)?),
         Some(Command::Simulate(arguments)) => arguments.run(out, look),
         Some(Command::Export(arguments)) => arguments.run(out, look),
-        Some(Command::Design(arguments)) => {
-            let (proposal, outputs, notes) = arguments.run(look)?;
-            let text = notes + &design::text::design(&proposal.design, look);
-            finish(&proposal, &text, &outputs, out, look)
-        }
+        Some(Command::Design(arguments)) => arguments.run(out, look),
         Some(Command::Monitor(arguments)) => arguments.run(out),
         Some(Command::Identify(arguments)) => arguments.run(out, look),
         Some(Command::Serve(arguments)) => arguments.run(out),
@@ -200,7 +196,7 @@ impl Results {
 }
 
 /// Writes the files, then says what was found and what was written.
-fn finish(
+pub(crate) fn finish(
     found: &impl Found,
     text: &str,
     outputs: &[Output],

@@ -2,20 +2,25 @@
 
 pub mod text;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use ct_signals::Columns;
+use effect_search::design::Limits as OwnLimits;
 use missing_effect::Options;
 use missing_effect::design::{Candidacy, Design, Limits};
 use plants::{EffectInfo, Known, Placed, Plant};
 use serde::Serialize;
 
+use crate::commands::finish;
 use crate::effort::EffortLevel;
 use crate::input::{self, Files, Input, ReadArguments};
+use crate::interrupt;
 use crate::look::Look;
 use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
+use crate::own_model::{self, AnyModelFile, OwnModelFile, OwnProposal};
 use crate::progress::Bar;
 use crate::{Error, names};
 
@@ -28,9 +33,13 @@ pub struct Arguments {
     /// Model file; neither of the two effects is in it
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
-    /// The two effects, as `ctid effects` lists them; of two tanks `overflow:upper` says which
+    /// The two effects, as `ctid effects` lists them; of two tanks `overflow:upper` says which, of a model of your own 'lag(y)'
     #[arg(long, num_args = 2, required = true, value_names = ["A", "B"])]
     between: Vec<String>,
+    /// Of a model of your own: an input that is played, as NAME or NAME=LOW..HIGH; several are played one by one and together. Without
+    /// any: all that moved in the records
+    #[arg(long, value_name = "NAME[=LOW..HIGH]")]
+    input: Vec<PlayedRange>,
     /// Smallest and largest command, or reference in a loop; without it what the records visited
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true)]
     range: Option<Vec<f64>>,
@@ -60,6 +69,35 @@ pub struct Arguments {
 pub(crate) fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("a whole number from 0 to {} is needed", u64::MAX))
+}
+
+/// An input of a model of one's own, and its range where one is given.
+#[derive(Debug, Clone)]
+struct PlayedRange {
+    name: String,
+    range: Option<(f64, f64)>,
+}
+
+impl std::str::FromStr for PlayedRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let Some((name, range)) = text.split_once('=') else {
+            return Ok(Self {
+                name: text.to_string(),
+                range: None,
+            });
+        };
+        let ends = range.split_once("..").and_then(|(low, high)| {
+            let number = |text: &str| text.trim().parse::<f64>().ok();
+            Some((number(low)?, number(high)?))
+        });
+        let range = ends.ok_or_else(|| format!("a range such as {name}=0..100 is needed"))?;
+        Ok(Self {
+            name: name.trim().to_string(),
+            range: Some(range),
+        })
+    }
 }
 
 /// A design, and in what unit of time its CSV is written.
@@ -169,6 +207,10 @@ fn vessel(
     }))
 }
 
+fn two() -> Error {
+    Error::Usage("--between takes two effects".to_owned())
+}
+
 impl Arguments {
     fn limits(&self) -> Limits {
         Limits {
@@ -190,21 +232,100 @@ impl Arguments {
         output::plan(&wanted, inputs)
     }
 
-    /// The design, where it goes, and what was read.
-    pub(crate) fn run(&self, look: Look) -> Result<(Proposal, Vec<Output>, String), Error> {
+    /// The limits for a model of one's own.
+    fn own_limits(&self, model: &OwnModelFile) -> Result<OwnLimits, Error> {
+        let mut limits = OwnLimits {
+            duration: self.duration,
+            seed: self.seed,
+            ..OwnLimits::default()
+        };
+        for PlayedRange { name, range } in &self.input {
+            limits.inputs.push(name.clone());
+            if let Some(range) = range {
+                limits.ranges.insert(name.clone(), *range);
+            }
+        }
+        let inputs = model.base.inputs.iter();
+        let all: Vec<String> = inputs.map(|input| input.about.name.clone()).collect();
+        let alone = match (&limits.inputs[..], &all[..]) {
+            ([one], _) | ([], [one]) => Some(one.clone()),
+            _ => None,
+        };
+        let one = |option: &str| {
+            alone.clone().ok_or_else(|| {
+                Error::Usage(format!(
+                    "{option}: {} has the inputs {}; name the one that it is of with --input NAME",
+                    model.base.name,
+                    all.join(", ")
+                ))
+            })
+        };
+        if let Some(range) = self.limits().range {
+            limits.ranges.insert(one("--range")?, range);
+        }
+        if let Some(slew) = self.slew {
+            limits.slews.insert(one("--slew")?, slew);
+        }
+        Ok(limits)
+    }
+
+    /// Of a model of one's own.
+    fn run_own(
+        &self,
+        model: &OwnModelFile,
+        files: &Files,
+        out: &mut dyn Write,
+        look: Look,
+    ) -> Result<(), Error> {
+        let limits = self.own_limits(model)?;
+        let records = model.records(files)?;
+        let mut outputs = self.outputs(&files.all())?;
+        let options = effect_search::Options {
+            seed: self.seed,
+            time_limit: Some(self.effort.limit_of_own_model()),
+            interrupt: Some(interrupt::flag()),
+            ..effect_search::Options::default()
+        };
+        let [first, second] = &self.between[..] else {
+            return Err(two());
+        };
+        let bar = Bar::with_limit(options.time_limit);
+        let tell = |progress: effect_search::Progress| bar.phase(progress.phase);
+        let design = own_model::design(model, &records, [first, second], &limits, &options, &tell);
+        bar.clear();
+        let proposal = OwnProposal::new(design?, model, records.time_unit);
+        if proposal.design.twins() && self.out.is_none() {
+            outputs.retain(|output| output.kind() != Kind::Record);
+        }
+        let notes = input::notes(&records.summaries, look);
+        let text = notes + &own_model::design_said(model, &proposal.design, look);
+        finish(&proposal, &text, &outputs, out, look)
+    }
+
+    /// Designs, and writes what was asked for.
+    pub(crate) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = Files {
             data: self.data.clone(),
             test: Vec::new(),
             model: self.model.clone(),
             options: self.reading.options(),
         };
-        let model = files.read_model()?;
+        let model = match AnyModelFile::read(&self.model)? {
+            AnyModelFile::Plant(model) => *model,
+            AnyModelFile::Own(model) => return self.run_own(&model, &files, out, look),
+        };
+        if let Some(input) = self.input.first() {
+            return Err(Error::Usage(format!(
+                "--input {}: a plant has one command; give its range with --range LOW HIGH",
+                input.name
+            )));
+        }
         let mut between = Vec::with_capacity(2);
         for name in &self.between {
             between.push(candidacy(&model, &self.model, name)?);
         }
         let &[first, second] = &between[..] else {
-            return Err(Error::Usage("--between takes two effects".to_owned()));
+            return Err(two());
         };
         let columns = model.columns.clone();
         let Input { problem, summaries } = files.read_with(model)?;
@@ -228,6 +349,8 @@ impl Arguments {
             outputs.retain(|output| output.kind() != Kind::Record);
         }
         let notes = input::notes(&summaries, look);
-        Ok((Proposal::new(design, &columns), outputs, notes))
+        let proposal = Proposal::new(design, &columns);
+        let text = notes + &text::design(&proposal.design, look);
+        finish(&proposal, &text, &outputs, out, look)
     }
 }

@@ -12,7 +12,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 /// A block with a heater, in a room; what the user believes.
-const BLOCK: &str = r#"model Block
+pub(crate) const BLOCK: &str = r#"model Block
   parameter Real k(unit="W/K", min=0) = 0.8;
   parameter Real g(unit="W/%", min=0) = 1.6;
   final parameter Real C(unit="J/K") = 50;
@@ -50,7 +50,7 @@ fn level(k: usize, of: usize) -> f64 {
 }
 
 /// A record of a model with its own parameters, the noise of each output of first order.
-fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Record {
+pub(crate) fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Record {
     let spec = ModelSpec::parse(text).unwrap();
     let model = Model::new(spec);
     let parameters = model.parameters();
@@ -112,7 +112,7 @@ fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Record {
     }
 }
 
-fn problem(believed: &str, record: Record) -> Problem {
+pub(crate) fn problem(believed: &str, record: Record) -> Problem {
     Problem {
         spec: ModelSpec::parse(believed).unwrap(),
         effects: Vec::new(),

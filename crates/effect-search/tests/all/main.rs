@@ -1,4 +1,5 @@
 //! One program for all tests.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod design;
 mod hidden;

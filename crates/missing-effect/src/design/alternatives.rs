@@ -3,13 +3,12 @@
 use super::{
     experiments::{Before, Search, Tried},
     limits::Bounds,
-    plan::{Candidate, Power, Prospect, SecondSensor, Wider},
+    plan::{Candidate, SecondSensor, Wider},
     play::Loop,
-    power::{power, prospect, times_as_long},
     second_sensor,
-    sequences::{Kind, Sequence},
 };
 use crate::Error;
+use effect_search::design::{Kind, Power, Prospect, Sequence, power, prospect, times_as_long};
 
 /// Nobody repeats an experiment more often.
 const MOST_TIMES: f64 = 20.0;
@@ -24,7 +23,7 @@ impl Search<'_, '_> {
     ) -> Option<usize> {
         let times = times_as_long(&best.power, self.ahead_of_each())?.ceil();
         let times = (times <= MOST_TIMES).then_some(times as usize)?;
-        let longer = sequence.repeated(times, bounds).ok()?;
+        let longer = sequence.repeated(times, &bounds.room()).ok()?;
         let tried = self.tried(&longer, bounds, before)?;
         (prospect(&tried.power) == Prospect::Decides && !tried.at_limit).then_some(times)
     }

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ct_signals::Record;
+use effect_search::design::{Sequence, power, sequences};
 use greybox::Triangle;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
@@ -13,9 +14,7 @@ use super::{
     limits::{Bounds, Refused},
     plan::{Candidate, Reach, SecondSensor, Wider},
     play::{Loop, Played, play},
-    power::power,
     separation::{Metric, imagined, information, linear, misfit_before, refitted},
-    sequences::{Sequence, sequences},
 };
 use crate::{Error, Problem, Progress, diagnose::allow, node::Node};
 
@@ -238,7 +237,7 @@ impl Search<'_, '_> {
         seed: u64,
         before: &Before,
     ) -> Result<(Vec<Tried>, [usize; 2]), Error> {
-        let mut all: Vec<(usize, Sequence)> = sequences(bounds, self.time_constant, seed)?
+        let mut all: Vec<(usize, Sequence)> = sequences(&bounds.room(), self.time_constant, seed)?
             .into_iter()
             .enumerate()
             .collect();

@@ -1,6 +1,7 @@
 //! What the user allows an experiment to do, checked against the record and the plant.
 
 use ct_signals::{MIN_ROWS, ROWS_PER_PARAMETER, Record, shown};
+use effect_search::design::Room;
 use serde::Serialize;
 
 use crate::{Problem, numbers::significant};
@@ -228,6 +229,21 @@ fn possible(problem: &Problem, looped: bool) -> Option<(f64, f64, &'static str)>
     // A command that has been negative may be so again.
     let low = visited(&problem.records, false).0.min(0.0);
     Some((low, most, "the input_range of the model file"))
+}
+
+impl Bounds {
+    /// What sequences may do within them.
+    pub(crate) fn room(&self) -> Room {
+        Room {
+            low: self.low,
+            high: self.high,
+            visited: self.visited,
+            slew: self.slew,
+            duration: self.duration,
+            interval: self.interval,
+            samples: self.samples,
+        }
+    }
 }
 
 impl Bounds {

@@ -8,10 +8,8 @@ mod experiments;
 mod limits;
 mod plan;
 mod play;
-mod power;
 mod second_sensor;
 mod separation;
-mod sequences;
 mod words;
 
 #[cfg(test)]
@@ -21,9 +19,9 @@ use std::time::Instant;
 
 use plants::{Domain, EffectInfo, Placed};
 
+pub use effect_search::design::{Kind, Power, Prospect};
 pub use limits::{Bounds, Limits, Refused};
-pub use plan::{Candidate, Design, Power, Prospect, Reach, Rival, SecondSensor, Sequence, Wider};
-pub use sequences::Kind;
+pub use plan::{Candidate, Design, Reach, Rival, SecondSensor, Sequence, Wider};
 
 use crate::{
     Error, Options, Problem, Progress,
@@ -146,7 +144,7 @@ pub fn design(
         schema: 1,
         between: [0, 1].map(|i| rival(&fitted, i)),
         bic_ahead: search.ahead(),
-        prospect: match power::prospect(&found.best.power) {
+        prospect: match effect_search::design::prospect(&found.best.power) {
             // A power that no refit has confirmed is a promise.
             Prospect::Decides if !found.best.refitted => Prospect::May,
             prospect => prospect,

@@ -1,9 +1,10 @@
 //! The result of a design: plain structs, written as JSON as they stand; everything that is printed is derived from them.
 
+use effect_search::design::{Kind, Power, Prospect};
 use plants::Domain;
 use serde::Serialize;
 
-use super::{limits::Bounds, sequences::Kind};
+use super::limits::Bounds;
 use crate::{Effort, Parameter, diagnosis::domain_of};
 
 /// One of the two effects that are to be told apart.
@@ -23,17 +24,6 @@ pub struct Rival {
     pub bic_gain: f64,
     /// How a person confirms it at the plant; empty outside hydraulics.
     pub confirm: String,
-}
-
-/// How far an experiment takes the two apart.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Power {
-    /// The smaller of the two below.
-    pub power: f64,
-    /// By how much the deviance of the other is above that of the true one on average, were the first true, were the second true.
-    pub if_true: [f64; 2],
-    /// Probability that all records together then decide for the true one, by more than 6 in the criterion; the smaller of the two.
-    pub decides: f64,
 }
 
 /// From where to where a level moves in an experiment, by either model.
@@ -112,20 +102,6 @@ pub struct Sequence {
     pub time: Vec<f64>,
     /// Values, each held until the next instant as the model file has it.
     pub values: Vec<f64>,
-}
-
-/// What can be hoped for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Prospect {
-    /// The best experiment will very probably decide.
-    Decides,
-    /// It may.
-    May,
-    /// It will hardly, within these limits.
-    Hardly,
-    /// The two show the same in every experiment that was tried.
-    Twins,
 }
 
 /// The next experiment.

@@ -1,12 +1,13 @@
 //! What a sensor in a tank whose level is not measured would add: it is measured too, with the noise of the first output.
 
 use ct_signals::Record;
+use effect_search::design::least;
 use greybox::{Noise, Setup, Triangle};
 use plants::{Outlet, OutputScales, Structure};
 
 use super::{
     play::Played,
-    separation::{Metric, imagined, imagined_priors, least, unlooped, vector},
+    separation::{Metric, imagined, imagined_priors, unlooped, vector},
 };
 use crate::{Error, node::Node};
 

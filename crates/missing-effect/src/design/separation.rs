@@ -1,14 +1,6 @@
 //! How far apart an experiment takes two models: the least misfit of the one to what the other would show.
 //!
-//! Let A be true. The experiment shows `y_A + v`. Model B answers with the parameters that imitate `y_A` best, but it still has
-//! to fit the existing record, and its initial levels are free. In the metric of the noise, linearised at B's fit:
-//! ```text
-//! lambda_A = min over d, l of  ( |y_A - y_B - J d - L l|^2 + |R d|^2 ) / sigma^2
-//! ```
-//! `J` the derivatives with respect to B's parameters, `L` to its initial states in the experiment, `R'R` the information of
-//! the existing record on the parameters, its own initial states eliminated. `lambda` is a noncentrality: by so much the deviance of
-//! B is above that of A on average, and its standard deviation is `2 sqrt(lambda)`, as twice the logarithm of a likelihood ratio
-//! of two fixed means has it.
+//! [`effect_search::design`] has the noncentrality and its linear form.
 //!
 //! **The local form** of the literature is `c^2 |p_A|^2 (1 - rho^2) / sigma^2`, `p` the signature of an effect at its absent value beside
 //! what the base's parameters imitate, `rho` the cosine of the two. It follows from the above where the size `c` is small (then `y_A` less
@@ -84,18 +76,7 @@ pub(crate) fn information(node: &Node, metric: &Metric) -> Triangle {
     };
     let several = (setup.outputs() > 1).then(weighed).flatten();
     let rows = several.as_ref().unwrap_or(&node.fit.triangle);
-    let count = setup.parameter_count();
-    let (parameters, states): (Vec<usize>, Vec<usize>) =
-        (0..setup.free().len()).partition(|&column| setup.free()[column] < count);
-    let order: Vec<usize> = states.iter().chain(&parameters).copied().collect();
-    let all = rows.select(&order);
-    let mut own = Triangle::new(parameters.len());
-    for i in states.len()..order.len() {
-        let row: Vec<f64> = (states.len()..order.len()).map(|j| all.at(i, j)).collect();
-        own.push(&row);
-    }
-    own.finish();
-    own
+    effect_search::design::information(rows, setup.free(), setup.parameter_count())
 }
 
 /// A model's vector for an experiment: its parameters, the levels at which it begins, lags at rest.
@@ -104,30 +85,6 @@ pub(crate) fn vector(node: &Node, setup: &Setup, played: &Played) -> Vec<f64> {
     x.extend(&played.initial);
     x.resize(setup.names().len(), 0.0);
     x
-}
-
-/// The least of `|rows|^2` over the first columns, what is known of the leading ones added; the last column is the residual.
-pub(crate) fn least(rows: &Triangle, known: &Triangle) -> f64 {
-    let columns = rows.columns();
-    let mut all = Triangle::new(columns);
-    let mut row = vec![0.0; columns];
-    for i in 0..columns {
-        for (j, value) in row.iter_mut().enumerate() {
-            *value = rows.at(i, j);
-        }
-        all.push(&row);
-    }
-    for i in 0..known.columns() {
-        row.fill(0.0);
-        for (j, value) in row[..known.columns()].iter_mut().enumerate() {
-            *value = known.at(i, j);
-        }
-        all.push(&row);
-    }
-    all.finish();
-    let free: Vec<usize> = (0..columns - 1).collect();
-    let step = all.solve(&free, &[], 0.0);
-    all.predicted(&step)
 }
 
 /// The linear form: what a model cannot imitate of an experiment that was played on the other.
@@ -141,7 +98,7 @@ pub(crate) fn linear(
     let setup = metric.with_records(&stand_in.setup, records).ok()?;
     let x = vector(stand_in, &setup, played);
     let rows = setup.linearise(&x, &metric.noise)?;
-    Some(least(&rows, known) / metric.variance())
+    Some(effect_search::design::least(&rows, known) / metric.variance())
 }
 
 /// One model's simulation of the existing records.

@@ -1,11 +1,9 @@
 //! The design in words.
 
+use effect_search::design::{Kind, Power, Prospect};
 use plants::Domain;
 
-use super::{
-    plan::{Candidate, Design, Power, Prospect, Rival},
-    sequences::Kind,
-};
+use super::plan::{Candidate, Design, Rival};
 use crate::{groups::GROUP_MARGIN, numbers::significant, sentences::with_error};
 
 /// Criteria that differ by less are equal, in words.

@@ -3,6 +3,7 @@
 //! The parameters that are watched are those that the text declares as `parameter`, in its order; constants and `final parameter`s stay as
 //! they are. Those that the model file knows are not fitted, and watched all the same: they may change.
 
+mod isolate;
 mod learn;
 mod onset;
 mod simulation;
@@ -13,10 +14,12 @@ use std::sync::Arc;
 use ct_model::{Expression, Given, Model, Variable};
 use ct_signals::Hold;
 use greybox::PriorValue;
+use missing_effect::GROUP_MARGIN;
 
 use self::simulation::running;
 use crate::{
-    Alarm, Each, Error, Refused, TimeAxis, Units, Watched,
+    Alarm, Each, Error, Other, Refused, Size, TimeAxis, Units, Verdict, Watched,
+    alarm::consistent,
     fingerprint::{Fingerprint, TIME_UNIT},
     intake::{Readings, Sample},
     isolate::Kept,
@@ -76,6 +79,39 @@ impl<'a> OwnModel<'a> {
         let spec = self.model.spec();
         spec.about(spec.outputs[output].variable)
     }
+}
+
+/// Puts what was isolated into an alarm, where it explains the rows.
+fn put_in(alarm: &mut Alarm, suspects: &[isolate::Suspect]) {
+    let explains = |best: &&isolate::Suspect| {
+        best.plausible && best.evidence > 0.0 && !best.left.is_more_than_noise()
+    };
+    let Some(best) = suspects.first().filter(explains) else {
+        return;
+    };
+    let near = |s: &&isolate::Suspect| s.plausible && best.evidence - s.evidence < GROUP_MARGIN;
+    alarm.effects = suspects
+        .iter()
+        .filter(near)
+        .map(|s| s.effect.clone())
+        .collect();
+    alarm.verdict = match alarm.effects.len() {
+        1 => Verdict::Effect,
+        _ => Verdict::Undecided,
+    };
+    alarm.since = Some(best.since);
+    alarm.evidence = Some(best.evidence);
+    alarm.next = suspects.get(1).map(|next| Other {
+        effect: next.effect.clone(),
+        evidence: next.evidence,
+    });
+    let (name, value, unit) = best.size.clone();
+    alarm.size = Some(Size {
+        name,
+        value,
+        unit,
+        vessel: None,
+    });
 }
 
 impl<'a> From<OwnModel<'a>> for Watched<'a> {
@@ -211,6 +247,14 @@ impl<'a> Believed<'a> for OwnModel<'a> {
             Some(since) => format!("since about {}", axis.at(since)),
             None => format!("since {} or before", axis.at(raised.since)),
         };
+        let found = alarm.since.map_or_else(Vec::new, |since| {
+            isolate::isolate(self, learned, hold, rows, growth, since)
+        });
+        put_in(&mut alarm, &found);
+        if let Some(sentence) = consistent(&alarm, "", axis) {
+            alarm.sentence = sentence;
+            return alarm;
+        }
         alarm.sentence = format!(
             "The model does not fit {since} (score {:.1}, threshold {:.1}){most}.",
             raised.score, raised.threshold

@@ -2,8 +2,34 @@
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::plan::{Power, Prospect};
-use crate::groups::GROUP_MARGIN;
+use serde::Serialize;
+
+use crate::accept::BIC_MARGIN;
+
+/// How far an experiment takes two effects apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Power {
+    /// The smaller of the two below.
+    pub power: f64,
+    /// By how much the deviance of the other is above that of the true one on average, were the first true, were the second true.
+    pub if_true: [f64; 2],
+    /// Probability that all records together then decide for the true one, by more than 6 in the criterion; the smaller of the two.
+    pub decides: f64,
+}
+
+/// What can be hoped for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Prospect {
+    /// The best experiment will very probably decide.
+    Decides,
+    /// It may.
+    May,
+    /// It will hardly, within these limits.
+    Hardly,
+    /// The two show the same in every experiment that was tried.
+    Twins,
+}
 
 /// A decision as good as certain, as likely, and what the criterion does not notice.
 const SURE: f64 = 0.9;
@@ -12,10 +38,10 @@ const NOTHING: f64 = 1.0;
 /// Quantile of the probability that a longer experiment is to reach.
 const WANTED: f64 = 1.645;
 
-/// The probability that the criterion of the false one ends above that of the true one by more than [`GROUP_MARGIN`]: their
+/// The probability that the criterion of the false one ends above that of the true one by more than 6: their
 /// difference, `ahead` before, is normal with mean `ahead + lambda` and variance `4 lambda`.
 fn decides(lambda: f64, ahead: f64) -> f64 {
-    let margin = lambda + ahead - GROUP_MARGIN;
+    let margin = lambda + ahead - BIC_MARGIN;
     if lambda <= 0.0 {
         return if margin > 0.0 { 1.0 } else { 0.0 };
     }
@@ -23,7 +49,8 @@ fn decides(lambda: f64, ahead: f64) -> f64 {
 }
 
 /// From the noncentralities, were the first true and were the second, and by how much each is ahead before.
-pub(crate) fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
+#[must_use]
+pub fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
     let [a, b] = if_true;
     Power {
         power: a.min(b),
@@ -32,7 +59,9 @@ pub(crate) fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
     }
 }
 
-pub(crate) fn prospect(power: &Power) -> Prospect {
+/// What a power lets hope for.
+#[must_use]
+pub fn prospect(power: &Power) -> Prospect {
     if power.power < NOTHING {
         Prospect::Twins
     } else if power.decides >= SURE {
@@ -47,12 +76,13 @@ pub(crate) fn prospect(power: &Power) -> Prospect {
 /// So many times as long should decide with a probability of 0.95, where a noncentrality grows as the length.
 ///
 /// `lambda + ahead - 6 = 1.645 x 2 sqrt(lambda)`, solved for the root of `lambda`.
-pub(crate) fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
+#[must_use]
+pub fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
     if prospect(power) == Prospect::Decides || prospect(power) == Prospect::Twins {
         return None;
     }
     let needed = |ahead: f64| {
-        let root = WANTED + (WANTED * WANTED + (GROUP_MARGIN - ahead)).max(0.0).sqrt();
+        let root = WANTED + (WANTED * WANTED + (BIC_MARGIN - ahead)).max(0.0).sqrt();
         root * root
     };
     let times = |i: usize| needed(ahead[i]) / power.if_true[i];

@@ -1,13 +1,29 @@
 //! The sequences among which the experiment is sought: steps, staircases, binary and multi-level sequences, within a range
 //! and a slew, with clock periods relative to the plant's slowest time constant.
 
-use ct_signals::excitation;
+use ct_signals::{Error, excitation};
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use serde::Serialize;
 
-use super::limits::Bounds;
-use crate::Error;
+/// What sequences may do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Room {
+    /// Smallest value \[unit of the input\].
+    pub low: f64,
+    /// Largest value.
+    pub high: f64,
+    /// From where to where the records went.
+    pub visited: (f64, f64),
+    /// Largest change in a second.
+    pub slew: Option<f64>,
+    /// Length \[s\].
+    pub duration: f64,
+    /// Time between samples \[s\].
+    pub interval: f64,
+    /// Samples.
+    pub samples: usize,
+}
 
 /// A kind of sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -41,7 +57,8 @@ impl Kind {
 
 /// A sequence and how it came about.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sequence {
+pub struct Sequence {
+    /// Its kind.
     pub kind: Kind,
     /// How long a level is held \[s\].
     pub clock: f64,
@@ -51,8 +68,11 @@ pub(crate) struct Sequence {
     pub draw: Option<u64>,
     /// It changes by at most so much in a second, where it was made slower than the limits ask for.
     pub slew: Option<f64>,
+    /// Smallest value.
     pub low: f64,
+    /// Largest value.
     pub high: f64,
+    /// A value for each sample.
     pub values: Vec<f64>,
 }
 
@@ -70,11 +90,11 @@ const REGISTER: u32 = 18;
 
 /// The whole range; its halves, in one of which a threshold or a bend lies; and what the records visited, once and twice as
 /// wide: there the models are known.
-fn parts(bounds: &Bounds) -> Vec<(f64, f64)> {
-    let (low, high) = (bounds.low, bounds.high);
+fn parts(room: &Room) -> Vec<(f64, f64)> {
+    let (low, high) = (room.low, room.high);
     let middle = 0.5 * (low + high);
     let mut parts = vec![(low, high), (low, middle), (middle, high)];
-    let (from, to) = bounds.visited;
+    let (from, to) = room.visited;
     for more in [0.0, 0.5 * (to - from)] {
         let part = ((from - more).max(low), (to + more).min(high));
         // What hardly moves shows nothing, and what is hardly narrower is the whole.
@@ -98,18 +118,17 @@ fn bits(n: usize, low: f64, high: f64, rng: &mut ChaCha8Rng) -> Result<Vec<f64>,
     }
 }
 
-/// All of them.
-pub(crate) fn sequences(
-    bounds: &Bounds,
-    time_constant: f64,
-    seed: u64,
-) -> Result<Vec<Sequence>, Error> {
-    let n = bounds.samples;
+/// All sequences within a room, of a plant with this slowest time constant \[s\].
+///
+/// # Errors
+/// Where the room holds no sequence: no sample, a range without width.
+pub fn sequences(room: &Room, time_constant: f64, seed: u64) -> Result<Vec<Sequence>, Error> {
+    let n = room.samples;
     // A plant that forgets nothing within the experiment has no time constant that could be a measure.
-    let slowest = time_constant.min(0.2 * bounds.duration);
+    let slowest = time_constant.min(0.2 * room.duration);
     let samples = |clock: f64| -> usize {
         let most = (LONGEST * n as f64).max(1.0);
-        (clock / bounds.interval).round().clamp(1.0, most) as usize
+        (clock / room.interval).round().clamp(1.0, most) as usize
     };
     let mut clocks: Vec<usize> = CLOCKS.iter().map(|c| samples(c * slowest)).collect();
     clocks.dedup();
@@ -118,7 +137,7 @@ pub(crate) fn sequences(
     let mut push = |kind, hold: usize, levels, draw, (low, high), values| {
         all.push(Sequence {
             kind,
-            clock: hold as f64 * bounds.interval,
+            clock: hold as f64 * room.interval,
             levels,
             draw,
             slew: None,
@@ -127,7 +146,7 @@ pub(crate) fn sequences(
             values,
         });
     };
-    for range in parts(bounds) {
+    for range in parts(room) {
         let (low, high) = range;
         let mut halves: Vec<usize> = STEPS.iter().map(|s| samples(s * slowest)).collect();
         halves.push(n.div_ceil(2));
@@ -144,8 +163,8 @@ pub(crate) fn sequences(
             push(Kind::Binary, clock, None, None, range, values);
         }
     }
-    let whole = [(bounds.low, bounds.high)];
-    let levels = whole.into_iter().chain(parts(bounds).split_off(3));
+    let whole = [(room.low, room.high)];
+    let levels = whole.into_iter().chain(parts(room).split_off(3));
     for (range, count) in levels.flat_map(|range| STAIRCASES.map(|count| (range, count))) {
         let at = |i: usize| range.0 + (range.1 - range.0) * i as f64 / (count - 1) as f64;
         let rising = (0..count).map(at);
@@ -158,7 +177,7 @@ pub(crate) fn sequences(
             push(Kind::Staircase, clock, Some(count), None, range, values);
         }
     }
-    for range in whole.into_iter().chain(parts(bounds).split_off(3)) {
+    for range in whole.into_iter().chain(parts(room).split_off(3)) {
         for (&clock, draw) in clocks
             .iter()
             .flat_map(|clock| (1..=DRAWS).map(move |d| (clock, d)))
@@ -167,9 +186,9 @@ pub(crate) fn sequences(
             push(Kind::MultiLevel, clock, None, Some(draw), range, values);
         }
     }
-    if let Some(slew) = bounds.slew {
+    if let Some(slew) = room.slew {
         for sequence in &mut all {
-            excitation::limit_slew(&mut sequence.values, slew * bounds.interval)?;
+            excitation::limit_slew(&mut sequence.values, slew * room.interval)?;
         }
     }
     Ok(all)
@@ -177,6 +196,9 @@ pub(crate) fn sequences(
 
 impl Sequence {
     /// The same, changing by at most so much in a second.
+    ///
+    /// # Errors
+    /// Where the slew is not positive.
     pub fn slowed(&self, slew: f64, interval: f64) -> Result<Self, Error> {
         let mut slower = self.clone();
         slower.slew = Some(slew);
@@ -185,12 +207,15 @@ impl Sequence {
     }
 
     /// The same over and over, within the slew of the limits.
-    pub fn repeated(&self, times: usize, bounds: &Bounds) -> Result<Self, Error> {
+    ///
+    /// # Errors
+    /// Where the slew is not positive.
+    pub fn repeated(&self, times: usize, room: &Room) -> Result<Self, Error> {
         let mut longer = self.clone();
         longer.values = self.values.repeat(times);
-        let limits = [bounds.slew, self.slew].into_iter().flatten();
+        let limits = [room.slew, self.slew].into_iter().flatten();
         let slew = limits.fold(f64::INFINITY, f64::min);
-        excitation::limit_slew(&mut longer.values, slew * bounds.interval)?;
+        excitation::limit_slew(&mut longer.values, slew * room.interval)?;
         Ok(longer)
     }
 }
@@ -200,12 +225,11 @@ impl Sequence {
 mod tests {
     use super::*;
 
-    fn bounds(slew: Option<f64>) -> Bounds {
-        Bounds {
+    fn room(slew: Option<f64>) -> Room {
+        Room {
             low: 2.0,
             high: 7.0,
             visited: (4.0, 4.5),
-            range_from: "",
             slew,
             duration: 1200.0,
             interval: 2.0,
@@ -217,8 +241,8 @@ mod tests {
     fn every_sequence_keeps_range_slew_and_length() {
         for slew in [None, Some(0.01), Some(0.2), Some(100.0)] {
             for time_constant in [0.5, 60.0, 1e4, f64::INFINITY] {
-                let bounds = bounds(slew);
-                let all = sequences(&bounds, time_constant, 3).unwrap();
+                let room = room(slew);
+                let all = sequences(&room, time_constant, 3).unwrap();
                 assert!(all.len() > 15);
                 for sequence in &all {
                     assert_eq!(sequence.values.len(), 600, "{:?}", sequence.kind);
@@ -240,7 +264,7 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_sequences_and_another_one_others() {
-        let of = |seed| sequences(&bounds(None), 60.0, seed).unwrap();
+        let of = |seed| sequences(&room(None), 60.0, seed).unwrap();
         assert_eq!(of(1), of(1));
         assert_ne!(of(1), of(2));
     }

@@ -1,0 +1,303 @@
+//! `ctid design` of a model of its user's own: the next experiment, at one of its inputs or at several.
+
+use ct_signals::{Heading, duration};
+use effect_search::design::{
+    Design, Experiment, InputRange, Kind, Limits, PlayedInput, Power, Prospect, Refused, Rival,
+    design as search,
+};
+use effect_search::{Options, Progress};
+use serde::Serialize;
+
+use super::effects::{every_candidate, find};
+use super::file::{OwnModelFile, Records};
+use super::problem::{blamed, problem};
+use super::words::{EffectWords, shown_unit};
+use crate::look::{Look, Side, table};
+use crate::output::Found;
+use crate::simulate::{cell, csv_text, header};
+use crate::{Error, numbers};
+
+/// How many experiments the table shows.
+const SHOWN: usize = 10;
+
+/// Searches the experiments.
+///
+/// # Errors
+/// Where the effects or the limits do not allow one, or nothing can be fitted.
+pub(crate) fn design(
+    file: &OwnModelFile,
+    records: &Records,
+    between: [&str; 2],
+    limits: &Limits,
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Design, Error> {
+    let all = every_candidate(&file.base, &file.candidates)?;
+    let mut ids = Vec::with_capacity(2);
+    for name in between {
+        let found = find(&file.base, &all, name).map_err(Error::UnknownEffect)?;
+        ids.push(found.id.as_str());
+    }
+    let problem = problem(file, records);
+    let found = search(&problem, [ids[0], ids[1]], limits, options, progress);
+    found.map_err(|error| match error {
+        // What is wrong with the options is no fault of a file.
+        effect_search::Error::Design(refused) if refused != Refused::OutOfTime => {
+            Error::Usage(refused.to_string())
+        }
+        error => blamed(&problem, &error),
+    })
+}
+
+/// A design, and how its experiment is written.
+#[derive(Debug, Serialize)]
+pub(crate) struct OwnProposal {
+    #[serde(flatten)]
+    pub design: Design,
+    /// The experiment as CSV; none where none is worth playing.
+    #[serde(skip)]
+    record: Option<String>,
+}
+
+impl OwnProposal {
+    /// A design whose experiment is written in columns of the model file's names.
+    pub fn new(design: Design, file: &OwnModelFile, time_unit: f64) -> Self {
+        let record = (!design.twins()).then(|| csv(&design, file, time_unit));
+        Self { design, record }
+    }
+}
+
+impl Found for OwnProposal {
+    fn record(&self) -> Option<String> {
+        self.record.clone()
+    }
+}
+
+fn csv(design: &Design, file: &OwnModelFile, time_unit: f64) -> String {
+    let (time, _) = file.columns.time_header();
+    let names = file
+        .columns
+        .inputs
+        .iter()
+        .map(|name| Heading::of(name).name);
+    let inputs = &design.experiment.inputs;
+    let mut head = vec![time];
+    head.extend(
+        names
+            .zip(inputs)
+            .map(|(name, input)| header(&name, &input.unit)),
+    );
+    let rows = design.experiment.time.iter().enumerate().map(|(k, time)| {
+        let values = inputs.iter().map(|input| cell(input.values[k]));
+        std::iter::once(cell(time / time_unit))
+            .chain(values)
+            .collect()
+    });
+    csv_text(std::iter::once(head).chain(rows))
+}
+
+/// What `ctid design` prints.
+pub(crate) fn said(file: &OwnModelFile, design: &Design, look: Look) -> String {
+    let words = EffectWords::of(&file.base, &file.candidates);
+    let mut text = rivals(design, look) + &experiments(design, look);
+    text += &format!("{}\n", look.heading("The next experiment"));
+    for sentence in sentences(design, &words, file) {
+        text += &look.paragraph("  ", &sentence);
+    }
+    text
+}
+
+/// The two effects on the records that there are.
+fn rivals(design: &Design, look: Look) -> String {
+    let title = format!(
+        "{} or {}, on the records that there are, in the metric of their noise",
+        design.between[0].effect, design.between[1].effect
+    );
+    let mut rows = vec![
+        ["effect", "BIC falls", "sizes"]
+            .map(|name| look.faint(name))
+            .to_vec(),
+    ];
+    for Rival {
+        effect,
+        sizes,
+        bic_gain,
+        ..
+    } in &design.between
+    {
+        let sizes = sizes
+            .iter()
+            .map(|(name, value)| format!("{name} {}", numbers::significant(*value, 3)));
+        let sizes: Vec<String> = sizes.collect();
+        rows.push(vec![
+            effect.clone(),
+            numbers::whole(*bic_gain),
+            sizes.join(", "),
+        ]);
+    }
+    lines(
+        &look.heading(&title),
+        &[Side::Left, Side::Right, Side::Left],
+        &rows,
+    )
+}
+
+fn range(low: f64, high: f64, unit: &str) -> String {
+    let unit = shown_unit(unit);
+    let (low, high) = (numbers::significant(low, 3), numbers::significant(high, 3));
+    format!("{low} .. {high} {unit}").trim_end().to_string()
+}
+
+/// The experiments, the best first, and the same once more.
+fn experiments(design: &Design, look: Look) -> String {
+    let of = |limits: &InputRange| {
+        let from = if limits.visited { " (visited)" } else { "" };
+        let slew = limits.slew.map_or(String::new(), |slew| {
+            format!(", at most {} a second", numbers::significant(slew, 3))
+        });
+        format!(
+            "{} {}{from}{slew}",
+            limits.input,
+            range(limits.low, limits.high, &limits.unit)
+        )
+    };
+    let ranges: Vec<String> = design.ranges.iter().map(of).collect();
+    let title = format!(
+        "Experiments of {} with {}",
+        duration(design.duration),
+        ranges.join(", ")
+    );
+    let heading = ["", "experiment", "outputs reach", "power", "decides"];
+    let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
+    let shown = design.experiments.iter().take(SHOWN).enumerate();
+    rows.extend(shown.map(|(k, experiment)| row(&(k + 1).to_string(), experiment)));
+    rows.extend(design.again.iter().map(|again| row("", again)));
+    let sides = [
+        Side::Right,
+        Side::Left,
+        Side::Left,
+        Side::Right,
+        Side::Right,
+    ];
+    let mut text = lines(&look.heading(&title), &sides, &rows);
+    text.pop();
+    let more = design.experiments.len().saturating_sub(SHOWN);
+    if more > 0 {
+        text += &format!("  {}\n", look.faint(format!("and {more} more")));
+    }
+    let note = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to what the records visited)";
+    text += &look.faint(look.paragraph("  ", note).trim_end());
+    text + "\n\n"
+}
+
+fn row(number: &str, experiment: &Experiment) -> Vec<String> {
+    let again = |played: &&PlayedInput| played.kind == Kind::Again;
+    let what = match experiment.inputs.iter().find(again) {
+        Some(_) => Kind::Again.name().to_string(),
+        None => {
+            let played: Vec<String> = experiment.inputs.iter().map(played_words).collect();
+            played.join("; ")
+        }
+    };
+    let reaches = experiment.reaches.iter();
+    let reaches: Vec<String> = reaches
+        .map(|reach| format!("{} {}", reach.output, range(reach.low, reach.high, "")))
+        .collect();
+    vec![
+        number.to_string(),
+        what,
+        reaches.join(", "),
+        power(&experiment.power, experiment.refitted),
+        format!("{:.2}", experiment.power.decides),
+    ]
+}
+
+fn played_words(played: &PlayedInput) -> String {
+    let levels = played
+        .levels
+        .map_or(String::new(), |n| format!(" of {n} levels"));
+    format!(
+        "{}: {}{levels} {}, held {}",
+        played.input,
+        played.kind.name(),
+        range(played.low, played.high, ""),
+        duration(played.clock)
+    )
+}
+
+/// What is below a hundredth is nothing.
+fn power(power: &Power, refitted: bool) -> String {
+    let mark = if refitted { "" } else { "~" };
+    if power.power < 0.01 {
+        return format!("{mark}nothing");
+    }
+    format!("{mark}{}", numbers::significant(power.power, 2))
+}
+
+fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<String> {
+    let [a, b] = design.between.each_ref().map(|rival| rival.effect.as_str());
+    let mut all = Vec::new();
+    let Some(best) = design.experiments.first() else {
+        return all;
+    };
+    let played: Vec<String> = best.inputs.iter().map(played_words).collect();
+    let played = played.join("; ");
+    let decides = 100.0 * best.power.decides;
+    all.push(match design.prospect {
+        Prospect::Twins => format!(
+            "{} and {} show the same in every experiment that was tried within these limits: no experiment of this kind tells them apart. Another sensor, or a look at the plant, may.",
+            words.placed(a),
+            words.placed(b)
+        ),
+        Prospect::Decides => format!("Play {played}. It decides between {a} and {b} with a probability of {decides:.0} %."),
+        Prospect::May => format!("Play {played}. It may decide between {a} and {b}: the probability is {decides:.0} %."),
+        Prospect::Hardly => format!(
+            "Within these limits hardly anything decides between {a} and {b}; the best is {played}, with a probability of {decides:.0} %. A wider range (--input NAME=LOW..HIGH) or a longer experiment (--duration) shows more."
+        ),
+    });
+    let held: Vec<String> = design
+        .experiment
+        .inputs
+        .iter()
+        .filter(|input| best.inputs.iter().all(|played| played.input != input.input))
+        .filter_map(|input| {
+            let value = numbers::significant(*input.values.first()?, 3);
+            Some(
+                format!("{} = {value} {}", input.input, shown_unit(&input.unit))
+                    .trim_end()
+                    .to_string(),
+            )
+        })
+        .collect();
+    if !design.twins() && !held.is_empty() {
+        all.push(format!("Hold {}.", held.join(", ")));
+    }
+    if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
+        all.push(format!("Played {times} times over it would decide."));
+    }
+    if file
+        .unused
+        .iter()
+        .any(|table| table.starts_with("controller."))
+        && !design.twins()
+    {
+        all.push(
+            "The experiment is played in open loop: switch the controller to manual.".to_string(),
+        );
+    }
+    if !design.left_out.is_empty() {
+        all.push(format!(
+            "Left out by the time limit: {}; --effort thorough goes on longer.",
+            design.left_out.join(", ")
+        ));
+    }
+    all
+}
+
+fn lines(heading: &str, sides: &[Side], rows: &[Vec<String>]) -> String {
+    let mut text = format!("{heading}\n");
+    for line in table(sides, rows) {
+        text += &format!("  {}\n", line.trim_end());
+    }
+    text + "\n"
+}

@@ -1,0 +1,248 @@
+//! What the user allows an experiment to do, checked against the records.
+
+use std::collections::BTreeMap;
+
+use ct_signals::{Record, shown};
+
+use super::InputRange;
+use super::sequences::Room;
+use crate::Problem;
+
+/// Samples for every fitted number at least, ...
+const SAMPLES_PER_PARAMETER: usize = 3;
+/// ... and in all at most.
+const MOST_SAMPLES: usize = 20_000;
+
+/// What an experiment may do; what is not given follows from the records.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Limits {
+    /// Inputs that are played; where none is named, all that moved in the records. The others are held at their median.
+    pub inputs: Vec<String>,
+    /// Smallest and largest value of an input \[its unit\]. Without it what the records visited.
+    pub ranges: BTreeMap<String, (f64, f64)>,
+    /// Largest change of an input in a second.
+    pub slews: BTreeMap<String, f64>,
+    /// Length \[s\]. Without it that of the longest record.
+    pub duration: Option<f64>,
+    /// Seed of the sequences that are drawn.
+    pub seed: u64,
+}
+
+/// An experiment that cannot be proposed. The messages name the options of `ctid design`.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refused {
+    /// One effect twice.
+    #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
+    SameEffect {
+        /// The effect.
+        effect: String,
+    },
+    /// An effect that the model has.
+    #[error(
+        "{effect} is in the model already, so that there is nothing to decide; `ctid remove '{effect}' --model M.toml` takes it out"
+    )]
+    InModel {
+        /// The effect.
+        effect: String,
+    },
+    /// An effect could not be fitted.
+    #[error(
+        "{effect} cannot be fitted to these records; `ctid effects '{effect}'` says what it needs"
+    )]
+    NoFit {
+        /// The effect.
+        effect: String,
+    },
+    /// A model without inputs.
+    #[error("the model has no input that an experiment could move")]
+    NoInput,
+    /// No such input.
+    #[error("--input {name}: the model has no such input; it has {known}")]
+    UnknownInput {
+        /// As given.
+        name: String,
+        /// The inputs that there are.
+        known: String,
+    },
+    /// The range's ends are exchanged, equal or no numbers.
+    #[error("--input {input}={}..{}: the smaller value comes first, and they have to differ", shown(*low), shown(*high))]
+    Range {
+        /// The input.
+        input: String,
+        /// First end.
+        low: f64,
+        /// Second end.
+        high: f64,
+    },
+    /// What is played never moved, and nobody says how far it may.
+    #[error("the records hold one value of {input}, {}, which says nothing of where it may go; give --input {input}=LOW..HIGH", shown(*value))]
+    NoRange {
+        /// The input.
+        input: String,
+        /// Its value.
+        value: f64,
+    },
+    /// Too few samples, or too many.
+    #[error("--duration {} s holds {samples} samples at one every {} s; give between {} and {} s", shown(*duration), shown(*interval), shown(*least as f64 * interval), shown(MOST_SAMPLES as f64 * interval))]
+    Duration {
+        /// The length \[s\].
+        duration: f64,
+        /// Samples in it.
+        samples: usize,
+        /// The fewest.
+        least: usize,
+        /// The sampling interval \[s\].
+        interval: f64,
+    },
+    /// Too slow to get anywhere.
+    #[error("--slew {} a second moves {input} by less than its range within {} s", shown(*slew), shown(*duration))]
+    Slew {
+        /// The input.
+        input: String,
+        /// Largest change in a second.
+        slew: f64,
+        /// The length \[s\].
+        duration: f64,
+    },
+    /// The limit on the time has passed before anything could be said.
+    #[error(
+        "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
+    )]
+    OutOfTime,
+}
+
+/// The limits as they hold.
+pub(super) struct Bounds {
+    /// Of each input that is played, by its position in the model.
+    pub played: Vec<(usize, InputRange, Room)>,
+    /// What the others are held at.
+    pub held: Vec<f64>,
+    pub duration: f64,
+    pub interval: f64,
+    pub samples: usize,
+}
+
+/// The median of some values.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+impl Bounds {
+    /// `parameters`: how many are fitted.
+    pub fn new(problem: &Problem, limits: &Limits, parameters: usize) -> Result<Self, Refused> {
+        let spec = &problem.spec;
+        let names: Vec<&str> = spec.inputs.iter().map(|u| u.about.name.as_str()).collect();
+        if names.is_empty() {
+            return Err(Refused::NoInput);
+        }
+        let asked = limits.inputs.iter();
+        for name in asked.chain(limits.ranges.keys()).chain(limits.slews.keys()) {
+            if !names.contains(&name.as_str()) {
+                return Err(Refused::UnknownInput {
+                    name: name.clone(),
+                    known: names.join(", "),
+                });
+            }
+        }
+        let longest = problem
+            .records
+            .iter()
+            .max_by(|a, b| a.duration().total_cmp(&b.duration()));
+        let interval = longest.map_or(1.0, |record| {
+            median(record.time.windows(2).map(|w| w[1] - w[0]).collect())
+        });
+        let duration = limits
+            .duration
+            .or(longest.map(Record::duration))
+            .unwrap_or(0.0);
+        let samples = (duration / interval).round().clamp(0.0, 1e9) as usize + 1;
+        let least = SAMPLES_PER_PARAMETER * parameters.max(4);
+        if !(least..=MOST_SAMPLES).contains(&samples) || !duration.is_finite() {
+            return Err(Refused::Duration {
+                duration,
+                samples,
+                least,
+                interval,
+            });
+        }
+        let visited = |i: usize| {
+            let values = problem
+                .records
+                .iter()
+                .map(|record| record.inputs[i].range());
+            values
+                .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+                .unwrap_or((0.0, 0.0))
+        };
+        let mut played = Vec::new();
+        for (i, name) in names.iter().enumerate() {
+            let own = |all: &Vec<String>| all.iter().any(|asked| asked == name);
+            let given = limits.ranges.get(*name);
+            let (from, to) = visited(i);
+            let (low, high) = given.copied().unwrap_or((from, to));
+            if !limits.inputs.is_empty() && !own(&limits.inputs) {
+                continue;
+            }
+            if given.is_none() && from == to {
+                if limits.inputs.is_empty() && names.len() > 1 {
+                    continue;
+                }
+                return Err(Refused::NoRange {
+                    input: (*name).to_string(),
+                    value: from,
+                });
+            }
+            let input = (*name).to_string();
+            if !(low < high && low.is_finite() && high.is_finite()) {
+                return Err(Refused::Range { input, low, high });
+            }
+            let slew = limits.slews.get(*name).copied();
+            if let Some(slew) = slew.filter(|slew| slew.is_nan() || slew * duration < high - low) {
+                return Err(Refused::Slew {
+                    input,
+                    slew,
+                    duration,
+                });
+            }
+            let range = InputRange {
+                input,
+                unit: spec.inputs[i].about.unit.clone(),
+                low,
+                high,
+                visited: given.is_none(),
+                slew,
+            };
+            let room = Room {
+                low,
+                high,
+                visited: (from, to),
+                slew,
+                duration,
+                interval,
+                samples,
+            };
+            played.push((i, range, room));
+        }
+        if played.is_empty() {
+            return Err(Refused::NoRange {
+                input: names[0].to_string(),
+                value: visited(0).0,
+            });
+        }
+        let held = (0..names.len()).map(|i| {
+            let values = longest.map(|record| record.inputs[i].values.clone());
+            let value = median(values.unwrap_or_default());
+            let range = played.iter().find(|(own, ..)| *own == i);
+            range.map_or(value, |(_, range, _)| value.clamp(range.low, range.high))
+        });
+        Ok(Self {
+            held: held.collect(),
+            played,
+            duration,
+            interval,
+            samples,
+        })
+    }
+}

@@ -1,0 +1,289 @@
+//! The next experiment: the one that tells two effects apart which the records leave undecided.
+//!
+//! Each of the two is fitted to the records. Sequences within the user's limits are then played on either fit, at one input or at several
+//! at once, and it is reckoned how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the
+//! other one is fitted to what the first gives on the existing records and in the experiment, both free of noise, and its misfit to the
+//! existing records alone is taken off.
+//!
+//! An experiment begins where the first record did, on a clock of its own, and without a controller: the inputs are what is played.
+
+mod limits;
+mod play;
+mod power;
+mod result;
+mod separation;
+mod sequences;
+
+use ct_model::effects::Role;
+use estimation::Noise;
+use rayon::prelude::*;
+
+pub use limits::{Limits, Refused};
+pub use power::{Power, Prospect, power, prospect, times_as_long};
+pub use result::{
+    Design, Experiment, InputRange, InputSequence, PlayedInput, Reach, Rival, Sequences,
+};
+pub use separation::{information, least};
+pub use sequences::{Kind, Room, Sequence, sequences};
+
+use crate::Error;
+use crate::believed::begin;
+use crate::diagnose::Progress;
+use crate::node::{Context, FINE, Node};
+use crate::problem::{Limit, Options, Phase, Problem};
+use limits::Bounds;
+use play::Stage;
+
+/// The slowest time constant that sequences are made for, over the length of an experiment: what such a process is like nobody knows ahead.
+const SLOWEST: f64 = 0.1;
+/// More power than this is of no use: it decides even where the effect is half as large as the records make it.
+const PLENTY: f64 = 200.0;
+/// Excursions that differ by less than this are one.
+const SAME_EXCURSION: f64 = 0.1;
+/// Experiments of a round of refits, and the most in all.
+const ROUND: usize = 4;
+const MOST_REFITS: usize = 16;
+/// Nobody repeats an experiment more often.
+const MOST_TIMES: f64 = 20.0;
+
+/// What the inputs do that move, and a value of every input for each sample of an experiment.
+type Sequenced = (Vec<PlayedInput>, Vec<Vec<f64>>);
+/// An experiment, and a value of every input for each of its samples.
+type Tried = (Experiment, Vec<Vec<f64>>);
+
+/// Proposes the next experiment.
+///
+/// # Errors
+/// [`Error::Design`] where the limits or the effects do not allow one; else where the records, the model or the fit do not.
+pub fn design(
+    problem: &Problem,
+    between: [&str; 2],
+    limits: &Limits,
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Design, Error> {
+    let tell = |phase| progress(Progress { phase });
+    if between[0] == between[1] {
+        let effect = between[0].to_string();
+        return Err(Refused::SameEffect { effect }.into());
+    }
+    if let Some(id) = between
+        .iter()
+        .find(|id| problem.effects.iter().any(|own| own == *id))
+    {
+        let effect = (*id).to_string();
+        return Err(Refused::InModel { effect }.into());
+    }
+    // What is wrong with the limits is said before anything is computed, as far as it can be.
+    Bounds::new(problem, limits, 0)?;
+    tell("fitting the model");
+    let limit = Limit::new(options);
+    limit.begin(Phase::Believed);
+    let (context, base) = begin(problem, options, limit)?;
+    tell("fitting both effects");
+    context.limit.begin(Phase::White);
+    let (base, nodes, noise) = context.rivals(&base, between)?;
+    if context.limit.passed() {
+        return Err(Refused::OutOfTime.into());
+    }
+    let parameters = nodes.iter().map(|node| node.fit.parameters);
+    let bounds = Bounds::new(problem, limits, parameters.max().unwrap_or(0))?;
+    let better = usize::from(nodes[1].fit.bic() < nodes[0].fit.bic());
+    let scales = nodes[better].fit.scales();
+    let stage = Stage::new(&context, &nodes, &noise, scales)?;
+    tell("trying experiments");
+    context.limit.begin(Phase::Coloured);
+    let all = candidates(problem, &bounds, limits.seed)?;
+    let mut tried: Vec<Tried> = all
+        .into_par_iter()
+        .filter(|_| !context.limit.leaves_out("some of the experiments"))
+        .filter_map(|(played, inputs)| Some((stage.tried(played, &inputs, &bounds)?, inputs)))
+        .collect();
+    sort(&mut tried);
+    tell("confirming by refits");
+    context.limit.begin(Phase::Groups);
+    let mut done = 0;
+    while done < MOST_REFITS
+        && tried.first().is_some_and(|(first, _)| !first.refitted)
+        && !context.limit.leaves_out("refits of experiments")
+    {
+        let wanted = tried
+            .iter_mut()
+            .filter(|(experiment, _)| !experiment.refitted);
+        let mut wanted: Vec<&mut Tried> = wanted.take(ROUND).collect();
+        done += wanted.len();
+        wanted.par_iter_mut().for_each(|(experiment, inputs)| {
+            experiment.power = stage
+                .confirmed(inputs, &bounds)
+                .unwrap_or(power([0.0; 2], [0.0; 2]));
+            experiment.refitted = true;
+        });
+        sort(&mut tried);
+    }
+    // After so many rounds the best of those that were refitted.
+    tried.sort_by_key(|(experiment, _)| !experiment.refitted);
+    let Some((best, inputs)) = tried.first().cloned() else {
+        return Err(Refused::OutOfTime.into());
+    };
+    let ahead = stage.ahead();
+    let times_as_long = times_as_long(&best.power, ahead)
+        .filter(|times| *times <= MOST_TIMES)
+        .map(|times| times.ceil() as usize);
+    let names = || problem.records[0].outputs.iter().map(|y| y.name.clone());
+    Ok(Design {
+        schema: 1,
+        model: problem.spec.name.clone(),
+        bic_ahead: ahead[0],
+        prospect: match prospect(&best.power) {
+            // A power that no refit has confirmed is a promise.
+            Prospect::Decides if !best.refitted => Prospect::May,
+            prospect => prospect,
+        },
+        between: nodes.each_ref().map(|node| rival(&context, &base, node)),
+        ranges: bounds
+            .played
+            .iter()
+            .map(|(_, range, _)| range.clone())
+            .collect(),
+        duration: bounds.duration,
+        again: stage.again(&bounds),
+        times_as_long,
+        experiment: Sequences {
+            time: bounds.time(),
+            inputs: problem
+                .spec
+                .inputs
+                .iter()
+                .zip(inputs)
+                .map(|(input, values)| InputSequence {
+                    input: input.about.name.clone(),
+                    unit: input.about.unit.clone(),
+                    values,
+                })
+                .collect(),
+        },
+        experiments: tried
+            .into_iter()
+            .map(|(experiment, _)| experiment)
+            .collect(),
+        noise: names().zip(stage.scales().iter().copied()).collect(),
+        left_out: context.limit.left_out(),
+        seconds: context.limit.seconds(),
+    })
+}
+
+impl Context<'_> {
+    /// The believed model and both effects beside it, in the metric of the noise that the better of them leaves.
+    fn rivals(&self, base: &Node, between: [&str; 2]) -> Result<(Node, [Node; 2], Noise), Error> {
+        let white = Noise::white(self.problem.spec.outputs.len());
+        let fitted = |id: &str| -> Result<Node, Error> {
+            let known = self.candidates.iter().position(|c| c.id == *id);
+            let i = known.ok_or_else(|| Error::UnknownEffect { id: id.to_string() })?;
+            let no_fit = || Refused::NoFit {
+                effect: id.to_string(),
+            };
+            let trial = self.trial(base, i, &white)?.ok_or_else(no_fit)?;
+            let mut added = base.added.clone();
+            added.push(i);
+            self.fitted(added, trial.model, trial.starts, &white, FINE)
+        };
+        let rough = [fitted(between[0])?, fitted(between[1])?];
+        let better = usize::from(rough[1].fit.bic() < rough[0].fit.bic());
+        let (noise, _) = self.noise_of(&rough[better])?;
+        let refitted = |node: &Node| self.refitted(node, &noise, FINE);
+        let nodes = [refitted(&rough[0])?, refitted(&rough[1])?];
+        Ok((refitted(base)?, nodes, noise))
+    }
+}
+
+impl Bounds {
+    /// Instants of an experiment \[s\].
+    fn time(&self) -> Vec<f64> {
+        (0..self.samples)
+            .map(|k| k as f64 * self.interval)
+            .collect()
+    }
+}
+
+fn rival(context: &Context, base: &Node, node: &Node) -> Rival {
+    let last = node.added[node.added.len() - 1];
+    let candidate = &context.candidates[last];
+    let own = candidate
+        .parameters
+        .iter()
+        .filter(|p| p.role != Role::Choice);
+    let outputs = &context.problem.records[0].outputs;
+    Rival {
+        effect: candidate.id.clone(),
+        sizes: own
+            .filter_map(|p| Some((p.short.clone(), node.value(&p.name)?)))
+            .collect(),
+        bic_gain: node.gain_over(base),
+        rmse_per_output: outputs
+            .iter()
+            .map(|y| y.name.clone())
+            .zip(node.fit.rmse.iter().copied())
+            .collect(),
+    }
+}
+
+/// Every sequence at every input that is played, the others held; then sequences of all of them at once.
+fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Sequenced>, Error> {
+    let held: Vec<Vec<f64>> = bounds
+        .held
+        .iter()
+        .map(|value| vec![*value; bounds.samples])
+        .collect();
+    let played = |input: usize, sequence: &Sequence| PlayedInput {
+        input: problem.spec.inputs[input].about.name.clone(),
+        kind: sequence.kind,
+        low: sequence.low,
+        high: sequence.high,
+        clock: sequence.clock,
+        levels: sequence.levels,
+    };
+    let mut of_each = Vec::new();
+    for (n, (_, _, room)) in bounds.played.iter().enumerate() {
+        // Inputs that move at once move independently.
+        let seed = seed.wrapping_add(n as u64);
+        of_each.push(sequences(room, SLOWEST * bounds.duration, seed)?);
+    }
+    let mut all = Vec::new();
+    for ((input, ..), sequences) in bounds.played.iter().zip(&of_each) {
+        for sequence in sequences {
+            let mut inputs = held.clone();
+            inputs[*input].clone_from(&sequence.values);
+            all.push((vec![played(*input, sequence)], inputs));
+        }
+    }
+    if bounds.played.len() > 1 {
+        let drawn = |sequence: &&Sequence| matches!(sequence.kind, Kind::Binary | Kind::MultiLevel);
+        let drawn: Vec<Vec<&Sequence>> = of_each
+            .iter()
+            .map(|all| all.iter().filter(drawn).collect())
+            .collect();
+        let fewest = drawn.iter().map(Vec::len).min().unwrap_or(0);
+        for k in 0..fewest {
+            let mut inputs = held.clone();
+            let mut each = Vec::new();
+            for ((input, ..), own) in bounds.played.iter().zip(&drawn) {
+                inputs[*input].clone_from(&own[k].values);
+                each.push(played(*input, own[k]));
+            }
+            all.push((each, inputs));
+        }
+    }
+    Ok(all)
+}
+
+/// The best first: by power as far as it is of use, then by excursion, then by power.
+fn sort(tried: &mut [Tried]) {
+    let useful = |experiment: &Experiment| experiment.power.power.min(PLENTY);
+    let excursion = |experiment: &Experiment| (experiment.excursion / SAME_EXCURSION).floor();
+    tried.sort_by(|(a, _), (b, _)| {
+        useful(b)
+            .total_cmp(&useful(a))
+            .then(excursion(a).total_cmp(&excursion(b)))
+            .then(b.power.power.total_cmp(&a.power.power))
+    });
+}

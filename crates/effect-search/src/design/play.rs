@@ -1,0 +1,275 @@
+//! Two fitted effects on which experiments are played.
+
+use std::collections::BTreeMap;
+
+use ct_signals::Record;
+use estimation::{Noise, Start, Triangle, fit_from, linearise};
+use greybox::{ModelSetup, PriorValue};
+
+use super::limits::Bounds;
+use super::separation::{information, least};
+use super::{Experiment, Kind, PlayedInput, Power, Reach, Refused, power};
+use crate::Error;
+use crate::node::{Context, FINE, Node};
+
+/// Both effects, and what the records say of each.
+pub(super) struct Stage<'s, 'a> {
+    context: &'s Context<'a>,
+    nodes: &'s [Node; 2],
+    noise: &'s Noise,
+    /// Standard deviation of the innovations of each output.
+    scales: Vec<f64>,
+    /// What each knows of its parameters.
+    known: [Triangle; 2],
+    /// The existing records as each has them, free of noise.
+    imagined: [Vec<Record>; 2],
+    /// `before[i]`: misfit of the other to what `i` imagines.
+    before: [f64; 2],
+    /// What each output visited.
+    visited: Vec<(f64, f64)>,
+}
+
+/// An output's range, missing samples aside.
+fn range(values: &[f64]) -> (f64, f64) {
+    let finite = values.iter().filter(|v| v.is_finite());
+    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+        (a.min(*v), b.max(*v))
+    })
+}
+
+fn joined(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+impl<'s, 'a> Stage<'s, 'a> {
+    pub fn new(
+        context: &'s Context<'a>,
+        nodes: &'s [Node; 2],
+        noise: &'s Noise,
+        scales: Vec<f64>,
+    ) -> Result<Self, Error> {
+        let records = &context.problem.records;
+        let no_fit = |i: usize| {
+            let last = nodes[i].added[nodes[i].added.len() - 1];
+            let effect = context.candidates[last].id.clone();
+            Error::from(Refused::NoFit { effect })
+        };
+        let of = |i: usize| -> Result<(Triangle, Vec<Record>), Error> {
+            let node = &nodes[i];
+            let setup = context.setup(&node.model)?.with_scales(scales.clone());
+            let rows = linearise(&setup, &node.fit.x, noise).ok_or_else(|| no_fit(i))?;
+            let known = information(&rows, setup.free(), setup.parameter_count());
+            let series = setup.simulate(&node.fit.x).ok_or_else(|| no_fit(i))?;
+            let mut series = series.into_iter();
+            let mut imagined = records.clone();
+            for output in imagined.iter_mut().flat_map(|record| &mut record.outputs) {
+                let model = series.next().unwrap_or_default();
+                for (value, model) in output.values.iter_mut().zip(model) {
+                    // What was not measured was not.
+                    if !value.is_nan() {
+                        *value = model;
+                    }
+                }
+            }
+            Ok((known, imagined))
+        };
+        let ((first, by_first), (second, by_second)) = (of(0)?, of(1)?);
+        let outputs = 0..records[0].outputs.len();
+        let visited = outputs.map(|o| {
+            let ranges = records
+                .iter()
+                .map(|record| range(&record.outputs[o].values));
+            ranges.fold((f64::INFINITY, f64::NEG_INFINITY), joined)
+        });
+        let mut stage = Self {
+            context,
+            nodes,
+            noise,
+            scales,
+            known: [first, second],
+            visited: visited.collect(),
+            imagined: [by_first, by_second],
+            before: [0.0; 2],
+        };
+        for truth in 0..2 {
+            stage.before[truth] = stage.misfit(truth, None).ok_or_else(|| no_fit(1 - truth))?;
+        }
+        Ok(stage)
+    }
+
+    pub fn scales(&self) -> &[f64] {
+        &self.scales
+    }
+
+    /// By how much the criterion of each is below that of the other.
+    pub fn ahead(&self) -> [f64; 2] {
+        let ahead = self.nodes[0].gain_over(&self.nodes[1]);
+        [ahead, -ahead]
+    }
+
+    /// A model against other records, outputs by their noise, and what is known of its parameters beside the records as a truth has it.
+    fn setup<'b>(
+        &'b self,
+        i: usize,
+        truth: usize,
+        records: &'b [Record],
+    ) -> Option<ModelSetup<'b>> {
+        let node = &self.nodes[i];
+        let setup = self.context.setup(&node.model).ok()?;
+        let setup = setup.with_records(records).ok()?;
+        let mut priors: BTreeMap<String, PriorValue> = self.context.problem.priors.clone();
+        let names = setup.names()[..setup.parameter_count()].to_vec();
+        priors.retain(|name, _| names.contains(name));
+        for (name, prior) in &mut priors {
+            prior.value = self.nodes[truth].value(name).unwrap_or(prior.value);
+        }
+        let setup = setup.with_priors(&priors).ok()?;
+        Some(setup.with_scales(self.scales.clone()))
+    }
+
+    /// A model's vector in an experiment: it begins where the first record did.
+    fn vector(&self, i: usize) -> Vec<f64> {
+        let spec = self.nodes[i].spec();
+        let length = spec.parameters.len() + spec.states.len();
+        self.nodes[i].fit.x[..length].to_vec()
+    }
+
+    /// What an experiment would show, were one of them true.
+    fn played(&self, truth: usize, inputs: &[Vec<f64>], bounds: &Bounds) -> Option<Record> {
+        let of = &self.context.problem.records[0];
+        let zeros = vec![0.0; bounds.samples];
+        let mut record = Record {
+            name: "the experiment".to_string(),
+            time: bounds.time(),
+            inputs: of
+                .inputs
+                .iter()
+                .zip(inputs)
+                .map(|(of, values)| of.with_values(values.clone()))
+                .collect(),
+            outputs: of
+                .outputs
+                .iter()
+                .map(|of| of.with_values(zeros.clone()))
+                .collect(),
+            references: Vec::new(),
+            calendar: None,
+        };
+        let series = {
+            let records = std::slice::from_ref(&record);
+            let setup = self.setup(truth, truth, records)?;
+            setup.simulate(&self.vector(truth))?
+        };
+        let finite = series.iter().flatten().all(|value| value.is_finite());
+        for (output, values) in record.outputs.iter_mut().zip(series) {
+            output.values = values;
+        }
+        finite.then_some(record)
+    }
+
+    /// An experiment, linearised.
+    pub fn tried(
+        &self,
+        played: Vec<PlayedInput>,
+        inputs: &[Vec<f64>],
+        bounds: &Bounds,
+    ) -> Option<Experiment> {
+        let shown = [
+            self.played(0, inputs, bounds)?,
+            self.played(1, inputs, bounds)?,
+        ];
+        let apart = |truth: usize| {
+            let stand_in = 1 - truth;
+            let records = std::slice::from_ref(&shown[truth]);
+            let setup = self.setup(stand_in, truth, records)?;
+            let rows = linearise(&setup, &self.vector(stand_in), self.noise)?;
+            Some(least(&rows, &self.known[stand_in]) / self.scales[0].powi(2))
+        };
+        let power = power([apart(0)?, apart(1)?], self.ahead());
+        let outputs = self.context.problem.records[0].outputs.iter().enumerate();
+        let reaches = outputs.map(|(o, output)| {
+            let of = |record: &Record| range(&record.outputs[o].values);
+            let (low, high) = joined(of(&shown[0]), of(&shown[1]));
+            Reach {
+                output: output.name.clone(),
+                low,
+                high,
+            }
+        });
+        let reaches: Vec<Reach> = reaches.collect();
+        let beyond = reaches
+            .iter()
+            .zip(&self.visited)
+            .map(|(reach, (low, high))| {
+                let out = (low - reach.low).max(0.0) + (reach.high - high).max(0.0);
+                out / (high - low).max(f64::MIN_POSITIVE)
+            });
+        Some(Experiment {
+            excursion: beyond.fold(0.0, f64::max),
+            inputs: played,
+            power,
+            refitted: false,
+            reaches,
+        })
+    }
+
+    /// Misfit of the other model to what one of them gives of the existing records, and of an experiment, refitted.
+    fn misfit(&self, truth: usize, experiment: Option<Record>) -> Option<f64> {
+        let stand_in = 1 - truth;
+        let mut records = self.imagined[truth].clone();
+        let mut x = self.nodes[stand_in].fit.x.clone();
+        if let Some(experiment) = experiment {
+            records.push(experiment);
+            let count = self.nodes[stand_in].spec().parameters.len();
+            x.extend_from_slice(&self.vector(stand_in)[count..]);
+        }
+        let setup = self.setup(stand_in, truth, &records)?;
+        let fit = fit_from(&setup, vec![Start::from(x)], self.noise, FINE).ok()?;
+        Some(fit.cost)
+    }
+
+    /// The power of an experiment by refits.
+    pub fn confirmed(&self, inputs: &[Vec<f64>], bounds: &Bounds) -> Option<Power> {
+        let apart = |truth: usize| {
+            let shown = self.played(truth, inputs, bounds)?;
+            let misfit = self.misfit(truth, Some(shown))?;
+            Some(((misfit - self.before[truth]) / self.scales[0].powi(2)).max(0.0))
+        };
+        Some(power([apart(0)?, apart(1)?], self.ahead()))
+    }
+
+    /// What the longest record played, once more.
+    pub fn again(&self, bounds: &Bounds) -> Option<Experiment> {
+        let records = &self.context.problem.records;
+        let longest = records
+            .iter()
+            .max_by(|a, b| a.duration().total_cmp(&b.duration()))?;
+        let own = Bounds {
+            played: bounds.played.clone(),
+            held: bounds.held.clone(),
+            duration: longest.duration(),
+            interval: bounds.interval,
+            samples: longest.len(),
+        };
+        let inputs: Vec<Vec<f64>> = longest
+            .inputs
+            .iter()
+            .map(|input| input.values.clone())
+            .collect();
+        let played = longest.inputs.iter().map(|input| {
+            let (low, high) = input.range();
+            PlayedInput {
+                input: input.name.clone(),
+                kind: Kind::Again,
+                low,
+                high,
+                clock: bounds.interval,
+                levels: None,
+            }
+        });
+        let mut experiment = self.tried(played.collect(), &inputs, &own)?;
+        experiment.power = self.confirmed(&inputs, &own)?;
+        experiment.refitted = true;
+        Some(experiment)
+    }
+}

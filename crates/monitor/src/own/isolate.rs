@@ -1,0 +1,284 @@
+//! Isolation at the ports of a model of its user's own: which effect of the catalogue began, and when, explains the latest rows.
+//!
+//! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as it
+//! was learned, the states at `j` as the learned model has them, only the effect's own parameters free. With `S` the sum of squares, in
+//! the noise's variance, of what is left of the rows from `j` on, without the effect and with it,
+//! ```text
+//! evidence = S_without - S_with - (parameters + 1) ln n
+//! ```
+//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs. Onsets
+//! are those around the one that a change of unknown direction has ([`super::onset`]).
+//!
+//! **Cost**: some ten simulations of the rows behind the onset for each effect, port and onset.
+
+use std::collections::BTreeMap;
+
+use ct_model::effects::{Candidate, Place, Role, Visited, apply, candidates};
+use ct_model::{Model, ModelSpec};
+use ct_signals::{Hold, Record};
+use estimation::{Noise, Start, fit_from, squares, within};
+use greybox::ModelSetup;
+use rayon::prelude::*;
+
+use super::OwnModel;
+use crate::isolate::{FEWEST, Left, ROUGH};
+use crate::{Each, isolate::Kept, learn::Learned, learn::record};
+
+/// Effects that begin while a plant runs. What is a model's shape, a wrong law or a lag, does not.
+const BEGIN: [&str; 11] = [
+    "dead_zone",
+    "saturation",
+    "backlash",
+    "gain_drift",
+    "offset",
+    "drift",
+    "constant",
+    "loss",
+    "limit",
+    "coupling",
+    "leak_at_height",
+];
+/// So does a parameter that has another value from then on.
+const STEP: &str = "step";
+/// Onsets that are tried, in rows behind the one that is found first.
+const AROUND: [f64; 5] = [1.0, 0.6, 0.8, 1.25, 1.6];
+/// So many starts of an effect are fitted, those that leave least.
+const STARTS: usize = 3;
+
+/// An effect that explains the latest rows, as well as it can.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Suspect {
+    pub effect: String,
+    pub evidence: f64,
+    /// \[s\]
+    pub since: f64,
+    /// Its size: name, value, unit.
+    pub size: (String, f64, String),
+    /// The size lies inside its bounds.
+    pub plausible: bool,
+    pub left: Left,
+}
+
+/// Whether an effect may begin at an instant.
+fn begins(candidate: &Candidate) -> bool {
+    let Some(effect) = candidate.effect else {
+        return false;
+    };
+    BEGIN.contains(&effect.id) || effect.id == STEP && effect.place == Place::Parameter
+}
+
+/// Every effect that may have begun, best first: an implausible size comes after every plausible one. `since`: the onset that is found first
+/// \[s\]; the noise of each output is `growth` times as large as it was learned.
+pub(super) fn isolate(
+    own: &OwnModel,
+    learned: &Learned,
+    hold: Hold,
+    rows: &[Kept],
+    growth: &Each<f64>,
+    since: f64,
+) -> Vec<Suspect> {
+    let Some(noise) = learned.noise() else {
+        return Vec::new();
+    };
+    let behind = rows.len() - rows.partition_point(|kept| kept.sample.time < since);
+    let lengths = AROUND.map(|share| ((share * behind as f64).round() as usize).max(FEWEST));
+    let mut lengths: Vec<usize> = lengths.into_iter().map(|n| n.min(rows.len())).collect();
+    lengths.sort_unstable();
+    lengths.dedup();
+    let sigmas = learned.outputs.iter().zip(growth);
+    let search = Search {
+        own,
+        spec: own.model.spec(),
+        theta: own.parameters_with(&learned.theta),
+        noise,
+        sigmas: sigmas
+            .map(|(output, growth)| output.sigma * growth)
+            .collect(),
+        samples: (rows.len() * learned.outputs.len()) as f64,
+    };
+    let windows: Vec<Window> = lengths
+        .into_iter()
+        .filter(|length| *length >= FEWEST)
+        .filter_map(|length| search.window(&rows[rows.len() - length..], hold))
+        .collect();
+    let mut suspects: Vec<Suspect> = windows
+        .par_iter()
+        .flat_map_iter(|window| window.candidates.iter().map(move |c| (window, c)))
+        .filter_map(|(window, candidate)| search.suspect(window, candidate))
+        .collect();
+    suspects.sort_by(|a, b| {
+        let keys = (b.plausible, b.evidence).partial_cmp(&(a.plausible, a.evidence));
+        keys.unwrap_or(std::cmp::Ordering::Equal)
+    });
+    // Of several onsets the one that explains most.
+    let mut best: Vec<Suspect> = Vec::with_capacity(suspects.len());
+    for suspect in suspects {
+        if best.iter().all(|known| known.effect != suspect.effect) {
+            best.push(suspect);
+        }
+    }
+    best
+}
+
+/// The rows behind an onset.
+struct Window {
+    /// When it begins \[s\].
+    since: f64,
+    records: [Record; 1],
+    states: Vec<f64>,
+    /// What the learned model leaves.
+    without: f64,
+    candidates: Vec<Candidate>,
+}
+
+struct Search<'s, 'a> {
+    own: &'s OwnModel<'a>,
+    spec: &'s ModelSpec,
+    /// All parameters of the learned model.
+    theta: Vec<f64>,
+    noise: Noise,
+    /// Standard deviation of each output's innovations.
+    sigmas: Vec<f64>,
+    /// Rows that are kept times outputs.
+    samples: f64,
+}
+
+impl Search<'_, '_> {
+    fn window(&self, rows: &[Kept], hold: Hold) -> Option<Window> {
+        let first = rows.first()?;
+        let reading = |output: usize| {
+            let readings = rows.iter().map(|kept| kept.sample.outputs[output]);
+            readings
+                .map(|reading| reading.unwrap_or(f64::NAN))
+                .collect()
+        };
+        let readings = (0..self.spec.outputs.len()).map(reading).collect();
+        let inputs = self.spec.inputs.len();
+        let records = [record(
+            rows.iter().map(|kept| &kept.sample),
+            inputs,
+            readings,
+            hold,
+        )];
+        let states = first.states.to_vec();
+        let setup = self.setup(self.own.model, &records, &BTreeMap::new())?;
+        let x = self.vector(&setup, &states);
+        let without = squares(&setup, &x, &self.noise)?.cost() / self.sigmas.first()?.powi(2);
+        let by_row = |k: usize| records[0].inputs.iter().map(|u| u.values[k]).collect();
+        let by_row: Vec<Vec<f64>> = (0..rows.len()).map(by_row).collect();
+        let time = setup.model_time(0);
+        let visited =
+            Visited::of_simulation(self.spec, (&self.theta, &states), &time, &by_row, "s").ok()?;
+        let mut candidates = candidates(self.spec, &visited);
+        candidates.retain(begins);
+        Some(Window {
+            since: first.sample.time,
+            states,
+            without,
+            candidates,
+            records,
+        })
+    }
+
+    /// A model in which nothing is fitted but what it has beside the learned one, without what is `known` of that.
+    fn setup<'b>(
+        &self,
+        model: &'b Model,
+        records: &'b [Record],
+        known: &BTreeMap<String, f64>,
+    ) -> Option<ModelSetup<'b>> {
+        let names = self.spec.parameters.iter().map(|p| p.about.name.clone());
+        let mut all: BTreeMap<String, f64> = names.zip(self.theta.iter().copied()).collect();
+        all.extend(known.clone());
+        let setup = ModelSetup::new(model, records, &all, self.own.time_unit).ok()?;
+        let parameters: Vec<usize> = (0..setup.parameter_count()).collect();
+        Some(
+            setup
+                .with_free(&parameters)
+                .with_scales(self.sigmas.clone()),
+        )
+    }
+
+    /// Where a fit begins: the states are those of the learned model; what an effect brings is at its start.
+    fn vector(&self, setup: &ModelSetup, states: &[f64]) -> Vec<f64> {
+        let mut x = setup.start().to_vec();
+        let first = setup.parameter_count();
+        x[first..first + states.len()].copy_from_slice(states);
+        x
+    }
+
+    fn suspect(&self, window: &Window, candidate: &Candidate) -> Option<Suspect> {
+        let model = Model::new(apply(self.spec, &[candidate]).ok()?);
+        let effect = candidate.effect?;
+        // Its onset is that of the rows.
+        let begin = candidate.record_numbers.get("begin");
+        let since = candidate
+            .parameters
+            .iter()
+            .find(|p| effect.id == STEP && p.role == Role::Shape);
+        let known = since
+            .zip(begin)
+            .map(|(since, begin)| (since.name.clone(), *begin));
+        let known: BTreeMap<String, f64> = known.into_iter().collect();
+        let setup = self.setup(&model, &window.records, &known)?;
+        let own: Vec<(usize, &ct_model::effects::EffectParameter)> = candidate
+            .parameters
+            .iter()
+            .filter_map(|p| {
+                let at = setup.names().iter().position(|name| *name == p.name)?;
+                Some((at, p))
+            })
+            .collect();
+        let begin = self.vector(&setup, &window.states);
+        let of = |x: &[f64]| {
+            let squares = squares(&setup, x, &self.noise);
+            let cost = squares.map_or(f64::INFINITY, |squares| squares.cost());
+            if cost.is_nan() { f64::INFINITY } else { cost }
+        };
+        let mut starts: Vec<(f64, Vec<f64>)> = Vec::new();
+        for values in candidate.starts() {
+            let mut x = begin.clone();
+            for ((at, parameter), value) in own.iter().zip(values) {
+                if !known.contains_key(&parameter.name) {
+                    x[*at] = value;
+                }
+            }
+            if starts.iter().all(|(_, known)| *known != x) {
+                starts.push((of(&x), x));
+            }
+        }
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts.retain(|(cost, _)| cost.is_finite());
+        starts.truncate(STARTS);
+        let starts: Vec<Start> = starts.into_iter().map(|(_, x)| Start::from(x)).collect();
+        let fit = fit_from(&setup, starts, &self.noise, ROUGH).ok()?;
+        let with = fit.cost / self.sigmas.first()?.powi(2);
+        let free = setup.free().len();
+        let leading = |(at, p): &&(usize, &ct_model::effects::EffectParameter)| {
+            p.role != Role::Choice && setup.free().contains(at)
+        };
+        let (at, parameter) = own.iter().find(leading)?;
+        let (low, high) = parameter.bounds;
+        let room = 1e-6 * (high - low);
+        let value = fit.x[*at];
+        let inside = |bound: f64, other: f64| {
+            !bound.is_finite() || (value - bound).abs() > room || bound == other
+        };
+        Some(Suspect {
+            effect: candidate.id.clone(),
+            evidence: window.without - with - (free + 1) as f64 * self.samples.ln(),
+            since: window.since,
+            size: (
+                parameter.short.clone(),
+                within(value, (low, high)),
+                parameter.unit.clone(),
+            ),
+            plausible: inside(low, high) && inside(high, low),
+            left: Left {
+                before: window.without,
+                left: with,
+                samples: window.records[0].len() * self.sigmas.len(),
+            },
+        })
+    }
+}

@@ -536,11 +536,40 @@ impl<'a> ModelSetup<'a> {
         Some(())
     }
 
+    /// [`Residuals::each_row`]; no generic function, so that simulations with derivatives are compiled here and not again in every crate that
+    /// fits.
+    #[inline(never)]
+    fn show_rows(&self, x: &[f64], each: &mut dyn FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        // A record has the parameters and its own states.
+        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
+        let parameters = self.free.iter().filter(|&&i| i < count).count();
+        let of = |r: usize| count + r * states..count + (r + 1) * states;
+        let own = |r: usize| self.free.iter().filter(|i| of(r).contains(i)).count();
+        let lanes = parameters + (0..self.records.len()).map(own).max().unwrap_or(0);
+        match lanes {
+            0..=2 => self.each_row_in_lanes::<2>(x, &self.free, each),
+            3..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
+            5..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
+            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
+            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
+        }
+    }
+
+    /// [`Residuals::each_residual`].
+    #[inline(never)]
+    fn show_residuals(
+        &self,
+        x: &[f64],
+        each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        self.each_row_in_lanes::<0>(x, &[], each)
+    }
+
     fn each_row_in_lanes<const L: usize>(
         &self,
         x: &[f64],
         by: &[usize],
-        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+        each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
     ) -> Option<()> {
         let (count, states) = (self.parameter_count(), self.model.spec().states.len());
         let columns = by.len() + 1;
@@ -585,24 +614,16 @@ impl Residuals for ModelSetup<'_> {
         &self.samples
     }
 
-    fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
-        // A record has the parameters and its own states.
-        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
-        let parameters = self.free.iter().filter(|&&i| i < count).count();
-        let of = |r: usize| count + r * states..count + (r + 1) * states;
-        let own = |r: usize| self.free.iter().filter(|i| of(r).contains(i)).count();
-        let lanes = parameters + (0..self.records.len()).map(own).max().unwrap_or(0);
-        match lanes {
-            0..=2 => self.each_row_in_lanes::<2>(x, &self.free, each),
-            3..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
-            5..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
-            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
-            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
-        }
+    fn each_row(&self, x: &[f64], mut each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        self.show_rows(x, &mut each)
     }
 
-    fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
-        self.each_row_in_lanes::<0>(x, &[], each)
+    fn each_residual(
+        &self,
+        x: &[f64],
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        self.show_residuals(x, &mut each)
     }
 
     fn floor(&self, output: usize) -> f64 {

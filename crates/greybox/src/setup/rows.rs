@@ -19,26 +19,16 @@ impl Residuals for Setup<'_> {
         &self.samples
     }
 
-    fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
-        // Parameters and one record's initial states; a few lane counts, so that short vectors stay cheap.
-        let parameters = self
-            .free
-            .iter()
-            .filter(|&&i| i < self.parameter_count())
-            .count();
-        match parameters + self.states() {
-            0..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
-            5..=6 => self.each_row_in_lanes::<6>(x, &self.free, each),
-            7..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
-            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
-            // One lane more, and a compiler copies a dual by a call instead of in registers.
-            13..=15 => self.each_row_in_lanes::<15>(x, &self.free, each),
-            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
-        }
+    fn each_row(&self, x: &[f64], mut each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        self.show_rows(x, &mut each)
     }
 
-    fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
-        self.each_row_in_lanes::<0>(x, &[], each)
+    fn each_residual(
+        &self,
+        x: &[f64],
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        self.show_residuals(x, &mut each)
     }
 
     fn price(&self, noise_order: usize) -> f64 {
@@ -76,12 +66,42 @@ impl Setup<'_> {
         estimation::rows(self, x)
     }
 
+    /// [`Residuals::each_row`]; no generic function, so that simulators with derivatives are compiled here and not again in every crate that fits.
+    #[inline(never)]
+    fn show_rows(&self, x: &[f64], each: &mut dyn FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        // Parameters and one record's initial states; a few lane counts, so that short vectors stay cheap.
+        let parameters = self
+            .free
+            .iter()
+            .filter(|&&i| i < self.parameter_count())
+            .count();
+        match parameters + self.states() {
+            0..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
+            5..=6 => self.each_row_in_lanes::<6>(x, &self.free, each),
+            7..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
+            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
+            // One lane more, and a compiler copies a dual by a call instead of in registers.
+            13..=15 => self.each_row_in_lanes::<15>(x, &self.free, each),
+            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
+        }
+    }
+
+    /// [`Residuals::each_residual`].
+    #[inline(never)]
+    fn show_residuals(
+        &self,
+        x: &[f64],
+        each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        self.each_row_in_lanes::<0>(x, &[], each)
+    }
+
     /// Shows every row with derivatives by some of the entries, in simulators of so many lanes.
     fn each_row_in_lanes<const L: usize>(
         &self,
         x: &[f64],
         by: &[usize],
-        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+        each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
     ) -> Option<()> {
         if self.stopped() {
             return None;

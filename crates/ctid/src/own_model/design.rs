@@ -19,6 +19,8 @@ use crate::{Error, numbers};
 
 /// How many experiments the table shows.
 const SHOWN: usize = 10;
+/// An effect that the records ask for lowers the criterion by this much.
+const NEEDED: f64 = 6.0;
 
 /// Searches the experiments.
 ///
@@ -255,6 +257,11 @@ fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<S
             "Within these limits hardly anything decides between {a} and {b}; the best is {played}, with a probability of {decides:.0} %. A wider range (--input NAME=LOW..HIGH) or a longer experiment (--duration) shows more."
         ),
     });
+    if design.between.iter().all(|rival| rival.bic_gain < NEEDED) {
+        all.push(format!(
+            "These records ask for neither of the two: {a} and {b}, alone, do not lower the criterion by {NEEDED}. The experiments are reckoned with the small sizes above."
+        ));
+    }
     let held: Vec<String> = design
         .experiment
         .inputs

@@ -236,12 +236,7 @@ impl Diagnose {
         let records = model.records(files)?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
-        let mut options = effect_search::Options {
-            seed: self.compare.seed,
-            time_limit: Some(self.compare.effort.limit_of_own_model()),
-            interrupt: Some(interrupt::flag()),
-            ..effect_search::Options::default()
-        };
+        let mut options = own_model::options(self.compare.seed, self.compare.effort);
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
         }

@@ -16,7 +16,6 @@ use serde::Serialize;
 use crate::commands::finish;
 use crate::effort::EffortLevel;
 use crate::input::{self, Files, Input, ReadArguments};
-use crate::interrupt;
 use crate::look::Look;
 use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
@@ -280,12 +279,7 @@ impl Arguments {
         let limits = self.own_limits(model)?;
         let records = model.records(files)?;
         let mut outputs = self.outputs(&files.all())?;
-        let options = effect_search::Options {
-            seed: self.seed,
-            time_limit: Some(self.effort.limit_of_own_model()),
-            interrupt: Some(interrupt::flag()),
-            ..effect_search::Options::default()
-        };
+        let options = own_model::options(self.seed, self.effort);
         let [first, second] = &self.between[..] else {
             return Err(two());
         };

@@ -7,7 +7,9 @@ use crate::look::{Look, Side, table};
 use crate::numbers;
 
 /// How many experiments the table shows.
-const SHOWN: usize = 10;
+pub(crate) const SHOWN: usize = 10;
+/// What the columns of the table mean.
+pub(crate) const NOTE: &str = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to what the records visited)";
 
 fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
@@ -99,8 +101,7 @@ fn experiments(design: &Design, look: Look) -> String {
     if more > 0 {
         text += &format!("  {}\n", look.faint(format!("and {more} more")));
     }
-    let note = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to what the records visited)";
-    text += &look.faint(look.paragraph("  ", note).trim_end());
+    text += &look.faint(look.paragraph("  ", NOTE).trim_end());
     text + "\n\n"
 }
 
@@ -133,7 +134,7 @@ fn row(number: &str, candidate: &Candidate, design: &Design) -> Vec<String> {
 }
 
 /// What is below a hundredth is nothing.
-fn power(power: &Power, refitted: bool) -> String {
+pub(crate) fn power(power: &Power, refitted: bool) -> String {
     let mark = if refitted { "" } else { "~" };
     if power.power < 0.01 {
         return format!("{mark}nothing");

@@ -2,7 +2,7 @@
 
 use ct_signals::{Heading, duration};
 use effect_search::design::{
-    Design, Experiment, InputRange, Kind, Limits, PlayedInput, Power, Prospect, Refused, Rival,
+    Design, Experiment, InputRange, Kind, Limits, PlayedInput, Prospect, Refused, Rival,
     design as search,
 };
 use effect_search::{Options, Progress};
@@ -12,13 +12,12 @@ use super::effects::{every_candidate, find};
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
 use super::words::{EffectWords, shown_unit};
+use crate::design::text::{NOTE, SHOWN, power};
 use crate::look::{Look, Side, table};
 use crate::output::Found;
 use crate::simulate::{cell, csv_text, header};
 use crate::{Error, numbers};
 
-/// How many experiments the table shows.
-const SHOWN: usize = 10;
 /// An effect that the records ask for lowers the criterion by this much.
 const NEEDED: f64 = 6.0;
 
@@ -187,8 +186,7 @@ fn experiments(design: &Design, look: Look) -> String {
     if more > 0 {
         text += &format!("  {}\n", look.faint(format!("and {more} more")));
     }
-    let note = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to what the records visited)";
-    text += &look.faint(look.paragraph("  ", note).trim_end());
+    text += &look.faint(look.paragraph("  ", NOTE).trim_end());
     text + "\n\n"
 }
 
@@ -225,15 +223,6 @@ fn played_words(played: &PlayedInput) -> String {
         range(played.low, played.high, ""),
         duration(played.clock)
     )
-}
-
-/// What is below a hundredth is nothing.
-fn power(power: &Power, refitted: bool) -> String {
-    let mark = if refitted { "" } else { "~" };
-    if power.power < 0.01 {
-        return format!("{mark}nothing");
-    }
-    format!("{mark}{}", numbers::significant(power.power, 2))
 }
 
 fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<String> {

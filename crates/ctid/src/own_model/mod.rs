@@ -25,7 +25,7 @@ pub(crate) use self::diagnose::{
 pub(crate) use self::export::{Exported, commented, export, number};
 pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
 pub(crate) use self::identify::{Beside, OneByOne};
-pub(crate) use self::problem::RecordNumbers;
+pub(crate) use self::problem::{RecordNumbers, options};
 pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;
 pub(crate) use self::unknown::file as unknown_file;

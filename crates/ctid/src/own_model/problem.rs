@@ -7,10 +7,21 @@ use ct_model::effects::{Role, Visited, apply};
 use effect_search::{Believed, Options, Problem, all_candidates, believed};
 
 use super::file::{OwnModelFile, Records};
-use crate::{Error, numbers};
+use crate::effort::EffortLevel;
+use crate::{Error, interrupt, numbers};
 
 /// The numbers of a record that effects are written in, by the effects' identifiers.
 pub(crate) type RecordNumbers = BTreeMap<String, BTreeMap<&'static str, f64>>;
+
+/// How a command searches, which Ctrl-C ends.
+pub(crate) fn options(seed: u64, effort: EffortLevel) -> Options<'static> {
+    Options {
+        seed,
+        time_limit: Some(effort.limit_of_own_model()),
+        interrupt: Some(interrupt::flag()),
+        ..Options::default()
+    }
+}
 
 /// What the search works on.
 pub(super) fn problem(file: &OwnModelFile, records: &Records) -> Problem {

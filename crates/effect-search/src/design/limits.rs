@@ -150,9 +150,7 @@ impl Bounds {
             .records
             .iter()
             .max_by(|a, b| a.duration().total_cmp(&b.duration()));
-        let interval = longest.map_or(1.0, |record| {
-            median(record.time.windows(2).map(|w| w[1] - w[0]).collect())
-        });
+        let interval = longest.map_or(1.0, Record::sample_interval);
         let duration = limits
             .duration
             .or(longest.map(Record::duration))

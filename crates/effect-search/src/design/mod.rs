@@ -1,7 +1,7 @@
 //! The next experiment: the one that tells two effects apart which the records leave undecided.
 //!
 //! Each of the two is fitted to the records. Sequences within the user's limits are then played on either fit, at one input or at several
-//! at once, and it is reckoned how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the
+//! at once, and it is computed how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the
 //! other one is fitted to what the first gives on the existing records and in the experiment, both free of noise, and its misfit to the
 //! existing records alone is taken off.
 //!
@@ -19,7 +19,7 @@ use estimation::Noise;
 use rayon::prelude::*;
 
 pub use limits::{Limits, Refused};
-pub use power::{Power, Prospect, power, prospect, times_as_long};
+pub use power::{PLENTY, Power, Prospect, by_use, power, prospect, times_as_long};
 pub use result::{
     Design, Experiment, InputRange, InputSequence, PlayedInput, Reach, Rival, Sequences,
 };
@@ -36,10 +36,6 @@ use play::Stage;
 
 /// The slowest time constant that sequences are made for, over the length of an experiment: what such a process is like nobody knows ahead.
 const SLOWEST: f64 = 0.1;
-/// More power than this is of no use: it decides even where the effect is half as large as the records make it.
-const PLENTY: f64 = 200.0;
-/// Excursions that differ by less than this are one.
-const SAME_EXCURSION: f64 = 0.1;
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 4;
 const MOST_REFITS: usize = 16;
@@ -276,14 +272,7 @@ fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Seque
     Ok(all)
 }
 
-/// The best first: by power as far as it is of use, then by excursion, then by power.
+/// The best first.
 fn sort(tried: &mut [Tried]) {
-    let useful = |experiment: &Experiment| experiment.power.power.min(PLENTY);
-    let excursion = |experiment: &Experiment| (experiment.excursion / SAME_EXCURSION).floor();
-    tried.sort_by(|(a, _), (b, _)| {
-        useful(b)
-            .total_cmp(&useful(a))
-            .then(excursion(a).total_cmp(&excursion(b)))
-            .then(b.power.power.total_cmp(&a.power.power))
-    });
+    tried.sort_by(|(a, _), (b, _)| by_use((&a.power, a.excursion), (&b.power, b.excursion)));
 }

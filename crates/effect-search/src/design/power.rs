@@ -1,5 +1,7 @@
 //! From a separation to what may be hoped for.
 
+use std::cmp::Ordering;
+
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use serde::Serialize;
@@ -31,6 +33,10 @@ pub enum Prospect {
     Twins,
 }
 
+/// More power than this is of no use: it decides even where the effect is half as large as the records make it.
+pub const PLENTY: f64 = 200.0;
+/// Excursions that differ by less than this are one.
+const SAME_EXCURSION: f64 = 0.1;
 /// A decision as good as certain, as likely, and what the criterion does not notice.
 const SURE: f64 = 0.9;
 const LIKELY: f64 = 0.5;
@@ -87,6 +93,18 @@ pub fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
     };
     let times = |i: usize| needed(ahead[i]) / power.if_true[i];
     Some(times(0).max(times(1))).filter(|times| times.is_finite() && *times > 1.0)
+}
+
+/// The order of two experiments, the better one first: by power as far as it is of use, then by excursion, then by power. Each with how far an
+/// output or a level leaves what it visited in the records, as a part of that.
+#[must_use]
+pub fn by_use((a, out_a): (&Power, f64), (b, out_b): (&Power, f64)) -> Ordering {
+    let useful = |power: &Power| power.power.min(PLENTY);
+    let excursion = |out: f64| (out / SAME_EXCURSION).floor();
+    useful(b)
+        .total_cmp(&useful(a))
+        .then(excursion(out_a).total_cmp(&excursion(out_b)))
+        .then(b.power.total_cmp(&a.power))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ct_signals::Record;
-use effect_search::design::{Sequence, power, sequences};
+use effect_search::design::{PLENTY, Sequence, by_use, power, sequences};
 use greybox::Triangle;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
@@ -21,14 +21,10 @@ use crate::{Error, Problem, Progress, diagnose::allow, node::Node};
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 6;
 const MOST_REFITS: usize = 30;
-/// More power than this is of no use: it decides even where the effect is half as large as the records make it.
-const PLENTY: f64 = 200.0;
 /// So many sequences are tried whatever the time limit.
 const FEWEST: usize = 2;
 /// A sequence that drives a controller to a limit is played so that it crosses its range in so many time constants.
 const SLOWER: [f64; 2] = [1.0, 4.0];
-/// Excursions that differ by less than this are one.
-const SAME_EXCURSION: f64 = 0.1;
 /// A level below this share of the highest one is none.
 const DRAINED: f64 = 1e-6;
 
@@ -361,14 +357,7 @@ impl Search<'_, '_> {
     }
 }
 
-/// The best first: by power as far as it is of use, then by excursion, then by power.
+/// The best first.
 fn sort(tried: &mut [Tried]) {
-    let useful = |candidate: &Candidate| candidate.power.power.min(PLENTY);
-    let excursion = |candidate: &Candidate| (candidate.excursion / SAME_EXCURSION).floor();
-    tried.sort_by(|(a, _), (b, _)| {
-        useful(b)
-            .total_cmp(&useful(a))
-            .then(excursion(a).total_cmp(&excursion(b)))
-            .then(b.power.power.total_cmp(&a.power.power))
-    });
+    tried.sort_by(|(a, _), (b, _)| by_use((&a.power, a.excursion), (&b.power, b.excursion)));
 }

@@ -244,9 +244,7 @@ impl Bounds {
             samples: self.samples,
         }
     }
-}
 
-impl Bounds {
     /// The limits for the records of a problem; `parameters` are fitted to the experiment alone.
     pub(crate) fn new(
         problem: &Problem,

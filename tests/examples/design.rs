@@ -5,11 +5,11 @@
 //!
 //! **The rule**: a record is a case where its diagnosis is *undecided* with the truth in the one group. The experiment is
 //! designed between the truth and the best other of the group that is no twin of it, within half to one and a half of
-//! the middle command (in a loop: of the level), as long as the record; where the design says that it has to be played several times
+//! the middle command (in a loop: of the level), as long as the record; where the design says that it has to be applied several times
 //! over, it is. Where all are twins the record is no case, and is counted apart. The first so many cases are taken.
 //!
 //! **The columns**: `pair`: both records diagnosed together name the truth in their one group, and the other is not in it. `alone`:
-//! nothing else is in the group either. `decides` is what the design had promised of playing it once.
+//! nothing else is in the group either. `decides` is what the design had promised of applying it once.
 
 use clap::Parser;
 use ctid_tests::design_cases::{

@@ -179,10 +179,10 @@ pub struct Answer {
     pub groups: Vec<Vec<String>>,
 }
 
-/// Plays the experiment to the rig, and diagnoses both records together.
+/// Applies the experiment to the rig, and diagnoses both records together.
 #[must_use]
 pub fn answered(case: &Undecided, other: &str, plan: &Design, seed: u64) -> Option<Answer> {
-    // The design says how many times it has to be played.
+    // The design says how many times it has to be applied.
     let times = plan.times_as_long.unwrap_or(1);
     let values = plan.experiment.values.repeat(times);
     let mut next = case.rig.play(values, &mut ChaCha8Rng::seed_from_u64(seed));

@@ -62,6 +62,10 @@ struct Place {
 
 /// The effect whose starts follow from the spectrum of the residual.
 const PERIODIC: &str = "periodic";
+/// The effect whose time is looked for between its starts.
+const STEP: &str = "step";
+/// So far from the best starts of a time others are scored, round by round, as shares of the longest record.
+const BETWEEN: [f64; 2] = [0.05, 0.025];
 
 impl Context<'_> {
     /// Periods of the strongest lines of a set's residuals, and half a line to either side \[unit of the model's time\].
@@ -84,6 +88,13 @@ impl Context<'_> {
             }
         }
         Ok(periods)
+    }
+
+    /// Length of the longest record \[unit of the model's time\].
+    fn longest_duration(&self) -> f64 {
+        let records = self.problem.records.iter();
+        let longest = records.map(ct_signals::Record::duration);
+        longest.fold(0.0, f64::max) / self.problem.time_unit
     }
 
     /// Scores of all candidates that a set does not have, best first.
@@ -171,18 +182,17 @@ impl Context<'_> {
                 starts.push(x);
             }
         }
-        if candidate.effect.is_some_and(|effect| effect.id == PERIODIC) {
-            let at = candidate
-                .parameters
-                .iter()
-                .position(|own| own.short == "period");
-            if let (Some(Some(at)), Some(first)) = (at.map(|at| places[at]), starts.first()) {
-                let first = first.clone();
-                for period in self.periods(node)? {
-                    let mut x = first.clone();
-                    x[at] = within(period, setup.bounds()[at]);
-                    starts.insert(0, x);
-                }
+        let own_place = |id: &str, parameter: &str| -> Option<usize> {
+            candidate.effect.filter(|effect| effect.id == id)?;
+            let mut own = candidate.parameters.iter();
+            places[own.position(|own| own.short == parameter)?]
+        };
+        if let (Some(at), Some(first)) = (own_place(PERIODIC, "period"), starts.first()) {
+            let first = first.clone();
+            for period in self.periods(node)? {
+                let mut x = first.clone();
+                x[at] = within(period, setup.bounds()[at]);
+                starts.insert(0, x);
             }
         }
         let starts = thinned(starts);
@@ -223,15 +233,35 @@ impl Context<'_> {
                 stepped,
             })
         };
-        let mut scored: Vec<Place> = starts
-            .into_iter()
-            .filter_map(|x| {
-                let joined = Joined::at(&setup, known, &columns, &x)?;
-                let triangle = linearise(&joined, &x, noise)?;
-                place(x, triangle)
-            })
-            .collect();
+        let scored_at = |x: Vec<f64>| {
+            let joined = Joined::at(&setup, known, &columns, &x)?;
+            let triangle = linearise(&joined, &x, noise)?;
+            place(x, triangle)
+        };
+        let mut scored: Vec<Place> = starts.into_iter().filter_map(scored_at).collect();
         scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+        if let Some(at) = own_place(STEP, "since") {
+            for share in BETWEEN {
+                let away = share * self.longest_duration();
+                let mut others: Vec<Vec<f64>> = Vec::new();
+                for best in scored.iter().take(PLACES) {
+                    for side in [-away, away] {
+                        let mut x = best.x.clone();
+                        x[at] = within(x[at] + side, setup.bounds()[at]);
+                        if !scored.iter().any(|place| place.x == x) && !others.contains(&x) {
+                            others.push(x);
+                        }
+                    }
+                }
+                scored.extend(others.into_iter().filter_map(scored_at));
+                scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+            }
+            // Neighbours of the best time lead where that does.
+            let best = scored.first().map_or(0.0, |place| place.x[at]);
+            let near = 2.0 * BETWEEN[0] * self.longest_duration();
+            let mut first = true;
+            scored.retain(|place| std::mem::take(&mut first) || (place.x[at] - best).abs() >= near);
+        }
         if !smooth {
             // Where the effect acts the set's own derivatives are others.
             scored.truncate(LINEARISED);

@@ -8,7 +8,7 @@ use crate::{
     levenberg_marquardt::{held, minimise, within},
     linearise_below, marginal,
     prior::{begin_near_priors, free_priors},
-    residuals, rows,
+    residuals, rows, squares,
 };
 
 /// Two ends are one minimum where twice the logarithm of their likelihood ratio is below this.
@@ -227,6 +227,28 @@ impl Start {
     }
 }
 
+/// Where a fit begins: within the bounds, and near the priors unless it is better where it was given, as the end of another fit is.
+fn begun(model: &impl Residuals, given: &[f64], noise: &Noise) -> Vec<f64> {
+    let inside = |mut x: Vec<f64>| {
+        for &i in model.free() {
+            x[i] = within(x[i], model.bounds()[i]);
+        }
+        x
+    };
+    let mut near = given.to_vec();
+    begin_near_priors(model, &mut near);
+    let (there, near) = (inside(given.to_vec()), inside(near));
+    if there == near {
+        return there;
+    }
+    let cost = |x: &[f64]| squares(model, x, noise).map_or(f64::INFINITY, |squares| squares.cost());
+    if cost(&there) <= cost(&near) {
+        there
+    } else {
+        near
+    }
+}
+
 /// Fits from the given starts, in parallel, in the metric of a given noise, of which the colour counts alone. The best one is given, and how
 /// many agree with it.
 ///
@@ -249,11 +271,7 @@ pub fn fit_from(
             if k > 0 && model.out_of_time() {
                 return None;
             }
-            let mut start = given.clone();
-            begin_near_priors(model, &mut start);
-            for (&i, bounds) in free.iter().zip(&bounds) {
-                start[i] = within(start[i], *bounds);
-            }
+            let start = begun(model, &given, noise);
             let known = triangle.filter(|_| start == given);
             let full = |x: &[f64]| {
                 let mut full = start.clone();

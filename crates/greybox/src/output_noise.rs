@@ -4,6 +4,9 @@
 //! linear prediction of the reading from all that is known at its instant: the model's own output and its past, the readings before it,
 //! the readings of the other outputs before it, the inputs. Its error is close to the noise as long as what the model lacks follows
 //! from these (L. Ljung, System Identification, 2nd ed., 1999, section 10.4: long ARX models).
+//!
+//! Coloured noise follows from its own past, the more the shorter the interval between readings. So that the errors of outputs with rates
+//! of their own are compared alike, each is predicted as far ahead as the slowest one's readings lie apart.
 
 use ct_signals::Record;
 use estimation::Triangle;
@@ -35,6 +38,19 @@ pub(crate) fn output_noise(records: &[Record], model: &[Vec<f64>]) -> Vec<Option
     (0..outputs).map(of).collect()
 }
 
+/// Rows from one reading to the next, in the middle; of the slowest output.
+fn slowest(records: &[Record]) -> usize {
+    let of = |values: &[f64]| {
+        let there: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).collect();
+        let mut apart: Vec<usize> = there.windows(2).map(|two| two[1] - two[0]).collect();
+        apart.sort_unstable();
+        apart.get(apart.len() / 2).copied()
+    };
+    let outputs = records.iter().flat_map(|record| &record.outputs);
+    let slowest = outputs.filter_map(|output| of(&output.values)).max();
+    slowest.unwrap_or(1)
+}
+
 /// The sum of squares that the prediction of one output leaves, over how many samples, and its coefficients.
 fn prediction(
     records: &[Record],
@@ -51,6 +67,7 @@ fn prediction(
     let mut triangle = Triangle::new(columns + 1);
     let mut values = Vec::with_capacity(columns + 1);
     let mut samples = 0;
+    let ahead = slowest(records);
     for (r, record) in records.iter().enumerate() {
         let series = |o: usize| &record.outputs[o].values;
         // Outputs may be sampled at rates of their own: the past of each is its last readings that are there.
@@ -62,10 +79,14 @@ fn prediction(
             })
             .collect();
         let own = &there[output];
-        for (i, &k) in own.iter().enumerate().skip(past) {
+        for &k in own {
+            let known = own.partition_point(|&j| j + ahead <= k);
+            if known < past {
+                continue;
+            }
             values.clear();
             values.push(1.0);
-            let before = &own[i - past..i];
+            let before = &own[known - past..known];
             values.extend(before.iter().map(|&j| series(output)[j]));
             let simulated = &model[r * outputs + output];
             values.extend(before.iter().chain([&k]).map(|&j| simulated[j]));

@@ -35,10 +35,10 @@ pub struct Arguments {
     /// The two effects, as `ctid effects` lists them; of two tanks `overflow:upper` says which, of a model of your own 'lag(y)'
     #[arg(long, num_args = 2, required = true, value_names = ["A", "B"])]
     between: Vec<String>,
-    /// Of a model of your own: an input that is played, as NAME or NAME=LOW..HIGH; several are played one by one and together. Without
+    /// Of a model of your own: an input that is applied, as NAME or NAME=LOW..HIGH; several are applied one by one and together. Without
     /// any: all that moved in the records
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
-    input: Vec<PlayedRange>,
+    input: Vec<AppliedRange>,
     /// Smallest and largest command, or reference in a loop; without it what the records visited
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true)]
     range: Option<Vec<f64>>,
@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Limit on the time of the search; the result says what it left out
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
-    /// Where the experiment goes as CSV, if one is worth playing; without it next.csv, or next-2.csv where that is there
+    /// Where the experiment goes as CSV, if one is worth applying; without it next.csv, or next-2.csv where that is there
     #[arg(long, value_name = "F.csv")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -72,12 +72,12 @@ pub(crate) fn seed(text: &str) -> Result<u64, String> {
 
 /// An input of a model of one's own, and its range where one is given.
 #[derive(Debug, Clone)]
-struct PlayedRange {
+struct AppliedRange {
     name: String,
     range: Option<(f64, f64)>,
 }
 
-impl std::str::FromStr for PlayedRange {
+impl std::str::FromStr for AppliedRange {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -136,7 +136,7 @@ fn digits(value: f64) -> String {
 
 impl Found for Proposal {
     fn record(&self) -> Option<String> {
-        // What tells nothing apart is not worth playing.
+        // What tells nothing apart is not worth applying.
         if self.design.twins() {
             return None;
         }
@@ -238,7 +238,7 @@ impl Arguments {
             seed: self.seed,
             ..OwnLimits::default()
         };
-        for PlayedRange { name, range } in &self.input {
+        for AppliedRange { name, range } in &self.input {
             limits.inputs.push(name.clone());
             if let Some(range) = range {
                 limits.ranges.insert(name.clone(), *range);

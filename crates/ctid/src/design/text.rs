@@ -1,6 +1,6 @@
 //! What a person reads of a design; all of it is derived from the struct that `--json` writes.
 
-use missing_effect::design::{Candidate, Design, Power, Rival};
+use missing_effect::design::{Alternative, Candidate, Design, Power};
 
 use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
@@ -15,21 +15,21 @@ fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
 
-fn named(rival: &Rival) -> String {
-    match &rival.place {
-        Some(place) => format!("{} ({place})", rival.effect),
-        None => rival.effect.clone(),
+fn named(alternative: &Alternative) -> String {
+    match &alternative.place {
+        Some(place) => format!("{} ({place})", alternative.effect),
+        None => alternative.effect.clone(),
     }
 }
 
 /// What `ctid design` prints.
 #[must_use]
 pub fn design(design: &Design, look: Look) -> String {
-    rivals(design, look) + &experiments(design, look) + &findings(design, look)
+    alternatives(design, look) + &experiments(design, look) + &findings(design, look)
 }
 
 /// The two effects on the records that there are.
-fn rivals(design: &Design, look: Look) -> String {
+fn alternatives(design: &Design, look: Look) -> String {
     let [a, b] = &design.between;
     let title = format!(
         "{} or {}, on the records that there are, in the metric of their noise",
@@ -38,14 +38,18 @@ fn rivals(design: &Design, look: Look) -> String {
     );
     let heading = ["effect", "BIC falls", "size found"];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
-    for rival in [a, b] {
-        let size = rival.size.as_ref().map_or(String::new(), |size| {
+    for alternative in [a, b] {
+        let size = alternative.size.as_ref().map_or(String::new(), |size| {
             let name = size.name.rsplit('.').next().unwrap_or_default();
             let (value, error) = numbers::value_and_error(size.value, size.std_error);
             let error = error.map_or(String::new(), |error| format!(" ± {error}"));
             with_unit(&format!("{name} {value}{error}"), &size.unit)
         });
-        rows.push(vec![named(rival), numbers::whole(rival.bic_gain), size]);
+        rows.push(vec![
+            named(alternative),
+            numbers::whole(alternative.bic_gain),
+            size,
+        ]);
     }
     let sides = [Side::Left, Side::Right, Side::Left];
     lines(&look.heading(&title), &sides, &rows)

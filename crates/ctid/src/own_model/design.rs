@@ -2,8 +2,8 @@
 
 use ct_signals::{Heading, duration};
 use effect_search::design::{
-    Design, Experiment, InputRange, Kind, Limits, PlayedInput, Prospect, Refused, Rival,
-    design as search,
+    Alternative, Design, Experiment, InputRange, InputSequenceKind, Kind, Limits, Prospect,
+    Refused, design as search,
 };
 use effect_search::{Options, Progress};
 use serde::Serialize;
@@ -55,7 +55,7 @@ pub(crate) fn design(
 pub(crate) struct OwnProposal {
     #[serde(flatten)]
     pub design: Design,
-    /// The experiment as CSV; none where none is worth playing.
+    /// The experiment as CSV; none where none is worth making.
     #[serde(skip)]
     record: Option<String>,
 }
@@ -100,7 +100,7 @@ fn csv(design: &Design, file: &OwnModelFile, time_unit: f64) -> String {
 /// What `ctid design` prints.
 pub(crate) fn said(file: &OwnModelFile, design: &Design, look: Look) -> String {
     let words = EffectWords::of(&file.base, &file.candidates);
-    let mut text = rivals(design, look) + &experiments(design, look);
+    let mut text = alternatives(design, look) + &experiments(design, look);
     text += &format!("{}\n", look.heading("The next experiment"));
     for sentence in sentences(design, &words, file) {
         text += &look.paragraph("  ", &sentence);
@@ -109,7 +109,7 @@ pub(crate) fn said(file: &OwnModelFile, design: &Design, look: Look) -> String {
 }
 
 /// The two effects on the records that there are.
-fn rivals(design: &Design, look: Look) -> String {
+fn alternatives(design: &Design, look: Look) -> String {
     let title = format!(
         "{} or {}, on the records that there are, in the metric of their noise",
         design.between[0].effect, design.between[1].effect
@@ -119,7 +119,7 @@ fn rivals(design: &Design, look: Look) -> String {
             .map(|name| look.faint(name))
             .to_vec(),
     ];
-    for Rival {
+    for Alternative {
         effect,
         sizes,
         bic_gain,
@@ -191,12 +191,12 @@ fn experiments(design: &Design, look: Look) -> String {
 }
 
 fn row(number: &str, experiment: &Experiment) -> Vec<String> {
-    let again = |played: &&PlayedInput| played.kind == Kind::Again;
+    let again = |applied: &&InputSequenceKind| applied.kind == Kind::Again;
     let what = match experiment.inputs.iter().find(again) {
         Some(_) => Kind::Again.name().to_string(),
         None => {
-            let played: Vec<String> = experiment.inputs.iter().map(played_words).collect();
-            played.join("; ")
+            let applied: Vec<String> = experiment.inputs.iter().map(sequence_words).collect();
+            applied.join("; ")
         }
     };
     let reaches = experiment.reaches.iter();
@@ -212,27 +212,30 @@ fn row(number: &str, experiment: &Experiment) -> Vec<String> {
     ]
 }
 
-fn played_words(played: &PlayedInput) -> String {
-    let levels = played
+fn sequence_words(applied: &InputSequenceKind) -> String {
+    let levels = applied
         .levels
         .map_or(String::new(), |n| format!(" of {n} levels"));
     format!(
         "{}: {}{levels} {}, held {}",
-        played.input,
-        played.kind.name(),
-        range(played.low, played.high, ""),
-        duration(played.clock)
+        applied.input,
+        applied.kind.name(),
+        range(applied.low, applied.high, ""),
+        duration(applied.clock)
     )
 }
 
 fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<String> {
-    let [a, b] = design.between.each_ref().map(|rival| rival.effect.as_str());
+    let [a, b] = design
+        .between
+        .each_ref()
+        .map(|alternative| alternative.effect.as_str());
     let mut all = Vec::new();
     let Some(best) = design.experiments.first() else {
         return all;
     };
-    let played: Vec<String> = best.inputs.iter().map(played_words).collect();
-    let played = played.join("; ");
+    let applied: Vec<String> = best.inputs.iter().map(sequence_words).collect();
+    let applied = applied.join("; ");
     let decides = 100.0 * best.power.decides;
     all.push(match design.prospect {
         Prospect::Twins => format!(
@@ -240,13 +243,17 @@ fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<S
             words.placed(a),
             words.placed(b)
         ),
-        Prospect::Decides => format!("Play {played}. It decides between {a} and {b} with a probability of {decides:.0} %."),
-        Prospect::May => format!("Play {played}. It may decide between {a} and {b}: the probability is {decides:.0} %."),
+        Prospect::Decides => format!("Apply {applied}. It decides between {a} and {b} with a probability of {decides:.0} %."),
+        Prospect::May => format!("Apply {applied}. It may decide between {a} and {b}: the probability is {decides:.0} %."),
         Prospect::Hardly => format!(
-            "Within these limits hardly anything decides between {a} and {b}; the best is {played}, with a probability of {decides:.0} %. A wider range (--input NAME=LOW..HIGH) or a longer experiment (--duration) shows more."
+            "Within these limits hardly anything decides between {a} and {b}; the best is {applied}, with a probability of {decides:.0} %. A wider range (--input NAME=LOW..HIGH) or a longer experiment (--duration) shows more."
         ),
     });
-    if design.between.iter().all(|rival| rival.bic_gain < NEEDED) {
+    if design
+        .between
+        .iter()
+        .all(|alternative| alternative.bic_gain < NEEDED)
+    {
         all.push(format!(
             "These records ask for neither of the two: {a} and {b}, alone, do not lower the criterion by {NEEDED}. The experiments are reckoned with the small sizes above."
         ));
@@ -255,7 +262,11 @@ fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<S
         .experiment
         .inputs
         .iter()
-        .filter(|input| best.inputs.iter().all(|played| played.input != input.input))
+        .filter(|input| {
+            best.inputs
+                .iter()
+                .all(|applied| applied.input != input.input)
+        })
         .filter_map(|input| {
             let value = numbers::significant(*input.values.first()?, 3);
             Some(
@@ -277,9 +288,7 @@ fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<S
         .any(|table| table.starts_with("controller."))
         && !design.twins()
     {
-        all.push(
-            "The experiment is played in open loop: switch the controller to manual.".to_string(),
-        );
+        all.push("The experiment is in open loop: switch the controller to manual.".to_string());
     }
     if !design.left_out.is_empty() {
         all.push(format!(

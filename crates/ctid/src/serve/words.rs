@@ -228,9 +228,9 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
     let sequence = &design.experiment;
     json!({
         "id": id,
-        "between": design.between.each_ref().map(|rival| match &rival.place {
-            Some(place) => format!("{} ({place})", rival.effect),
-            None => rival.effect.clone(),
+        "between": design.between.each_ref().map(|alternative| match &alternative.place {
+            Some(place) => format!("{} ({place})", alternative.effect),
+            None => alternative.effect.clone(),
         }),
         "sentences": design.sentences.iter().cloned().chain(findings::left_out(&design.effort)).collect::<Vec<_>>(),
         "rows": candidates.chain(&design.again).map(row).collect::<Vec<_>>(),

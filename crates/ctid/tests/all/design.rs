@@ -42,8 +42,8 @@ fn an_undecided_verdict_points_to_the_experiment_that_is_then_written() {
 
     let found = place.json("d.json");
     assert_eq!(found["schema"], 1);
-    for rival in found["between"].as_array().unwrap() {
-        assert!(between.contains(rival["effect"].as_str().unwrap()));
+    for alternative in found["between"].as_array().unwrap() {
+        assert!(between.contains(alternative["effect"].as_str().unwrap()));
     }
     // What is printed is what is written.
     let best = &found["candidates"][0];
@@ -57,11 +57,11 @@ fn an_undecided_verdict_points_to_the_experiment_that_is_then_written() {
 
     let next = place.read("next.csv");
     assert!(next.starts_with("t [s],u [V]\n0,"));
-    let played = column(&next, 1);
-    assert_eq!(played.len(), 300);
-    assert!(played.iter().all(|u| (1.5..=8.5).contains(u)));
+    let simulated = column(&next, 1);
+    assert_eq!(simulated.len(), 300);
+    assert!(simulated.iter().all(|u| (1.5..=8.5).contains(u)));
     let series = found["experiment"]["values"].as_array().unwrap();
-    assert_eq!(series.len(), played.len());
+    assert_eq!(series.len(), simulated.len());
 
     // Nothing is overwritten, and the same question has the same answer.
     let before = place.read("next.csv");
@@ -83,11 +83,11 @@ fn limits_and_units_are_kept() {
     assert!(text.contains("wrote plan.csv"), "{text}");
     let plan = place.read("plan.csv");
     assert!(plan.starts_with("t [min],u [V]\n0,"));
-    let (time, played) = (column(&plan, 0), column(&plan, 1));
+    let (time, simulated) = (column(&plan, 0), column(&plan, 1));
     // A sample is 2 min: 400 of them in 48000 s.
     assert_eq!((time.len(), time[1]), (400, 2.0));
-    assert!(played.iter().all(|u| (1.5..=8.5).contains(u)));
-    let steps = played.windows(2).map(|w| (w[1] - w[0]).abs());
+    assert!(simulated.iter().all(|u| (1.5..=8.5).contains(u)));
+    let steps = simulated.windows(2).map(|w| (w[1] - w[0]).abs());
     assert!(steps.fold(0.0, f64::max) <= 0.005 * 120.0 + 1e-8);
 }
 
@@ -118,7 +118,7 @@ fn twins_are_said_to_be_twins_and_nothing_is_written() {
     assert!(said.contains("Step the pump and watch the jet"), "{text}");
     let text = place
         .succeeds("design b.csv --model line.toml --between sensor_lag pump_lag --out to-play.csv");
-    assert!(text.contains("to-play.csv is not written: nothing is worth playing"));
+    assert!(text.contains("to-play.csv is not written: nothing is worth applying"));
     assert!(!place.path("to-play.csv").exists());
 }
 

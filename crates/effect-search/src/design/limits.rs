@@ -16,7 +16,7 @@ const MOST_SAMPLES: usize = 20_000;
 /// What an experiment may do; what is not given follows from the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Limits {
-    /// Inputs that are played; where none is named, all that moved in the records. The others are held at their median.
+    /// Inputs that are applied; where none is named, all that moved in the records. The others are held at their median.
     pub inputs: Vec<String>,
     /// Smallest and largest value of an input \[its unit\]. Without it what the records visited.
     pub ranges: BTreeMap<String, (f64, f64)>,
@@ -75,7 +75,7 @@ pub enum Refused {
         /// Second end.
         high: f64,
     },
-    /// What is played never moved, and nobody says how far it may.
+    /// What is applied never moved, and nobody says how far it may.
     #[error("the records hold one value of {input}, {}, which says nothing of where it may go; give --input {input}=LOW..HIGH", shown(*value))]
     NoRange {
         /// The input.
@@ -114,8 +114,8 @@ pub enum Refused {
 
 /// The limits as they hold.
 pub(super) struct Bounds {
-    /// Of each input that is played, by its position in the model.
-    pub played: Vec<(usize, InputRange, Room)>,
+    /// Of each input that is applied, by its position in the model.
+    pub applied: Vec<(usize, InputRange, Room)>,
     /// What the others are held at.
     pub held: Vec<f64>,
     pub duration: f64,
@@ -174,7 +174,7 @@ impl Bounds {
                 .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
                 .unwrap_or((0.0, 0.0))
         };
-        let mut played = Vec::new();
+        let mut applied = Vec::new();
         for (i, name) in names.iter().enumerate() {
             let own = |all: &Vec<String>| all.iter().any(|asked| asked == name);
             let given = limits.ranges.get(*name);
@@ -221,9 +221,9 @@ impl Bounds {
                 interval,
                 samples,
             };
-            played.push((i, range, room));
+            applied.push((i, range, room));
         }
-        if played.is_empty() {
+        if applied.is_empty() {
             return Err(Refused::NoRange {
                 input: names[0].to_string(),
                 value: visited(0).0,
@@ -232,12 +232,12 @@ impl Bounds {
         let held = (0..names.len()).map(|i| {
             let values = longest.map(|record| record.inputs[i].values.clone());
             let value = median(values.unwrap_or_default());
-            let range = played.iter().find(|(own, ..)| *own == i);
+            let range = applied.iter().find(|(own, ..)| *own == i);
             range.map_or(value, |(_, range, _)| value.clamp(range.low, range.high))
         });
         Ok(Self {
             held: held.collect(),
-            played,
+            applied,
             duration,
             interval,
             samples,

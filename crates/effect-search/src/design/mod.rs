@@ -1,14 +1,14 @@
 //! The next experiment: the one that tells two effects apart which the records leave undecided.
 //!
-//! Each of the two is fitted to the records. Sequences within the user's limits are then played on either fit, at one input or at several
-//! at once, and it is computed how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the
+//! Each of the two is fitted to the records. Either is then simulated with sequences within the user's limits, at one input or at several at
+//! once, and it is computed how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the
 //! other one is fitted to what the first gives on the existing records and in the experiment, both free of noise, and its misfit to the
 //! existing records alone is taken off.
 //!
-//! An experiment begins where the first record did, on a clock of its own, and without a controller: the inputs are what is played.
+//! An experiment begins where the first record did, on a clock of its own, and without a controller: the inputs are what is applied.
 
+mod comparison;
 mod limits;
-mod play;
 mod power;
 mod result;
 mod separation;
@@ -18,10 +18,11 @@ use ct_model::effects::Role;
 use estimation::Noise;
 use rayon::prelude::*;
 
+use comparison::Comparison;
 pub use limits::{Limits, Refused};
 pub use power::{PLENTY, Power, Prospect, by_use, power, prospect, times_as_long};
 pub use result::{
-    Design, Experiment, InputRange, InputSequence, PlayedInput, Reach, Rival, Sequences,
+    Alternative, Design, Experiment, InputRange, InputSequence, InputSequenceKind, Reach, Sequences,
 };
 pub use separation::{information, least};
 pub use sequences::{Kind, Room, Sequence, sequences};
@@ -32,7 +33,6 @@ use crate::diagnose::Progress;
 use crate::node::{Context, FINE, Node};
 use crate::problem::{Limit, Options, Phase, Problem};
 use limits::Bounds;
-use play::Stage;
 
 /// The slowest time constant that sequences are made for, over the length of an experiment: what such a process is like nobody knows ahead.
 const SLOWEST: f64 = 0.1;
@@ -43,7 +43,7 @@ const MOST_REFITS: usize = 16;
 const MOST_TIMES: f64 = 20.0;
 
 /// What the inputs do that move, and a value of every input for each sample of an experiment.
-type Sequenced = (Vec<PlayedInput>, Vec<Vec<f64>>);
+type Sequenced = (Vec<InputSequenceKind>, Vec<Vec<f64>>);
 /// An experiment, and a value of every input for each of its samples.
 type Tried = (Experiment, Vec<Vec<f64>>);
 
@@ -78,7 +78,7 @@ pub fn design(
     let (context, base) = begin(problem, options, limit)?;
     tell("fitting both effects");
     context.limit.begin(Phase::White);
-    let (base, nodes, noise) = context.rivals(&base, between)?;
+    let (base, nodes, noise) = context.alternatives(&base, between)?;
     if context.limit.passed() {
         return Err(Refused::OutOfTime.into());
     }
@@ -86,14 +86,16 @@ pub fn design(
     let bounds = Bounds::new(problem, limits, parameters.max().unwrap_or(0))?;
     let better = usize::from(nodes[1].fit.bic() < nodes[0].fit.bic());
     let scales = nodes[better].fit.scales();
-    let stage = Stage::new(&context, &nodes, &noise, scales)?;
+    let comparison = Comparison::new(&context, &nodes, &noise, scales)?;
     tell("trying experiments");
     context.limit.begin(Phase::Coloured);
     let all = candidates(problem, &bounds, limits.seed)?;
     let mut tried: Vec<Tried> = all
         .into_par_iter()
         .filter(|_| !context.limit.leaves_out("some of the experiments"))
-        .filter_map(|(played, inputs)| Some((stage.tried(played, &inputs, &bounds)?, inputs)))
+        .filter_map(|(applied, inputs)| {
+            Some((comparison.tried(applied, &inputs, &bounds)?, inputs))
+        })
         .collect();
     sort(&mut tried);
     tell("confirming by refits");
@@ -109,7 +111,7 @@ pub fn design(
         let mut wanted: Vec<&mut Tried> = wanted.take(ROUND).collect();
         done += wanted.len();
         wanted.par_iter_mut().for_each(|(experiment, inputs)| {
-            experiment.power = stage
+            experiment.power = comparison
                 .confirmed(inputs, &bounds)
                 .unwrap_or(power([0.0; 2], [0.0; 2]));
             experiment.refitted = true;
@@ -121,7 +123,7 @@ pub fn design(
     let Some((best, inputs)) = tried.first().cloned() else {
         return Err(Refused::OutOfTime.into());
     };
-    let ahead = stage.ahead();
+    let ahead = comparison.ahead();
     let times_as_long = times_as_long(&best.power, ahead)
         .filter(|times| *times <= MOST_TIMES)
         .map(|times| times.ceil() as usize);
@@ -135,14 +137,16 @@ pub fn design(
             Prospect::Decides if !best.refitted => Prospect::May,
             prospect => prospect,
         },
-        between: nodes.each_ref().map(|node| rival(&context, &base, node)),
+        between: nodes
+            .each_ref()
+            .map(|node| alternative(&context, &base, node)),
         ranges: bounds
-            .played
+            .applied
             .iter()
             .map(|(_, range, _)| range.clone())
             .collect(),
         duration: bounds.duration,
-        again: stage.again(&bounds),
+        again: comparison.again(&bounds),
         times_as_long,
         experiment: Sequences {
             time: bounds.time(),
@@ -162,7 +166,7 @@ pub fn design(
             .into_iter()
             .map(|(experiment, _)| experiment)
             .collect(),
-        noise: names().zip(stage.scales().iter().copied()).collect(),
+        noise: names().zip(comparison.scales().iter().copied()).collect(),
         left_out: context.limit.left_out(),
         seconds: context.limit.seconds(),
     })
@@ -170,7 +174,11 @@ pub fn design(
 
 impl Context<'_> {
     /// The believed model and both effects beside it, in the metric of the noise that the better of them leaves.
-    fn rivals(&self, base: &Node, between: [&str; 2]) -> Result<(Node, [Node; 2], Noise), Error> {
+    fn alternatives(
+        &self,
+        base: &Node,
+        between: [&str; 2],
+    ) -> Result<(Node, [Node; 2], Noise), Error> {
         let white = Noise::white(self.problem.spec.outputs.len());
         let fitted = |id: &str| -> Result<Node, Error> {
             let known = self.candidates.iter().position(|c| c.id == *id);
@@ -201,7 +209,7 @@ impl Bounds {
     }
 }
 
-fn rival(context: &Context, base: &Node, node: &Node) -> Rival {
+fn alternative(context: &Context, base: &Node, node: &Node) -> Alternative {
     let last = node.added[node.added.len() - 1];
     let candidate = &context.candidates[last];
     let own = candidate
@@ -209,7 +217,7 @@ fn rival(context: &Context, base: &Node, node: &Node) -> Rival {
         .iter()
         .filter(|p| p.role != Role::Choice);
     let outputs = &context.problem.records[0].outputs;
-    Rival {
+    Alternative {
         effect: candidate.id.clone(),
         sizes: own
             .filter_map(|p| Some((p.short.clone(), node.value(&p.name)?)))
@@ -223,14 +231,14 @@ fn rival(context: &Context, base: &Node, node: &Node) -> Rival {
     }
 }
 
-/// Every sequence at every input that is played, the others held; then sequences of all of them at once.
+/// Every sequence at every input that is applied, the others held; then sequences of all of them at once.
 fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Sequenced>, Error> {
     let held: Vec<Vec<f64>> = bounds
         .held
         .iter()
         .map(|value| vec![*value; bounds.samples])
         .collect();
-    let played = |input: usize, sequence: &Sequence| PlayedInput {
+    let applied = |input: usize, sequence: &Sequence| InputSequenceKind {
         input: problem.spec.inputs[input].about.name.clone(),
         kind: sequence.kind,
         low: sequence.low,
@@ -239,20 +247,20 @@ fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Seque
         levels: sequence.levels,
     };
     let mut of_each = Vec::new();
-    for (n, (_, _, room)) in bounds.played.iter().enumerate() {
+    for (n, (_, _, room)) in bounds.applied.iter().enumerate() {
         // Inputs that move at once move independently.
         let seed = seed.wrapping_add(n as u64);
         of_each.push(sequences(room, SLOWEST * bounds.duration, seed)?);
     }
     let mut all = Vec::new();
-    for ((input, ..), sequences) in bounds.played.iter().zip(&of_each) {
+    for ((input, ..), sequences) in bounds.applied.iter().zip(&of_each) {
         for sequence in sequences {
             let mut inputs = held.clone();
             inputs[*input].clone_from(&sequence.values);
-            all.push((vec![played(*input, sequence)], inputs));
+            all.push((vec![applied(*input, sequence)], inputs));
         }
     }
-    if bounds.played.len() > 1 {
+    if bounds.applied.len() > 1 {
         let drawn = |sequence: &&Sequence| matches!(sequence.kind, Kind::Binary | Kind::MultiLevel);
         let drawn: Vec<Vec<&Sequence>> = of_each
             .iter()
@@ -262,9 +270,9 @@ fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Seque
         for k in 0..fewest {
             let mut inputs = held.clone();
             let mut each = Vec::new();
-            for ((input, ..), own) in bounds.played.iter().zip(&drawn) {
+            for ((input, ..), own) in bounds.applied.iter().zip(&drawn) {
                 inputs[*input].clone_from(&own[k].values);
-                each.push(played(*input, own[k]));
+                each.push(applied(*input, own[k]));
             }
             all.push((each, inputs));
         }

@@ -8,7 +8,7 @@ use super::{Kind, Power, Prospect};
 
 /// One of the two effects that are to be told apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Rival {
+pub struct Alternative {
     /// The effect, with its port.
     pub effect: String,
     /// Its parameters on the records that there are, by the names that they have in the effect.
@@ -38,7 +38,7 @@ pub struct InputRange {
 
 /// What an input does in an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PlayedInput {
+pub struct InputSequenceKind {
     /// Its name in the model.
     pub input: String,
     /// Kind of the sequence.
@@ -68,7 +68,7 @@ pub struct Reach {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiment {
     /// What each input does that moves; the others are held at their median.
-    pub inputs: Vec<PlayedInput>,
+    pub inputs: Vec<InputSequenceKind>,
     /// What it gives.
     pub power: Power,
     /// The power is that of a refit; otherwise that of the models linearised at their fits.
@@ -79,7 +79,7 @@ pub struct Experiment {
     pub excursion: f64,
 }
 
-/// What a person plays to the plant.
+/// What a person applies to the plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sequences {
     /// Instants \[s\].
@@ -107,20 +107,20 @@ pub struct Design {
     /// The model.
     pub model: String,
     /// The two effects.
-    pub between: [Rival; 2],
+    pub between: [Alternative; 2],
     /// By how much the criterion of the second is above that of the first on the records that there are.
     pub bic_ahead: f64,
     /// What the best experiment can be expected to do.
     pub prospect: Prospect,
-    /// What is played, and within which limits.
+    /// What is applied, and within which limits.
     pub ranges: Vec<InputRange>,
     /// Length \[s\].
     pub duration: f64,
     /// Experiments, the best first: of those that have power in plenty the one that stays nearest to what the records visited.
     pub experiments: Vec<Experiment>,
-    /// What the longest record played, once more.
+    /// What the longest record had, once more.
     pub again: Option<Experiment>,
-    /// Played so many times over, the best experiment would decide; `None` where it does already, or would not.
+    /// Applied so many times over, the best experiment would decide; `None` where it does already, or would not.
     pub times_as_long: Option<usize>,
     /// The best experiment.
     pub experiment: Sequences,
@@ -133,7 +133,7 @@ pub struct Design {
 }
 
 impl Design {
-    /// No experiment tells the two apart: none is worth playing.
+    /// No experiment tells the two apart: none is worth making.
     #[must_use]
     pub fn twins(&self) -> bool {
         self.prospect == Prospect::Twins

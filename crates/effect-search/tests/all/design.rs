@@ -81,9 +81,9 @@ fn the_experiment_decides_for_the_truth() {
                 .fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)))
         };
         let (low, high) = range(&own.inputs[0].values);
-        let played = range(&design.experiment.inputs[0].values);
-        assert!(played.0 >= low && played.1 <= high);
-        // What was played once more is worth less than the best.
+        let applied = range(&design.experiment.inputs[0].values);
+        assert!(applied.0 >= low && applied.1 <= high);
+        // What was applied once more is worth less than the best.
         let again = design.again.as_ref().unwrap();
         assert_eq!(again.inputs[0].kind, Kind::Again);
         assert!(again.power.power < best.power.power);

@@ -4,8 +4,8 @@ use super::{
     experiments::{Before, Search, Tried},
     limits::Bounds,
     plan::{Candidate, SecondSensor, Wider},
-    play::Loop,
     second_sensor,
+    simulated::Loop,
 };
 use crate::Error;
 use effect_search::design::{Kind, Power, Prospect, Sequence, power, prospect, times_as_long};
@@ -53,15 +53,15 @@ impl Search<'_, '_> {
         }))
     }
 
-    /// What the longest record played, once more.
+    /// What the longest record had, once more.
     pub fn again(&self, bounds: &Bounds, before: &Before) -> Option<Candidate> {
         let records = self.problem.records.iter();
         let record = records.max_by_key(|record| record.len())?;
-        let played = match (&self.into, record.references.first()) {
+        let applied = match (&self.into, record.references.first()) {
             (Loop::Closed(_), Some(reference)) => reference,
             _ => &record.inputs[0],
         };
-        let (low, high) = played.range();
+        let (low, high) = applied.range();
         let sequence = Sequence {
             kind: Kind::Again,
             clock: bounds.interval,
@@ -70,7 +70,7 @@ impl Search<'_, '_> {
             slew: None,
             low,
             high,
-            values: played.values.clone(),
+            values: applied.values.clone(),
         };
         let tried = self.tried(&sequence, bounds, before)?;
         let tried = (tried, sequence);
@@ -85,7 +85,7 @@ impl Search<'_, '_> {
     ) -> Option<SecondSensor> {
         let plant = self.problem.plant;
         let vessel = second_sensor::place(&self.nodes[0].setup.structure)?;
-        let played = self.played(&best.values, bounds.interval)?;
+        let simulated = self.simulated(&best.values, bounds.interval)?;
         let existing = |truth: usize| {
             let [truth, other] = [&self.nodes[truth], &self.nodes[1 - truth]];
             second_sensor::in_existing(truth, other, self.metric)
@@ -93,7 +93,7 @@ impl Search<'_, '_> {
         let experiment = |truth: usize| {
             let (node, other) = (&self.nodes[truth], &self.nodes[1 - truth]);
             let known = &before.known[1 - truth];
-            second_sensor::in_experiment(&played[truth], node, other, known, self.metric)
+            second_sensor::in_experiment(&simulated[truth], node, other, known, self.metric)
         };
         // Records that were recorded anew have decided nothing yet: what is ahead is what a parameter costs.
         let [a, b] = self.nodes.each_ref().map(|node| node.fit.price);

@@ -13,8 +13,8 @@ use super::{
     INSTEAD, REFITS,
     limits::{Bounds, Refused},
     plan::{Candidate, Reach, SecondSensor, Wider},
-    play::{Loop, Played, play},
-    separation::{Metric, imagined, information, linear, misfit_before, refitted},
+    separation::{Metric, information, linear, misfit_before, noise_free, refitted},
+    simulated::{Loop, SimulatedExperiment, simulate_experiment},
 };
 use crate::{Error, Problem, Progress, diagnose::allow, node::Node};
 
@@ -23,7 +23,7 @@ const ROUND: usize = 6;
 const MOST_REFITS: usize = 30;
 /// So many sequences are tried whatever the time limit.
 const FEWEST: usize = 2;
-/// A sequence that drives a controller to a limit is played so that it crosses its range in so many time constants.
+/// A sequence that drives a controller to a limit is applied so that it crosses its range in so many time constants.
 const SLOWER: [f64; 2] = [1.0, 4.0];
 /// A level below this share of the highest one is none.
 const DRAINED: f64 = 1e-6;
@@ -59,8 +59,8 @@ pub(crate) type Tried = (Candidate, Sequence);
 /// What each node knows from the records, and how far each is from the other's simulation of them.
 pub(crate) struct Before {
     pub known: [Triangle; 2],
-    imagined: [Vec<Record>; 2],
-    /// `misfit[i]`: of the other to what `i` imagines.
+    noise_free: [Vec<Record>; 2],
+    /// `misfit[i]`: of the other to what `i` shows.
     pub misfit: [f64; 2],
     /// Smallest and largest level of each vessel, by either.
     levels: Vec<(f64, f64)>,
@@ -84,10 +84,10 @@ impl Search<'_, '_> {
 
     pub fn before(&self) -> Result<Before, Error> {
         let [a, b] = self.nodes;
-        let imagined = [imagined(a)?, imagined(b)?];
+        let noise_free = [noise_free(a)?, noise_free(b)?];
         let misfit = [
-            misfit_before(&imagined[0], a, b, self.metric)?,
-            misfit_before(&imagined[1], b, a, self.metric)?,
+            misfit_before(&noise_free[0], a, b, self.metric)?,
+            misfit_before(&noise_free[1], b, a, self.metric)?,
         ];
         let levels = [
             a.setup.simulate(&a.fit.x)?.level,
@@ -100,14 +100,14 @@ impl Search<'_, '_> {
         Ok(Before {
             levels: (0..self.problem.plant.vessels()).map(either).collect(),
             known: [information(a, self.metric), information(b, self.metric)],
-            imagined,
+            noise_free,
             misfit,
         })
     }
 
-    pub fn played(&self, values: &[f64], interval: f64) -> Option<[Played; 2]> {
+    pub fn simulated(&self, values: &[f64], interval: f64) -> Option<[SimulatedExperiment; 2]> {
         let on = |i: usize| {
-            play(
+            simulate_experiment(
                 &self.nodes[i],
                 &self.into,
                 values,
@@ -125,16 +125,18 @@ impl Search<'_, '_> {
         bounds: &Bounds,
         before: &Before,
     ) -> Option<Candidate> {
-        let played = self.played(&sequence.values, bounds.interval)?;
+        let simulated = self.simulated(&sequence.values, bounds.interval)?;
         let of = |truth: usize| {
             let stand_in = 1 - truth;
             let (node, known) = (&self.nodes[stand_in], &before.known[stand_in]);
-            linear(&played[truth], node, known, self.metric)
+            linear(&simulated[truth], node, known, self.metric)
         };
         let plant = self.problem.plant;
         let reaches: Vec<Reach> = (0..plant.vessels())
             .map(|vessel| {
-                let either = played.each_ref().map(|played| played.levels[vessel]);
+                let either = simulated
+                    .each_ref()
+                    .map(|simulated| simulated.levels[vessel]);
                 let (low, high) = (either[0].0.min(either[1].0), either[0].1.max(either[1].1));
                 Reach {
                     level: plant.level_name(vessel).to_string(),
@@ -155,7 +157,7 @@ impl Search<'_, '_> {
         let excursions = reaches.iter().zip(&before.levels).map(beyond);
         Some(Candidate {
             excursion: excursions.fold(0.0, f64::max),
-            at_limit: played.iter().any(|played| played.at_limit),
+            at_limit: simulated.iter().any(|simulated| simulated.at_limit),
             kind: sequence.kind,
             low: sequence.low,
             high: sequence.high,
@@ -197,11 +199,11 @@ impl Search<'_, '_> {
         bounds: &Bounds,
         before: &Before,
     ) -> Option<Candidate> {
-        let played = self.played(&sequence.values, bounds.interval)?;
+        let simulated = self.simulated(&sequence.values, bounds.interval)?;
         let of = |truth: usize| {
             refitted(
-                &before.imagined[truth],
-                &played[truth],
+                &before.noise_free[truth],
+                &simulated[truth],
                 (&self.nodes[truth], &self.nodes[1 - truth]),
                 before.misfit[truth],
                 self.metric,

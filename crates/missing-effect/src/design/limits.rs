@@ -19,9 +19,9 @@ fn at_least(value: f64) -> String {
 /// What an experiment may do; what is `None` follows from the records.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
-    /// Smallest and largest value of what is played: the command, or in a loop the reference. Without it what the records visited.
+    /// Smallest and largest value of what is applied: the command, or in a loop the reference. Without it what the records visited.
     pub range: Option<(f64, f64)>,
-    /// Largest change of what is played in a second. Without it there is none.
+    /// Largest change of what is applied in a second. Without it there is none.
     pub slew: Option<f64>,
     /// Length \[s\]. Without it that of the longest record.
     pub duration: Option<f64>,
@@ -103,7 +103,7 @@ pub enum Refused {
         /// What bounds it.
         what: &'static str,
     },
-    /// What is played never moved, and nobody says how far it may.
+    /// What is applied never moved, and nobody says how far it may.
     #[error(
         "the records hold one {what} of {} alone, which says nothing of where it may go; give --range",
         shown(*value)
@@ -184,7 +184,7 @@ pub enum Refused {
 /// The most samples of an experiment: a week at one a second is too many to search among.
 const MOST_SAMPLES: usize = 200_000;
 
-/// The limits as they hold, in seconds and the units of what is played.
+/// The limits as they hold, in seconds and the units of what is applied.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bounds {
     /// Smallest value.
@@ -205,21 +205,21 @@ pub struct Bounds {
     pub samples: usize,
 }
 
-/// What the records visited of what is played.
+/// What the records visited of what is applied.
 fn visited(records: &[Record], looped: bool) -> (f64, f64) {
-    let played = |record: &Record| match (record.references.first(), looped) {
+    let applied = |record: &Record| match (record.references.first(), looped) {
         (Some(reference), true) => reference.range(),
         _ => record.input_range(),
     };
     records
         .iter()
-        .map(played)
+        .map(applied)
         .fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| {
             (a.0.min(b.0), a.1.max(b.1))
         })
 }
 
-/// The limits of what can be played at all, and what sets them.
+/// The limits of what can be applied at all, and what sets them.
 fn possible(problem: &Problem, looped: bool) -> Option<(f64, f64, &'static str)> {
     if looped {
         let height = problem.known.tank_height?;

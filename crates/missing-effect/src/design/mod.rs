@@ -1,15 +1,15 @@
 //! The next experiment: the one that tells two effects apart which the records leave undecided.
 //!
-//! Each of the two is fitted to the records. Sequences within the user's limits are then played on either fit, and it is
+//! Each of the two is fitted to the records. Sequences within the user's limits are then applied to either fit, and it is
 //! reckoned how far the other stays behind what they show (`separation.rs`). The most promising are confirmed by refits.
 
 mod alternatives;
 mod experiments;
 mod limits;
 mod plan;
-mod play;
 mod second_sensor;
 mod separation;
+mod simulated;
 mod words;
 
 #[cfg(test)]
@@ -21,7 +21,7 @@ use plants::{Domain, EffectInfo, Placed};
 
 pub use effect_search::design::{Kind, Power, Prospect};
 pub use limits::{Bounds, Limits, Refused};
-pub use plan::{Candidate, Design, Reach, Rival, SecondSensor, Sequence, Wider};
+pub use plan::{Alternative, Candidate, Design, Reach, SecondSensor, Sequence, Wider};
 
 use crate::{
     Error, Options, Problem, Progress,
@@ -36,8 +36,8 @@ use crate::{
     step,
 };
 use experiments::Search;
-use play::Loop;
 use separation::Metric;
+use simulated::Loop;
 
 /// An effect, and the vessel it is to act in; `None`: of those in which it explains the records well, the one in which it comes
 /// nearest to the other effect.
@@ -67,7 +67,7 @@ pub(crate) const REFITS: f64 = 0.7;
 /// ... and the look at what could be done instead.
 pub(crate) const INSTEAD: f64 = 0.8;
 
-/// Both rivals on the records, and the metric in which they are compared.
+/// Both alternatives on the records, and the metric in which they are compared.
 struct Fitted<'a> {
     nodes: [Node<'a>; 2],
     base: Node<'a>,
@@ -136,13 +136,13 @@ pub fn design(
         progress,
     };
     let found = search.run(&bounds, limits.seed)?;
-    let of_played = match (problem.records[0].references.first(), in_loop) {
+    let of_applied = match (problem.records[0].references.first(), in_loop) {
         (Some(reference), true) => reference,
         _ => &problem.records[0].inputs[0],
     };
     let mut design = Design {
         schema: 1,
-        between: [0, 1].map(|i| rival(&fitted, i)),
+        between: [0, 1].map(|i| alternative(&fitted, i)),
         bic_ahead: search.ahead(),
         prospect: match effect_search::design::prospect(&found.best.power) {
             // A power that no refit has confirmed is a promise.
@@ -158,8 +158,8 @@ pub fn design(
         times_as_long: found.times_as_long,
         second_sensor: found.second_sensor,
         experiment: Sequence {
-            name: of_played.name.clone(),
-            unit: of_played.unit.clone(),
+            name: of_applied.name.clone(),
+            unit: of_applied.unit.clone(),
             time: (0..found.values.len())
                 .map(|k| k as f64 * bounds.interval)
                 .collect(),
@@ -262,12 +262,12 @@ fn no_fit(candidacy: Candidacy) -> Refused {
     }
 }
 
-fn rival(fitted: &Fitted, i: usize) -> Rival {
+fn alternative(fitted: &Fitted, i: usize) -> Alternative {
     let node = &fitted.nodes[i];
     let placed = node.added[0];
     let parameters = step::parameters(&node.setup, &node.fit, &node.fit.std_errors());
     let own = format!("{}.", placed.effect.id);
-    Rival {
+    Alternative {
         effect: placed.effect.id.to_string(),
         place: step::place_name(node, placed),
         size: parameters.into_iter().find(|p| p.name.starts_with(&own)),

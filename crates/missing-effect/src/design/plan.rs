@@ -9,7 +9,7 @@ use crate::{Effort, Parameter, diagnosis::domain_of};
 
 /// One of the two effects that are to be told apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Rival {
+pub struct Alternative {
     /// The effect.
     pub effect: String,
     /// The vessel it acts in, where the plant has more than one: `upper` or `lower`.
@@ -91,10 +91,10 @@ pub struct SecondSensor {
     pub best_with: Power,
 }
 
-/// What a person plays to the plant.
+/// What a person applies to the plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sequence {
-    /// Name of what is played: that of the command, or in a loop that of the reference.
+    /// Name of what is applied: that of the command, or in a loop that of the reference.
     pub name: String,
     /// Its unit.
     pub unit: String,
@@ -110,12 +110,12 @@ pub struct Design {
     /// Version of this layout.
     pub schema: u32,
     /// The two effects.
-    pub between: [Rival; 2],
+    pub between: [Alternative; 2],
     /// By how much the criterion of the second is above that of the first on the records that there are.
     pub bic_ahead: f64,
     /// What the best experiment can be expected to do.
     pub prospect: Prospect,
-    /// The reference of the loop is played, not the command.
+    /// The reference of the loop is applied, not the command.
     pub in_loop: bool,
     /// The limits that hold.
     pub limits: Bounds,
@@ -125,11 +125,11 @@ pub struct Design {
     pub overfull: usize,
     /// Experiments that were left out because they would drive the controller to a limit.
     pub limited: usize,
-    /// What the longest record played, once more.
+    /// What the longest record had, once more.
     pub again: Option<Candidate>,
     /// The best of a wider range, where there is one to be had.
     pub wider: Option<Wider>,
-    /// Played so many times over, the best experiment would decide; `None` where it does already, or would not.
+    /// Repeated so many times, the best experiment would decide; `None` where it does already, or would not.
     pub times_as_long: Option<usize>,
     /// What a second sensor would give, where the plant has another level.
     pub second_sensor: Option<SecondSensor>,
@@ -156,7 +156,7 @@ impl Design {
         domain_of(&self.plant, &self.output_unit)
     }
 
-    /// No experiment tells the two apart: none is worth playing.
+    /// No experiment tells the two apart: none is worth making.
     #[must_use]
     pub fn twins(&self) -> bool {
         self.prospect == Prospect::Twins

@@ -6,8 +6,8 @@ use greybox::{Noise, Setup, Triangle};
 use plants::{Outlet, OutputScales, Structure};
 
 use super::{
-    play::Played,
-    separation::{Metric, imagined, imagined_priors, unlooped, vector},
+    separation::{Metric, noise_free, priors_of_truth, unlooped, vector},
+    simulated::SimulatedExperiment,
 };
 use crate::{Error, node::Node};
 
@@ -99,11 +99,11 @@ fn rows(stand_in: &Node, x: &[f64], records: &[Record], metric: &Metric) -> Opti
 
 /// The separation in records like the existing ones, with that level measured too.
 pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Option<f64> {
-    let records = imagined(truth).ok()?;
+    let records = noise_free(truth).ok()?;
     let records = shown(truth, &records, &unlooped(truth))?;
     let mut rows = rows(stand_in, &unlooped(stand_in), &records, metric)?;
     let last = rows.columns() - 1;
-    for (name, prior) in imagined_priors(truth, stand_in) {
+    for (name, prior) in priors_of_truth(truth, stand_in) {
         let setup = &stand_in.setup;
         let column = |free: &usize| setup.names()[*free] == name;
         // The parameters that are fitted come first, here as there.
@@ -119,17 +119,17 @@ pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Opt
     Some(least(&rows, &Triangle::new(0)) / metric.variance())
 }
 
-/// The separation in an experiment that was played on the truth, with that level measured too.
+/// The separation in an experiment that was simulated with the truth, with that level measured too.
 pub(crate) fn in_experiment(
-    played: &Played,
+    simulated: &SimulatedExperiment,
     truth: &Node,
     stand_in: &Node,
     known: &Triangle,
     metric: &Metric,
 ) -> Option<f64> {
-    let records = std::slice::from_ref(&played.record);
+    let records = std::slice::from_ref(&simulated.record);
     let begun = |node: &Node| -> Result<Vec<f64>, Error> {
-        Ok(vector(node, &node.setup.with_records(records)?, played))
+        Ok(vector(node, &node.setup.with_records(records)?, simulated))
     };
     let records = shown(truth, records, &begun(truth).ok()?)?;
     let rows = rows(stand_in, &begun(stand_in).ok()?, &records, metric)?;

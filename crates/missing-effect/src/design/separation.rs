@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use ct_signals::Record;
 use greybox::{Noise, PriorValue, Setup, Triangle, fit_from, starts_around};
 
-use super::play::Played;
+use super::simulated::SimulatedExperiment;
 use crate::{
     Error,
     node::{FINE, Node},
@@ -80,29 +80,29 @@ pub(crate) fn information(node: &Node, metric: &Metric) -> Triangle {
 }
 
 /// A model's vector for an experiment: its parameters, the levels at which it begins, lags at rest.
-pub(crate) fn vector(node: &Node, setup: &Setup, played: &Played) -> Vec<f64> {
+pub(crate) fn vector(node: &Node, setup: &Setup, simulated: &SimulatedExperiment) -> Vec<f64> {
     let mut x = node.fit.x[..node.setup.parameter_count()].to_vec();
-    x.extend(&played.initial);
+    x.extend(&simulated.initial);
     x.resize(setup.names().len(), 0.0);
     x
 }
 
-/// The linear form: what a model cannot imitate of an experiment that was played on the other.
+/// The linear form: what a model cannot imitate of an experiment that was simulated with the other.
 pub(crate) fn linear(
-    played: &Played,
+    simulated: &SimulatedExperiment,
     stand_in: &Node,
     known: &Triangle,
     metric: &Metric,
 ) -> Option<f64> {
-    let records = std::slice::from_ref(&played.record);
+    let records = std::slice::from_ref(&simulated.record);
     let setup = metric.with_records(&stand_in.setup, records).ok()?;
-    let x = vector(stand_in, &setup, played);
+    let x = vector(stand_in, &setup, simulated);
     let rows = setup.linearise(&x, &metric.noise)?;
     Some(effect_search::design::least(&rows, known) / metric.variance())
 }
 
 /// One model's simulation of the existing records.
-pub(crate) fn imagined(truth: &Node) -> Result<Vec<Record>, Error> {
+pub(crate) fn noise_free(truth: &Node) -> Result<Vec<Record>, Error> {
     let mut series = truth.setup.simulate(&truth.fit.x)?.output.into_iter();
     let mut records = truth.setup.records.to_vec();
     for output in records.iter_mut().flat_map(|record| &mut record.outputs) {
@@ -121,7 +121,7 @@ pub(crate) fn unlooped(node: &Node) -> Vec<f64> {
 }
 
 /// What is known of a model's parameters beside the records, free of noise as the simulation of another model is: that one's values.
-pub(crate) fn imagined_priors(truth: &Node, stand_in: &Node) -> BTreeMap<String, PriorValue> {
+pub(crate) fn priors_of_truth(truth: &Node, stand_in: &Node) -> BTreeMap<String, PriorValue> {
     let mut priors = stand_in.setup.prior_values();
     let names = truth.setup.names()[..truth.setup.parameter_count()].iter();
     for (name, value) in names.zip(&truth.fit.x) {
@@ -141,25 +141,25 @@ pub(crate) fn misfit_before(
 ) -> Result<f64, Error> {
     let setup = metric
         .with_records(&stand_in.setup, existing)?
-        .with_priors(&imagined_priors(truth, stand_in))?;
+        .with_priors(&priors_of_truth(truth, stand_in))?;
     Ok(fit_from(&setup, &[unlooped(stand_in)], &metric.noise, FINE)?.cost)
 }
 
 /// The same with the experiment among the records, in units of the noise and beyond what was there `before`.
 pub(crate) fn refitted(
     existing: &[Record],
-    played: &Played,
+    simulated: &SimulatedExperiment,
     (truth, stand_in): (&Node, &Node),
     before: f64,
     metric: &Metric,
 ) -> Result<f64, Error> {
     let mut records = existing.to_vec();
-    records.push(played.record.clone());
+    records.push(simulated.record.clone());
     let setup = metric
         .with_records(&stand_in.setup, &records)?
-        .with_priors(&imagined_priors(truth, stand_in))?;
+        .with_priors(&priors_of_truth(truth, stand_in))?;
     let mut own = unlooped(stand_in);
-    own.extend(&played.initial);
+    own.extend(&simulated.initial);
     own.resize(setup.names().len(), 0.0);
     let mut starts = starts_around(&setup, &own, STARTS_AROUND, 1);
     starts.push(own);

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 use super::{
     Bounds, Candidacy, Fitted, Limits, Metric, Prospect, Refused, Search, design, fitted,
-    play::{Loop, play},
-    separation::{imagined, information, linear, misfit_before, refitted, unlooped, vector},
+    separation::{information, linear, misfit_before, noise_free, refitted, unlooped, vector},
+    simulated::{Loop, simulate_experiment},
 };
 use crate::{
     Error, Options, Problem, Progress,
@@ -155,7 +155,7 @@ fn a_side_measurement_counts_in_the_refits() {
         let starts: Vec<Vec<f64>> = starts.into_iter().chain([x]).collect();
         fit_from(&setup, &starts, &metric.noise, FINE).unwrap().cost
     };
-    let existing = imagined(a).unwrap();
+    let existing = noise_free(a).unwrap();
     let before = misfit_before(&existing, a, b, metric).unwrap();
     let held = cost(&existing, unlooped(b), true);
     let free = cost(&existing, unlooped(b), false);
@@ -164,12 +164,12 @@ fn a_side_measurement_counts_in_the_refits() {
 
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let values = excitation::steps(300, 30..=60, 3.9, 6.1, &mut rng).unwrap();
-    let played = play(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
-    let confirmed = refitted(&existing, &played, (a, b), before, metric).unwrap();
+    let simulated = simulate_experiment(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
+    let confirmed = refitted(&existing, &simulated, (a, b), before, metric).unwrap();
     let mut both = existing;
-    both.push(played.record.clone());
+    both.push(simulated.record.clone());
     let mut x = unlooped(b);
-    x.extend(&played.initial);
+    x.extend(&simulated.initial);
     let held = cost(&both, x.clone(), true);
     let free = cost(&both, x, false);
     let with = before + confirmed * metric.variance();
@@ -187,11 +187,11 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
     let values = excitation::steps(300, 30..=60, 3.9, 6.1, &mut rng).unwrap();
     for truth in 0..2 {
         let (a, b) = (&fitted.nodes[truth], &fitted.nodes[1 - truth]);
-        let played = play(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
-        let promised = linear(&played, b, &information(b, metric), metric).unwrap();
-        let existing = imagined(a).unwrap();
+        let simulated = simulate_experiment(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
+        let promised = linear(&simulated, b, &information(b, metric), metric).unwrap();
+        let existing = noise_free(a).unwrap();
         let before = misfit_before(&existing, a, b, metric).unwrap();
-        let confirmed = refitted(&existing, &played, (a, b), before, metric).unwrap();
+        let confirmed = refitted(&existing, &simulated, (a, b), before, metric).unwrap();
 
         let cost = |node: &crate::node::Node, records: &[Record]| {
             let setup = node.setup.with_records(records).unwrap();
@@ -201,7 +201,7 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
                 x.push(if record == 0 {
                     unlooped(node)[x.len()]
                 } else {
-                    played.initial[0]
+                    simulated.initial[0]
                 });
             }
             fit_from(&setup, &[x], &metric.noise, FINE).unwrap().cost
@@ -210,7 +210,7 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
             .into_par_iter()
             .map(|seed| {
                 let mut both = existing.clone();
-                both.push(played.record.clone());
+                both.push(simulated.record.clone());
                 let both = noisy(&both, 100 + seed);
                 let ratio = |records: &[Record]| cost(b, records) - cost(a, records);
                 (ratio(&both) - ratio(&both[..1])) / metric.variance()
@@ -248,13 +248,16 @@ fn for_a_small_effect_the_power_is_that_of_the_signatures() {
     let [a, b] = &fitted.nodes;
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let values = excitation::steps(300, 30..=60, 2.0, 8.0, &mut rng).unwrap();
-    let mut played = play(b, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
+    let mut simulated = simulate_experiment(b, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
     // The same beginning for both: it is a part of the base.
-    let records = std::slice::from_ref(&played.record).to_vec();
+    let records = std::slice::from_ref(&simulated.record).to_vec();
     let setup = a.setup.with_records(&records).unwrap();
-    let shown = setup.simulate(&vector(a, &setup, &played)).unwrap().output;
-    played.record.outputs[0].values = shown[0].clone();
-    let found = linear(&played, b, &Triangle::new(0), &fitted.metric).unwrap();
+    let shown = setup
+        .simulate(&vector(a, &setup, &simulated))
+        .unwrap()
+        .output;
+    simulated.record.outputs[0].values = shown[0].clone();
+    let found = linear(&simulated, b, &Triangle::new(0), &fitted.metric).unwrap();
 
     let both = b.setup.structure.with(a.added[0]).unwrap();
     let setup = b.setup.with_records(&records).unwrap();
@@ -264,7 +267,7 @@ fn for_a_small_effect_the_power_is_that_of_the_signatures() {
         match name.as_str() {
             "pump_gain" => *value = base[0],
             "alpha" => *value = base[1],
-            "level(0)" => *value = played.initial[0],
+            "level(0)" => *value = simulated.initial[0],
             _ => {}
         }
     }
@@ -307,8 +310,8 @@ fn exact_twins_have_no_power() {
     let said = found.sentences.join(" ");
     assert!(said.contains("No experiment within these limits"), "{said}");
     // What a person can do instead.
-    for rival in &found.between {
-        assert!(said.contains(&rival.confirm), "{said}");
+    for alternative in &found.between {
+        assert!(said.contains(&alternative.confirm), "{said}");
     }
 }
 
@@ -411,19 +414,19 @@ fn a_tank_that_would_overflow_is_left_out() {
     assert!(found.experiment.values.iter().all(within));
 }
 
-/// What is stopped while sequences are played plays no more of them, and says that it was stopped.
+/// What is stopped while sequences are applied simulates no more of them, and says that it was stopped.
 #[test]
-fn a_design_that_is_stopped_plays_nothing_more() {
+fn a_design_that_is_stopped_simulates_nothing_more() {
     let problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);
     let fitted = leak_or_curve(&problem);
     let stop = AtomicBool::new(true);
     let mut node = fitted.nodes[0].clone();
     node.setup.stop = Some(&stop);
     let values = vec![5.0; 300];
-    let playable = || play(&node, &Loop::Open, &values, INTERVAL, 100.0).is_some();
-    assert!(!playable());
+    let simulated = || simulate_experiment(&node, &Loop::Open, &values, INTERVAL, 100.0).is_some();
+    assert!(!simulated());
     stop.store(false, Ordering::Relaxed);
-    assert!(playable());
+    assert!(simulated());
 
     let pair = between("const_leak", "pump_nonlinearity");
     let options = Options {

@@ -3,7 +3,7 @@
 use effect_search::design::{Kind, Power, Prospect};
 use plants::Domain;
 
-use super::plan::{Candidate, Design, Rival};
+use super::plan::{Alternative, Candidate, Design};
 use crate::{groups::GROUP_MARGIN, numbers::significant, sentences::with_error};
 
 /// Criteria that differ by less are equal, in words.
@@ -14,25 +14,25 @@ fn with_unit(number: &str, unit: &str) -> String {
 }
 
 /// An effect, with the tank where there are two, and its size.
-fn sized(rival: &Rival, domain: Domain) -> String {
-    let size = rival.size.as_ref().map_or(String::new(), |size| {
+fn sized(alternative: &Alternative, domain: Domain) -> String {
+    let size = alternative.size.as_ref().map_or(String::new(), |size| {
         let name = size.name.rsplit('.').next().unwrap_or_default();
         format!(" ({name} = {})", with_error(size))
     });
-    format!("{}{size}", named(rival, domain))
+    format!("{}{size}", named(alternative, domain))
 }
 
 /// An effect, with the tank where there are two.
-pub(super) fn named(rival: &Rival, domain: Domain) -> String {
-    match &rival.place {
+pub(super) fn named(alternative: &Alternative, domain: Domain) -> String {
+    match &alternative.place {
         Some(place) => {
             format!(
                 "{} {}",
-                rival.effect,
-                domain.place_words(&rival.effect, place)
+                alternative.effect,
+                domain.place_words(&alternative.effect, place)
             )
         }
-        None => rival.effect.clone(),
+        None => alternative.effect.clone(),
     }
 }
 
@@ -83,7 +83,7 @@ pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
         format!(", changed by at most {slew} a second")
     });
     let sequence = match (candidate.kind, candidate.levels) {
-        (Kind::Again, _) => format!("what the record played, {range}"),
+        (Kind::Again, _) => format!("what the record had, {range}"),
         (Kind::Step, _) => format!("steps {range}, one every {clock}"),
         (Kind::Staircase, Some(levels)) => {
             format!("a staircase of {levels} levels {range}, up and down, each held for {clock}")
@@ -129,21 +129,27 @@ fn so_far(design: &Design) -> Vec<String> {
             sized(second, domain)
         )
     });
-    for rival in [a, b] {
-        if rival.bic_gain < GROUP_MARGIN {
-            let called = if rival.bic_gain < 0.0 {
-                format!("the criterion is higher with it, by {:.0}", -rival.bic_gain)
+    for alternative in [a, b] {
+        if alternative.bic_gain < GROUP_MARGIN {
+            let called = if alternative.bic_gain < 0.0 {
+                format!(
+                    "the criterion is higher with it, by {:.0}",
+                    -alternative.bic_gain
+                )
             } else {
-                format!("it lowers the criterion by {:.0} alone", rival.bic_gain)
+                format!(
+                    "it lowers the criterion by {:.0} alone",
+                    alternative.bic_gain
+                )
             };
-            let edge = if rival.at_the_edge {
+            let edge = if alternative.at_the_edge {
                 ", and its size ends where its plausible range does"
             } else {
                 ""
             };
             said.push(format!(
                 "They do not call for {}: {called}{edge}. What is hardly there is hardly told from anything.",
-                named(rival, domain)
+                named(alternative, domain)
             ));
         }
     }
@@ -159,7 +165,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     let Some(best) = design.candidates.first() else {
         return said;
     };
-    let played = if design.in_loop {
+    let applied = if design.in_loop {
         "reference"
     } else {
         "command"
@@ -180,7 +186,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     } else {
         let first = design.experiment.values.first().copied();
         said.push(format!(
-            "The next experiment: {}, {} samples of {} s. Let the plant settle at a {played} of {} first.",
+            "The next experiment: {}, {} samples of {} s. Let the plant settle at a {applied} of {} first.",
             described(best, unit),
             design.experiment.values.len(),
             significant(design.limits.interval, 3),
@@ -206,13 +212,13 @@ pub(super) fn of(design: &Design) -> Vec<String> {
             reservation(best),
             match design.prospect {
                 _ if design.bic_ahead.abs() > GROUP_MARGIN => "it is not needed to tell them apart",
-                Prospect::Decides => "play it",
-                Prospect::May => "it is worth playing, and may leave the question open",
+                Prospect::Decides => "apply it",
+                Prospect::May => "it is worth applying, and may leave the question open",
                 _ => "it will hardly do",
             }
         ));
         if let Some(times) = design.times_as_long {
-            said.push(format!("Played {times} times over it would decide."));
+            said.push(format!("Repeated {times} times it would decide."));
         }
     }
     if design.overfull > 0 {
@@ -259,7 +265,9 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     }
     if design.prospect != Prospect::Decides && domain == Domain::Hydraulic {
         said.push("Without an experiment, at the plant:".to_string());
-        said.extend([a, b].map(|rival| format!("{}: {}", rival.effect, rival.confirm)));
+        said.extend(
+            [a, b].map(|alternative| format!("{}: {}", alternative.effect, alternative.confirm)),
+        );
     }
     said
 }

@@ -1,4 +1,4 @@
-//! Two fitted effects on which experiments are played.
+//! Two fitted effects, and what either would show in an experiment.
 
 use std::collections::BTreeMap;
 
@@ -8,12 +8,12 @@ use greybox::{ModelSetup, PriorValue};
 
 use super::limits::Bounds;
 use super::separation::{information, least};
-use super::{Experiment, Kind, PlayedInput, Power, Reach, Refused, power};
+use super::{Experiment, InputSequenceKind, Kind, Power, Reach, Refused, power};
 use crate::Error;
 use crate::node::{Context, FINE, Node};
 
 /// Both effects, and what the records say of each.
-pub(super) struct Stage<'s, 'a> {
+pub(super) struct Comparison<'s, 'a> {
     context: &'s Context<'a>,
     nodes: &'s [Node; 2],
     noise: &'s Noise,
@@ -22,8 +22,8 @@ pub(super) struct Stage<'s, 'a> {
     /// What each knows of its parameters.
     known: [Triangle; 2],
     /// The existing records as each has them, free of noise.
-    imagined: [Vec<Record>; 2],
-    /// `before[i]`: misfit of the other to what `i` imagines.
+    simulated: [Vec<Record>; 2],
+    /// `before[i]`: misfit of the other to what `i` shows.
     before: [f64; 2],
     /// What each output visited.
     visited: Vec<(f64, f64)>,
@@ -41,7 +41,7 @@ fn joined(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-impl<'s, 'a> Stage<'s, 'a> {
+impl<'s, 'a> Comparison<'s, 'a> {
     pub fn new(
         context: &'s Context<'a>,
         nodes: &'s [Node; 2],
@@ -61,8 +61,8 @@ impl<'s, 'a> Stage<'s, 'a> {
             let known = information(&rows, setup.free(), setup.parameter_count());
             let series = setup.simulate(&node.fit.x).ok_or_else(|| no_fit(i))?;
             let mut series = series.into_iter();
-            let mut imagined = records.clone();
-            for output in imagined.iter_mut().flat_map(|record| &mut record.outputs) {
+            let mut simulated = records.clone();
+            for output in simulated.iter_mut().flat_map(|record| &mut record.outputs) {
                 let model = series.next().unwrap_or_default();
                 for (value, model) in output.values.iter_mut().zip(model) {
                     // What was not measured was not.
@@ -71,7 +71,7 @@ impl<'s, 'a> Stage<'s, 'a> {
                     }
                 }
             }
-            Ok((known, imagined))
+            Ok((known, simulated))
         };
         let ((first, by_first), (second, by_second)) = (of(0)?, of(1)?);
         let outputs = 0..records[0].outputs.len();
@@ -81,20 +81,22 @@ impl<'s, 'a> Stage<'s, 'a> {
                 .map(|record| range(&record.outputs[o].values));
             ranges.fold((f64::INFINITY, f64::NEG_INFINITY), joined)
         });
-        let mut stage = Self {
+        let mut comparison = Self {
             context,
             nodes,
             noise,
             scales,
             known: [first, second],
             visited: visited.collect(),
-            imagined: [by_first, by_second],
+            simulated: [by_first, by_second],
             before: [0.0; 2],
         };
         for truth in 0..2 {
-            stage.before[truth] = stage.misfit(truth, None).ok_or_else(|| no_fit(1 - truth))?;
+            comparison.before[truth] = comparison
+                .misfit(truth, None)
+                .ok_or_else(|| no_fit(1 - truth))?;
         }
-        Ok(stage)
+        Ok(comparison)
     }
 
     pub fn scales(&self) -> &[f64] {
@@ -135,7 +137,12 @@ impl<'s, 'a> Stage<'s, 'a> {
     }
 
     /// What an experiment would show, were one of them true.
-    fn played(&self, truth: usize, inputs: &[Vec<f64>], bounds: &Bounds) -> Option<Record> {
+    fn simulated_record(
+        &self,
+        truth: usize,
+        inputs: &[Vec<f64>],
+        bounds: &Bounds,
+    ) -> Option<Record> {
         let of = &self.context.problem.records[0];
         let zeros = vec![0.0; bounds.samples];
         let mut record = Record {
@@ -170,13 +177,13 @@ impl<'s, 'a> Stage<'s, 'a> {
     /// An experiment, linearised.
     pub fn tried(
         &self,
-        played: Vec<PlayedInput>,
+        applied: Vec<InputSequenceKind>,
         inputs: &[Vec<f64>],
         bounds: &Bounds,
     ) -> Option<Experiment> {
         let shown = [
-            self.played(0, inputs, bounds)?,
-            self.played(1, inputs, bounds)?,
+            self.simulated_record(0, inputs, bounds)?,
+            self.simulated_record(1, inputs, bounds)?,
         ];
         let apart = |truth: usize| {
             let stand_in = 1 - truth;
@@ -206,7 +213,7 @@ impl<'s, 'a> Stage<'s, 'a> {
             });
         Some(Experiment {
             excursion: beyond.fold(0.0, f64::max),
-            inputs: played,
+            inputs: applied,
             power,
             refitted: false,
             reaches,
@@ -216,7 +223,7 @@ impl<'s, 'a> Stage<'s, 'a> {
     /// Misfit of the other model to what one of them gives of the existing records, and of an experiment, refitted.
     fn misfit(&self, truth: usize, experiment: Option<Record>) -> Option<f64> {
         let stand_in = 1 - truth;
-        let mut records = self.imagined[truth].clone();
+        let mut records = self.simulated[truth].clone();
         let mut x = self.nodes[stand_in].fit.x.clone();
         if let Some(experiment) = experiment {
             records.push(experiment);
@@ -231,21 +238,21 @@ impl<'s, 'a> Stage<'s, 'a> {
     /// The power of an experiment by refits.
     pub fn confirmed(&self, inputs: &[Vec<f64>], bounds: &Bounds) -> Option<Power> {
         let apart = |truth: usize| {
-            let shown = self.played(truth, inputs, bounds)?;
+            let shown = self.simulated_record(truth, inputs, bounds)?;
             let misfit = self.misfit(truth, Some(shown))?;
             Some(((misfit - self.before[truth]) / self.scales[0].powi(2)).max(0.0))
         };
         Some(power([apart(0)?, apart(1)?], self.ahead()))
     }
 
-    /// What the longest record played, once more.
+    /// What the longest record had, once more.
     pub fn again(&self, bounds: &Bounds) -> Option<Experiment> {
         let records = &self.context.problem.records;
         let longest = records
             .iter()
             .max_by(|a, b| a.duration().total_cmp(&b.duration()))?;
         let own = Bounds {
-            played: bounds.played.clone(),
+            applied: bounds.applied.clone(),
             held: bounds.held.clone(),
             duration: longest.duration(),
             interval: bounds.interval,
@@ -256,9 +263,9 @@ impl<'s, 'a> Stage<'s, 'a> {
             .iter()
             .map(|input| input.values.clone())
             .collect();
-        let played = longest.inputs.iter().map(|input| {
+        let applied = longest.inputs.iter().map(|input| {
             let (low, high) = input.range();
-            PlayedInput {
+            InputSequenceKind {
                 input: input.name.clone(),
                 kind: Kind::Again,
                 low,
@@ -267,7 +274,7 @@ impl<'s, 'a> Stage<'s, 'a> {
                 levels: None,
             }
         });
-        let mut experiment = self.tried(played.collect(), &inputs, &own)?;
+        let mut experiment = self.tried(applied.collect(), &inputs, &own)?;
         experiment.power = self.confirmed(&inputs, &own)?;
         experiment.refitted = true;
         Some(experiment)

@@ -1,11 +1,11 @@
-//! An experiment played on a fitted model: without noise, from rest, in the loop where there is one.
+//! An experiment simulated with a fitted model: without noise, from rest, in the loop where there is one.
 
 use ct_signals::{Hold, Record};
 use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller};
 
 use crate::node::Node;
 
-/// What the experiment is played into.
+/// What the experiment is applied into.
 #[derive(Debug, Clone)]
 pub(crate) enum Loop<'a> {
     /// The command itself.
@@ -16,7 +16,7 @@ pub(crate) enum Loop<'a> {
 
 /// What came out.
 #[derive(Debug, Clone)]
-pub(crate) struct Played {
+pub(crate) struct SimulatedExperiment {
     /// The record that the experiment would give, free of noise.
     pub record: Record,
     /// Levels when it began.
@@ -105,14 +105,14 @@ fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64)
     }
 }
 
-/// Plays a sequence; `None` where the simulation does not stay finite, or nobody waits any more.
-pub(crate) fn play(
+/// Simulates a sequence; `None` where the simulation does not stay finite, or nobody waits any more.
+pub(crate) fn simulate_experiment(
     node: &Node,
     into: &Loop,
     values: &[f64],
     interval: f64,
     time_constant: f64,
-) -> Option<Played> {
+) -> Option<SimulatedExperiment> {
     let setup = &node.setup;
     if setup.stopped() {
         return None;
@@ -155,7 +155,7 @@ pub(crate) fn play(
     if !(finite(&input) && outputs.iter().all(|output| finite(output)) && finite(&initial)) {
         return None;
     }
-    Some(Played {
+    Some(SimulatedExperiment {
         record: Record {
             name: "the experiment".to_string(),
             time: (0..values.len()).map(|k| k as f64 * interval).collect(),

@@ -25,6 +25,8 @@ const MOST_STARTS: usize = 24;
 pub(crate) const DAMPING: f64 = 1e-9;
 /// From so many of the best starts of a threshold or a shape a candidate is fitted.
 const PLACES: usize = 2;
+/// Parts of the predicted step from which a fit may begin, as shares of it.
+const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 /// So many of the best starts of a threshold are linearised by all parameters.
 const LINEARISED: usize = 3;
 
@@ -199,11 +201,21 @@ impl Context<'_> {
         let count = self.samples();
         let set = self.setup(&node.model)?;
         let columns = self.columns_beside(node, &set, &setup);
+        // Where an effect is absent its shapes change nothing: their columns hold rounding errors, and nothing is to follow from these.
+        let silent: Vec<usize> = candidate
+            .parameters
+            .iter()
+            .zip(&places)
+            .filter(|(own, _)| smooth && own.role == Role::Shape)
+            .filter_map(|(_, place)| *place)
+            .collect();
         let place = |x: Vec<f64>, triangle: Triangle| {
-            let free: Vec<usize> = (0..setup.free().len()).collect();
-            let scale: Vec<f64> = free
-                .iter()
-                .map(|&j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
+            let all = 0..setup.free().len();
+            let free: Vec<usize> = all
+                .filter(|&j| !silent.contains(&setup.free()[j]))
+                .collect();
+            let scale: Vec<f64> = (0..setup.free().len())
+                .map(|j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
                 .collect();
             let step = triangle.solve(&free, &scale, DAMPING);
             let predicted = triangle.predicted(&step);
@@ -281,7 +293,7 @@ impl Context<'_> {
             return Ok(None);
         };
         let fall = count * (node.fit.cost / best.max(f64::MIN_POSITIVE)).ln();
-        // Of a place and one step from there the better one begins the fit: a simulation without derivatives tells.
+        // A simulation without derivatives tells which of the starts is better.
         let kept = if smooth && scored.len() == 1 {
             1
         } else {
@@ -296,12 +308,16 @@ impl Context<'_> {
             .into_iter()
             .take(kept)
             .map(|place| {
-                let there = cost(&place.stepped);
-                if there <= place.cost {
-                    (there, place.stepped)
-                } else {
-                    (place.cost, place.x)
-                }
+                let to = |share: f64| -> Vec<f64> {
+                    let both = place.x.iter().zip(&place.stepped);
+                    both.map(|(x, stepped)| x + share * (stepped - x)).collect()
+                };
+                // Where the whole step goes too far the fit begins with a part of it: where it is absent an effect has no shape.
+                let parts = SHARES.iter().map(|&share| to(share));
+                parts
+                    .map(|x| (cost(&x), x))
+                    .find(|(there, _)| *there <= place.cost)
+                    .unwrap_or((place.cost, place.x))
             })
             .collect();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));

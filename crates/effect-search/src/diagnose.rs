@@ -81,10 +81,6 @@ pub fn diagnose(
     tell("confirming");
     context.limit.begin(Phase::Confirm);
     let mut confirmed = context.confirm(grown.best.clone(), &grown.base, &noise)?;
-    let exchanged = context.exchanged(confirmed.clone(), &grown, &noise, options.max_effects);
-    if exchanged.gain_over(&confirmed) > 0.0 {
-        confirmed = context.confirm(exchanged, &grown.base, &noise)?;
-    }
     if grown.cut_short && confirmed.added.len() == grown.base.added.len() {
         // The noise model of a search that was cut short explains what was not reached: the test below decides without it.
         confirmed = grown.best.clone();
@@ -250,16 +246,6 @@ fn in_metric(
         grown.best = other;
     }
     let (own, _) = context.noise_of(&grown.best)?;
-    if own.order() == 0 && !context.limit.passed() {
-        // Beside what was found the noise is white: then sets are compared by their simulation error.
-        let white = Noise::white(noise.outputs());
-        let other = context.refitted(&grown.best, &white, FINE)?;
-        let mut by_error = by_error;
-        if other.fit.bic() < by_error.best.fit.bic() {
-            by_error.best = other;
-        }
-        return Ok((by_error, white));
-    }
     if own.order() > 0 && own.difference(&noise) > SAME_NOISE && !context.limit.passed() {
         let base = context.refitted(&grown.base, &own, FINE);
         let best = context.refitted(&grown.best, &own, FINE);

@@ -12,7 +12,6 @@ mod believed;
 pub mod design;
 mod diagnose;
 mod error;
-mod exchange;
 mod factor_score;
 mod groups;
 mod held_out;

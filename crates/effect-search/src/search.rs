@@ -49,19 +49,10 @@ pub(crate) struct Grown {
     among: Vec<usize>,
     /// Sets that may grow, best first.
     beam: Vec<Node>,
-    /// Pairs by their joint scores: they join the beam when the single effects have grown, which they would push out of it.
-    pairs: Vec<Node>,
     /// All sets that were fitted.
     pub fitted: Vec<Node>,
     /// The time ended the search.
     pub cut_short: bool,
-}
-
-impl Grown {
-    /// Candidates that are scored beside sets of several.
-    pub fn among(&self) -> &[usize] {
-        &self.among
-    }
 }
 
 impl Context<'_> {
@@ -143,14 +134,15 @@ impl Context<'_> {
         if max_effects > 0 {
             beam.extend(singles.iter().take(BEAM).cloned());
         }
-        let mut pairs: Vec<Node> = Vec::new();
+        let few = beam.len();
         if max_effects > 1 && !self.limit.passed() {
-            let best = joint_scores(self, &base, &trials, noise, PAIRS);
-            let fits = best
+            let pairs = joint_scores(self, &base, &trials, noise, PAIRS);
+            let fits: Vec<Node> = pairs
                 .par_iter()
                 .filter(|_| !self.limit.passed())
-                .filter_map(|&(a, b)| self.pair(&base, (a, b), &trials, noise).ok().flatten());
-            pairs = fits.collect();
+                .filter_map(|&(a, b)| self.pair(&base, (a, b), &trials, noise).ok().flatten())
+                .collect();
+            beam.extend(fits);
         }
         let many = (trials.len() / 2).max(ALWAYS).min(trials.len());
         let mut among: Vec<usize> = trials[..many].iter().map(|t| t.candidate).collect();
@@ -168,10 +160,9 @@ impl Context<'_> {
             among,
             cut_short: self.limit.leaves_out(LARGER),
             base,
-            fitted: singles.iter().chain(&pairs).cloned().collect(),
+            fitted: singles.iter().chain(&beam[few..]).cloned().collect(),
             singles,
             beam,
-            pairs,
         };
         self.grow_on(grown, noise, max_effects)
     }
@@ -184,16 +175,12 @@ impl Context<'_> {
             mut best,
             among,
             mut beam,
-            mut pairs,
             mut fitted,
             mut cut_short,
         } = grown;
         let first_size = base.added.len() + 1;
         let mut size = first_size.max(best.added.len());
         loop {
-            if size > first_size || self.limit.passed() {
-                beam.append(&mut pairs);
-            }
             beam = best_first(beam);
             beam.truncate(BEAM);
             let Some(first) = beam.first() else { break };
@@ -231,7 +218,7 @@ impl Context<'_> {
                     .collect();
                 for child in self.refits(parent, &promising, noise) {
                     let same = |known: &Node| same_set(known, &child);
-                    if !beam.iter().chain(&pairs).any(same) {
+                    if !beam.iter().any(same) {
                         fitted.push(child.clone());
                         beam.push(child);
                     }
@@ -245,14 +232,13 @@ impl Context<'_> {
             best,
             among,
             beam,
-            pairs,
             fitted,
             cut_short,
         })
     }
 
     /// Whether a candidate might lower the criterion.
-    pub fn may_lower_the_criterion(&self, trial: &Trial) -> bool {
+    fn may_lower_the_criterion(&self, trial: &Trial) -> bool {
         let fitted = self.candidates[trial.candidate].fitted().max(1) as f64;
         FALL_FACTOR * trial.fall + FALL_MARGIN > fitted * self.samples().ln()
     }

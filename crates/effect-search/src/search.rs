@@ -17,7 +17,7 @@ use crate::score::Trial;
 const REFITS: usize = 8;
 const FIRST_REFITS: usize = 28;
 /// So many single effects, the best, are fitted from starts of their own too, ...
-const OWN_STARTS: usize = 8;
+const OWN_STARTS: usize = 16;
 /// ... and from so many each.
 const STARTS: usize = 4;
 /// So many pairs are fitted.

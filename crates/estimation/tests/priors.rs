@@ -228,3 +228,34 @@ fn intervals_hold_the_truth() {
         assert!(shorter / (RUNS as f64) < 0.98);
     }
 }
+
+/// A model that lacks something may end far from a prior: what is fitted on from there begins there, and not near the prior.
+#[test]
+fn a_fit_goes_on_where_another_ended_far_from_a_prior() {
+    let mut curves = drawn(5, 1, 0.0, 1.0);
+    let prior = Prior {
+        entry: 1,
+        value: 5.0,
+        std_error: 0.5,
+    };
+    curves.priors = vec![prior];
+    let white = white(&curves);
+    let ended = fit_from(&curves, vec![Start::from(TRUTH.to_vec())], &white, STOPPING).unwrap();
+    assert!((ended.x[1] - 5.0).abs() > 10.0 * 0.5, "{:?}", ended.x);
+    let stopping = Stopping {
+        evaluations: 1,
+        ..STOPPING
+    };
+    let again = fit_from(
+        &curves,
+        vec![Start::from(ended.x.clone())],
+        &white,
+        stopping,
+    );
+    assert_eq!(again.unwrap().x, ended.x);
+    // A start that is worse than one near the prior begins near it.
+    let mut far = ended.x.clone();
+    far[1] = -40.0;
+    let near = fit_from(&curves, vec![Start::from(far)], &white, stopping).unwrap();
+    assert!((near.x[1] - 5.0).abs() < 5.001 * 0.5, "{:?}", near.x);
+}

@@ -112,3 +112,43 @@ fn prediction(
     triangle.finish();
     (triangle.at(columns, columns).powi(2), samples, columns)
 }
+
+#[cfg(test)]
+mod tests {
+    use ct_signals::{Channel, noise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// Noise of one colour in two outputs, the second of which is read at every fifth row: they weigh as their deviations say.
+    #[test]
+    fn coloured_noise_of_a_slow_output_weighs_as_its_deviation() {
+        const ROWS: usize = 4000;
+        const DEVIATIONS: [f64; 2] = [0.016, 0.0256];
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut outputs = DEVIATIONS.map(|sigma| noise::ar1(ROWS, sigma, 0.85, &mut rng));
+        for (k, value) in outputs[1].iter_mut().enumerate() {
+            if k % 5 != 0 {
+                *value = f64::NAN;
+            }
+        }
+        let [first, second] = outputs;
+        let record = Record {
+            name: "record".into(),
+            time: (0..ROWS).map(|k| k as f64).collect(),
+            inputs: vec![Channel::new("u", "V", noise::white(ROWS, 1.0, &mut rng))],
+            outputs: vec![
+                Channel::new("y", "g/L", first),
+                Channel::new("z", "g/L", second),
+            ],
+            references: Vec::new(),
+            calendar: None,
+        };
+        let zeros = vec![vec![0.0; ROWS]; 2];
+        let found = output_noise(&[record], &zeros);
+        let ratio = found[1].zip(found[0]).map_or(f64::NAN, |(z, y)| z / y);
+        let expected = DEVIATIONS[1] / DEVIATIONS[0];
+        assert!((ratio / expected - 1.0).abs() < 0.15, "{ratio}");
+    }
+}

@@ -315,3 +315,28 @@ fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
     assert_eq!(found.record_numbers["lag(y)"]["duration"], 900.0);
     assert!((tau(&found) - 25.0).abs() < 1.0, "{}", tau(&found));
 }
+
+/// A step is found at its time, which lies between the times at which it is looked for first, beside an effect of another output.
+#[test]
+fn a_step_is_found_at_its_time_beside_another_effect() {
+    const SINCE: f64 = 1587.0;
+    let text = PAIR
+        .replace(
+            "k1*(T1 - 20)",
+            "k1*(1 + (if time >= 1587 then 0.2 else 0))*(T1 - 20)",
+        )
+        .replace("k2*(T2 - 20)", "k2*(T2 - 20) - 4");
+    let diagnosis = found(&problem(PAIR, record(&text, 0.0, 0.2, 11)));
+    assert!(names(&diagnosis, "step(k1)"), "{:?}", diagnosis.groups);
+    assert!(names(&diagnosis, "constant(T2)"), "{:?}", diagnosis.groups);
+    let last = &diagnosis.steps[diagnosis.steps.len() - 1];
+    let since = last
+        .parameters
+        .iter()
+        .find(|own| own.name == "step_k1_since")
+        .unwrap();
+    assert!(
+        (since.value - SINCE).abs() < 4.0 * since.std_error.unwrap(),
+        "{since:?}"
+    );
+}

@@ -221,7 +221,7 @@ pub(crate) fn finish(
         };
         text += &look.faint(match (written, output.kind()) {
             (true, _) => format!("wrote {path}"),
-            (false, Kind::Record) => format!("{path} is not written: nothing is worth playing"),
+            (false, Kind::Record) => format!("{path} is not written: nothing is worth applying"),
             (false, _) => {
                 format!("{path} is not written: nothing is left unexplained that has a shape")
             }

@@ -201,7 +201,7 @@ impl Context<'_> {
         let count = self.samples();
         let set = self.setup(&node.model)?;
         let columns = self.columns_beside(node, &set, &setup);
-        // Where an effect is absent its shapes change nothing: their columns hold rounding errors, and nothing is to follow from these.
+        // Where an effect is absent its shapes change nothing: their columns hold rounding errors, and no step follows from these.
         let silent: Vec<usize> = candidate
             .parameters
             .iter()
@@ -253,8 +253,9 @@ impl Context<'_> {
         let mut scored: Vec<Place> = starts.into_iter().filter_map(scored_at).collect();
         scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
         if let Some(at) = own_place(STEP, "since") {
+            let duration = self.longest_duration();
             for share in BETWEEN {
-                let away = share * self.longest_duration();
+                let away = share * duration;
                 let mut others: Vec<Vec<f64>> = Vec::new();
                 for best in scored.iter().take(PLACES) {
                     for side in [-away, away] {
@@ -268,9 +269,9 @@ impl Context<'_> {
                 scored.extend(others.into_iter().filter_map(scored_at));
                 scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
             }
-            // Neighbours of the best time lead where that does.
+            // A fit from a neighbour of the best time ends where that from the best one does.
             let best = scored.first().map_or(0.0, |place| place.x[at]);
-            let near = 2.0 * BETWEEN[0] * self.longest_duration();
+            let near = 2.0 * BETWEEN[0] * duration;
             let mut first = true;
             scored.retain(|place| std::mem::take(&mut first) || (place.x[at] - best).abs() >= near);
         }
@@ -312,7 +313,7 @@ impl Context<'_> {
                     let both = place.x.iter().zip(&place.stepped);
                     both.map(|(x, stepped)| x + share * (stepped - x)).collect()
                 };
-                // Where the whole step goes too far the fit begins with a part of it: where it is absent an effect has no shape.
+                // Where the whole step raises the cost the fit begins with a part of it: at an absent effect no shape can be fitted.
                 let parts = SHARES.iter().map(|&share| to(share));
                 parts
                     .map(|x| (cost(&x), x))

@@ -23,10 +23,11 @@ const SAMPLES: usize = 5;
 /// `model`: what a model of the records gives, a series for each record and output, as [`crate::ModelSetup::simulate`] has it.
 pub(crate) fn output_noise(records: &[Record], model: &[Vec<f64>]) -> Vec<Option<f64>> {
     let outputs = records.first().map_or(0, |record| record.outputs.len());
+    let ahead = slowest(records);
     let of = |output: usize| {
         let mut past = PAST;
         while past > 0 {
-            let (sum, samples, columns) = prediction(records, model, output, past);
+            let (sum, samples, columns) = prediction(records, model, output, (past, ahead));
             if samples >= SAMPLES * columns {
                 let variance = sum / (samples - columns) as f64;
                 return (variance.is_finite() && variance > 0.0).then(|| variance.sqrt());
@@ -38,11 +39,18 @@ pub(crate) fn output_noise(records: &[Record], model: &[Vec<f64>]) -> Vec<Option
     (0..outputs).map(of).collect()
 }
 
-/// Rows from one reading to the next, in the middle; of the slowest output.
+/// Rows in which an output was read.
+fn read_rows(values: &[f64]) -> Vec<usize> {
+    (0..values.len()).filter(|&k| !values[k].is_nan()).collect()
+}
+
+/// The median of the rows from one reading to the next, of the slowest output.
 fn slowest(records: &[Record]) -> usize {
     let of = |values: &[f64]| {
-        let there: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).collect();
-        let mut apart: Vec<usize> = there.windows(2).map(|two| two[1] - two[0]).collect();
+        let mut apart: Vec<usize> = read_rows(values)
+            .windows(2)
+            .map(|two| two[1] - two[0])
+            .collect();
         apart.sort_unstable();
         apart.get(apart.len() / 2).copied()
     };
@@ -51,12 +59,13 @@ fn slowest(records: &[Record]) -> usize {
     slowest.unwrap_or(1)
 }
 
-/// The sum of squares that the prediction of one output leaves, over how many samples, and its coefficients.
+/// The sum of squares that the prediction of one output leaves, so many rows ahead from so many past readings; over how many samples, and
+/// its coefficients.
 fn prediction(
     records: &[Record],
     model: &[Vec<f64>],
     output: usize,
-    past: usize,
+    (past, ahead): (usize, usize),
 ) -> (f64, usize, usize) {
     let others = past.min(PAST_OF_OTHERS);
     let (inputs, outputs) = records
@@ -67,17 +76,10 @@ fn prediction(
     let mut triangle = Triangle::new(columns + 1);
     let mut values = Vec::with_capacity(columns + 1);
     let mut samples = 0;
-    let ahead = slowest(records);
     for (r, record) in records.iter().enumerate() {
         let series = |o: usize| &record.outputs[o].values;
         // Outputs may be sampled at rates of their own: the past of each is its last readings that are there.
-        let there: Vec<Vec<usize>> = (0..outputs)
-            .map(|o| {
-                (0..record.len())
-                    .filter(|&k| !series(o)[k].is_nan())
-                    .collect()
-            })
-            .collect();
+        let there: Vec<Vec<usize>> = (0..outputs).map(|o| read_rows(series(o))).collect();
         let own = &there[output];
         for &k in own {
             let known = own.partition_point(|&j| j + ahead <= k);

@@ -57,11 +57,11 @@ fn an_undecided_verdict_points_to_the_experiment_that_is_then_written() {
 
     let next = place.read("next.csv");
     assert!(next.starts_with("t [s],u [V]\n0,"));
-    let simulated = column(&next, 1);
-    assert_eq!(simulated.len(), 300);
-    assert!(simulated.iter().all(|u| (1.5..=8.5).contains(u)));
+    let applied = column(&next, 1);
+    assert_eq!(applied.len(), 300);
+    assert!(applied.iter().all(|u| (1.5..=8.5).contains(u)));
     let series = found["experiment"]["values"].as_array().unwrap();
-    assert_eq!(series.len(), simulated.len());
+    assert_eq!(series.len(), applied.len());
 
     // Nothing is overwritten, and the same question has the same answer.
     let before = place.read("next.csv");
@@ -83,11 +83,11 @@ fn limits_and_units_are_kept() {
     assert!(text.contains("wrote plan.csv"), "{text}");
     let plan = place.read("plan.csv");
     assert!(plan.starts_with("t [min],u [V]\n0,"));
-    let (time, simulated) = (column(&plan, 0), column(&plan, 1));
+    let (time, applied) = (column(&plan, 0), column(&plan, 1));
     // A sample is 2 min: 400 of them in 48000 s.
     assert_eq!((time.len(), time[1]), (400, 2.0));
-    assert!(simulated.iter().all(|u| (1.5..=8.5).contains(u)));
-    let steps = simulated.windows(2).map(|w| (w[1] - w[0]).abs());
+    assert!(applied.iter().all(|u| (1.5..=8.5).contains(u)));
+    let steps = applied.windows(2).map(|w| (w[1] - w[0]).abs());
     assert!(steps.fold(0.0, f64::max) <= 0.005 * 120.0 + 1e-8);
 }
 

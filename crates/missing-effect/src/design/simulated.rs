@@ -5,7 +5,7 @@ use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller}
 
 use crate::node::Node;
 
-/// What the experiment is applied into.
+/// What the experiment is applied to.
 #[derive(Debug, Clone)]
 pub(crate) enum Loop<'a> {
     /// The command itself.

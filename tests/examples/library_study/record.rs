@@ -95,7 +95,8 @@ fn controller(model: &str) -> (usize, usize, f64, f64) {
         "mass-spring" => (0, 0, 20.0, 30.0),
         "house" => (0, 0, 1.5, 20.0),
         "bioreactor" => (0, 0, -0.02, 60.0),
-        "battery" => (0, 0, 1.0, 200.0),
+        // What is drawn lowers the voltage.
+        "battery" => (0, 0, -1.0, 200.0),
         _ => (0, 0, 0.3, 40.0),
     }
 }
@@ -137,15 +138,15 @@ impl Drive<'_> {
             let mut outputs = vec![Vec::new(); spec.outputs.len()];
             let mut read = vec![0.0; outputs.len()];
             let (mut integral, mut middle) = (0.0, None);
+            // A command answers to the reading of the row before: the terminals of a cell follow its current at once.
+            let mut measured: Option<f64> = None;
             let rows_of = inputs[u].len();
             for k in 0..rows_of {
                 let now = |inputs: &[Vec<f64>], k: usize| -> Vec<f64> {
                     inputs.iter().map(|input| input[k]).collect()
                 };
-                if self.closed {
+                if let (true, Some(measured)) = (self.closed, measured) {
                     // The reference moves as the command of the open loop does, around where the output began.
-                    simulation.read(&now(&inputs, k), &mut read);
-                    let measured = read[y] + noise.get(r).map_or(0.0, |n| n[y][k]);
                     let reference = *middle.get_or_insert(measured)
                         + 0.5 * (inputs[u][k] - 0.5 * (low + high)) / gain;
                     let error = reference - measured;
@@ -158,6 +159,7 @@ impl Drive<'_> {
                 }
                 let from = now(&inputs, k);
                 simulation.read(&from, &mut read);
+                measured = Some(read[y] + noise.get(r).map_or(0.0, |n| n[y][k]));
                 for (output, value) in outputs.iter_mut().zip(&read) {
                     output.push(*value);
                 }
@@ -620,7 +622,20 @@ pub fn outcome(
         },
         if verbose {
             format!(
-                "\n    singles {:?}\n    weights {:?}\n    truth {:?}",
+                "\n    believed {:?}, {} of {} starts agree\n    singles {:?}\n    weights {:?}\n    truth {:?}",
+                found.steps[0]
+                    .parameters
+                    .iter()
+                    .zip(
+                        spec.parameters
+                            .iter()
+                            .map(|p| Some(p.value))
+                            .chain(std::iter::repeat(None))
+                    )
+                    .map(|(e, truth)| format!("{} = {:.4e} (true {truth:?})", e.name, e.value))
+                    .collect::<Vec<_>>(),
+                found.steps[0].starts_agree,
+                found.steps[0].starts,
                 found
                     .singles
                     .iter()

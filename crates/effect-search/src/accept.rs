@@ -45,12 +45,90 @@ impl Context<'_> {
             let doubtful = lacking.into_iter().filter(|lacking| {
                 node.gain_over(lacking) <= BIC_MARGIN
                     || !self.beyond_chance((&node, &node.fit), (lacking, &lacking.fit))
+                    || self.rests_on_one_reading(&node, lacking, noise)
             });
             let Some(least) = doubtful.min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())) else {
                 return Ok(node);
             };
             node = least;
         }
+    }
+
+    /// Whether a set is better than one that lacks some of its effects by one reading alone: without it both, fitted again, are alike.
+    fn rests_on_one_reading(&self, node: &Node, lacking: &Node, noise: &Noise) -> bool {
+        let without = |node: &Node, records: &[Record]| {
+            let setup = self.setup(&node.model).ok()?;
+            let start = vec![node.fit.x.clone().into()];
+            estimation::fit_from(&setup.against(records), start, noise, FINE).ok()
+        };
+        let Some((series, row)) = self.telling_reading(node, lacking, noise) else {
+            return false;
+        };
+        let mut records = self.problem.records.clone();
+        let outputs = records[0].outputs.len();
+        records[series / outputs].outputs[series % outputs].values[row] = f64::NAN;
+        let (Some(with), Some(lacks)) = (without(node, &records), without(lacking, &records))
+        else {
+            return false;
+        };
+        lacks.bic() - with.bic() <= BIC_MARGIN
+            || !self.beyond_chance((node, &with), (lacking, &lacks))
+    }
+
+    /// A set, compared by its simulation error, less the effects that rest on one reading; `None` where no other stays that the criterion
+    /// needs.
+    pub fn of_many_readings(&self, mut node: Node, base: &Node) -> Option<Node> {
+        let white = Noise::white(node.spec().outputs.len());
+        while node.added.len() > base.added.len() {
+            let lacking = self.each_lacking(&node, base, &white);
+            let mut resting = lacking.into_iter().filter(|lacking| {
+                node.gain_over(lacking) <= BIC_MARGIN
+                    || self.rests_on_one_reading(&node, lacking, &white)
+            });
+            let Some(less) = resting.next() else {
+                return Some(node);
+            };
+            node = less;
+        }
+        None
+    }
+
+    /// The reading (series and row) that makes half or more of what a set fits better than one that lacks some of its effects. In coloured noise
+    /// a reading shows in as many rows after it as the noise model has coefficients.
+    fn telling_reading(
+        &self,
+        node: &Node,
+        lacking: &Node,
+        noise: &Noise,
+    ) -> Option<(usize, usize)> {
+        const TELLING: f64 = 0.5;
+        let squares = |of: &Node| {
+            let setup = self.setup(&of.model).ok()?;
+            Some(noise.whiten(&estimation::residuals(&setup, &of.fit.x)?))
+        };
+        let (with, lacks) = (squares(node)?, squares(lacking)?);
+        let scales = node.fit.scales();
+        let falls = with
+            .iter()
+            .zip(&lacks)
+            .enumerate()
+            .map(|(s, (with, lacks))| {
+                let scale = scales[s % scales.len()].powi(2);
+                let rows = with.iter().zip(lacks);
+                rows.map(|(a, b)| (b * b - a * a) / scale)
+                    .map(|fall| if fall.is_nan() { 0.0 } else { fall })
+                    .collect::<Vec<f64>>()
+            });
+        let falls: Vec<Vec<f64>> = falls.collect();
+        let all: f64 = falls.iter().flatten().sum();
+        let rows = noise.order() + 1;
+        let at_each = falls.iter().enumerate().flat_map(|(series, falls)| {
+            let windows = (0..falls.len()).map(move |row| row..falls.len().min(row + rows));
+            windows.map(move |window| (falls[window.clone()].iter().sum::<f64>(), series, window))
+        });
+        let (most, series, window) = at_each.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let row = window.max_by(|&a, &b| falls[series][a].total_cmp(&falls[series][b]))?;
+        (most >= TELLING * all).then_some((series, row))
     }
 
     /// The set without each of the effects that the search added.

@@ -109,7 +109,8 @@ pub fn diagnose(
         let mut sets = by_error_sets;
         sets.extend(grown.fitted.iter().cloned());
         sets.extend([grown.best.clone(), confirmed.clone()]);
-        if let Some((part, _)) = context.largest_part(&base, &sets)? {
+        let part = context.largest_part(&base, &sets)?;
+        if let Some(part) = part.and_then(|(part, _)| context.of_many_readings(part, &base)) {
             confirmed = part;
             own = context.in_own_noise(&confirmed)?;
             noise = white.clone();

@@ -144,7 +144,7 @@ impl<'a> Limit<'a> {
     /// A limit of its own for what follows the search, whatever time that took.
     pub fn afterwards(&self) -> Self {
         /// Share of the time of the search.
-        const SHARE: f64 = 0.25;
+        const SHARE: f64 = 0.15;
         let whole = self.whole.map(|whole| whole.mul_f64(SHARE));
         Self {
             time: Arc::new(TimeLimit::new(whole)),

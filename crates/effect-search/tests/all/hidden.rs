@@ -340,3 +340,46 @@ fn a_step_is_found_at_its_time_beside_another_effect() {
         "{since:?}"
     );
 }
+
+/// A free fall, as a camera follows it.
+const FALL: &str = r#"model Fall
+  final parameter Real g(unit="m/s2") = 9.81;
+  output Real y(unit="m") = h;
+  Real h(unit="m", start=47);
+  Real w(unit="m/s", start=0);
+equation
+  der(h) = w;
+  der(w) = -g;
+end Fall;"#;
+
+#[test]
+fn one_reading_that_is_off_is_no_effect() {
+    for seed in 0..8 {
+        for correlation in [0.0, 0.8] {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let read = noise::ar1(43, 0.03, correlation, &mut rng);
+            let time: Vec<f64> = (0..43).map(|k| f64::from(k) / 15.0).collect();
+            let mut values: Vec<f64> = time
+                .iter()
+                .zip(&read)
+                .map(|(t, v)| 47.0 + 0.3 * t - 0.5 * 9.81 * t * t + v)
+                .collect();
+            values[42] += 0.4;
+            let record = Record {
+                name: "fall.csv".into(),
+                time,
+                inputs: Vec::new(),
+                outputs: vec![Channel::new("y", "m", values)],
+                references: Vec::new(),
+                calendar: None,
+            };
+            let diagnosis = found(&problem(FALL, record));
+            assert!(
+                diagnosis.effects.is_empty(),
+                "{seed} {correlation}: {:?} {:?}",
+                diagnosis.verdict,
+                diagnosis.groups
+            );
+        }
+    }
+}

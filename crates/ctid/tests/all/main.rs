@@ -15,6 +15,7 @@ mod injected;
 mod model_file;
 mod monitor;
 mod outputs;
+mod own_candidates;
 mod own_design;
 mod own_effects;
 mod own_limits;

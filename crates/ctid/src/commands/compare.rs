@@ -177,12 +177,9 @@ impl Compare {
     ) -> Result<(), Error> {
         let records = model.records(files)?;
         let outputs = self.results.plan(&files.all(), None)?;
-        let bar = Bar::new();
+        let options = own_model::options(self.seed, self.effort);
+        let bar = Bar::with_limit(options.time_limit);
         bar.phase("fitting the model");
-        let options = FitOptions {
-            seed: self.seed,
-            ..FitOptions::default()
-        };
         let comparison = own_model::compare(model, &records, &options);
         bar.clear();
         let notes = input::notes(&records.summaries, look) + &unused(&model.unused, look);

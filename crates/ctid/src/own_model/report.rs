@@ -59,6 +59,7 @@ impl<T: Serialize> Found for Paged<'_, T> {
 pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Diagnosis {
     let source = "what the past of the model's residual does not predict";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
+    shown.effort.clone_from(&found.effort);
     shown.seconds = found.seconds;
     shown
 }

@@ -211,7 +211,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 compute(work, &task, options, &show)
             }
             Input::Own(work) => {
-                // Such a fit goes on where it is stopped: the next one waits for its end.
+                // What was stopped ends its step first: the next one waits for that.
                 let _alone = lock(&own_fits);
                 if stop.load(Ordering::Relaxed) {
                     return Err(Error::Usage("stopped".to_string()));
@@ -223,7 +223,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                     } => work
                         .search(max_effects, effort, &interrupt, &show)
                         .map(|found| Outcome::OwnDiagnosed(Box::new(found))),
-                    _ => work.compute().map(|found| Outcome::Own(Box::new(found))),
+                    _ => work.compute(&interrupt).map(|found| Outcome::Own(Box::new(found))),
                 }
             }
         }));

@@ -12,7 +12,6 @@ use axum::body::Bytes;
 use ct_model::{ModelSpec, TextError};
 use ct_signals::{Columns, ReadOptions, Reading};
 use effect_search::{Diagnosis, Options};
-use greybox::FitOptions;
 use missing_effect::{Diagnosis as Shown, Progress};
 use serde_json::{Value, json};
 
@@ -359,8 +358,14 @@ impl Work {
         })
     }
 
-    pub(super) fn compute(&self) -> Result<Comparison, Error> {
-        compare(&self.model, &self.records, &FitOptions::default())
+    /// Fits the model, until the flag is set.
+    pub(super) fn compute(&self, interrupt: &AtomicBool) -> Result<Comparison, Error> {
+        let options = Options {
+            time_limit: Some(EffortLevel::default().limit_of_own_model()),
+            interrupt: Some(interrupt),
+            ..Options::default()
+        };
+        compare(&self.model, &self.records, &options)
     }
 
     /// Searches what is missing, until the flag is set.
@@ -611,7 +616,7 @@ mod tests {
         let name = "heated-block".to_string();
         change(&mut session, Change::Example { name }).unwrap();
         let work = Work::new(&mut session).unwrap();
-        let found = work.compute().unwrap();
+        let found = work.compute(&AtomicBool::new(false)).unwrap();
         let [step] = &found.steps;
         let body = work.body(7, &found);
         assert_eq!(

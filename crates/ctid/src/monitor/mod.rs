@@ -67,6 +67,10 @@ impl Arguments {
         let candidates = candidates.map(|(candidate, model)| CandidateModel { candidate, model });
         let candidates: Vec<CandidateModel> = candidates.collect();
         let mut session = Session::new(self, (&file, &candidates), out)?;
+        let note = file.loop_said(Look::plain());
+        if !note.is_empty() {
+            session.screen.say(note.trim_end());
+        }
         let events = source::open()?;
         let mut lines = Lines::default();
         let ended = loop {

@@ -282,12 +282,7 @@ fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<S
     if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
         all.push(format!("Played {times} times over it would decide."));
     }
-    if file
-        .unused
-        .iter()
-        .any(|table| table.starts_with("controller."))
-        && !design.twins()
-    {
+    if !file.controllers.is_empty() && !design.twins() {
         all.push("The experiment is in open loop: switch the controller to manual.".to_string());
     }
     if !design.left_out.is_empty() {

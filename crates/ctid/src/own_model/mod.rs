@@ -2,6 +2,7 @@
 
 mod candidates;
 mod compare;
+mod controller;
 mod design;
 mod diagnose;
 pub(crate) mod effects;

@@ -199,8 +199,9 @@ export async function show(state) {
   columns(state);
   $("own-check-part").hidden = !own.check;
   $("own-check").textContent = own.check || "";
-  $("own-unused").hidden = !(own.unused || []).length;
-  $("own-unused").textContent = `No part in a fit has ${(own.unused || []).map((one) => `[${one}]`).join(", ")}.`;
+  const unused = (own.unused || []).map((one) => `[${one}]`).join(", ");
+  $("own-unused").hidden = !unused && !own.loop;
+  $("own-unused").textContent = [own.loop ? `${own.loop}.` : "", unused ? `No part in a fit has ${unused}.` : ""].join(" ").trim();
   const ready = !own.text_error && !own.file_error && !state.job && state.records.some((one) => !one.held_out) && state.records.every((one) => one.read);
   $("own-fit").disabled = !ready;
   $("own-diagnose").disabled = !ready;

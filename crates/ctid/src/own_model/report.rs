@@ -151,7 +151,6 @@ pub(crate) fn diagnosed(
     });
     shown.scores = singles.collect();
     shown.sentences = sentences(found, &words);
-    shown.effort.left_out.clone_from(&found.left_out);
     shown.seconds = found.seconds;
     let unknown = found.unknown.as_ref();
     Document {

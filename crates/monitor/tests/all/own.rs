@@ -91,7 +91,8 @@ impl Plant {
     }
 
     pub(crate) fn run(&self) -> Vec<Row> {
-        let (mut rows, mut states) = (Vec::new(), vec![20.0; self.model.spec().states.len()]);
+        let mut rows = Vec::new();
+        let mut states = self.model.starts(&self.parameters[0].1);
         let changes = self.parameters.iter().map(|(row, _)| *row).skip(1);
         let ends: Vec<usize> = changes.chain([self.inputs[0].len()]).collect();
         for ((from, parameters), end) in self.parameters.iter().zip(ends) {

@@ -111,5 +111,6 @@ fn a_candidate_may_bring_a_state() {
     assert_eq!(alarm.effects[0], "second_store", "{}", alarm.sentence);
     let size = alarm.size.as_ref().unwrap();
     assert_eq!(size.name, "h");
-    assert!((size.value / 0.8 - 1.0).abs() < 0.3, "{size:?}");
+    // Its size hangs together with the capacity and with the onset, which is found to a few rows.
+    assert!((size.value / 0.8 - 1.0).abs() < 0.5, "{size:?}");
 }

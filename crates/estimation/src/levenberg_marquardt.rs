@@ -50,7 +50,13 @@ pub fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
 
 /// Whether the gradient holds a parameter at its bound.
 pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
-    let room = 1e-12 * (upper - lower);
+    // Of a parameter with one bound the width is infinite, and every value would lie within a share of it.
+    let width = upper - lower;
+    let room = if width.is_finite() {
+        1e-12 * width
+    } else {
+        0.0
+    };
     (x <= lower + room && descent <= 0.0) || (x >= upper - room && descent >= 0.0)
 }
 
@@ -174,5 +180,22 @@ pub(crate) fn minimise(
         x,
         triangle: at,
         stop: Stop::Evaluations,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_with_one_bound_is_held_at_that_bound_alone() {
+        let (above, below) = ((0.0, f64::INFINITY), (f64::NEG_INFINITY, 2.0));
+        for descent in [-1.0, 1.0] {
+            assert!(!held(0.3, above, descent));
+            assert!(!held(0.3, below, descent));
+        }
+        assert!(held(0.0, above, -1.0) && !held(0.0, above, 1.0));
+        assert!(held(2.0, below, 1.0) && !held(2.0, below, -1.0));
+        assert!(held(1.0, (0.0, 1.0), 1.0) && !held(1.0, (0.0, 1.0), -1.0));
     }
 }

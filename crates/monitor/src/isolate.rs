@@ -57,7 +57,7 @@ pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 8,
     cost: 1e-3,
 };
-const FINE: Stopping = Stopping {
+pub(crate) const FINE: Stopping = Stopping {
     evaluations: 40,
     cost: 1e-8,
 };

@@ -80,7 +80,7 @@ pub use learn::Model;
 pub use monitor::{
     Each, Estimate, Gathered, Innovation, Monitor, Notice, Progress, Row, State, Step,
 };
-pub use own::OwnModel;
+pub use own::{CandidateModel, OwnModel};
 pub use scatter::{ScatterAlarm, ScatterEvent};
 pub use settings::Settings;
 pub use time_axis::TimeAxis;

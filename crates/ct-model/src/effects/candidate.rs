@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use super::effect::{Effect, Place, Role, Starts};
 use super::fragment::{Action, Counts, Fragment, instance};
 use super::port::Port;
-use super::scale::{Scales, balance_unit, divided};
+use super::scale::{Scales, balance_unit};
+use super::unit_text::quotient;
 use super::visited::{Span, Visited};
 use super::{all_effects, domain, shape};
 use crate::expression::{Expression, Operator, Variable};
@@ -420,7 +421,7 @@ fn candidate(
         "value" => value_unit.clone(),
         "time" => visited.time_unit.clone(),
         "balance" => balance_unit.clone(),
-        "balance/port" => divided(&balance_unit, &port_unit),
+        "balance/port" => quotient(&balance_unit, &port_unit),
         other => other.to_string(),
     };
     let states = fragment.states.iter_mut().map(|state| &mut state.about);

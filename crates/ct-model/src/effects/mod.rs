@@ -44,6 +44,7 @@ mod port;
 mod scale;
 mod shape;
 mod thermal;
+mod unit_text;
 mod visited;
 
 pub use apply::{ApplyError, apply};

@@ -1,6 +1,7 @@
 //! Sizes and units of the terms of an equation.
 
 use super::port::Port;
+use super::unit_text::{product, quotient};
 use super::visited::Visited;
 use crate::expression::{Expression, Operator, Variable};
 use crate::spec::ModelSpec;
@@ -78,13 +79,13 @@ pub(super) fn balance_unit(spec: &ModelSpec, state: usize, time: &str) -> String
     let own = if unit.is_empty() {
         String::new()
     } else {
-        divided(unit, time)
+        quotient(unit, time)
     };
     match &state.coefficient {
         None => own,
         Some(Expression::Variable(c)) => match spec.about(*c).unit.as_str() {
             "" => String::new(),
-            coefficient => divided(&own, &divided("1", coefficient)),
+            coefficient => product(&own, coefficient),
         },
         Some(_) => String::new(),
     }
@@ -104,46 +105,5 @@ fn units_of_terms(spec: &ModelSpec, expression: &Expression, all: &mut Vec<Strin
             }
         }
         _ => {}
-    }
-}
-
-/// One unit over another, `W` over `degC` is `W/K`; empty where one is not known.
-pub(super) fn divided(a: &str, b: &str) -> String {
-    if a.is_empty() || b.is_empty() {
-        return String::new();
-    }
-    let sides = |unit: &str| {
-        let (above, below) = unit.split_once('/').unwrap_or((unit, ""));
-        let parts = |side: &str| -> Vec<String> {
-            let side = side.trim_matches(|c| c == '(' || c == ')');
-            side.split('.')
-                .filter(|part| !part.is_empty() && *part != "1")
-                .map(|part| if part == "degC" { "K" } else { part }.to_string())
-                .collect()
-        };
-        (parts(above), parts(below))
-    };
-    let ((mut above, mut below), (under, over)) = (sides(a), sides(b));
-    for part in over {
-        match below.iter().position(|own| *own == part) {
-            Some(at) => drop(below.remove(at)),
-            None => above.push(part),
-        }
-    }
-    for part in under {
-        match above.iter().position(|own| *own == part) {
-            Some(at) => drop(above.remove(at)),
-            None => below.push(part),
-        }
-    }
-    let above = if above.is_empty() {
-        "1".to_string()
-    } else {
-        above.join(".")
-    };
-    match below.as_slice() {
-        [] => above,
-        [one] => format!("{above}/{one}"),
-        more => format!("{above}/({})", more.join(".")),
     }
 }

@@ -167,6 +167,14 @@ fn unused(tables: &[String], look: Look) -> String {
 }
 
 impl Compare {
+    /// A loop that is to be simulated, where that cannot be done.
+    fn check_loop(&self, model: &OwnModelFile) -> Result<(), Error> {
+        match self.way {
+            LoopWay::Simulated => model.require_no_loop(),
+            LoopWay::Measured => Ok(()),
+        }
+    }
+
     /// A model of the user's own.
     fn run_own(
         &self,
@@ -175,17 +183,17 @@ impl Compare {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
+        self.check_loop(model)?;
         let records = model.records(files)?;
         let outputs = self.results.plan(&files.all(), None)?;
-        let bar = Bar::new();
+        let options = own_model::options(self.seed, self.effort);
+        let bar = Bar::with_limit(options.time_limit);
         bar.phase("fitting the model");
-        let options = FitOptions {
-            seed: self.seed,
-            ..FitOptions::default()
-        };
         let comparison = own_model::compare(model, &records, &options);
         bar.clear();
-        let notes = input::notes(&records.summaries, look) + &unused(&model.unused, look);
+        let notes = input::notes(&records.summaries, look)
+            + &unused(&model.unused, look)
+            + &model.loop_said(look);
         let comparison = comparison?;
         let notes = notes + &not_kept(model, &comparison.record_numbers, look);
         let text = notes + &own_model::said(&comparison, look);
@@ -233,6 +241,7 @@ impl Diagnose {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
+        self.compare.check_loop(model)?;
         let records = model.records(files)?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
@@ -247,6 +256,7 @@ impl Diagnose {
         bar.clear();
         let diagnosis = diagnosis?;
         let text = input::notes(&records.summaries, look)
+            + &model.loop_said(look)
             + &not_kept(model, &diagnosis.record_numbers, look)
             + &own_model::diagnosis_said(model, &diagnosis, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);

@@ -69,6 +69,7 @@ impl Export {
                 "a model file of a plant holds first guesses, no values: give the records that it is fitted to, DATA.csv",
             ));
         }
+        let fitted = (!self.data.is_empty()).then(|| model.loop_said(look));
         let bar = Bar::new();
         bar.phase("fitting the model");
         let exported = match model {
@@ -94,7 +95,9 @@ impl Export {
             [] => format!("{} as its text and [known] have it", exported.model),
             records => format!("{} fitted to {}", exported.model, records.join(", ")),
         };
-        let text = input::notes(&summaries, look) + &look.paragraph("", &said);
+        let text = input::notes(&summaries, look)
+            + &fitted.unwrap_or_default()
+            + &look.paragraph("", &said);
         finish(&exported, &text, &outputs, out, look)
     }
 }

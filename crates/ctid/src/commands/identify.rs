@@ -137,10 +137,11 @@ impl Identify {
         &self,
         model: Option<ModelFile>,
         own: Option<&OneByOne>,
+        data: &Path,
     ) -> Result<(Columns, Hold, Option<ControllerSettings>), Error> {
         if let Some(own) = own {
             let (columns, hold) = own.columns();
-            return Ok((columns, hold, None));
+            return Ok((columns, hold, own.controller(data)?));
         }
         if let (Some(path), Some(model)) = (&self.model, model) {
             if model.columns.outputs.len() > 1 {
@@ -293,7 +294,6 @@ impl Identify {
         let Reading { record, summary } = reading;
         let mut record = self.without_unnamed(record);
         if let Some(own) = own {
-            record.references.clear();
             own.convert(&mut record)?;
         }
         Ok(Reading { record, summary })
@@ -357,7 +357,7 @@ impl Identify {
             _ => None,
         };
         let own = own.as_ref();
-        let (columns, hold, controller) = self.layout(plant, own)?;
+        let (columns, hold, controller) = self.layout(plant, own, data)?;
         let layout = (&columns, hold, own);
         self.check_options(&methods)?;
         let requests = methods

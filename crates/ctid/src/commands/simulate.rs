@@ -108,6 +108,8 @@ impl Simulate {
                 "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
             ));
         }
+        // Without a fit the inputs are those that are applied, whatever moves them.
+        let fitted = (!self.fit.is_empty()).then(|| model.loop_said(look));
         let bar = Bar::new();
         bar.phase("fitting the model");
         let found = match model {
@@ -130,7 +132,9 @@ impl Simulate {
         bar.clear();
         let (mut found, summaries) = found?;
         found.readings = self.readings;
-        let text = input::notes(&summaries, look) + &simulate::said(&found, look);
+        let text = input::notes(&summaries, look)
+            + &fitted.unwrap_or_default()
+            + &simulate::said(&found, look);
         finish(&found, &text, &outputs, out, look)
     }
 }

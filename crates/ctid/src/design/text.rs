@@ -32,7 +32,7 @@ pub fn design(design: &Design, look: Look) -> String {
 fn alternatives(design: &Design, look: Look) -> String {
     let [a, b] = &design.between;
     let title = format!(
-        "{} or {}, on the records that there are, in the metric of their noise",
+        "{} or {}, on the records that there are, weighted by their noise",
         named(a),
         named(b)
     );

@@ -25,12 +25,20 @@ pub(crate) struct Findings {
     model: String,
     steps: Vec<FoundStep>,
     unknown: Option<FoundStep>,
+    #[serde(default)]
+    singles: Vec<FoundSingle>,
     record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
 struct FoundStep {
     parameters: Vec<FoundParameter>,
+}
+
+/// An effect alone beside the believed model.
+#[derive(Debug, Clone, Deserialize)]
+struct FoundSingle {
+    sizes: Vec<FoundParameter>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -65,11 +73,15 @@ impl Findings {
         self.record_numbers.contains_key(id)
     }
 
-    /// The value of a parameter in the last model that has it, or of the shape of what no candidate explains.
+    /// The value of a parameter in the last model that has it, of the shape of what no candidate explains, or, of an effect that is in no
+    /// model, as it was fitted alone.
     fn value(&self, name: &str) -> Option<f64> {
         let steps = self.steps.iter().rev().chain(&self.unknown);
         let steps = steps.flat_map(|step| &step.parameters);
-        let mut named = steps.filter(|parameter| parameter.name == name);
+        let singles = self.singles.iter().flat_map(|single| &single.sizes);
+        let mut named = steps
+            .chain(singles)
+            .filter(|parameter| parameter.name == name);
         named.find_map(|parameter| parameter.value)
     }
 }
@@ -150,6 +162,14 @@ fn keep(
             known.join(", ")
         ));
     };
+    let sizes = candidate.parameters.iter().filter_map(|parameter| {
+        let size = rounded(found.value(&parameter.name)?, 7);
+        Some((parameter.short.as_str(), size))
+    });
+    let sizes: Vec<(&str, f64)> = sizes.collect();
+    if sizes.is_empty() && numbers.is_empty() {
+        return Ok(", of which the result has no size".to_string());
+    }
     let no_table = || format!("[effect.\"{id}\"] is not a table; make it one");
     let mut tables = Table::new();
     tables.set_implicit(true);
@@ -165,13 +185,9 @@ fn keep(
         .as_table_like_mut()
         .ok_or_else(no_table)?;
     let mut said = Vec::new();
-    for parameter in &candidate.parameters {
-        let Some(size) = found.value(&parameter.name) else {
-            continue;
-        };
-        let size = rounded(size, 7);
-        said.push(format!("{} = {size}", parameter.short));
-        set(table, &parameter.short, value(size));
+    for (short, size) in sizes {
+        said.push(format!("{short} = {size}"));
+        set(table, short, value(size));
     }
     if !numbers.is_empty() {
         let mut inline = InlineTable::new();

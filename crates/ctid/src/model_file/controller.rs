@@ -91,16 +91,38 @@ impl ControllerSettings {
 }
 
 impl Source<'_> {
+    /// The controller of a plant, which reads the last output.
     pub(super) fn controller(
         &self,
         raw: &Spanned<RawController>,
+    ) -> Result<ControllerSettings, Error> {
+        let of_own = [
+            ("output", &raw.as_ref().output),
+            ("reference", &raw.as_ref().reference),
+        ];
+        for (key, word) in of_own {
+            if let Some(word) = word {
+                let what = format!(
+                    "{key} is no setting of the controller of a plant: write it under [columns]"
+                );
+                return Err(self.at(word.span().start, what));
+            }
+        }
+        self.controller_law(raw, "controller")
+    }
+
+    /// What a controller does with the error; `table`: the name of its table.
+    pub(crate) fn controller_law(
+        &self,
+        raw: &Spanned<RawController>,
+        table: &str,
     ) -> Result<ControllerSettings, Error> {
         let at = raw.span().start;
         let raw = raw.as_ref();
         const TYPES: &str =
             "write type = \"PI\" with gain and integral_time, or type = \"RS\" with r and s";
         let Some(kind) = &raw.kind else {
-            return Err(self.at(at, format!("[controller] has no type; {TYPES}")));
+            return Err(self.at(at, format!("[{table}] has no type; {TYPES}")));
         };
         let foreign: &[(&str, Option<usize>)] = match kind.as_ref().as_str() {
             "PI" => &[
@@ -132,7 +154,7 @@ impl Source<'_> {
         }
         let needed = |key: &str, number: &Option<Spanned<Number>>| match number {
             Some(number) => self.finite(key, number),
-            None => Err(self.at(at, format!("[controller] has no {key}; write {key} = ..."))),
+            None => Err(self.at(at, format!("[{table}] has no {key}; write {key} = ..."))),
         };
         let limit = |key: &str, number: &Option<Spanned<Number>>, none: f64| {
             number.as_ref().map_or(Ok(none), |n| self.finite(key, n))
@@ -149,10 +171,7 @@ impl Source<'_> {
                     .iter()
                     .map(|n| n.value())
                     .collect::<Vec<f64>>()),
-                None => Err(self.at(
-                    at,
-                    format!("[controller] has no {key}; write {key} = [...]"),
-                )),
+                None => Err(self.at(at, format!("[{table}] has no {key}; write {key} = [...]"))),
             };
             let (r, s) = (list("r", &raw.r)?, list("s", &raw.s)?);
             match raw

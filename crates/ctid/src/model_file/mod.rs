@@ -42,6 +42,7 @@ use crate::Error;
 pub use controller::{ControllerLaw, ControllerSettings};
 pub(crate) use effects::{any_structure, vessel};
 use raw::Raw;
+pub(crate) use raw::RawController;
 pub(crate) use source::Source;
 
 /// The largest model file, and the largest file of a term \[bytes\].

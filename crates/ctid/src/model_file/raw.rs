@@ -64,7 +64,11 @@ pub(super) struct RawKnown {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct RawController {
+pub(crate) struct RawController {
+    /// Of a model of its user's own: the output that it reads, ...
+    pub(crate) output: Option<Spanned<String>>,
+    /// ... and the column of the reference.
+    pub(crate) reference: Option<Spanned<String>>,
     #[serde(rename = "type")]
     pub(super) kind: Option<Spanned<String>>,
     pub(super) gain: Option<Spanned<Number>>,
@@ -112,13 +116,13 @@ pub(super) enum RawPrior {
     untagged,
     expecting = "not a number: write it without quotes, such as 154.0"
 )]
-pub(super) enum Number {
+pub(crate) enum Number {
     Float(f64),
     Integer(i64),
 }
 
 impl Number {
-    pub(super) fn value(self) -> f64 {
+    pub(crate) fn value(self) -> f64 {
         match self {
             Self::Float(value) => value,
             Self::Integer(value) => value as f64,

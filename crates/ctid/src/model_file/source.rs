@@ -18,9 +18,14 @@ impl Source<'_> {
     pub(crate) fn at(&self, byte: usize, what: impl Into<String>) -> Error {
         Error::AtLine {
             file: self.file.to_string(),
-            line: 1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count(),
+            line: self.line_of(byte),
             what: what.into(),
         }
+    }
+
+    /// The line of a byte of the text, the first one is 1.
+    pub(crate) fn line_of(&self, byte: usize) -> usize {
+        1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count()
     }
 
     /// What the parser refuses, in one line, with the key that was probably meant.

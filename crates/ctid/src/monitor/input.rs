@@ -193,7 +193,7 @@ impl<'a> Session<'a> {
         self.screen.say(&format!("{INPUT}: {}{hint}", rows.order()));
         let units = match self.model {
             Believed::Plant(_) => self.units(&rows)?,
-            Believed::Own(file, time_unit) => {
+            Believed::Own(file, _, time_unit) => {
                 self.own_units(file, time_unit, &rows)?;
                 Units::default()
             }
@@ -217,7 +217,7 @@ impl<'a> Session<'a> {
             Believed::Plant(_) => self
                 .screen
                 .outputs(names.map(|name| (name, &*units.output))),
-            Believed::Own(file, _) => {
+            Believed::Own(file, ..) => {
                 let outputs = file.signals().skip(file.model.spec().inputs.len());
                 let units = outputs.map(|about| about.unit.as_str());
                 self.screen.outputs(names.zip(units));
@@ -278,7 +278,9 @@ impl<'a> Session<'a> {
                     "the saved state has a time in units of {time_unit} s, but the rows have one of {seconds} s; convert the rows, or name another --state"
                 )));
             }
-            self.model = Believed::Own(file, seconds);
+            if let Believed::Own(_, _, unit) = &mut self.model {
+                *unit = seconds;
+            }
         }
         Ok(())
     }

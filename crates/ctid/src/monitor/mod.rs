@@ -13,7 +13,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
 
-use ::monitor::{Model, Monitor, OwnModel, Settings, Units, Watched};
+use ::monitor::{CandidateModel, Model, Monitor, OwnModel, Settings, Units, Watched};
 use clap::Args;
 use ct_signals::{Columns, Conversion, Rows};
 
@@ -59,7 +59,18 @@ impl Arguments {
     /// Where the model, the state or the first line cannot be used, nothing comes, or something cannot be written.
     pub fn run(&self, out: &mut dyn Write) -> Result<(), Error> {
         let file = AnyModelFile::read(&self.model)?.with_effects()?;
-        let mut session = Session::new(self, &file, out)?;
+        let candidates = match &file {
+            AnyModelFile::Plant(_) => Vec::new(),
+            AnyModelFile::Own(file) => file.with_each_candidate()?,
+        };
+        let candidates = candidates.into_iter();
+        let candidates = candidates.map(|(candidate, model)| CandidateModel { candidate, model });
+        let candidates: Vec<CandidateModel> = candidates.collect();
+        let mut session = Session::new(self, (&file, &candidates), out)?;
+        let note = file.loop_said(Look::plain());
+        if !note.is_empty() {
+            session.screen.say(note.trim_end());
+        }
         let events = source::open()?;
         let mut lines = Lines::default();
         let ended = loop {
@@ -113,20 +124,21 @@ impl From<Error> for Halt {
 #[derive(Clone)]
 enum Believed<'a> {
     Plant(Box<Model>),
-    /// And the seconds in one unit of its time.
-    Own(&'a OwnModelFile, f64),
+    /// With the candidates of its file, and the seconds in one unit of its time.
+    Own(&'a OwnModelFile, &'a [CandidateModel], f64),
 }
 
 impl<'a> Believed<'a> {
     fn watched(&self) -> Watched<'a> {
         match self {
             Self::Plant(model) => Model::clone(model).into(),
-            Self::Own(file, time_unit) => OwnModel {
+            Self::Own(file, candidates, time_unit) => OwnModel {
                 model: &file.model,
                 known: file.known.clone(),
                 priors: file.priors.clone(),
                 hold: file.hold,
                 time_unit: *time_unit,
+                candidates,
             }
             .into(),
         }
@@ -164,7 +176,7 @@ struct Session<'a> {
 impl<'a> Session<'a> {
     fn new(
         arguments: &'a Arguments,
-        file: &'a AnyModelFile,
+        (file, candidates): (&'a AnyModelFile, &'a [CandidateModel]),
         out: &'a mut dyn Write,
     ) -> Result<Self, Error> {
         let settings = Settings {
@@ -196,7 +208,8 @@ impl<'a> Session<'a> {
                 let declared = declared.then(|| file.columns.time_header().1);
                 let saved = state.as_ref().and_then(::monitor::State::time_unit);
                 let time_unit = declared.or(saved).unwrap_or(1.0);
-                (file.columns.clone(), Believed::Own(file, time_unit))
+                let model = Believed::Own(file, candidates, time_unit);
+                (file.columns.clone(), model)
             }
         };
         let monitor = match state {

@@ -1,10 +1,13 @@
 //! A model of its user's own fitted to records, and how far it is off.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use effect_search::{Estimate, NoiseFloor, Step, held_out};
-use greybox::{Fit, FitOptions, ModelSetup, weighted_rms};
+use effect_search::{Estimate, NoiseFloor, Options, Step, held_out};
+use greybox::{Fit, FitOptions, ModelSetup, TimeLimit, weighted_rms};
+use missing_effect::Effort;
 use serde::Serialize;
 
 use super::file::{OwnModelFile, Records};
@@ -13,6 +16,10 @@ use crate::Error;
 
 /// Estimates whose correlation is above this are not known one without the other.
 const TOGETHER: f64 = 0.999;
+/// The effects of the file are added one after the other within this share of the time, ...
+const OF_EFFECTS: f64 = 0.5;
+/// ... and the initial states of held-out records are fitted within this share of it, whatever the fit took.
+const OF_HELD_OUT: f64 = 0.25;
 
 /// Measured and model, of one output of one record.
 #[derive(Debug)]
@@ -41,22 +48,42 @@ pub(crate) struct Comparison {
     pub noise: Vec<NoiseFloor>,
     /// Fitted entries that these records do not determine, alone or together with another one.
     pub not_determined: Vec<Vec<String>>,
+    /// The limit on the time, and what it cut short.
+    pub effort: Effort,
     pub seconds: f64,
     #[serde(skip)]
     pub curves: Vec<Curves>,
 }
 
-/// Fits the model and says how far it is off.
+/// Fits the model and says how far it is off. Of the options the seed, the limit on the time and the interruption flag are used.
 ///
 /// # Errors
 /// Where nothing can be fitted, with the file that is to blame.
 pub(crate) fn compare(
     file: &OwnModelFile,
     records: &Records,
-    options: &FitOptions,
+    options: &Options,
 ) -> Result<Comparison, Error> {
     let began = Instant::now();
-    let file = &file.mended(Some(records))?;
+    let share = |share: f64| options.time_limit.map(|limit| limit.mul_f64(share));
+    let of_effects = Options {
+        time_limit: share(OF_EFFECTS),
+        ..*options
+    };
+    let file = &file.mended_within(Some(records), &of_effects)?;
+    let effects_are_cut =
+        !file.effects.on.is_empty() && of_effects.time_limit.is_some_and(|t| began.elapsed() >= t);
+    let rest = options
+        .time_limit
+        .map(|t| t.saturating_sub(began.elapsed()));
+    let limit = Arc::new(TimeLimit::new(rest));
+    if effects_are_cut {
+        limit.leave_out("steps of the fits of the effects");
+    }
+    let fit_options = FitOptions {
+        seed: options.seed,
+        ..FitOptions::default()
+    };
     let spec = file.model.spec();
     let blame = |error: greybox::Error| Error::File {
         file: records
@@ -77,7 +104,15 @@ pub(crate) fn compare(
     let setup = setup.with_priors(&file.priors).map_err(blame)?;
     let parameters = setup.free().len();
     ct_signals::require_samples(&records.records, parameters)?;
-    let fit = setup.fit(options).map_err(blame)?;
+    let limited = setup
+        .clone()
+        .with_time_limit(limit.clone(), options.interrupt);
+    let fit = limited.fit(&fit_options).map_err(blame)?;
+    if limit.passed() {
+        limit.leave_out("steps of the fit");
+    }
+    let afterwards = Arc::new(TimeLimit::new(share(OF_HELD_OUT)));
+    let setup = setup.with_time_limit(afterwards.clone(), None);
     let simulated = setup
         .simulate(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
@@ -85,6 +120,9 @@ pub(crate) fn compare(
         effect_search::Error::Fit(error) => blame(error),
         other => Error::Columns(other.to_string()),
     })?;
+    if test.is_some() && afterwards.passed() {
+        limit.leave_out("steps of the fit of the held-out records' initial states");
+    }
     let noise = setup
         .output_noise(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
@@ -116,7 +154,7 @@ pub(crate) fn compare(
     let noise_floors = noise_floors.collect();
     // The fit is one by simulation error: its residual has the noise's colour.
     let errors = setup
-        .robust(&fit, options.noise_order)
+        .robust(&fit, fit_options.noise_order)
         .map_or_else(|_| fit.std_errors(), |robust| robust.std_errors);
     let free = setup.free();
     let entries = setup.names().iter().zip(units.chain(states)).enumerate();
@@ -168,6 +206,13 @@ pub(crate) fn compare(
         curves: curves.collect(),
         steps: [step],
         noise: noise_floors,
+        effort: Effort {
+            limit: options.time_limit.map(|limit| limit.as_secs_f64()),
+            left_out: limit.left_out(),
+            interrupted: options
+                .interrupt
+                .is_some_and(|flag| flag.load(Ordering::Relaxed)),
+        },
         seconds: began.elapsed().as_secs_f64(),
     })
 }
@@ -198,4 +243,51 @@ fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::path::{Path, PathBuf};
+    use std::time::Duration;
+
+    use super::*;
+    use crate::input::Files;
+    use crate::look::Look;
+    use crate::own_model::{AnyModelFile, said};
+
+    /// A limit that has passed leaves a fit, and it is said in a line that it was cut short.
+    #[test]
+    fn the_limit_on_the_time_is_kept_and_said() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/models");
+        let model = folder.join("heated-block.toml");
+        let AnyModelFile::Own(file) = AnyModelFile::read(&model).unwrap() else {
+            unreachable!("it names a text")
+        };
+        let records = file
+            .records(&Files {
+                data: vec![folder.join("heated-block.csv")],
+                test: Vec::new(),
+                model: PathBuf::from("m.toml"),
+                options: ct_signals::ReadOptions::default(),
+            })
+            .unwrap();
+        let within = |limit: Duration| {
+            let options = Options {
+                time_limit: Some(limit),
+                ..Options::default()
+            };
+            compare(&file, &records, &options).unwrap()
+        };
+        let cut = within(Duration::ZERO);
+        assert_eq!(cut.effort.left_out, ["steps of the fit"]);
+        let text = said(&cut, Look::plain());
+        let line = "warning: Left out by the time limit of 0 s: steps of the fit. For a longer search: `--effort thorough` (limit 10 min).\n";
+        assert!(text.contains(line), "{text}");
+        let whole = within(Duration::from_secs(600));
+        assert!(whole.effort.left_out.is_empty() && whole.effort.limit == Some(600.0));
+        assert!(whole.steps[0].rmse <= cut.steps[0].rmse);
+        assert!(!said(&whole, Look::plain()).contains("time limit"));
+    }
 }

@@ -13,6 +13,7 @@ use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
 use super::words::{EffectWords, shown_unit};
 use crate::design::text::{NOTE, SHOWN, power};
+use crate::findings::Reader;
 use crate::look::{Look, Side, table};
 use crate::output::Found;
 use crate::simulate::{cell, csv_text, header};
@@ -99,10 +100,9 @@ fn csv(design: &Design, file: &OwnModelFile, time_unit: f64) -> String {
 
 /// What `ctid design` prints.
 pub(crate) fn said(file: &OwnModelFile, design: &Design, look: Look) -> String {
-    let words = EffectWords::of(&file.base, &file.candidates);
-    let mut text = alternatives(design, look) + &experiments(design, look);
+    let mut text = alternatives(design, look) + &listed(file, design, look);
     text += &format!("{}\n", look.heading("The next experiment"));
-    for sentence in sentences(design, &words, file) {
+    for sentence in sentences(file, design, Reader::Commands) {
         text += &look.paragraph("  ", &sentence);
     }
     text
@@ -111,7 +111,7 @@ pub(crate) fn said(file: &OwnModelFile, design: &Design, look: Look) -> String {
 /// The two effects on the records that there are.
 fn alternatives(design: &Design, look: Look) -> String {
     let title = format!(
-        "{} or {}, on the records that there are, in the metric of their noise",
+        "{} or {}, on the records that there are, weighted by their noise",
         design.between[0].effect, design.between[1].effect
     );
     let mut rows = vec![
@@ -149,12 +149,14 @@ fn range(low: f64, high: f64, unit: &str) -> String {
     format!("{low} .. {high} {unit}").trim_end().to_string()
 }
 
-/// The experiments, the best first, and the same once more.
-fn experiments(design: &Design, look: Look) -> String {
+/// Length and inputs with what they may do: `33 min, u 0 .. 36 % (visited)`.
+pub(crate) fn limits(design: &Design) -> String {
     let of = |limits: &InputRange| {
         let from = if limits.visited { " (visited)" } else { "" };
         let slew = limits.slew.map_or(String::new(), |slew| {
-            format!(", at most {} a second", numbers::significant(slew, 3))
+            let unit = shown_unit(&limits.unit);
+            let slew = format!("{} {unit}", numbers::significant(slew, 3));
+            format!(", at most {} a second", slew.trim_end())
         });
         format!(
             "{} {}{from}{slew}",
@@ -163,16 +165,71 @@ fn experiments(design: &Design, look: Look) -> String {
         )
     };
     let ranges: Vec<String> = design.ranges.iter().map(of).collect();
-    let title = format!(
-        "Experiments of {} with {}",
+    format!(
+        "experiments of {} with {}",
         duration(design.duration),
         ranges.join(", ")
-    );
+    )
+}
+
+/// An experiment in words.
+pub(crate) struct ShownExperiment {
+    /// What the inputs do.
+    pub what: String,
+    /// Where each output goes.
+    pub reaches: Vec<String>,
+    pub power: String,
+    pub decides: String,
+}
+
+/// The best experiments, and the same once more.
+pub(crate) fn experiments(file: &OwnModelFile, design: &Design) -> Vec<ShownExperiment> {
+    let shown = design.experiments.iter().take(SHOWN);
+    let all = shown.chain(&design.again);
+    all.map(|experiment| in_words(file, design, experiment))
+        .collect()
+}
+
+fn in_words(file: &OwnModelFile, design: &Design, experiment: &Experiment) -> ShownExperiment {
+    let again = |applied: &&InputSequenceKind| applied.kind == Kind::Again;
+    let what = match experiment.inputs.iter().find(again) {
+        Some(_) => Kind::Again.name().to_string(),
+        None => applied(design, experiment),
+    };
+    let unit = |name: &str| {
+        let mut signals = file.signals();
+        let about = signals.find(|about| about.name == name);
+        about.map_or("", |about| about.unit.as_str())
+    };
+    let reaches = experiment.reaches.iter().map(|reach| {
+        let to = range(reach.low, reach.high, unit(&reach.output));
+        format!("{} {to}", reach.output)
+    });
+    ShownExperiment {
+        what,
+        reaches: reaches.collect(),
+        power: power(&experiment.power, experiment.refitted),
+        decides: format!("{:.2}", experiment.power.decides),
+    }
+}
+
+/// The experiments, the best first, and the same once more, as a table.
+fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
+    let mut title = limits(design);
+    title.replace_range(..1, "E");
     let heading = ["", "experiment", "outputs reach", "power", "decides"];
     let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
-    let shown = design.experiments.iter().take(SHOWN).enumerate();
-    rows.extend(shown.map(|(k, experiment)| row(&(k + 1).to_string(), experiment)));
-    rows.extend(design.again.iter().map(|again| row("", again)));
+    let count = design.experiments.len().min(SHOWN);
+    let shown = experiments(file, design).into_iter().enumerate();
+    rows.extend(shown.map(|(k, shown)| {
+        let number = if k < count {
+            (k + 1).to_string()
+        } else {
+            String::new()
+        };
+        let reaches = shown.reaches.join(", ");
+        vec![number, shown.what, reaches, shown.power, shown.decides]
+    }));
     let sides = [
         Side::Right,
         Side::Left,
@@ -190,29 +247,17 @@ fn experiments(design: &Design, look: Look) -> String {
     text + "\n\n"
 }
 
-fn row(number: &str, experiment: &Experiment) -> Vec<String> {
-    let again = |applied: &&InputSequenceKind| applied.kind == Kind::Again;
-    let what = match experiment.inputs.iter().find(again) {
-        Some(_) => Kind::Again.name().to_string(),
-        None => {
-            let applied: Vec<String> = experiment.inputs.iter().map(sequence_words).collect();
-            applied.join("; ")
-        }
-    };
-    let reaches = experiment.reaches.iter();
-    let reaches: Vec<String> = reaches
-        .map(|reach| format!("{} {}", reach.output, range(reach.low, reach.high, "")))
-        .collect();
-    vec![
-        number.to_string(),
-        what,
-        reaches.join(", "),
-        power(&experiment.power, experiment.refitted),
-        format!("{:.2}", experiment.power.decides),
-    ]
+/// What the inputs do that move.
+fn applied(design: &Design, experiment: &Experiment) -> String {
+    let inputs = experiment.inputs.iter();
+    let inputs: Vec<String> = inputs.map(|own| sequence_words(design, own)).collect();
+    inputs.join("; ")
 }
 
-fn sequence_words(applied: &InputSequenceKind) -> String {
+fn sequence_words(design: &Design, applied: &InputSequenceKind) -> String {
+    let mut ranges = design.ranges.iter();
+    let own = ranges.find(|range| range.input == applied.input);
+    let unit = own.map_or("", |range| range.unit.as_str());
     let levels = applied
         .levels
         .map_or(String::new(), |n| format!(" of {n} levels"));
@@ -220,12 +265,14 @@ fn sequence_words(applied: &InputSequenceKind) -> String {
         "{}: {}{levels} {}, held {}",
         applied.input,
         applied.kind.name(),
-        range(applied.low, applied.high, ""),
+        range(applied.low, applied.high, unit),
         duration(applied.clock)
     )
 }
 
-fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<String> {
+/// What to apply, and what it can be expected to tell.
+pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) -> Vec<String> {
+    let words = EffectWords::of(&file.base, &file.candidates);
     let [a, b] = design
         .between
         .each_ref()
@@ -234,8 +281,15 @@ fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<S
     let Some(best) = design.experiments.first() else {
         return all;
     };
-    let applied: Vec<String> = best.inputs.iter().map(sequence_words).collect();
-    let applied = applied.join("; ");
+    let applied = applied(design, best);
+    let (wider, longer, effort) = match reader {
+        Reader::Commands => (
+            " (--input NAME=LOW..HIGH)",
+            " (--duration)",
+            "; --effort thorough goes on longer",
+        ),
+        Reader::Page => ("", "", ""),
+    };
     let decides = 100.0 * best.power.decides;
     all.push(match design.prospect {
         Prospect::Twins => format!(
@@ -246,7 +300,7 @@ fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<S
         Prospect::Decides => format!("Apply {applied}. It decides between {a} and {b} with a probability of {decides:.0} %."),
         Prospect::May => format!("Apply {applied}. It may decide between {a} and {b}: the probability is {decides:.0} %."),
         Prospect::Hardly => format!(
-            "Within these limits hardly anything decides between {a} and {b}; the best is {applied}, with a probability of {decides:.0} %. A wider range (--input NAME=LOW..HIGH) or a longer experiment (--duration) shows more."
+            "Within these limits hardly anything decides between {a} and {b}; the best is {applied}, with a probability of {decides:.0} %. A wider range{wider} or a longer experiment{longer} shows more."
         ),
     });
     if design
@@ -282,17 +336,12 @@ fn sentences(design: &Design, words: &EffectWords, file: &OwnModelFile) -> Vec<S
     if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
         all.push(format!("Played {times} times over it would decide."));
     }
-    if file
-        .unused
-        .iter()
-        .any(|table| table.starts_with("controller."))
-        && !design.twins()
-    {
+    if !file.controllers.is_empty() && !design.twins() {
         all.push("The experiment is in open loop: switch the controller to manual.".to_string());
     }
     if !design.left_out.is_empty() {
         all.push(format!(
-            "Left out by the time limit: {}; --effort thorough goes on longer.",
+            "Left out by the time limit: {}{effort}.",
             design.left_out.join(", ")
         ));
     }

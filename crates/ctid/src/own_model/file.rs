@@ -14,9 +14,11 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::candidates::{self, RawCandidates};
+use super::controller::{self, OwnController, RawControllers};
 use super::effects::{self, OwnEffects, RawEffects};
 use super::problem::RecordNumbers;
 use crate::input::Files;
+use crate::look::Look;
 use crate::model_file::{self, ModelFile, Source};
 use crate::{Error, names};
 
@@ -40,7 +42,7 @@ struct Raw {
     #[serde(default)]
     candidates: RawCandidates,
     #[serde(default)]
-    controller: BTreeMap<String, toml::Table>,
+    controller: RawControllers,
     #[serde(default)]
     hold: Hold,
 }
@@ -80,6 +82,8 @@ pub(crate) struct OwnModelFile {
     pub hold: Hold,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
+    /// What moved inputs in a loop.
+    pub controllers: Vec<OwnController>,
     /// What stands in the file and is not used yet.
     pub unused: Vec<String>,
 }
@@ -121,6 +125,14 @@ impl AnyModelFile {
 }
 
 impl AnyModelFile {
+    /// What is said of a loop that a model of its user's own declares and no simulation has; empty where there is none.
+    pub fn loop_said(&self, look: Look) -> String {
+        match self {
+            Self::Plant(_) => String::new(),
+            Self::Own(file) => file.loop_said(look),
+        }
+    }
+
     /// The same with the effects of a model of its user's own in it, as they stand in the file.
     ///
     /// # Errors
@@ -155,7 +167,14 @@ impl OwnModelFile {
     ) -> Result<Self, Error> {
         let file = path.display().to_string();
         let source = Source { file: &file, text };
-        let raw: Raw = toml::from_str(text).map_err(|error| source.syntax(&error))?;
+        let raw: Result<Raw, _> = toml::from_str(text);
+        let raw = raw.map_err(|error| match unnamed_controller(text) {
+            Some(at) => source.at(
+                at,
+                "[controller] does not say which input it drives: write [controller.u], with the name of the input for u",
+            ),
+            None => source.syntax(&error),
+        })?;
         let spec = read(Path::new(raw.model.as_ref()))?;
         let own_candidates = candidates::read(&spec, &raw.candidates, &source)?;
         let listed = (&raw.effects[..], &raw.effect);
@@ -190,11 +209,8 @@ impl OwnModelFile {
             .map(|name| format!("candidates.{name}"));
         let waiting = effects.waiting.iter();
         let waiting = waiting.map(|id| format!("effect.\"{id}\""));
-        let controllers = raw
-            .controller
-            .keys()
-            .map(|name| format!("controller.{name}"));
-        let unused = candidates.chain(controllers).chain(waiting).collect();
+        let unused = candidates.chain(waiting).collect();
+        let controllers = controller::read(&spec, &raw.controller, &source)?;
         let known = raw.known.into_iter();
         let known = known.map(|(name, value)| (own(name), value));
         Ok(Self {
@@ -216,6 +232,7 @@ impl OwnModelFile {
             hold: raw.hold,
             candidates: own_candidates,
             effects,
+            controllers,
             unused,
         })
     }
@@ -343,6 +360,17 @@ impl OwnModelFile {
         };
         columns.time_header().1
     }
+}
+
+/// Where a controller stands that is written as that of a plant, which has one input.
+fn unnamed_controller(text: &str) -> Option<usize> {
+    let table = text.parse::<toml::Table>().ok()?;
+    let controller = table.get("controller")?.as_table()?;
+    let is_setting = |value: &toml::Value| !value.is_table();
+    let at = text
+        .find("[controller]")
+        .or_else(|| text.find("controller"));
+    at.filter(|_| controller.values().any(is_setting))
 }
 
 /// Puts a channel of a record into the unit of the model's signal.

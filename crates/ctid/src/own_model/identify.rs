@@ -6,10 +6,12 @@ use ct_model::{Linearity, TransferFunction, Variable};
 use ct_signals::{Columns, Hold, Record, quoted};
 use serde::Serialize;
 
+use super::controller::OwnController;
 use super::file::OwnModelFile;
 use crate::Error;
 use crate::identify::Order;
 use crate::look::{Look, Side, table};
+use crate::model_file::ControllerSettings;
 use crate::numbers;
 use crate::output::Found;
 
@@ -132,20 +134,48 @@ impl<'f> OneByOne<'f> {
         let columns = Columns {
             inputs: vec![all.inputs[self.input].clone()],
             outputs: vec![all.outputs[self.output].clone()],
+            references: self
+                .loop_controller()
+                .and_then(|own| own.reference.clone())
+                .into_iter()
+                .collect(),
             ..all.clone()
         };
         (columns, self.file.hold)
     }
 
-    /// Puts a record of the two into the units of the model.
+    /// The controller that drives this input by this output.
+    fn loop_controller(&self) -> Option<&OwnController> {
+        let mut controllers = self.file.controllers.iter();
+        controllers.find(|own| own.input == self.input && own.output == self.output)
+    }
+
+    /// The same with times in seconds; `data`: a record, whose header says the unit of the time where the model file does not.
+    ///
+    /// # Errors
+    /// Where the record cannot be read.
+    pub fn controller(&self, data: &Path) -> Result<Option<ControllerSettings>, Error> {
+        let controller = self.loop_controller();
+        let in_seconds = |own: &OwnController| Ok(own.in_seconds(self.file.time_unit(data)?));
+        controller.map(in_seconds).transpose()
+    }
+
+    /// Puts a record of the two into the units of the model. A reference that no controller names says nothing of this loop, and is left out.
     ///
     /// # Errors
     /// Where a unit is of another dimension.
     pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
         let spec = self.file.model.spec();
-        let output = spec.outputs[self.output].variable;
-        let signals = [&spec.inputs[self.input].about, spec.about(output)];
+        let output = spec.about(spec.outputs[self.output].variable);
+        if self
+            .loop_controller()
+            .is_none_or(|own| own.reference.is_none())
+        {
+            record.references.clear();
+        }
+        let signals = [&spec.inputs[self.input].about, output, output];
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
+        let channels = channels.chain(record.references.first_mut());
         for (channel, about) in channels.zip(signals) {
             super::file::convert(&record.name, channel, about)?;
         }

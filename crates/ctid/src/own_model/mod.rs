@@ -2,6 +2,7 @@
 
 mod candidates;
 mod compare;
+mod controller;
 mod design;
 mod diagnose;
 pub(crate) mod effects;
@@ -17,7 +18,10 @@ mod unknown;
 pub(crate) mod words;
 
 pub(crate) use self::compare::{Comparison, compare};
-pub(crate) use self::design::{OwnProposal, design, said as design_said};
+pub(crate) use self::design::{
+    OwnProposal, design, experiments, limits as design_limits, said as design_said,
+    sentences as design_sentences,
+};
 pub(crate) use self::diagnose::{
     diagnose, heading as diagnosis_heading, remaining as diagnosis_remaining,
     said as diagnosis_said, sizes,

@@ -5,6 +5,7 @@ use ct_model::effects::{Candidate, Place, Port, Visited, candidates};
 
 use super::OwnModelFile;
 use super::effects::every_candidate;
+use super::words::EffectWords;
 use crate::Error;
 use crate::look::Look;
 use crate::symptoms::{Sought, best};
@@ -46,6 +47,7 @@ fn searched(file: &OwnModelFile) -> Result<Vec<Candidate>, Error> {
 /// As [`own_candidates`], which the model file has passed.
 pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
     let all = searched(file)?;
+    let words = EffectWords::of(&file.base, &file.candidates);
     let mut text = String::new();
     for (i, heading) in HEADINGS.into_iter().enumerate() {
         let here: Vec<&Candidate> = all.iter().filter(|c| group(c) == i).collect();
@@ -53,14 +55,14 @@ pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
             continue;
         }
         text += &format!("{}\n", look.heading(heading));
-        text += &by_effect(&here, look);
+        text += &by_effect(&here, &words, look);
         text.push('\n');
     }
     Ok(text)
 }
 
 /// Candidates, those of one effect that follow each other together, with its physics.
-fn by_effect(all: &[&Candidate], look: Look) -> String {
+fn by_effect(all: &[&Candidate], words: &EffectWords, look: Look) -> String {
     let mut text = String::new();
     let mut rest = all;
     while let Some(first) = rest.first() {
@@ -68,8 +70,8 @@ fn by_effect(all: &[&Candidate], look: Look) -> String {
         let count = rest.iter().take_while(same).count().max(1);
         let ids: Vec<&str> = rest[..count].iter().map(|c| c.id.as_str()).collect();
         text += &look.paragraph("  ", &look.strong(ids.join(", ")));
-        let own = "a term of the model file";
-        text += &look.paragraph("      ", first.effect.map_or(own, |effect| effect.physics));
+        let physics = format!("{}.", words.physics(&first.id));
+        text += &look.paragraph("      ", &physics);
         rest = &rest[count..];
     }
     text
@@ -85,7 +87,8 @@ pub(crate) fn like(file: &OwnModelFile, sought: &Sought, look: Look) -> Result<S
     if found.is_empty() {
         return Err(sought.nothing());
     }
-    Ok(by_effect(&found, look))
+    let words = EffectWords::of(&file.base, &file.candidates);
+    Ok(by_effect(&found, &words, look))
 }
 
 /// `ctid check`: the ports with the names of what can act there, a few lines.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use ct_model::Model;
-use ct_model::effects::{Role, Visited, apply};
+use ct_model::effects::{Candidate, Role, Visited, apply};
 use effect_search::{Believed, Options, Problem, all_candidates, believed};
 
 use super::file::{OwnModelFile, Records};
@@ -56,6 +56,18 @@ impl OwnModelFile {
     /// # Errors
     /// Where the records do not allow a fit, or without any where the file lacks a number.
     pub fn mended(&self, records: Option<&Records>) -> Result<Self, Error> {
+        self.mended_within(records, &Options::default())
+    }
+
+    /// The same within a limit on the time, or until an interruption.
+    ///
+    /// # Errors
+    /// As [`OwnModelFile::mended`].
+    pub fn mended_within(
+        &self,
+        records: Option<&Records>,
+        options: &Options,
+    ) -> Result<Self, Error> {
         if self.effects.on.is_empty() {
             return Ok(self.clone());
         }
@@ -66,7 +78,7 @@ impl OwnModelFile {
             None => self.as_it_stands()?,
             Some(records) => {
                 let problem = problem(self, records);
-                believed(&problem, &Options::default()).map_err(|e| blamed(&problem, &e))?
+                believed(&problem, options).map_err(|e| blamed(&problem, &e))?
             }
         };
         Ok(Self {
@@ -82,20 +94,8 @@ impl OwnModelFile {
             file: self.name.clone(),
             what,
         };
-        let declared = self.columns.time.is_some();
-        let time_unit = declared.then(|| self.columns.time_header().1);
-        let visited = Visited {
-            time_unit: unit_of(time_unit.unwrap_or(1.0)).to_string(),
-            ..Visited::nominal(&self.base)
-        };
-        let (kept, own) = (&self.effects.kept, &self.candidates);
-        let all = all_candidates(&self.base, &visited, kept, own)
-            .map_err(|error| Error::Columns(error.to_string()))?;
-        let mut on = Vec::new();
-        for id in &self.effects.on {
-            let candidate = all.iter().find(|candidate| candidate.id == *id);
-            on.push(candidate.ok_or_else(|| refuse(format!("{id} cannot act in this model")))?);
-        }
+        let all = self.every_kept_candidate()?;
+        let on = self.listed(&all)?;
         let mut record_numbers = RecordNumbers::new();
         let mut values = BTreeMap::new();
         for candidate in &on {
@@ -134,6 +134,56 @@ impl OwnModelFile {
             spec,
             record_numbers,
         })
+    }
+
+    /// All that can act in the model without records: with what the file keeps of earlier ones.
+    fn every_kept_candidate(&self) -> Result<Vec<Candidate>, Error> {
+        let declared = self.columns.time.is_some();
+        let time_unit = declared.then(|| self.columns.time_header().1);
+        let visited = Visited {
+            time_unit: unit_of(time_unit.unwrap_or(1.0)).to_string(),
+            ..Visited::nominal(&self.base)
+        };
+        let (kept, own) = (&self.effects.kept, &self.candidates);
+        all_candidates(&self.base, &visited, kept, own)
+            .map_err(|error| Error::Columns(error.to_string()))
+    }
+
+    /// Those of these that the file lists as its effects, in its order.
+    fn listed<'c>(&self, all: &'c [Candidate]) -> Result<Vec<&'c Candidate>, Error> {
+        let find = |id: &String| {
+            let found = all.iter().find(|candidate| candidate.id == *id);
+            found.ok_or_else(|| Error::File {
+                file: self.name.clone(),
+                what: format!("{id} cannot act in this model"),
+            })
+        };
+        self.effects.on.iter().map(find).collect()
+    }
+
+    /// Each candidate of the file that is not among its effects, and the model with its effects and that candidate. One that repeats another is
+    /// left out where that one is not in the model: alone the two are the same.
+    ///
+    /// # Errors
+    /// Where a candidate cannot act beside the effects.
+    pub fn with_each_candidate(&self) -> Result<Vec<(Candidate, Model)>, Error> {
+        let all = self.every_kept_candidate()?;
+        let on = self.listed(&all)?;
+        let is_on = |id: &String| self.effects.on.contains(id);
+        let own = all.iter().filter(|candidate| {
+            candidate.effect.is_none()
+                && !is_on(&candidate.id)
+                && candidate.repeats.as_ref().is_none_or(is_on)
+        });
+        own.map(|candidate| {
+            let together: Vec<&Candidate> = on.iter().copied().chain([candidate]).collect();
+            let spec = apply(&self.base, &together).map_err(|error| Error::File {
+                file: self.name.clone(),
+                what: error.to_string(),
+            })?;
+            Ok((candidate.clone(), Model::new(spec)))
+        })
+        .collect()
     }
 
     /// Which effects are written in numbers of the records at hand, as the file keeps none: a sentence for each. `used`: those of a result.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use ct_signals::{ArModel, Channel, Clock, Record, residual_tests};
-use effect_search::{Estimate, NoiseFloor, Step};
+use effect_search::{Estimate, NoiseFloor, Step, Unknown};
 use missing_effect::{
     Diagnosis, Effort, Located, OutputStep, Parameter, PerOutput, Rankings, ResidualTests, Score,
     Series, Shown, ShownInput, Verdict, locate,
@@ -14,9 +14,9 @@ use serde::Serialize;
 use super::compare::Comparison;
 use super::diagnose::sentences;
 use super::file::{OwnModelFile, Records};
-use super::words::{EffectWords, shown_unit};
+use super::words::{EffectWords, Site, shown_unit};
 use crate::output::Found;
-use crate::report;
+use crate::report::{self, ComparedPort, MissingTerm};
 
 /// What was found, written as JSON as it stands, and its page.
 #[derive(Debug, Serialize)]
@@ -31,10 +31,10 @@ pub(crate) struct Paged<'t, T> {
 
 impl<'t, T> Paged<'t, T> {
     /// With the page that shows this, where one is asked for.
-    pub fn new(found: &'t T, shown: Option<&Diagnosis>) -> Self {
+    pub fn new(found: &'t T, shown: Option<&Document>) -> Self {
         Self {
             found,
-            page: shown.map(report::html).unwrap_or_default(),
+            page: shown.map(Document::html).unwrap_or_default(),
             unknown: None,
         }
     }
@@ -55,12 +55,62 @@ impl<T: Serialize> Found for Paged<'_, T> {
     }
 }
 
+/// What the report shows.
+#[derive(Debug, Clone)]
+pub(crate) struct Document {
+    pub diagnosis: Diagnosis,
+    /// What nothing explains, as a function at a port.
+    pub term: Option<MissingTerm>,
+}
+
+impl Document {
+    /// The report as a complete HTML file.
+    pub fn html(&self) -> String {
+        report::html_with(&self.diagnosis, self.term.as_ref())
+    }
+}
+
+/// The shape of what no candidate explains, as it is shown.
+pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTerm {
+    let shown_term = match words.sites(&unknown.effect) {
+        [Site::Input(u), ..] => format!("added to the input {u}"),
+        [Site::Output(y), ..] => format!("added to the output {y}"),
+        [Site::Equation(x), ..] => format!("added to the equation of {x}"),
+        [Site::Value(p), ..] => format!("the relative change of {p}"),
+        [] => "the missing term".to_string(),
+    };
+    let places = unknown.places.iter().map(|place| {
+        let placed = words.placed(&place.effect);
+        ComparedPort::new(placed, place.bic_gain, place.share_left_out)
+    });
+    MissingTerm {
+        effect: unknown.effect.clone(),
+        placed: words.placed(&unknown.effect),
+        variable: unknown.variable.clone(),
+        variable_unit: shown_unit(&unknown.variable_unit).to_string(),
+        shown_term,
+        unit: shown_unit(&unknown.unit).to_string(),
+        knots: unknown.at.clone(),
+        ordinates: unknown.value.clone(),
+        ordinate_errors: unknown.std_error.clone(),
+        command: format!(
+            "ctid add '{}' --model M.toml --from RESULT.json",
+            unknown.effect
+        ),
+        places: places.collect(),
+    }
+}
+
 /// What the report shows of a comparison.
-pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Diagnosis {
+pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Document {
     let source = "what the past of the model's residual does not predict";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
+    shown.effort.clone_from(&found.effort);
     shown.seconds = found.seconds;
-    shown
+    Document {
+        diagnosis: shown,
+        term: None,
+    }
 }
 
 /// What the report shows of a diagnosis.
@@ -68,7 +118,7 @@ pub(crate) fn diagnosed(
     file: &OwnModelFile,
     records: &Records,
     found: &effect_search::Diagnosis,
-) -> Diagnosis {
+) -> Document {
     let words = EffectWords::of(&file.base, &file.candidates);
     let source = "the residual of the last model";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
@@ -101,9 +151,12 @@ pub(crate) fn diagnosed(
     });
     shown.scores = singles.collect();
     shown.sentences = sentences(found, &words);
-    shown.effort.left_out.clone_from(&found.left_out);
     shown.seconds = found.seconds;
-    shown
+    let unknown = found.unknown.as_ref();
+    Document {
+        diagnosis: shown,
+        term: unknown.map(|unknown| missing_term(&words, unknown)),
+    }
 }
 
 /// The number of an only output; NaN of several.
@@ -334,5 +387,71 @@ fn tests(record: &Record, residual: &[f64]) -> ResidualTests {
         cross_correlation_bound: bound,
         whiteness_p: residual_tests::ljung_box(residual, portmanteau, 0).unwrap_or(f64::NAN),
         input_p: if p.is_nan() { p } else { (count * p).min(1.0) },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use effect_search::PortScore;
+
+    use super::*;
+
+    fn unknown(effect: &str, variable: [&str; 2], unit: &str) -> Unknown {
+        let place = |effect: &str, share_left_out| PortScore {
+            effect: effect.to_string(),
+            bic_gain: 812.345,
+            share_left_out,
+        };
+        Unknown {
+            effect: effect.to_string(),
+            variable: variable[0].to_string(),
+            variable_unit: variable[1].to_string(),
+            unit: unit.to_string(),
+            share: 0.9,
+            share_left_out: Some(0.8),
+            rmse_per_output: BTreeMap::new(),
+            at: vec![0.0, 50.0, 100.0],
+            value: vec![0.0, -2.0, 1.0],
+            std_error: vec![None, Some(0.1), Some(0.2)],
+            parameters: Vec::new(),
+            places: vec![place(effect, Some(0.8)), place("course(T)", None)],
+        }
+    }
+
+    /// Where the term acts, what it depends on, its units and the command stand in the report, and its values are those of its figure.
+    #[test]
+    fn what_nothing_explains_is_shown_with_its_port_and_units() {
+        let text = include_str!("../../../../examples/models/heated-block.mo");
+        let spec = ct_model::ModelSpec::parse(text).unwrap();
+        let words = EffectWords::of(&spec, &BTreeMap::new());
+        let term = missing_term(&words, &unknown("shape(T,u)", ["u", "%"], "W"));
+        assert_eq!(term.shown_term, "added to the equation of T");
+        assert_eq!(
+            term.placed,
+            "shape(T,u) in the equation of T (block), with u (power of the heater)"
+        );
+        assert_eq!(term.places[0].left_out, "80 %");
+        assert_eq!(term.places[1].left_out, "");
+        let of_parameter = missing_term(&words, &unknown("shape(k,T)", ["T", "degC"], "1"));
+        assert_eq!(of_parameter.shown_term, "the relative change of k");
+        assert_eq!(of_parameter.unit, "");
+        let document = Document {
+            diagnosis: crate::report::sample::two_tanks(),
+            term: Some(term),
+        };
+        let html = document.html();
+        for part in [
+            "What nothing explains",
+            "id=\"plot-unknown-shape\"",
+            "added to the equation of T, in W",
+            "<code>ctid add &#39;shape(T,u)&#39; --model M.toml --from RESULT.json</code>",
+            "Ports and variables that were compared",
+            "\"variable_unit\":\"%\"",
+            "\"ordinate_errors\":[null,0.1,0.2]",
+        ] {
+            assert!(html.contains(part), "{part}");
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::compare::{Comparison, Curves};
 use super::diagnose::state_rows;
+use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
@@ -66,6 +67,11 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     let rows: Vec<Vec<String>> = rows.collect();
     for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
         text += &format!("  {}\n", line.trim_end());
+    }
+    let cut = findings::effort(&comparison.effort, Reader::Commands);
+    if !cut.is_empty() {
+        text += &look.warning(format!("warning: {}", cut.join(" ")));
+        text.push('\n');
     }
     let agree = format!(
         "{} of {} starts ended in this minimum",

@@ -38,7 +38,7 @@ impl Site {
 struct Words {
     place: String,
     sites: Vec<Site>,
-    physics: &'static str,
+    physics: String,
 }
 
 impl EffectWords {
@@ -46,19 +46,15 @@ impl EffectWords {
     pub fn of(spec: &ModelSpec, own: &BTreeMap<String, OwnCandidate>) -> Self {
         // A model file has been read with these candidates.
         let all = every_candidate(spec, own).unwrap_or_default();
-        let words = |candidate: &Candidate| Words {
-            place: place(spec, candidate.port),
-            sites: match own.get(&candidate.id) {
-                Some(own) => own
-                    .terms
-                    .keys()
-                    .map(|key| site_of_term(spec, key))
-                    .collect(),
-                None => sites(spec, candidate.port),
+        let words = |candidate: &Candidate| match own.get(&candidate.id) {
+            Some(own) => of_own(spec, own),
+            None => Words {
+                place: place(spec, candidate.port),
+                sites: sites(spec, candidate.port),
+                physics: candidate
+                    .effect
+                    .map_or(String::new(), |effect| effect.physics.to_string()),
             },
-            physics: candidate
-                .effect
-                .map_or("A term of the model file", |effect| effect.physics),
         };
         Self(all.iter().map(|c| (c.id.clone(), words(c))).collect())
     }
@@ -77,8 +73,8 @@ impl EffectWords {
     }
 
     /// What it does, in a sentence without its end.
-    pub fn physics(&self, id: &str) -> &'static str {
-        let words = self.0.get(id).map_or("", |words| words.physics);
+    pub fn physics(&self, id: &str) -> &str {
+        let words = self.0.get(id).map_or("", |words| &words.physics);
         words.trim_end_matches('.')
     }
 }
@@ -104,14 +100,34 @@ pub(crate) fn shown_unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
 }
 
+/// A candidate of the model file, by what its terms are added to.
+fn of_own(spec: &ModelSpec, own: &OwnCandidate) -> Words {
+    let ports = own.terms.keys().filter_map(|key| port_of_term(spec, key));
+    let ports: Vec<Port> = ports.collect();
+    let places: Vec<String> = ports.iter().map(|port| place(spec, *port)).collect();
+    let terms = own.terms.iter();
+    let terms: Vec<String> = terms
+        .map(|(key, term)| format!("{} to {key}", escaped(term)))
+        .collect();
+    Words {
+        place: places.join(" and "),
+        sites: ports.iter().flat_map(|port| sites(spec, *port)).collect(),
+        physics: format!(
+            "A candidate of the model file, which adds {}",
+            terms.join(" and ")
+        ),
+    }
+}
+
 /// What a term of the model file is added to.
-fn site_of_term(spec: &ModelSpec, name: &str) -> Site {
-    match spec.find(name) {
-        Some(Variable::State(_)) => Site::Equation(name.to_string()),
-        Some(variable) if spec.outputs.iter().any(|o| o.variable == variable) => {
-            Site::Output(name.to_string())
+fn port_of_term(spec: &ModelSpec, name: &str) -> Option<Port> {
+    match spec.find(name)? {
+        Variable::State(i) => Some(Port::Balance(i)),
+        variable => {
+            let mut outputs = spec.outputs.iter();
+            let output = outputs.position(|output| output.variable == variable);
+            Some(output.map_or(Port::Value(variable), Port::Output))
         }
-        _ => Site::Value(name.to_string()),
     }
 }
 
@@ -194,5 +210,41 @@ mod tests {
             assert_eq!(words.placed(id), placed);
             assert!(words.physics(id).len() > 10, "{id}");
         }
+    }
+
+    #[test]
+    fn a_candidate_of_the_model_file_is_where_its_terms_are() {
+        let spec = ModelSpec::parse(include_str!("../../../../examples/models/heated-block.mo"));
+        let parameter = ct_model::effects::OwnParameter {
+            unit: String::new(),
+            min: None,
+            max: None,
+            start: 1.0,
+        };
+        let term = |key: &str, term: &str| (key.to_string(), term.to_string());
+        let own = OwnCandidate {
+            parameters: BTreeMap::from([("q".to_string(), parameter)]),
+            terms: BTreeMap::from([term("T", "-q*T"), term("loss", "q*u"), term("y", "q")]),
+            ..OwnCandidate::default()
+        };
+        let all = BTreeMap::from([("vent".to_string(), own)]);
+        let words = EffectWords::of(&spec.unwrap(), &all);
+        assert_eq!(
+            words.placed("vent"),
+            "vent in the equation of T (block) and at the flow loss and at the output y, which reads T (block)"
+        );
+        assert_eq!(
+            words.physics("vent"),
+            "A candidate of the model file, which adds -q*T to T and q*u to loss and q to y"
+        );
+        let site = |name: &str| name.to_string();
+        assert_eq!(
+            words.sites("vent"),
+            [
+                Site::Equation(site("T")),
+                Site::Value(site("loss")),
+                Site::Output(site("y"))
+            ]
+        );
     }
 }

@@ -5,6 +5,7 @@ use missing_effect::{Diagnosis, Failures, OutputStep, ResidualTests, Score, Show
 use serde::Serialize;
 
 use super::decimate::min_max;
+use super::missing_term::MissingTerm;
 use super::text;
 use crate::findings;
 
@@ -25,7 +26,15 @@ struct Report<'a> {
     /// Which of the scores are of effects that cannot be told from an added one.
     equal: Vec<bool>,
     /// What nothing explains.
-    unknown: Option<&'a Unknown>,
+    unknown: Option<Missing<'a>>,
+}
+
+/// Of a plant, or of a model of its user's own.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Missing<'a> {
+    Plant(&'a Unknown),
+    Own(&'a MissingTerm),
 }
 
 #[derive(Serialize)]
@@ -120,6 +129,11 @@ struct Curve {
 
 /// The JSON of the report, safe inside a `<script>` element. What is not finite becomes `null`.
 pub(crate) fn json(diagnosis: &Diagnosis) -> String {
+    json_with(diagnosis, None)
+}
+
+/// The same of a model of its user's own, with what nothing explains there.
+pub(super) fn json_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> String {
     let report = Report {
         clock: (&diagnosis.clock).into(),
         input_unit: &diagnosis.input_unit,
@@ -143,7 +157,10 @@ pub(crate) fn json(diagnosis: &Diagnosis) -> String {
         scores: &diagnosis.scores,
         added: scores(diagnosis, findings::is_added),
         equal: scores(diagnosis, findings::fits_as_well),
-        unknown: diagnosis.unknown.as_ref(),
+        unknown: match (term, &diagnosis.unknown) {
+            (Some(term), _) => Some(Missing::Own(term)),
+            (None, unknown) => unknown.as_ref().map(Missing::Plant),
+        },
     };
     script_safe(&report)
 }

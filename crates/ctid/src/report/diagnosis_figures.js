@@ -278,14 +278,16 @@ const diagnosisFigures = (report, view) => {
   // A curve with its band.
   function banded(x, y, error, title, name) {
     const c = theme();
-    const edge = (sign) => y.map((v, k) => v + sign * 1.96 * error[k]);
+    // Where the error is not known there is no band.
+    const known = (k) => error[k] !== null && error[k] !== undefined;
+    const edge = (sign) => y.map((v, k) => (known(k) ? v + sign * 1.96 * error[k] : null));
     const unit = pretty(report.unknown.unit);
     const line = { width: 0 };
     return { data: [
       { x, y: edge(-1), mode: "lines", line, hoverinfo: "skip" },
       { x, y: edge(1), mode: "lines", line, fill: "tonexty", fillcolor: c.band, hoverinfo: "skip" },
       { x, y, mode: x.length > 20 ? "lines" : "lines+markers", line: { color: c.best, width: 2.2 }, marker: { size: 6 },
-        customdata: error.map((e) => 1.96 * e), hovertemplate: `%{x:.5~g}: %{y:.3~g} ± %{customdata:.2~g} ${unit}<extra></extra>` },
+        customdata: error.map((e, k) => (known(k) ? ` ± ${Number((1.96 * e).toPrecision(2))}` : "")), hovertemplate: `%{x:.5~g}: %{y:.3~g}%{customdata} ${unit}<extra></extra>` },
     ], layout: layout(narrow.matches ? 260 : 300, {
       hovermode: "closest", xaxis: axis(title, { exponentformat: "none" }), yaxis: axis(named(name, unit), { zeroline: true }),
     }) };
@@ -303,8 +305,9 @@ const diagnosisFigures = (report, view) => {
 
   function unknownShape() {
     const u = report.unknown;
-    const name = { rate: "net inflow", input: "command" }[u.variable] || u.variable;
-    return banded(u.knots, u.ordinates, u.ordinate_errors, named(name, pretty(u.variable_unit)), "missing term");
+    // A model of one's own names its signals, a plant has a few.
+    const name = u.shown_term ? plain(u.variable) : { rate: "net inflow", input: "command" }[u.variable] || u.variable;
+    return banded(u.knots, u.ordinates, u.ordinate_errors, named(name, pretty(u.variable_unit)), u.shown_term ? plain(u.shown_term) : "missing term");
   }
 
   const figures = {

@@ -12,6 +12,7 @@ mod data;
 mod decimate;
 mod figures;
 mod identification;
+mod missing_term;
 mod page;
 #[cfg(test)]
 pub(crate) mod sample;
@@ -26,6 +27,7 @@ pub use self::baysse::html as baysse;
 pub(crate) use self::data::{json as drawing, records as drawing_of_records, rounded};
 pub(crate) use self::decimate::min_max;
 pub use self::identification::html as identification;
+pub(crate) use self::missing_term::{COMPARED, ComparedPort, MissingTerm};
 pub use self::page::head;
 use self::page::{NOTICES, Page, figure, figure_with, items, large, section};
 pub(crate) use self::page::{PLOTLY, PLOTS, STYLE};
@@ -44,14 +46,20 @@ const SCRIPT: &str = concat!(
 /// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and
 /// no scores; what is empty is left out.
 pub fn html(diagnosis: &Diagnosis) -> String {
+    html_with(diagnosis, None)
+}
+
+/// The same of a model of its user's own, with what nothing explains there.
+pub(crate) fn html_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> String {
     let title = format!("ctid: {}", escape(&diagnosis.plant));
-    let data = data::json(diagnosis);
+    let data = data::json_with(diagnosis, term);
     let body: String = [
         headline(diagnosis),
         shown(diagnosis),
         "<main>".to_owned(),
         fit(diagnosis),
         unknown(diagnosis),
+        term.map_or(String::new(), missing_term::html),
         failures(diagnosis),
         residual_tests(diagnosis),
         ranking(diagnosis),

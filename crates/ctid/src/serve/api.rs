@@ -19,6 +19,7 @@ use tokio::task::spawn_blocking;
 use super::body::whole;
 use super::guard::{LARGEST_BODY, Refusal, check_length};
 use super::jobs::{self, Task};
+use super::own_design::AppliedInput;
 use super::session::{Session, lock};
 use super::sessions::Shared;
 use super::settings::Form;
@@ -348,6 +349,9 @@ enum Run {
         range: Option<(f64, f64)>,
         slew: Option<f64>,
         duration: Option<f64>,
+        /// Of a model of one's own: what each input may do.
+        #[serde(default)]
+        inputs: Vec<AppliedInput>,
     },
 }
 
@@ -369,6 +373,7 @@ async fn run(State(app): State<Arc<App>>, Query(tab): Query<Tab>, Json(run): Jso
             range,
             slew,
             duration,
+            inputs,
         } => Task::Design {
             group,
             between,
@@ -378,6 +383,7 @@ async fn run(State(app): State<Arc<App>>, Query(tab): Query<Tab>, Json(run): Jso
                 duration,
                 ..Limits::default()
             },
+            inputs,
         },
     };
     aside(move || {

@@ -16,7 +16,7 @@ const STYLE: &str = "text/css; charset=utf-8";
 const PAGE: &str = "text/html; charset=utf-8";
 
 /// Path, kind and content of what does not change.
-const FILES: [(&str, &str, &str); 16] = [
+const FILES: [(&str, &str, &str); 18] = [
     ("/", PAGE, include_str!("page/index.html")),
     ("/report.css", STYLE, report::STYLE),
     ("/page.css", STYLE, include_str!("page/page.css")),
@@ -29,6 +29,16 @@ const FILES: [(&str, &str, &str); 16] = [
     ("/model.js", SCRIPT, include_str!("page/model.js")),
     ("/fit.js", SCRIPT, include_str!("page/fit.js")),
     ("/own.js", SCRIPT, include_str!("page/own.js")),
+    (
+        "/own_unknown.js",
+        SCRIPT,
+        include_str!("page/own_unknown.js"),
+    ),
+    (
+        "/own_experiment.js",
+        SCRIPT,
+        include_str!("page/own_experiment.js"),
+    ),
     ("/chains.js", SCRIPT, include_str!("page/chains.js")),
     ("/findings.js", SCRIPT, include_str!("page/findings.js")),
     ("/unknown.js", SCRIPT, include_str!("page/unknown.js")),

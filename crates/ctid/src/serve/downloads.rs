@@ -150,7 +150,7 @@ async fn file(
                 (
                     "report.html".to_string(),
                     "text/html; charset=utf-8",
-                    report::html(&shown),
+                    shown.html(),
                 )
             }
             Wanted::Report => {
@@ -164,6 +164,14 @@ async fn file(
                     "text/html; charset=utf-8",
                     report::html(&latest.found),
                 )
+            }
+            Wanted::Experiment if session.own.is_some() => {
+                let own = session.own.as_ref();
+                let design = own.and_then(|own| own.design.as_ref());
+                let design = design.ok_or_else(|| missing("no experiment was designed yet"))?;
+                let text = design.record.clone();
+                let text = text.ok_or_else(|| missing("no experiment tells the two apart"))?;
+                ("next.csv".to_string(), "text/csv; charset=utf-8", text)
             }
             Wanted::Experiment => {
                 let found = session.design.as_ref();

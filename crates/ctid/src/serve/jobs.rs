@@ -15,6 +15,7 @@ use missing_effect::{Diagnosis, Options, Problem, Progress, Verdict, compare, di
 
 use super::guard::Refusal;
 use super::own;
+use super::own_design::{self, AppliedInput};
 use super::session::{Fitted, Found, Job, Kind, Session, lock};
 use super::sessions::Shared;
 use super::words;
@@ -42,6 +43,8 @@ pub(super) enum Task {
         group: usize,
         between: [String; 2],
         limits: Limits,
+        /// Of a model of its user's own: what each input may do.
+        inputs: Vec<AppliedInput>,
     },
 }
 
@@ -55,6 +58,7 @@ enum Input {
 enum Outcome {
     Own(Box<Comparison>),
     OwnDiagnosed(Box<effect_search::Diagnosis>),
+    OwnDesigned(Box<effect_search::design::Design>),
     Fitted(Diagnosis),
     Diagnosed(Diagnosis),
     Designed(Box<Design>, Columns),
@@ -147,9 +151,12 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
         (Task::Compare | Task::Diagnose { .. }, Some(_)) => {
             Input::Own(Box::new(own::Work::new(&mut session)?))
         }
-        (_, Some(_)) => {
+        (Task::Design { group, between, .. }, Some(_)) => {
+            Input::Own(Box::new(own::Work::beside(&mut session, *group, between)?))
+        }
+        (Task::Chain(_), Some(_)) => {
             return Err(Refusal::input(
-                "experiments and chains are not on the page for models of your own yet: add an effect, and fit the model again",
+                "chains are not on the page for models of your own yet: add an effect, and fit the model again",
             ));
         }
         (task, None) => {
@@ -184,8 +191,12 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 Input::Plant(_) => effort.limit(),
                 Input::Own(_) => effort.limit_of_own_model(),
             }),
-            Task::Design { .. } => Some(missing_effect::TIME_LIMIT),
-            _ => None,
+            Task::Design { .. } | Task::Compare => match &work {
+                Input::Plant(_) if matches!(task, Task::Compare) => None,
+                Input::Plant(_) => Some(missing_effect::TIME_LIMIT),
+                Input::Own(_) => Some(EffortLevel::default().limit_of_own_model()),
+            },
+            Task::Chain(_) => None,
         },
         stop: stop.clone(),
         interrupt: interrupt.clone(),
@@ -211,19 +222,31 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 compute(work, &task, options, &show)
             }
             Input::Own(work) => {
-                // Such a fit goes on where it is stopped: the next one waits for its end.
+                // What was stopped ends its step first: the next one waits for that.
                 let _alone = lock(&own_fits);
                 if stop.load(Ordering::Relaxed) {
                     return Err(Error::Usage("stopped".to_string()));
                 }
-                match task {
+                match &task {
                     Task::Diagnose {
                         max_effects,
                         effort,
                     } => work
-                        .search(max_effects, effort, &interrupt, &show)
+                        .search(*max_effects, *effort, &interrupt, &show)
                         .map(|found| Outcome::OwnDiagnosed(Box::new(found))),
-                    _ => work.compute().map(|found| Outcome::Own(Box::new(found))),
+                    Task::Design {
+                        between,
+                        limits,
+                        inputs,
+                        ..
+                    } => {
+                        let limits = own_design::limits(inputs, limits.duration);
+                        work.design(between, &limits, &interrupt, &show)
+                            .map(|design| Outcome::OwnDesigned(Box::new(design)))
+                    }
+                    _ => work
+                        .compute(&interrupt)
+                        .map(|found| Outcome::Own(Box::new(found))),
                 }
             }
         }));
@@ -295,12 +318,15 @@ fn settle(session: &mut Session, work: Input, outcome: Outcome) {
         (Input::Own(work), Outcome::OwnDiagnosed(found)) => {
             return work.settle_diagnosis(session, found);
         }
+        (Input::Own(work), Outcome::OwnDesigned(design)) => {
+            return work.settle_design(session, design);
+        }
         (Input::Plant(work), _) => *work,
         (Input::Own(_), _) => return,
     };
     let id = session.number();
     match outcome {
-        Outcome::Own(_) | Outcome::OwnDiagnosed(_) => {}
+        Outcome::Own(_) | Outcome::OwnDiagnosed(_) | Outcome::OwnDesigned(_) => {}
         Outcome::Fitted(found) => {
             let Some(step) = found.steps.last() else {
                 return;

@@ -7,7 +7,7 @@
 //! | the page's files | `assets.rs`, `page/` |
 //! | what one tab works on | `session.rs`, its records `upload.rs`; all of them: `sessions.rs`; what they hold: `held.rs` |
 //! | the form of the model | `settings.rs` |
-//! | a model of its user's own, and its fits | `own.rs` |
+//! | a model of its user's own, and its fits | `own.rs`; what was found `own_findings.rs`; its experiments `own_design.rs` |
 //! | computations | `jobs.rs` |
 //! | what the page is told | `state.rs`, `words.rs` |
 //! | the routes | `api.rs`, `downloads.rs` |
@@ -30,10 +30,10 @@
 //! | `POST /api/forget?session=` | `{name}` of a record | the state |
 //! | `POST /api/settings?session=` | `{plant, hold, columns, known, controller}`, as the model file has them, and `from`: the same as the form was filled from | the state; 409 where the model says something else than `from` |
 //! | `POST /api/text?session=` | `{text}`, a whole model file, and `from`: the text that it replaces | the state; 409 where another stands there |
-//! | `POST /api/own?session=` | `{do: "begin"}`, `{do: "end"}`, `{do: "example", name}`, `{do: "write", text, file}` of which one may be missing, `{do: "column", signal, column}` | the state |
+//! | `POST /api/own?session=` | `{do: "begin"}`, `{do: "end"}`, `{do: "example", name}`, `{do: "write", text, file}` of which one may be missing, `{do: "column", signal, column}`, `{do: "add" or "remove", effect}` | the state |
 //! | `POST /api/effect?session=` | `{do: "add" or "remove", effect, place}`; `{do: "keep", effect}` adds what the diagnosis left unexplained under that name | the state |
 //! | `POST /api/loop?session=` | `{measured}`: whether models run on the measured command where the loop could be simulated | the state |
-//! | `POST /api/run?session=` | `{what: "compare"}`, `{what: "diagnose", max_effects, effort}`, effort `quick`, `normal` or `thorough`, `{what: "chain", effects: [[effect, place], ...]}`, `{what: "design", group, between: [a, b], range: [low, high], slew, duration}`, of which the last three may be missing | the state |
+//! | `POST /api/run?session=` | `{what: "compare"}`, `{what: "diagnose", max_effects, effort}`, effort `quick`, `normal` or `thorough`, `{what: "chain", effects: [[effect, place], ...]}`, `{what: "design", group, between: [a, b], range: [low, high], slew, duration}`, of which the last three may be missing; of a model of its user's own `inputs: [{name, apply, range, slew}]` in place of range and slew | the state |
 //! | `POST /api/cancel?session=` | | the state; what was computed is dropped |
 //! | `POST /api/finish?session=` | | the state; a search ends soon with the best that it has found |
 //! | `GET /api/data?session=` | | the records' curves, as the report draws them |
@@ -61,6 +61,7 @@ mod guard;
 mod held;
 mod jobs;
 mod own;
+mod own_design;
 mod own_findings;
 mod session;
 mod sessions;

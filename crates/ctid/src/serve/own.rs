@@ -11,13 +11,14 @@ use std::sync::atomic::AtomicBool;
 use axum::body::Bytes;
 use ct_model::{ModelSpec, TextError};
 use ct_signals::{Columns, ReadOptions, Reading};
+use effect_search::design::{Design, Limits};
 use effect_search::{Diagnosis, Options};
-use greybox::FitOptions;
-use missing_effect::{Diagnosis as Shown, Progress};
+use missing_effect::Progress;
 use serde_json::{Value, json};
 
 use super::guard::Refusal;
 use super::held::of_diagnosis;
+use super::own_design::Designed;
 use super::own_findings::{self, Diagnosed};
 use super::session::Session;
 use super::upload::Upload;
@@ -25,7 +26,7 @@ use crate::edit::own::Findings;
 use crate::effort::EffortLevel;
 use crate::look::Look;
 use crate::model_file::read_text;
-use crate::own_model::{Comparison, OwnModelFile, Records, compare, diagnose, report};
+use crate::own_model::{Comparison, OwnModelFile, Records, compare, design, diagnose, report};
 use crate::report::{min_max, rounded};
 use crate::{Error, check, edit, numbers};
 
@@ -72,8 +73,10 @@ pub(super) struct Own {
     pub fit: Option<Fit>,
     /// What was diagnosed last.
     pub diagnosis: Option<Diagnosed>,
+    /// The experiment that was designed last.
+    pub design: Option<Designed>,
     /// What the report shows: the last of both.
-    pub shown: Option<Arc<Shown>>,
+    pub shown: Option<Arc<report::Document>>,
     /// Columns and what is held, as they were read last: a text that is being typed is no model for a while.
     read: (Columns, ReadOptions),
 }
@@ -157,8 +160,12 @@ impl Own {
     pub(super) fn held(&self) -> usize {
         let fit = self.fit.as_ref();
         let of_fit = |fit: &Fit| fit.body.len() + fit.text.len() + fit.file.len();
-        let shown = self.shown.as_ref().map_or(0, |shown| of_diagnosis(shown));
-        self.text.len() + self.file.len() + fit.map_or(0, of_fit) + shown
+        let shown = self
+            .shown
+            .as_ref()
+            .map_or(0, |shown| of_diagnosis(&shown.diagnosis));
+        let design = self.design.as_ref().map_or(0, Designed::held);
+        self.text.len() + self.file.len() + fit.map_or(0, of_fit) + shown + design
     }
 
     /// The text in the place of the file that a model file names.
@@ -223,9 +230,11 @@ impl Own {
             "time": columns.and_then(|columns| columns.time.clone()),
             "signals": signals,
             "unused": unused,
+            "loop": model.as_ref().ok().and_then(OwnModelFile::loop_note),
             "effects": model.as_ref().ok().map(|model| model.effects.on.clone()),
             "ports": ports,
             "diagnosis": diagnosis,
+            "design": self.design.as_ref().map(|design| &design.body),
             "fit": self.fit.as_ref().map(|fit| fit.id),
             "fitted": self.fit.as_ref().is_some_and(|fit| {
                 fit.text == self.text && fit.file == self.file && fit.data == data
@@ -317,6 +326,16 @@ fn no_model() -> Refusal {
     Refusal::input("there is no model of your own yet")
 }
 
+/// How far a search is that goes through these phases.
+fn progress(now: effect_search::Progress, phases: &[&str]) -> Progress {
+    let done = phases.iter().position(|phase| *phase == now.phase);
+    Progress {
+        phase: now.phase,
+        done: done.unwrap_or(0),
+        total: phases.len(),
+    }
+}
+
 /// What a fit or a diagnosis works on.
 pub(super) struct Work {
     own: Own,
@@ -330,6 +349,38 @@ impl Work {
     /// Where text, file or records do not allow a fit.
     pub(super) fn new(session: &mut Session) -> Result<Self, Refusal> {
         let own = session.own.clone().ok_or_else(no_model)?;
+        Self::of(session, own)
+    }
+
+    /// The model that was diagnosed with what was found beside a group: two of the group are to be told apart there.
+    ///
+    /// # Errors
+    /// Where nothing was diagnosed, or the records are others since.
+    pub(super) fn beside(
+        session: &mut Session,
+        group: usize,
+        between: &[String; 2],
+    ) -> Result<Self, Refusal> {
+        let mut own = session.own.clone().ok_or_else(no_model)?;
+        let found = own.diagnosis.clone();
+        let found = found.filter(|found| found.data == session.data);
+        let Some(found) = found else {
+            return Err(Refusal::input(
+                "these records were not diagnosed yet; diagnose first",
+            ));
+        };
+        (own.text, own.file) = (found.text, found.file);
+        let effects = found.effects.iter().enumerate();
+        for (_, effect) in effects.filter(|(k, id)| *k != group && !between.contains(id)) {
+            let kept = Some(&found.findings);
+            let path = Path::new(FILE);
+            let edited = edit::own::with_effect(path, &own.file, effect, kept, &own.named_text());
+            own.file = edited?.text;
+        }
+        Self::of(session, own)
+    }
+
+    fn of(session: &mut Session, own: Own) -> Result<Self, Refusal> {
         let model = own.model()?;
         let options = ReadOptions::from(model.hold);
         let (mut fitted, mut held_out): (Vec<Reading>, Vec<Reading>) = Default::default();
@@ -359,8 +410,14 @@ impl Work {
         })
     }
 
-    pub(super) fn compute(&self) -> Result<Comparison, Error> {
-        compare(&self.model, &self.records, &FitOptions::default())
+    /// Fits the model, until the flag is set.
+    pub(super) fn compute(&self, interrupt: &AtomicBool) -> Result<Comparison, Error> {
+        let options = Options {
+            time_limit: Some(EffortLevel::default().limit_of_own_model()),
+            interrupt: Some(interrupt),
+            ..Options::default()
+        };
+        compare(&self.model, &self.records, &options)
     }
 
     /// Searches what is missing, until the flag is set.
@@ -371,7 +428,6 @@ impl Work {
         interrupt: &AtomicBool,
         show: &(dyn Fn(Progress) + Sync),
     ) -> Result<Diagnosis, Error> {
-        /// What a search goes through.
         const PHASES: [&str; 4] = [
             "fitting the model",
             "searching the effects",
@@ -387,13 +443,49 @@ impl Work {
             options.max_effects = usize::from(most.get());
         }
         diagnose(&self.model, &self.records, &options, &|now| {
-            let done = PHASES.iter().position(|phase| *phase == now.phase);
-            show(Progress {
-                phase: now.phase,
-                done: done.unwrap_or(0),
-                total: PHASES.len(),
-            });
+            show(progress(now, &PHASES));
         })
+    }
+
+    /// The experiment within these limits that tells two effects apart, until the flag is set.
+    pub(super) fn design(
+        &self,
+        between: &[String; 2],
+        limits: &Limits,
+        interrupt: &AtomicBool,
+        show: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Design, Error> {
+        const PHASES: [&str; 4] = [
+            "fitting the model",
+            "fitting both effects",
+            "trying experiments",
+            "confirming by refits",
+        ];
+        let options = Options {
+            time_limit: Some(EffortLevel::default().limit_of_own_model()),
+            interrupt: Some(interrupt),
+            ..Options::default()
+        };
+        let between = between.each_ref().map(String::as_str);
+        design(
+            &self.model,
+            &self.records,
+            between,
+            limits,
+            &options,
+            &|now| {
+                show(progress(now, &PHASES));
+            },
+        )
+    }
+
+    /// Puts a design where the page finds it.
+    pub(super) fn settle_design(self, session: &mut Session, design: &Design) {
+        let id = session.number();
+        let designed = Designed::new(id, &self.model, design, self.records.time_unit);
+        if let Some(own) = &mut session.own {
+            own.design = Some(designed);
+        }
     }
 
     /// Puts a diagnosis where the page finds it.
@@ -605,13 +697,91 @@ mod tests {
         assert!(!file.contains("block"));
     }
 
+    /// A heated block whose heater answers 15 s late, every 5 s.
+    fn late() -> String {
+        let mut text = String::from("t [s],heater [%],room [degC],block [degC]\n");
+        let (mut block, mut seed) = (21.0, 7_u32);
+        let mut past = [0.0; 3];
+        for k in 0..300 {
+            let u = f64::from(k / 17 * 31 % 80);
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let noise = 0.1 * (f64::from(seed >> 8) / f64::from(1 << 24) - 0.5);
+            text += &format!("{},{u},21,{:.4}\n", 5 * k, block + noise);
+            block += 5.0 * (0.25 * past[0] - 0.15 * (block - 21.0)) / 52.0;
+            past = [past[1], past[2], u];
+        }
+        text
+    }
+
+    /// What was found beside a group is in the model of its experiment, and the experiment is one of the inputs' units.
+    #[test]
+    fn the_experiment_between_two_effects_of_a_group() {
+        let mut session = Session::new(None, None, Vec::new());
+        let name = "heated-block".to_string();
+        change(&mut session, Change::Example { name }).unwrap();
+        let upload = Upload::new("late.csv", false, late().into_bytes().into()).unwrap();
+        session.take_alone(upload);
+        let between = ["delay(u)", "lag(u)"].map(str::to_string);
+        let early = Work::beside(&mut session, 0, &between).err().unwrap();
+        assert!(early.to_string().contains("diagnose first"), "{early}");
+        let data = session.data;
+        let own = session.own.as_mut().unwrap();
+        let found = r#"{ "model": "HeatedBlock", "steps": [], "unknown": null, "record_numbers": { "offset(y)": {} } }"#;
+        own.diagnosis = Some(Diagnosed {
+            id: 1,
+            text: own.text.clone(),
+            file: own.file.clone(),
+            data,
+            findings: Findings::of_text(found).unwrap(),
+            effects: vec!["delay(u)".to_string(), "offset(y)".to_string()],
+            body: json!({}),
+        });
+        let work = Work::beside(&mut session, 0, &between).unwrap();
+        assert_eq!(work.model.effects.on, ["offset(y)"]);
+        let inputs = json!([
+            { "name": "u", "apply": true, "range": [0.0, 50.0], "slew": null },
+            { "name": "Ta", "apply": false, "range": null, "slew": null },
+        ]);
+        let inputs: Vec<super::super::own_design::AppliedInput> =
+            serde_json::from_value(inputs).unwrap();
+        let limits = super::super::own_design::limits(&inputs, Some(900.0));
+        assert_eq!(limits.inputs, ["u"]);
+        let design = work
+            .design(&between, &limits, &AtomicBool::new(false), &|_| {})
+            .unwrap();
+        work.settle_design(&mut session, &design);
+        let shown = state(&mut session)["own"]["design"].clone();
+        assert_eq!(shown["between"], json!(between));
+        assert!(
+            shown["limits"]
+                .as_str()
+                .unwrap()
+                .contains("15 min with u 0.00 .. 50.0 %"),
+            "{shown}"
+        );
+        assert_eq!(shown["inputs"].as_array().unwrap().len(), 1, "{shown}");
+        assert_eq!(shown["inputs"][0]["unit"], "%");
+        let reaches = shown["rows"][0]["reaches"][0].as_str().unwrap();
+        assert!(
+            reaches.starts_with("y ") && reaches.ends_with(" degC"),
+            "{shown}"
+        );
+        assert!(!shown["sentences"].to_string().contains("--"), "{shown}");
+        let design = session.own.as_ref().and_then(|own| own.design.clone());
+        let record = design.unwrap().record.unwrap();
+        assert!(
+            record.starts_with("t [s],heater [%],room [degC]\n"),
+            "{record}"
+        );
+    }
+
     #[test]
     fn curves_errors_and_parameters_are_those_of_compare() {
         let mut session = Session::new(None, None, Vec::new());
         let name = "heated-block".to_string();
         change(&mut session, Change::Example { name }).unwrap();
         let work = Work::new(&mut session).unwrap();
-        let found = work.compute().unwrap();
+        let found = work.compute(&AtomicBool::new(false)).unwrap();
         let [step] = &found.steps;
         let body = work.body(7, &found);
         assert_eq!(

@@ -7,8 +7,10 @@ use serde_json::{Value, json};
 
 use crate::edit::own::Findings;
 use crate::numbers;
+use crate::own_model::report::missing_term;
 use crate::own_model::words::{EffectWords, Site};
 use crate::own_model::{OwnModelFile, diagnosis_heading, diagnosis_remaining, sizes};
+use crate::report::COMPARED;
 
 /// A diagnosis.
 #[derive(Debug, Clone)]
@@ -68,6 +70,8 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
         "groups": groups.collect::<Vec<_>>(),
         "outputs": outputs.iter().map(|name| json!({ "name": name, "unit": units(name) })).collect::<Vec<_>>(),
         "steps": steps.collect::<Vec<_>>(),
+        "unknown": found.unknown.as_ref().map(|unknown| missing_term(&words, unknown)),
+        "compared": COMPARED,
         "candidates": found.candidates,
         "seconds": found.seconds,
     })

@@ -50,8 +50,9 @@ fn a_shape_that_no_effect_has_is_found_and_kept() {
         "model = \"block.mo\"\n[columns]\ntime = \"t [s]\"\nu = \"u [W]\"\ny = \"y [degC]\"\n";
     place.write("m.toml", model);
     place.write("a.csv", heated(1));
-    let said =
-        place.succeeds("diagnose a.csv --model m.toml --json found.json --unknown shape.csv");
+    let said = place.succeeds(
+        "diagnose a.csv --model m.toml --json found.json --unknown shape.csv --report r.html",
+    );
     let found = place.json("found.json");
     assert!(
         ["unexplained", "partial"].contains(&found["verdict"].as_str().unwrap()),
@@ -68,6 +69,15 @@ fn a_shape_that_no_effect_has_is_found_and_kept() {
         "{shape}"
     );
     assert_eq!(shape.lines().count(), 26);
+    // The report shows the same function, and the command that keeps it.
+    let report = place.read("r.html");
+    for part in [
+        "plot-unknown-shape".to_string(),
+        format!("\"effect\":\"{effect}\""),
+        format!("ctid add &#39;{effect}&#39; --model M.toml --from RESULT.json"),
+    ] {
+        assert!(report.contains(&part), "{part}");
+    }
     place.succeeds(&format!("add {effect} --model m.toml --from found.json"));
     let before = found["steps"][0]["rmse_per_output"]["y"].as_f64().unwrap();
     let mended = place.result("compare a.csv --model m.toml");

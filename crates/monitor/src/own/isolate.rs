@@ -1,7 +1,9 @@
-//! Isolation at the ports of a model of its user's own: which effect of the catalogue began, and when, explains the latest rows.
+//! Isolation at the ports of a model of its user's own: which effect of the catalogue, or which candidate of the user's own, began, and when,
+//! explains the latest rows.
 //!
 //! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as it
-//! was learned, the states at `j` as the learned model has them, only the effect's own parameters free. With `S` the sum of squares, in
+//! was learned, the states at `j` as the learned model has them, only the effect's own parameters free, and the initial values of the states that
+//! it brings. With `S` the sum of squares, in
 //! the noise's variance, of what is left of the rows from `j` on, without the effect and with it,
 //! ```text
 //! evidence = S_without - S_with - (parameters + 1) ln n
@@ -9,19 +11,19 @@
 //! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs. Onsets
 //! are those around the one that a change of unknown direction has ([`super::onset`]).
 //!
-//! **Cost**: some ten simulations of the rows behind the onset for each effect, port and onset.
+//! **Cost**: some ten simulations of the rows behind the onset for each effect, port and onset; of a candidate of the user's own up to a hundred.
 
 use std::collections::BTreeMap;
 
 use ct_model::effects::{Candidate, Place, Role, Visited, apply, candidates};
-use ct_model::{Model, ModelSpec};
+use ct_model::{Model, ModelSpec, State};
 use ct_signals::{Hold, Record};
 use estimation::{Noise, Start, fit_from, squares, within};
 use greybox::ModelSetup;
 use rayon::prelude::*;
 
-use super::OwnModel;
-use crate::isolate::{FEWEST, Left, ROUGH};
+use super::{CandidateModel, OwnModel};
+use crate::isolate::{FEWEST, FINE, Left, ROUGH};
 use crate::{Each, isolate::Kept, learn::Learned, learn::record};
 
 /// Effects that begin while a plant runs. What is a model's shape, a wrong law or a lag, does not.
@@ -44,6 +46,9 @@ const STEP: &str = "step";
 const AROUND: [f64; 5] = [1.0, 0.6, 0.8, 1.25, 1.6];
 /// So many starts of an effect are fitted, those that leave least.
 const STARTS: usize = 3;
+/// So many candidates of the user's own are tried at every onset, those that explain most at the one that is found first: a file may hold
+/// hundreds, and rows do not wait.
+const OWN: usize = 16;
 
 /// An effect that explains the latest rows, as well as it can.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,8 +109,12 @@ pub(super) fn isolate(
     let mut suspects: Vec<Suspect> = windows
         .par_iter()
         .flat_map_iter(|window| window.candidates.iter().map(move |c| (window, c)))
-        .filter_map(|(window, candidate)| search.suspect(window, candidate))
+        .filter_map(|(window, candidate)| {
+            let model = Model::new(apply(search.spec, &[candidate]).ok()?);
+            search.suspect(window, candidate, &model)
+        })
         .collect();
+    suspects.extend(search.of_own(&windows, since));
     suspects.sort_by(|a, b| {
         let keys = (b.plausible, b.evidence).partial_cmp(&(a.plausible, a.evidence));
         keys.unwrap_or(std::cmp::Ordering::Equal)
@@ -191,36 +200,72 @@ impl Search<'_, '_> {
         let mut all: BTreeMap<String, f64> = names.zip(self.theta.iter().copied()).collect();
         all.extend(known.clone());
         let setup = ModelSetup::new(model, records, &all, self.own.time_unit).ok()?;
-        let parameters: Vec<usize> = (0..setup.parameter_count()).collect();
-        Some(
-            setup
-                .with_free(&parameters)
-                .with_scales(self.sigmas.clone()),
-        )
+        let first = setup.parameter_count();
+        let brought = model.spec().states.iter().enumerate();
+        let brought = brought.filter(|(_, state)| self.learned_state(state).is_none());
+        let mut free: Vec<usize> = (0..first).collect();
+        free.extend(brought.map(|(i, _)| first + i));
+        Some(setup.with_free(&free).with_scales(self.sigmas.clone()))
+    }
+
+    /// Which state of the learned model this is; `None` of one that an effect brings.
+    fn learned_state(&self, state: &State) -> Option<usize> {
+        let mut learned = self.spec.states.iter();
+        learned.position(|own| own.about.name == state.about.name)
     }
 
     /// Where a fit begins: the states are those of the learned model; what an effect brings is at its start.
     fn vector(&self, setup: &ModelSetup, states: &[f64]) -> Vec<f64> {
         let mut x = setup.start().to_vec();
         let first = setup.parameter_count();
-        x[first..first + states.len()].copy_from_slice(states);
+        // An effect puts its states where the order of the chains has them.
+        for (i, state) in setup.model().spec().states.iter().enumerate() {
+            if let Some(learned) = self.learned_state(state) {
+                x[first + i] = states[learned];
+            }
+        }
         x
     }
 
-    fn suspect(&self, window: &Window, candidate: &Candidate) -> Option<Suspect> {
-        let model = Model::new(apply(self.spec, &[candidate]).ok()?);
-        let effect = candidate.effect?;
+    /// Those of the user's own. `since`: the onset that is found first \[s\].
+    fn of_own(&self, windows: &[Window], since: f64) -> Vec<Suspect> {
+        let first = windows
+            .iter()
+            .min_by(|a, b| (a.since - since).abs().total_cmp(&(b.since - since).abs()));
+        let Some(first) = first else {
+            return Vec::new();
+        };
+        let at = |window: &Window, own: &CandidateModel| {
+            self.suspect(window, &own.candidate, &own.model)
+        };
+        let own = self.own.candidates.par_iter();
+        let mut found: Vec<(&CandidateModel, Suspect)> =
+            own.filter_map(|own| Some((own, at(first, own)?))).collect();
+        found.sort_by(|(_, a), (_, b)| b.evidence.total_cmp(&a.evidence));
+        found.truncate(OWN);
+        let others: Vec<Suspect> = windows
+            .par_iter()
+            .filter(|window| window.since != first.since)
+            .flat_map_iter(|window| found.iter().filter_map(move |(own, _)| at(window, own)))
+            .collect();
+        let found = found.into_iter().map(|(_, suspect)| suspect);
+        found.chain(others).collect()
+    }
+
+    /// A candidate fitted behind an onset; `model`: the learned one with the candidate in it.
+    fn suspect(&self, window: &Window, candidate: &Candidate, model: &Model) -> Option<Suspect> {
+        let is_step = candidate.effect.is_some_and(|effect| effect.id == STEP);
         // Its onset is that of the rows.
         let begin = candidate.record_numbers.get("begin");
         let since = candidate
             .parameters
             .iter()
-            .find(|p| effect.id == STEP && p.role == Role::Shape);
+            .find(|p| is_step && p.role == Role::Shape);
         let known = since
             .zip(begin)
             .map(|(since, begin)| (since.name.clone(), *begin));
         let known: BTreeMap<String, f64> = known.into_iter().collect();
-        let setup = self.setup(&model, &window.records, &known)?;
+        let setup = self.setup(model, &window.records, &known)?;
         let own: Vec<(usize, &ct_model::effects::EffectParameter)> = candidate
             .parameters
             .iter()
@@ -251,15 +296,28 @@ impl Search<'_, '_> {
         starts.retain(|(cost, _)| cost.is_finite());
         starts.truncate(STARTS);
         let starts: Vec<Start> = starts.into_iter().map(|(_, x)| Start::from(x)).collect();
-        let fit = fit_from(&setup, starts, &self.noise, ROUGH).ok()?;
+        // The catalogue's starts are shares of what the rows visit; those of the user's own may lie far from what has begun.
+        let stopping = match candidate.effect {
+            Some(_) => ROUGH,
+            None => FINE,
+        };
+        let fit = fit_from(&setup, starts, &self.noise, stopping).ok()?;
         let with = fit.cost / self.sigmas.first()?.powi(2);
         let free = setup.free().len();
         let leading = |(at, p): &&(usize, &ct_model::effects::EffectParameter)| {
             p.role != Role::Choice && setup.free().contains(at)
         };
-        let (at, parameter) = own.iter().find(leading)?;
+        // Of a candidate of the user's own the one that is zero without it, if there is such a one.
+        let is_size = |(_, p): &&(usize, &ct_model::effects::EffectParameter)| {
+            candidate.effect.is_none() && p.role == Role::Size
+        };
+        let mut sized = own.iter().filter(leading);
+        let (at, parameter) = sized.find(is_size).or_else(|| own.iter().find(leading))?;
         let (low, high) = parameter.bounds;
-        let room = 1e-6 * (high - low);
+        // A candidate of the user's own may have a bound on one side alone.
+        let width = Some(high - low).filter(|width| width.is_finite());
+        let start = parameter.starts.first().map(|start| start.abs());
+        let room = 1e-6 * width.or(start).unwrap_or(1.0);
         let value = fit.x[*at];
         let inside = |bound: f64, other: f64| {
             !bound.is_finite() || (value - bound).abs() > room || bound == other

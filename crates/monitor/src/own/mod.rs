@@ -11,6 +11,7 @@ mod simulation;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use ct_model::effects::Candidate;
 use ct_model::{Expression, Given, Model, Variable};
 use ct_signals::Hold;
 use greybox::PriorValue;
@@ -41,6 +42,17 @@ pub struct OwnModel<'a> {
     pub hold: Hold,
     /// Seconds in one unit of the model's time, above zero.
     pub time_unit: f64,
+    /// Candidates of the user's own, which take part in the isolation beside the catalogue's effects.
+    pub candidates: &'a [CandidateModel],
+}
+
+/// A candidate of the user's own, and the watched model with it.
+#[derive(Debug, Clone)]
+pub struct CandidateModel {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// The watched model with the candidate in it: what both have goes by the same names.
+    pub model: Model,
 }
 
 impl<'a> OwnModel<'a> {
@@ -53,6 +65,7 @@ impl<'a> OwnModel<'a> {
             priors: BTreeMap::new(),
             hold: Hold::Zero,
             time_unit: 1.0,
+            candidates: &[],
         }
     }
 

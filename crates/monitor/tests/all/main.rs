@@ -6,5 +6,6 @@ mod domain;
 mod monitor;
 mod outputs;
 mod own;
+mod own_candidates;
 mod play;
 mod support;

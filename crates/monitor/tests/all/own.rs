@@ -7,7 +7,7 @@ use monitor::{
 };
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
-const BLOCK: &str = r#"
+pub(crate) const BLOCK: &str = r#"
 model HeatedBlock
   parameter Real C(unit="J/K", min=0) = 40;
   parameter Real k(unit="W/K", min=0) = 0.2;
@@ -44,22 +44,22 @@ equation
 end TwoHeaters;
 "#;
 
-fn model(text: &str) -> Model {
+pub(crate) fn model(text: &str) -> Model {
     Model::new(ModelSpec::parse(text).unwrap())
 }
 
 /// A plant: its model, the parameters that it has from a row on, and the noise of each output.
-struct Plant {
-    model: Model,
-    parameters: Vec<(usize, Vec<f64>)>,
+pub(crate) struct Plant {
+    pub(crate) model: Model,
+    pub(crate) parameters: Vec<(usize, Vec<f64>)>,
     inputs: Vec<Vec<f64>>,
     noise: Vec<Vec<f64>>,
-    interval: f64,
+    pub(crate) interval: f64,
 }
 
 impl Plant {
     /// C = 52, k = 0.15, g = 0.6, e = 2e-9 (W/K4): a time constant of some 120 s.
-    fn block(rows: usize, seed: u64) -> Self {
+    pub(crate) fn block(rows: usize, seed: u64) -> Self {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let room = excitation::steps(rows, 200..=900, 15.0, 25.0, rng).unwrap();
         Self {
@@ -90,8 +90,9 @@ impl Plant {
         }
     }
 
-    fn run(&self) -> Vec<Row> {
-        let (mut rows, mut states) = (Vec::new(), vec![20.0; self.model.spec().states.len()]);
+    pub(crate) fn run(&self) -> Vec<Row> {
+        let mut rows = Vec::new();
+        let mut states = self.model.starts(&self.parameters[0].1);
         let changes = self.parameters.iter().map(|(row, _)| *row).skip(1);
         let ends: Vec<usize> = changes.chain([self.inputs[0].len()]).collect();
         for ((from, parameters), end) in self.parameters.iter().zip(ends) {
@@ -116,7 +117,7 @@ impl Plant {
 const HEATERS_TRUE: [f64; 6] = [20.0, 0.25, 0.4, 0.3, 0.6, 0.55];
 
 /// What is known of the block: without its capacity the other parameters have no scale.
-fn own(model: &Model) -> OwnModel<'_> {
+pub(crate) fn own(model: &Model) -> OwnModel<'_> {
     let mut own = OwnModel::new(model);
     if model.spec().name == "HeatedBlock" {
         own.known.insert("C".to_string(), 52.0);
@@ -128,13 +129,13 @@ fn monitor(model: &Model) -> Monitor<'_> {
     Monitor::new(own(model), Settings::default(), Units::default()).unwrap()
 }
 
-fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
+pub(crate) fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
     rows.iter()
         .map(|row| monitor.update(row).unwrap())
         .collect()
 }
 
-fn alarms(steps: &[Step]) -> Vec<&monitor::Alarm> {
+pub(crate) fn alarms(steps: &[Step]) -> Vec<&monitor::Alarm> {
     steps.iter().filter_map(|s| s.alarm.as_ref()).collect()
 }
 

@@ -1,12 +1,14 @@
 // A model of one's own: its text and its model file as they are typed, what the text holds, and the fit to the records.
 import { $, button, fill, figure, make, plot, table, units } from "./dom.js";
+import * as experiment from "./own_experiment.js";
 import * as server from "./server.js";
+import * as unknown from "./own_unknown.js";
 
 /** So long after the last key what was typed is sent. */
 const PAUSE = 600;
 // What the plants have and a model of one's own has not.
 const PLANTS = ["model", "missing", "columns", "trail-part", "fit-part", "fails-part", "unknown-part", "parameters-part", "chains-part", "experiment-part"];
-const OWN = ["own", "own-missing", "own-fit-part", "own-parameters-part", "own-ports-part", "own-check-part"];
+const OWN = ["own", "own-missing", "own-fit-part", "own-parameters-part", "own-ports-part", "own-unknown-part", "own-experiment-part", "own-check-part"];
 // Box, key of the request, what is wrong with it.
 const TEXTS = [["own-text", "text", "own-text-error"], ["own-file", "file", "own-file-error"]];
 
@@ -151,7 +153,8 @@ function findings(own) {
       line(one, `own-found-${k}`),
       make("p", { className: "figures" }, one.sizes.map((size) => make("span", {}, units(size)))),
       make("p", {}, `${one.physics}.`),
-      one.others.length ? [make("p", { className: "caption" }, "These records cannot tell it from:"), make("ul", { className: "others" }, one.others.map((other, l) => make("li", {}, line(other, `own-other-${k}-${l}`))))] : null))) : null,
+      one.others.length ? [make("p", { className: "caption" }, "These records cannot tell it from:"), make("ul", { className: "others" }, one.others.map((other, l) => make("li", {}, line(other, `own-other-${k}-${l}`),
+        button("What would tell?", { id: `own-tell-${k}-${l}`, ariaLabel: `Which experiment tells ${one.effect} from ${other.effect}?` }, () => experiment.ask({ group: k, between: [one.effect, other.effect] }, fail)))))] : null))) : null,
     found.sentences.map((sentence) => make("p", {}, units(sentence))),
     make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": "How the error fell" }, errors),
     make("p", { className: "caption" }, `${found.candidates} candidates in ${found.seconds.toFixed(1)} s. Simulation error, root mean square.`));
@@ -173,8 +176,10 @@ export function next(state) {
   if (!state.records.some((one) => !one.held_out)) return "drop a record";
   if (state.records.some((one) => one.error)) return "say which column is what";
   if (!own.fitted) return "fit the model";
+  const term = own.diagnosis?.unknown?.effect;
   const open = (own.diagnosis?.groups || []).find((one) => ![one, ...one.others].some(({ effect }) => own.effects.includes(effect)));
   if (open) return `add ${open.effect}, and watch the error fall`;
+  if (term && own.diagnosis.of_this_model) return `look at what nothing explains, and keep ${term} or write a candidate of your own`;
   return own.diagnosis ? "" : "diagnose what is missing";
 }
 
@@ -199,8 +204,9 @@ export async function show(state) {
   columns(state);
   $("own-check-part").hidden = !own.check;
   $("own-check").textContent = own.check || "";
-  $("own-unused").hidden = !(own.unused || []).length;
-  $("own-unused").textContent = `No part in a fit has ${(own.unused || []).map((one) => `[${one}]`).join(", ")}.`;
+  const unused = (own.unused || []).map((one) => `[${one}]`).join(", ");
+  $("own-unused").hidden = !unused && !own.loop;
+  $("own-unused").textContent = [own.loop ? `${own.loop}.` : "", unused ? `No part in a fit has ${unused}.` : ""].join(" ").trim();
   const ready = !own.text_error && !own.file_error && !state.job && state.records.some((one) => !one.held_out) && state.records.every((one) => one.read);
   $("own-fit").disabled = !ready;
   $("own-diagnose").disabled = !ready;
@@ -208,8 +214,10 @@ export async function show(state) {
   if (!own.file_error && !own.text_error) {
     findings(own);
     ports(own);
+    unknown.show(own, (effect, id) => toggle(own, effect, id));
+    experiment.show(state);
   } else {
-    $("own-ports-part").hidden = true;
+    for (const part of ["own-ports-part", "own-unknown-part", "own-experiment-part"]) $(part).hidden = true;
   }
   document.querySelector(".see").classList.toggle("stale", own.fit !== null && !own.fitted);
   const wanted = `${own.fit}`;
@@ -259,12 +267,14 @@ function curves(one) {
       showlegend: true,
       xaxis: plots.axis("time [s]", { anchor: "y2" }),
       yaxis: plots.axis(inUnit(one.output, one.unit), { domain: [0.36, 1] }),
-      yaxis2: plots.axis("residual", { domain: [0, 0.27] }),
+      yaxis2: plots.axis(inUnit("residual", one.unit), { domain: [0, 0.27] }),
     }),
   };
 }
 
 export function draw() {
+  unknown.draw();
+  experiment.draw();
   if (!body || !window.Plotly) return;
   const wanted = `${body.id}`;
   if (drawn !== wanted) {
@@ -277,6 +287,7 @@ export function draw() {
 
 export function start(examples, told) {
   fail = told;
+  experiment.start(told);
   for (const id of ["example", "own-example"]) {
     fill($(id), make("option", { value: "" }, "try an example…"), examples.map((name) => make("option", { value: name }, name)));
     $(id).addEventListener("change", async () => {

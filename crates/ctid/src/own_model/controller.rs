@@ -1,0 +1,251 @@
+//! `[controller.u]`: what moved an input of a model of its user's own in a loop.
+//!
+//! `ctid identify` works with it by the methods that have to do with a loop. Simulations of the model run on the measured inputs: what that
+//! means for a fit is said, and `compare` and `diagnose` want to be told to do so.
+
+use std::collections::BTreeMap;
+
+use ct_model::{ModelSpec, Variable};
+use ct_signals::quoted;
+use toml::Spanned;
+
+use super::file::OwnModelFile;
+use crate::look::Look;
+use crate::model_file::{ControllerLaw, ControllerSettings, RawController, Source};
+use crate::{Error, names};
+
+/// All controllers of a model file, by the input that each drives.
+pub(super) type RawControllers = BTreeMap<Spanned<String>, Spanned<RawController>>;
+
+/// A controller of the model file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct OwnController {
+    /// The input that it drives, by its position.
+    pub input: usize,
+    /// The output that it reads, by its position.
+    pub output: usize,
+    /// The column of the reference.
+    pub reference: Option<String>,
+    /// Its law; times are in the unit of the model's time.
+    settings: ControllerSettings,
+    /// Its table: `controller.u`.
+    table: String,
+    /// The line of the table.
+    line: usize,
+}
+
+/// Reads and checks the controllers.
+///
+/// # Errors
+/// One line that names the file, the line, what is wrong and the mend.
+pub(super) fn read(
+    spec: &ModelSpec,
+    raw: &RawControllers,
+    source: &Source,
+) -> Result<Vec<OwnController>, Error> {
+    let inputs: Vec<&str> = (0..spec.inputs.len())
+        .map(|i| spec.about(Variable::Input(i)).name.as_str())
+        .collect();
+    let outputs: Vec<&str> = spec
+        .outputs
+        .iter()
+        .map(|output| spec.about(output.variable).name.as_str())
+        .collect();
+    let position = |at: usize, what: &str, known: &[&str], name: &str| {
+        known.iter().position(|own| *own == name).ok_or_else(|| {
+            source.at(
+                at,
+                format!(
+                    "{} is no {what} of {}: it has {}{}",
+                    quoted(name),
+                    spec.name,
+                    known.join(", "),
+                    names::suggestion(name, known.iter().copied())
+                ),
+            )
+        })
+    };
+    let one = |(name, raw): (&Spanned<String>, &Spanned<RawController>)| {
+        let (at, table) = (name.span().start, format!("controller.{}", name.as_ref()));
+        let input = position(at, "input", &inputs, name.as_ref())?;
+        let output = match (&raw.as_ref().output, &outputs[..]) {
+            (Some(output), known) => {
+                position(output.span().start, "output", known, output.as_ref())?
+            }
+            (None, [_]) => 0,
+            (None, several) => {
+                return Err(source.at(
+                    at,
+                    format!(
+                        "[{table}] does not say which output it reads: write output = \"...\", one of {}",
+                        several.join(", ")
+                    ),
+                ));
+            }
+        };
+        let reference = raw.as_ref().reference.as_ref();
+        Ok(OwnController {
+            input,
+            output,
+            reference: reference.map(|column| column.as_ref().clone()),
+            settings: source.controller_law(raw, &table)?,
+            line: source.line_of(at),
+            table,
+        })
+    };
+    raw.iter().map(one).collect()
+}
+
+impl OwnController {
+    /// Its law with times in seconds; `time_unit`: seconds in one unit of the model's time.
+    pub fn in_seconds(&self, time_unit: f64) -> ControllerSettings {
+        // Of a polynomial in d/dt, highest power first.
+        let scaled = |coefficients: &[f64]| -> Vec<f64> {
+            let powers = coefficients.iter().rev().enumerate();
+            let mut scaled: Vec<f64> = powers
+                .map(|(k, c)| c * time_unit.powi(i32::try_from(k).unwrap_or(i32::MAX)))
+                .collect();
+            scaled.reverse();
+            scaled
+        };
+        let law = match &self.settings.law {
+            ControllerLaw::Pi {
+                gain,
+                integral_time,
+            } => ControllerLaw::Pi {
+                gain: *gain,
+                integral_time: integral_time * time_unit,
+            },
+            ControllerLaw::Continuous { r, s } => ControllerLaw::Continuous {
+                r: scaled(r),
+                s: scaled(s),
+            },
+            sampled @ ControllerLaw::Sampled { .. } => sampled.clone(),
+        };
+        ControllerSettings {
+            law,
+            ..self.settings.clone()
+        }
+    }
+}
+
+impl OwnModelFile {
+    fn driven(&self) -> (String, String) {
+        let tables: Vec<String> = self
+            .controllers
+            .iter()
+            .map(|controller| format!("[{}]", controller.table))
+            .collect();
+        let inputs: Vec<&str> = self
+            .controllers
+            .iter()
+            .map(|controller| self.base.inputs[controller.input].about.name.as_str())
+            .collect();
+        (tables.join(", "), inputs.join(", "))
+    }
+
+    /// What a simulation on measured inputs means where the file declares a controller; `None` where it declares none.
+    pub fn loop_note(&self) -> Option<String> {
+        if self.controllers.is_empty() {
+            return None;
+        }
+        let (tables, inputs) = self.driven();
+        Some(format!(
+            "{tables}: the loop is not simulated, the model runs on the measured {inputs}; where the noise is coloured the estimates may be biased, and their standard errors too small"
+        ))
+    }
+
+    /// The same as a command says it; empty where there is none.
+    pub fn loop_said(&self, look: Look) -> String {
+        self.loop_note().map_or(String::new(), |note| {
+            look.paragraph("", &format!("note: {note}"))
+        })
+    }
+
+    /// # Errors
+    /// Where the file declares a controller: its loop cannot be simulated.
+    pub fn require_no_loop(&self) -> Result<(), Error> {
+        let Some(first) = self.controllers.first() else {
+            return Ok(());
+        };
+        let (tables, inputs) = self.driven();
+        Err(Error::AtLine {
+            file: self.name.clone(),
+            line: first.line,
+            what: format!(
+                "{tables}: the loop of a model of your own cannot be simulated; fit on the measured {inputs} with --loop measured, or write the controller into {} (its reference as an input, its integral as a state, {inputs} as a flow) and delete this table",
+                self.text.display()
+            ),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::path::Path;
+
+    use super::*;
+
+    const TEXT: &str = "model A\n parameter Real k = 1;\n input Real u;\n input Real d;\n output Real y = x;\n output Real z = k*x;\n Real x(start=0);\nequation\n der(x) = u + d - k*x;\nend A;\n";
+
+    fn read(controller: &str) -> Result<OwnModelFile, String> {
+        let text = format!("model = \"a.mo\"\n[columns]\ntime = \"t [min]\"\n{controller}\n");
+        let spec = |_: &Path| Ok(ModelSpec::parse(TEXT).unwrap());
+        let file = OwnModelFile::parse_with(Path::new("m.toml"), &text, spec);
+        file.map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn times_are_those_of_the_column() {
+        let law = |text: &str| read(text).unwrap().controllers[0].in_seconds(60.0).law;
+        let pi = law(
+            "[controller.u]\ntype = \"PI\"\noutput = \"y\"\nreference = \"r\"\ngain = 2\nintegral_time = 1.5",
+        );
+        let expected = ControllerLaw::Pi {
+            gain: 2.0,
+            integral_time: 90.0,
+        };
+        assert_eq!(pi, expected);
+        // The same one as polynomials in d/dt: u = (2 p + 4/3)/p e, time in minutes.
+        let rs = law(
+            "[controller.u]\ntype = \"RS\"\noutput = \"y\"\nvariable = \"p\"\nr = [3.0, 2.0]\ns = [1.5, 0.0]",
+        );
+        let expected = ControllerLaw::Continuous {
+            r: vec![180.0, 2.0],
+            s: vec![90.0, 0.0],
+        };
+        assert_eq!(rs, expected);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line_and_the_mend() {
+        let pi = "type = \"PI\"\ngain = 2\nintegral_time = 90";
+        for (text, said) in [
+            (
+                format!("[controller.w]\noutput = \"y\"\n{pi}"),
+                "m.toml:4: w is no input of A: it has u, d",
+            ),
+            (
+                format!("[controller.u]\noutput = \"x\"\n{pi}"),
+                "m.toml:5: x is no output of A: it has y, z",
+            ),
+            (
+                format!("[controller.u]\n{pi}"),
+                "m.toml:4: [controller.u] does not say which output it reads: write output = \"...\", one of y, z",
+            ),
+            (
+                "[controller.u]\noutput = \"y\"\ntype = \"PI\"\ngain = 2".to_string(),
+                "m.toml:4: [controller.u] has no integral_time; write integral_time = ...",
+            ),
+            (
+                format!("[controller]\n{pi}"),
+                "m.toml:4: [controller] does not say which input it drives: write [controller.u]",
+            ),
+        ] {
+            let error = read(&text).err().unwrap();
+            assert!(error.starts_with(said), "{error}");
+        }
+    }
+}

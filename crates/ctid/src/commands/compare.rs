@@ -30,9 +30,10 @@ pub(super) struct Compare {
     /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
-    /// In a loop whose [controller] is known: simulate it from its reference, or run on the measured command
-    #[arg(long = "loop", value_enum, default_value_t = LoopWay::Simulated, value_name = "WAY")]
-    way: LoopWay,
+    /// In a loop whose [controller] is known: simulate it from its reference, as is done for a plant, or run on the measured command, as is
+    /// done for a model of one's own
+    #[arg(long = "loop", value_enum, value_name = "WAY")]
+    way: Option<LoopWay>,
     /// Limit on the time of the search; Ctrl-C ends it earlier with the best result so far
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
@@ -102,7 +103,7 @@ impl Compare {
 
     fn options(&self) -> Options<'static> {
         Options {
-            simulate_loop: self.way == LoopWay::Simulated,
+            simulate_loop: self.way != Some(LoopWay::Measured),
             time_limit: Some(self.effort.limit()),
             interrupt: Some(interrupt::flag()),
             ..Options::default()
@@ -167,11 +168,11 @@ fn unused(tables: &[String], look: Look) -> String {
 }
 
 impl Compare {
-    /// A loop that is to be simulated, where that cannot be done.
+    /// A loop that was asked to be simulated, where that cannot be done.
     fn check_loop(&self, model: &OwnModelFile) -> Result<(), Error> {
         match self.way {
-            LoopWay::Simulated => model.require_no_loop(),
-            LoopWay::Measured => Ok(()),
+            Some(LoopWay::Simulated) => model.require_no_loop(),
+            Some(LoopWay::Measured) | None => Ok(()),
         }
     }
 

@@ -1,7 +1,7 @@
 //! `[controller.u]`: what moved an input of a model of its user's own in a loop.
 //!
 //! `ctid identify` works with it by the methods that have to do with a loop. Simulations of the model run on the measured inputs: what that
-//! means for a fit is said, and `compare` and `diagnose` want to be told to do so.
+//! means for a fit is said.
 
 use std::collections::BTreeMap;
 
@@ -162,6 +162,8 @@ impl OwnModelFile {
         })
     }
 
+    /// For what is asked to simulate the loop.
+    ///
     /// # Errors
     /// Where the file declares a controller: its loop cannot be simulated.
     pub fn require_no_loop(&self) -> Result<(), Error> {
@@ -173,7 +175,7 @@ impl OwnModelFile {
             file: self.name.clone(),
             line: first.line,
             what: format!(
-                "{tables}: the loop of a model of your own cannot be simulated; fit on the measured {inputs} with --loop measured, or write the controller into {} (its reference as an input, its integral as a state, {inputs} as a flow) and delete this table",
+                "{tables}: the loop of a model of your own cannot be simulated; leave --loop out to fit on the measured {inputs}, or write the controller into {} (its reference as an input, its integral as a state, {inputs} as a flow) and delete this table",
                 self.text.display()
             ),
         })

@@ -93,16 +93,20 @@ fn a_loop_that_is_not_simulated_is_refused_or_said() {
     let place = place();
     let says = [
         "m.toml:6: [controller.u]: the loop of a model of your own cannot be simulated",
-        "--loop measured",
+        "leave --loop out",
         "write the controller into plant.mo",
     ];
     for command in ["compare", "diagnose"] {
-        place.refuses(&format!("{command} loop.csv --model m.toml"), &says);
+        place.refuses(
+            &format!("{command} loop.csv --model m.toml --loop simulated"),
+            &says,
+        );
     }
     let note = "note: [controller.u]: the loop is not simulated, the model runs on the measured u";
     let unfolded = |text: String| text.split_whitespace().collect::<Vec<_>>().join(" ");
     for command in [
-        "compare loop.csv --model m.toml --loop measured",
+        "compare loop.csv --model m.toml",
+        "diagnose loop.csv --model m.toml --loop measured",
         "simulate m.toml loop.csv --out y.csv --fit loop.csv",
         "export m.toml loop.csv --csv curves.csv",
     ] {

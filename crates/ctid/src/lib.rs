@@ -8,6 +8,7 @@
 //! | a missing term as a file | [`term_file`] |
 //! | the next experiment | [`mod@design`] |
 //! | a model on new inputs | `simulate` |
+//! | a model of the user's own, without the command line | [`own_model`] |
 //! | the tour | [`tour`] |
 //! | rows watched as they come | [`mod@monitor`] |
 //! | linear models from a record | [`mod@identify`] |
@@ -25,7 +26,7 @@ mod column_errors;
 mod commands;
 pub mod design;
 pub mod edit;
-mod effort;
+pub mod effort;
 mod error;
 mod findings;
 pub mod identify;
@@ -36,7 +37,7 @@ pub mod model_file;
 pub mod monitor;
 mod names;
 pub mod output;
-mod own_model;
+pub mod own_model;
 mod plot;
 mod program;
 pub mod progress;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use ct_model::ModelSpec;
 use ct_model::effects::Candidate;
+use effect_search::{Diagnosis, Estimate, Kept};
 use serde::Deserialize;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
 
@@ -71,6 +72,51 @@ impl Findings {
         let steps = steps.flat_map(|step| &step.parameters);
         let mut named = steps.filter(|parameter| parameter.name == name);
         named.find_map(|parameter| parameter.value)
+    }
+}
+
+impl Findings {
+    /// What is kept of an effect: where fits of its parameters begin, and the numbers of its records.
+    ///
+    /// # Errors
+    /// Where the result says nothing of it.
+    pub fn kept(&self, candidate: &Candidate) -> Result<Kept, String> {
+        let id = &candidate.id;
+        let Some(numbers) = self.record_numbers.get(id) else {
+            let known: Vec<&str> = self.record_numbers.keys().map(String::as_str).collect();
+            return Err(format!(
+                "the result says nothing of {id}: it has {}; without --from the effect is fitted anew",
+                known.join(", ")
+            ));
+        };
+        let start = candidate.parameters.iter().filter_map(|parameter| {
+            let size = self.value(&parameter.name)?;
+            Some((parameter.short.clone(), rounded(size, 7)))
+        });
+        Ok(Kept {
+            numbers: numbers.clone(),
+            start: start.collect(),
+        })
+    }
+}
+
+impl From<&Diagnosis> for Findings {
+    fn from(found: &Diagnosis) -> Self {
+        let step = |parameters: &[Estimate]| FoundStep {
+            parameters: parameters
+                .iter()
+                .map(|parameter| FoundParameter {
+                    name: parameter.name.clone(),
+                    value: Some(parameter.value).filter(|value| value.is_finite()),
+                })
+                .collect(),
+        };
+        Self {
+            model: found.model.clone(),
+            steps: found.steps.iter().map(|s| step(&s.parameters)).collect(),
+            unknown: found.unknown.as_ref().map(|u| step(&u.parameters)),
+            record_numbers: found.record_numbers.clone(),
+        }
     }
 }
 
@@ -143,13 +189,7 @@ fn keep(
     found: &Findings,
 ) -> Result<String, String> {
     let id = &candidate.id;
-    let Some(numbers) = found.record_numbers.get(id) else {
-        let known: Vec<&str> = found.record_numbers.keys().map(String::as_str).collect();
-        return Err(format!(
-            "the result says nothing of {id}: it has {}; without --from the effect is fitted anew",
-            known.join(", ")
-        ));
-    };
+    let kept = found.kept(candidate)?;
     let no_table = || format!("[effect.\"{id}\"] is not a table; make it one");
     let mut tables = Table::new();
     tables.set_implicit(true);
@@ -166,16 +206,15 @@ fn keep(
         .ok_or_else(no_table)?;
     let mut said = Vec::new();
     for parameter in &candidate.parameters {
-        let Some(size) = found.value(&parameter.name) else {
+        let Some(&size) = kept.start.get(&parameter.short) else {
             continue;
         };
-        let size = rounded(size, 7);
         said.push(format!("{} = {size}", parameter.short));
         set(table, &parameter.short, value(size));
     }
-    if !numbers.is_empty() {
+    if !kept.numbers.is_empty() {
         let mut inline = InlineTable::new();
-        for (name, number) in numbers {
+        for (name, number) in &kept.numbers {
             inline.insert(name, (*number).into());
         }
         set(table, RECORD, value(inline));

@@ -8,6 +8,7 @@ use greybox::{Fit, FitOptions, ModelSetup, weighted_rms};
 use serde::Serialize;
 
 use super::file::{OwnModelFile, Records};
+use super::fitted::{FittedModel, blame};
 use super::problem::RecordNumbers;
 use crate::Error;
 
@@ -15,20 +16,26 @@ use crate::Error;
 const TOGETHER: f64 = 0.999;
 
 /// Measured and model, of one output of one record.
-#[derive(Debug)]
-pub(crate) struct Curves {
+#[derive(Debug, Clone)]
+pub struct Curves {
+    /// The record's name.
     pub record: String,
+    /// The output's name.
     pub output: String,
+    /// Its unit.
     pub unit: String,
     /// Length of the record \[s\].
     pub length: f64,
+    /// What was measured, NaN where nothing was \[unit of the output\].
     pub measured: Vec<f64>,
+    /// What the model gives \[unit of the output\].
     pub model: Vec<f64>,
 }
 
 /// What `ctid compare` finds.
-#[derive(Debug, Serialize)]
-pub(crate) struct Comparison {
+#[derive(Debug, Clone, Serialize)]
+pub struct Comparison {
+    /// Version of this layout.
     pub schema: u32,
     /// The model's name.
     pub model: String,
@@ -36,12 +43,15 @@ pub(crate) struct Comparison {
     pub effects: Vec<String>,
     /// What of the records they are written in.
     pub record_numbers: RecordNumbers,
+    /// The fitted model.
     pub steps: [Step; 1],
     /// What a linear prediction from the past of each output's residual leaves.
     pub noise: Vec<NoiseFloor>,
     /// Fitted entries that these records do not determine, alone or together with another one.
     pub not_determined: Vec<Vec<String>>,
+    /// How long it took \[s\].
     pub seconds: f64,
+    /// Measured and model, of each output of each record.
     #[serde(skip)]
     pub curves: Vec<Curves>,
 }
@@ -50,38 +60,45 @@ pub(crate) struct Comparison {
 ///
 /// # Errors
 /// Where nothing can be fitted, with the file that is to blame.
-pub(crate) fn compare(
+pub fn compare(
     file: &OwnModelFile,
     records: &Records,
     options: &FitOptions,
 ) -> Result<Comparison, Error> {
     let began = Instant::now();
-    let file = &file.mended(Some(records))?;
+    let mut comparison = FittedModel::fit(file, records.clone(), options, None)?.compare()?;
+    comparison.seconds = began.elapsed().as_secs_f64();
+    Ok(comparison)
+}
+
+impl FittedModel {
+    /// How far the fitted model is off, on its records and on those that are held out.
+    ///
+    /// # Errors
+    /// Where a simulation is not finite, or the initial states of a held-out record cannot be fitted.
+    pub fn compare(&self) -> Result<Comparison, Error> {
+        let began = Instant::now();
+        let (file, records, fit) = (self.model(), self.records(), self.estimate());
+        let mut comparison = compared(self, file, records, fit)?;
+        comparison.seconds = began.elapsed().as_secs_f64();
+        Ok(comparison)
+    }
+}
+
+fn compared(
+    fitted: &FittedModel,
+    file: &OwnModelFile,
+    records: &Records,
+    fit: &Fit,
+) -> Result<Comparison, Error> {
     let spec = file.model.spec();
-    let blame = |error: greybox::Error| Error::File {
-        file: records
-            .records
-            .iter()
-            .map(|r| r.name.as_str())
-            .collect::<Vec<_>>()
-            .join(", "),
-        what: error.to_string(),
-    };
-    let setup = ModelSetup::new(
-        &file.model,
-        &records.records,
-        &file.known,
-        records.time_unit,
-    )
-    .map_err(blame)?;
-    let setup = setup.with_priors(&file.priors).map_err(blame)?;
-    let parameters = setup.free().len();
-    ct_signals::require_samples(&records.records, parameters)?;
-    let fit = setup.fit(options).map_err(blame)?;
+    let blame = |error: greybox::Error| blame(&records.records, &error);
+    let options = fitted.options();
+    let setup = fitted.setup()?;
     let simulated = setup
         .simulate(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
-    let test = held_out(&setup, &fit, &records.test).map_err(|error| match error {
+    let test = held_out(&setup, fit, &records.test).map_err(|error| match error {
         effect_search::Error::Fit(error) => blame(error),
         other => Error::Columns(other.to_string()),
     })?;
@@ -116,7 +133,7 @@ pub(crate) fn compare(
     let noise_floors = noise_floors.collect();
     // The fit is one by simulation error: its residual has the noise's colour.
     let errors = setup
-        .robust(&fit, options.noise_order)
+        .robust(fit, options.noise_order)
         .map_or_else(|_| fit.std_errors(), |robust| robust.std_errors);
     let free = setup.free();
     let entries = setup.names().iter().zip(units.chain(states)).enumerate();
@@ -164,11 +181,11 @@ pub(crate) fn compare(
         model: spec.name.clone(),
         effects: file.effects.on.clone(),
         record_numbers: file.record_numbers.clone(),
-        not_determined: not_determined(&setup, &fit),
+        not_determined: not_determined(&setup, fit),
         curves: curves.collect(),
         steps: [step],
         noise: noise_floors,
-        seconds: began.elapsed().as_secs_f64(),
+        seconds: 0.0,
     })
 }
 

@@ -56,7 +56,7 @@ impl<T: Serialize> Found for Paged<'_, T> {
 }
 
 /// What the report shows of a comparison.
-pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Diagnosis {
+pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Diagnosis {
     let source = "what the past of the model's residual does not predict";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
     shown.seconds = found.seconds;
@@ -64,7 +64,7 @@ pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Compariso
 }
 
 /// What the report shows of a diagnosis.
-pub(crate) fn diagnosed(
+pub fn diagnosed(
     file: &OwnModelFile,
     records: &Records,
     found: &effect_search::Diagnosis,

@@ -187,7 +187,7 @@ fn simulated(fitted: Fitted, inputs: &Inputs, record: &Record) -> Result<Found, 
             let errors = errors.iter().enumerate();
             Some(
                 errors
-                    .map(|(o, errors)| Band::of(errors, known, o))
+                    .map(|(o, errors)| Band::of(errors, known, o, LEVEL))
                     .collect(),
             )
         }

@@ -1,0 +1,36 @@
+//! The native part of the Python package `ctid`: arrays in, results of the crates out. No algorithm is in it.
+//!
+//! | what | where |
+//! |---|---|
+//! | exceptions | `error.rs` |
+//! | long work: the interpreter's lock is released, Ctrl-C is heard | `work.rs` |
+//! | frames as the program reads its records | `frame.rs` |
+//! | a model of the user's own, its fit, its diagnosis | `model.rs`, `fit.rs`, `diagnosis.rs` |
+//! | objects as bytes, for `pickle` | `bytes.rs` |
+//!
+//! What users see is in `python/ctid`: it makes frames of these arrays and says what types there are.
+
+mod bytes;
+mod diagnosis;
+mod error;
+mod fit;
+mod frame;
+mod model;
+mod work;
+
+use pyo3::prelude::*;
+
+/// Native classes and functions.
+#[pymodule]
+mod _ctid {
+    #[pymodule_export]
+    use crate::diagnosis::Diagnosis;
+    #[pymodule_export]
+    use crate::error::{DataError, Error, ModelError};
+    #[pymodule_export]
+    use crate::fit::Fit;
+    #[pymodule_export]
+    use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::model::Model;
+}

@@ -11,14 +11,27 @@ A record is a pandas frame whose index is the time, or a mapping of arrays with 
 are several experiments. Results are frames where pandas is installed; else mappings of arrays.
 """
 
-from ._ctid import DataError, Error, ModelError
-from ._model import Diagnosis, Fit, Model
+from . import tables
+from ._ctid import ContinuousRls, DataError, Error, ModelError, StabilizedOe
+from ._linear import Fcloe, Identification, StateSpace, identify
+from ._model import Design, Diagnosis, Fit, Model
+from ._monitor import Monitor, Step
 
 __all__ = [
+    "ContinuousRls",
     "DataError",
+    "Design",
     "Diagnosis",
     "Error",
+    "Fcloe",
     "Fit",
+    "Identification",
     "Model",
     "ModelError",
+    "Monitor",
+    "StabilizedOe",
+    "StateSpace",
+    "Step",
+    "identify",
+    "tables",
 ]

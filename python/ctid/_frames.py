@@ -52,7 +52,7 @@ def as_list(data: Records | None, what: str = "data") -> list[Data]:
     if isinstance(data, Mapping) or is_frame(data):
         return [cast("Data", data)]
     if isinstance(data, Sequence) and not isinstance(data, (str, bytes)):
-        return list(cast("Sequence[Data]", data))
+        return list(data)
     raise DataError(
         f"{what}: a {type(data).__name__} is no record: give a pandas frame whose index is the time, a mapping of arrays, or a list of them"
     )

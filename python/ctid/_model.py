@@ -14,9 +14,14 @@ from . import _ctid
 from ._ctid import DataError, ModelError
 from ._frames import Array, Data, Records, as_list, index_of, need_pandas, series, table, to_frame, to_frames
 
+from ._linear import StateSpace, state_space
+from ._monitor import Monitor
+
 if TYPE_CHECKING:
     import pandas as pd
     from typing_extensions import Self
+
+    from ._tank import Known, Plant
 
 #: How much time a search may take: 5 s, 40 s, 10 min.
 Effort = Literal["quick", "normal", "thorough"]
@@ -177,6 +182,43 @@ class Model:
             _clear(progress)
         return Fit(fitted, [index_of(record, _rows(record)) for record in records])
 
+    @staticmethod
+    def tank(
+        plant: Plant,
+        known: Mapping[str, Known] | None = None,
+        *,
+        effects: Sequence[str] = (),
+        where: Mapping[str, str] | None = None,
+        start: Mapping[str, float] | None = None,
+        priors: Mapping[str, tuple[float, float]] | None = None,
+        hold: Hold | None = None,
+    ) -> Model:
+        """One of the plants of the program: `single-tank`, `single-tank-linear`, `cascaded-tanks`, `cascaded-tanks-linear`, `first-order`, `three-tank`.
+
+        `known`, `start`, `priors` and `hold` are what a model file has under these names: `known={"area": 154.0}`. `effects` are in the model
+        already, in the vessel that `where` names. Raises `ModelError`.
+        """
+        from ._tank import tank
+
+        return tank(plant, known, effects=effects, where=where, start=start, priors=priors, hold=hold)
+
+    def linearize(self, at: Mapping[str, float] | None = None) -> StateSpace:
+        """The matrices of the model about values of its states and inputs, `at={"T": 40.0, "u": 30.0}`; a linear model needs none.
+
+        Slopes are exact. Time is in the model's unit; `at["time"]` is the time of a model that hangs on it. Raises `ModelError` where the model
+        delays a signal, or a slope is not finite there.
+        """
+        found = self._native.linearize({str(name): float(value) for name, value in (at or {}).items()})
+        return state_space(found)
+
+    def monitor(self, *, false_alarm_every: float = 1e6, learn: int = 1000, time_unit: float = 1.0) -> Monitor:
+        """The model beside a running plant.
+
+        `false_alarm_every`: mean number of rows between false alarms, 1000 or more; `learn`: fewest rows to learn from, 100 to 1024; `time_unit`:
+        seconds in one unit of the model's time. Raises `ModelError`.
+        """
+        return Monitor(self._native.monitor(float(time_unit), float(false_alarm_every), int(learn)))
+
     def to_modelica(self) -> str:
         """The model as text, its effects in it; its values are the fitted ones where it comes from a fit or a diagnosis."""
         return self._native.to_modelica()
@@ -249,7 +291,7 @@ class Fit:
         """Covariance of what was fitted, under the noise of the residual. Raises `DataError` where the records do not determine all of it."""
         found = self._native.covariance()
         if found is None:
-            which = "; ".join(" with ".join(names) for names in self._native.not_determined)
+            which = "; ".join(" with ".join(names) for names in self._not_determined)
             raise DataError(
                 f"the records do not determine all that is fitted ({which or 'see summary()'}): make some of it known, or give priors"
             )
@@ -260,9 +302,9 @@ class Fit:
     def _tables(self, of: Callable[[Array, Array], Array]) -> pd.DataFrame:
         pandas = need_pandas()
         parts = []
-        for k, (record, times, outputs) in enumerate(self._native.series):
+        for k, (record, times, outputs) in enumerate(self._series):
             columns = {name: of(measured, model) for name, measured, model in outputs}
-            index = self._indexes[k] if len(self._indexes) == len(self._native.series) else None
+            index = self._indexes[k] if len(self._indexes) == len(self._series) else None
             if index is None or len(index) != len(times):
                 index = pandas.Index(times, name="t [s]")
             parts.append((record, pandas.DataFrame(columns, index=index)))
@@ -299,7 +341,7 @@ class Fit:
 
         On others the initial states are fitted to the first rows, which are not scored.
         """
-        found = self._native.scores if test is None else self._native.score(to_frames(test, "test", self._wanted))
+        found = self._scores if test is None else self._score_of(test)
         result: pd.DataFrame = table(
             {"rmse": [s[1] for s in found], "fit_percent": [s[2] for s in found]}, [s[0] for s in found]
         )
@@ -310,10 +352,31 @@ class Fit:
 
         Of several outputs it is their mean. `scores` has each. 100 is perfect, 0 no better than the mean, and below zero worse.
         """
-        found = self._native.score(to_frames(test, "test", self._wanted))
+        found = self._score_of(test)
         if not found:
             raise DataError("test: no record: give a frame, or a list of them")
         return float(np.mean([s[2] for s in found]))
+
+    @property
+    def _not_determined(self) -> list[list[str]]:
+        return self._native.not_determined
+
+    @property
+    def _series(self) -> list[tuple[str, Array, list[tuple[str, Array, Array]]]]:
+        return self._native.series
+
+    @property
+    def _scores(self) -> list[tuple[str, float, float]]:
+        return self._native.scores
+
+    def _score_of(self, test: Records) -> list[tuple[str, float, float]]:
+        frames = to_frames(test, "test", self._wanted)
+        return self._native.score(frames) if frames else []
+
+    @property
+    def _name(self) -> str:
+        model = self._native.model
+        return " + ".join([model.name, *model.effects])
 
     @property
     def _wanted(self) -> list[str]:
@@ -387,14 +450,13 @@ class Fit:
                 numbers = [f"{value:.6g}", f"{error:.3g}", f"{value - half:.6g}", f"{value + half:.6g}"]
                 rows.append([name, *numbers, unit])
         tried, agree = self._native.starts
-        model = self._native.model
-        lines = [" + ".join([model.name, *model.effects]), "", *_aligned(rows), ""]
+        lines = [self._name, "", *_aligned(rows), ""]
         lines.append(f"{agree} of {tried} starts ended in this minimum")
-        for names in self._native.not_determined:
+        for names in self._not_determined:
             lines.append(f"warning: these records do not determine {' and '.join(names)} one without the other")
         rows = [["", "fit %", "rmse", "whiteness p", "input p"]]
         tests = {name: p for name, p, _, _ in self._native.outputs}
-        for name, rmse, percent in self._native.scores:
+        for name, rmse, percent in self._scores:
             white, trace = tests.get(name, (np.nan, np.nan))
             rows.append([name, f"{percent:.2f}", f"{rmse:.4g}", _p(white), _p(trace)])
         lines += ["", *_aligned(rows)]
@@ -451,11 +513,11 @@ class Fit:
         """Measured and simulated outputs, and their residuals; returns matplotlib axes."""
         from ._plot import fit_axes
 
-        return fit_axes(self._native.series, ax)
+        return fit_axes(self._series, ax)
 
     def __repr__(self) -> str:
-        percent = ", ".join(f"{name} {fit:.1f} %" for name, _, fit in self._native.scores)
-        return f"<ctid.Fit of {self._native.model.name}: {percent}>"
+        percent = ", ".join(f"{name} {fit:.1f} %" for name, _, fit in self._scores)
+        return f"<ctid.Fit of {self._name}: {percent}>"
 
     def __copy__(self) -> Self:
         return self
@@ -569,13 +631,63 @@ class Diagnosis:
     def report(self, path: str | os.PathLike[str]) -> None:
         """Writes the page of `ctid diagnose --report`, which needs no network."""
         with open(path, "w", encoding="utf-8") as file:
-            file.write(self._native.html())
+            file.write(self._page)
+
+    @property
+    def _title(self) -> str:
+        return str(self._found["model"])
+
+    @property
+    def _series(self) -> list[tuple[str, bool, Array, list[tuple[str, Array, list[Array]]]]]:
+        return self._native.series
+
+    @property
+    def _page(self) -> str:
+        return self._native.html()
+
+    def design(
+        self,
+        between: tuple[str, str],
+        ranges: Mapping[str, tuple[float, float]] | None = None,
+        *,
+        slews: Mapping[str, float] | None = None,
+        inputs: Sequence[str] | None = None,
+        duration: float | None = None,
+        effort: Effort = "normal",
+        time_limit: float | None = None,
+        seed: int = _SEED,
+        progress: Progress = True,
+    ) -> Design:
+        """Proposes the next experiment, which tells two effects apart, as `ctid design` does.
+
+        `ranges`: smallest and largest value of inputs, in their units; without them what the records visited. `slews`: the largest change in a second.
+        `inputs`: those that are applied; without them all that have a range or moved. `duration` in s; without it that of the longest record.
+
+        Raises `ModelError` where the effects or the limits do not allow one.
+        """
+        first, second = between
+        applied = list(inputs) if inputs is not None else list(ranges or {})
+        try:
+            found, time_unit = self._native.design(
+                (str(first), str(second)),
+                ranges={name: (float(low), float(high)) for name, (low, high) in (ranges or {}).items()},
+                slews={name: float(value) for name, value in (slews or {}).items()},
+                inputs=applied,
+                duration=duration,
+                seed=seed,
+                effort=effort,
+                time_limit=time_limit,
+                progress=_teller(progress),
+            )
+        finally:
+            _clear(progress)
+        return Design(json.loads(found), time_unit)
 
     def plot(self, ax: Any = None) -> Any:
         """Measured outputs, the believed model and the last one, and the fall of the error; returns matplotlib axes."""
         from ._plot import diagnosis_axes
 
-        return diagnosis_axes(self._native.series, self._found, ax)
+        return diagnosis_axes(self._series, self._title, self._found, ax)
 
     def __repr__(self) -> str:
         effects = ", ".join(self.effects)
@@ -589,6 +701,45 @@ class Diagnosis:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _diagnosis_of, (self._native.to_bytes(),)
+
+
+class Design:
+    """An experiment that was proposed; it never changes."""
+
+    __slots__ = ("_found", "_time_unit")
+
+    def __init__(self, found: dict[str, Any], time_unit: float) -> None:
+        self._found = found
+        self._time_unit = time_unit
+
+    @property
+    def prospect(self) -> str:
+        """`decides`, `may`, `hardly`, or `twins` where no experiment tells the two apart."""
+        return str(self._found["prospect"])
+
+    @property
+    def experiment(self) -> pd.DataFrame:
+        """The best experiment, to be applied: a column for each input, in its unit; the index is the time in s."""
+        found = self._found["experiment"]
+        columns = {one["input"]: one["values"] for one in found["inputs"]}
+        result: pd.DataFrame = table(columns, found["time"], "t [s]")
+        return result
+
+    @property
+    def experiments(self) -> pd.DataFrame:
+        """All experiments that were tried, the best first: what each applies, and the probability with which it decides."""
+        all = self._found["experiments"]
+        applied = ["; ".join(f"{i['input']}: {i['kind']} {i['low']:.3g}..{i['high']:.3g}" for i in e["inputs"]) for e in all]
+        result: pd.DataFrame = table({"inputs": applied, "decides": [e["power"]["decides"] for e in all]})
+        return result
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as `ctid design --json` writes it; numbers that are none are None."""
+        result: dict[str, Any] = json.loads(json.dumps(self._found))
+        return result
+
+    def __repr__(self) -> str:
+        return f"<ctid.Design {self.prospect}>"
 
 
 def _model_of(content: bytes) -> Model:

@@ -43,7 +43,9 @@ def fit_axes(series: Sequence[tuple[str, Array, list[tuple[str, Array, Array]]]]
     return axes
 
 
-def diagnosis_axes(series: Sequence[tuple[str, bool, Array, list[tuple[str, Array, list[Array]]]]], found: dict[str, Any], ax: Any) -> Any:
+def diagnosis_axes(
+    series: Sequence[tuple[str, bool, Array, list[tuple[str, Array, list[Array]]]]], title: str, found: dict[str, Any], ax: Any
+) -> Any:
     """Measured, the believed model and the last one, of each output of the first record; then the error of every step."""
     record, _, time, outputs = series[0]
     axes = _axes_apart(len(outputs), ax)
@@ -51,15 +53,15 @@ def diagnosis_axes(series: Sequence[tuple[str, bool, Array, list[tuple[str, Arra
     for axis, (name, measured, models) in zip(axes, outputs, strict=False):
         axis.plot(time, measured, ".", ms=2, color="0.5", label="measured")
         if models:
-            axis.plot(time, models[0], lw=1.2, label=found["model"])
+            axis.plot(time, models[0], lw=1.2, label=title)
         if len(models) > 1:
-            axis.plot(time, models[-1], lw=1.2, label=" + ".join([found["model"], *found["effects"]]))
+            axis.plot(time, models[-1], lw=1.2, label=" + ".join([title, *found["effects"]]))
         axis.set_ylabel(name)
         axis.set_xlabel("time [s]")
         axis.legend(loc="best", fontsize="small")
     axes[0].set_title(record)
     last = axes[-1]
-    names = [step["added"] or found["model"] for step in steps]
+    names = [step["added"] or title for step in steps]
     for output in steps[0]["rmse_per_output"]:
         last.plot(range(len(steps)), [step["rmse_per_output"][output] for step in steps], "o-", label=output)
         floor = next((noise["level"] for noise in found["noise"] if noise["output"] == output), None)

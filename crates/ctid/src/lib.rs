@@ -7,7 +7,7 @@
 //! | records and model, read and checked | [`input`] |
 //! | a missing term as a file | [`term_file`] |
 //! | the next experiment | [`mod@design`] |
-//! | a model on new inputs | `simulate` |
+//! | a model on new inputs | [`mod@simulate`] |
 //! | a model of the user's own, without the command line | [`own_model`] |
 //! | the tour | [`tour`] |
 //! | rows watched as they come | [`mod@monitor`] |
@@ -44,7 +44,7 @@ pub mod progress;
 pub mod report;
 pub mod serve;
 mod signature;
-mod simulate;
+pub mod simulate;
 mod symptoms;
 pub mod tables;
 pub mod term_file;

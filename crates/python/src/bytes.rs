@@ -1,8 +1,8 @@
-//! Objects as bytes, for `pickle`: CBOR, which keeps numbers that are none.
+//! Objects as bytes, for `pickle`: MessagePack, which keeps numbers that are none.
 
 use pyo3::prelude::*;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
@@ -11,23 +11,25 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// A value as bytes.
 pub fn of(value: &impl Serialize) -> PyResult<Vec<u8>> {
-    let mut bytes = Vec::new();
-    ciborium::into_writer(&(VERSION, value), &mut bytes)
-        .map_err(|error| Error::new_err(format!("this object cannot be pickled: {error}")))?;
-    Ok(bytes)
+    rmp_serde::to_vec_named(&(VERSION, value))
+        .map_err(|error| Error::new_err(format!("this object cannot be pickled: {error}")))
 }
 
 /// A value from its bytes.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> PyResult<T> {
     let other = |why: String| Error::new_err(format!("this is no object of ctid {VERSION}: {why}"));
-    let (version, value): (String, ciborium::Value) =
-        ciborium::from_reader(bytes).map_err(|error| other(error.to_string()))?;
+    // The version first: what follows may have another layout.
+    let mut reader = rmp_serde::Deserializer::from_read_ref(bytes);
+    let all = Versioned::<T>::deserialize(&mut reader);
+    let Versioned(version, value) = all.map_err(|error| other(error.to_string()))?;
     if version != VERSION {
         return Err(other(format!(
             "ctid {version} has pickled it; make it again"
         )));
     }
-    value
-        .deserialized()
-        .map_err(|error| other(error.to_string()))
+    Ok(value)
 }
+
+/// A value behind the version that has written it.
+#[derive(Deserialize)]
+struct Versioned<T>(String, T);

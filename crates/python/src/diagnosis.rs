@@ -1,8 +1,12 @@
 //! A diagnosis.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use ctid::own_model::{Records, diagnosed_page};
+use ctid::effort::EffortLevel;
+use ctid::own_model::{Records, design, diagnosed_page};
+use effect_search::Options;
+use effect_search::design::Limits;
 use missing_effect::Failures;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -11,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::Content;
 use crate::model::{Inner, Kept, Model};
-use crate::{bytes, error};
+use crate::{bytes, error, work};
 
 /// What a model is missing; it never changes.
 #[pyclass(frozen, module = "ctid._ctid")]
@@ -122,6 +126,52 @@ impl Diagnosis {
             file,
             values: estimates.map(|p| (p.name.clone(), p.value)).collect(),
         })))
+    }
+
+    /// The experiment that tells two effects apart best; what `ctid design --json` writes, without its mark, and the unit of the model's time
+    /// \[s\].
+    #[pyo3(signature = (between, *, ranges, slews, inputs, duration, seed, effort, time_limit, progress=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    fn design(
+        &self,
+        py: Python<'_>,
+        between: (String, String),
+        ranges: BTreeMap<String, (f64, f64)>,
+        slews: BTreeMap<String, f64>,
+        inputs: Vec<String>,
+        duration: Option<f64>,
+        seed: u64,
+        effort: &str,
+        time_limit: Option<f64>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(String, f64)> {
+        let limit = crate::fit::limit(effort, time_limit, EffortLevel::limit_of_own_model)?;
+        let limits = Limits {
+            inputs,
+            ranges,
+            slews,
+            duration,
+            seed,
+        };
+        let found = work::run(py, progress.as_ref(), |stop, phases| {
+            let options = Options {
+                seed,
+                time_limit: Some(limit),
+                interrupt: Some(stop),
+                ..Options::default()
+            };
+            let between = [between.0.as_str(), between.1.as_str()];
+            let tell = |progress: effect_search::Progress| phases.tell(progress.phase);
+            design(
+                &self.model.file,
+                &self.records,
+                between,
+                &limits,
+                &options,
+                &tell,
+            )
+        })?;
+        Ok((json(&found)?, self.records.time_unit))
     }
 
     /// Of each record, fitted ones first: its name, whether it is held out, its times \[s\], and of each output its name, what was measured and

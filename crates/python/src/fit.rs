@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use ct_signals::ReadOptions;
 use ctid::effort::EffortLevel;
@@ -79,8 +80,31 @@ impl Fit {
     }
 }
 
+/// How long a search may take.
+pub fn limit(
+    effort: &str,
+    seconds: Option<f64>,
+    of: impl Fn(EffortLevel) -> Duration,
+) -> PyResult<Duration> {
+    let effort = match effort {
+        "quick" => EffortLevel::Quick,
+        "normal" => EffortLevel::Normal,
+        "thorough" => EffortLevel::Thorough,
+        other => {
+            return Err(error::of_model(format!(
+                "effort is \"quick\", \"normal\" or \"thorough\", and not \"{other}\""
+            )));
+        }
+    };
+    match seconds {
+        None => Ok(of(effort)),
+        Some(seconds) => Duration::try_from_secs_f64(seconds)
+            .map_err(|_| error::of_model("time_limit is a number of seconds above zero")),
+    }
+}
+
 /// A simulation as Python takes it.
-fn simulation<'py>(py: Python<'py>, found: &Simulated) -> PyResult<Bound<'py, PyDict>> {
+pub fn simulation<'py>(py: Python<'py>, found: &Simulated) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     let outputs = PyDict::new(py);
     for output in &found.outputs {
@@ -304,21 +328,7 @@ impl Fit {
         seed: u64,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Diagnosis> {
-        let effort = match effort {
-            "quick" => EffortLevel::Quick,
-            "normal" => EffortLevel::Normal,
-            "thorough" => EffortLevel::Thorough,
-            other => {
-                return Err(error::of_model(format!(
-                    "effort is \"quick\", \"normal\" or \"thorough\", and not \"{other}\""
-                )));
-            }
-        };
-        let limit = match time_limit {
-            None => effort.limit_of_own_model(),
-            Some(seconds) => std::time::Duration::try_from_secs_f64(seconds)
-                .map_err(|_| error::of_model("time_limit is a number of seconds above zero"))?,
-        };
+        let limit = limit(effort, time_limit, EffortLevel::limit_of_own_model)?;
         let mut frames = self.frames.to_vec();
         let fitted = frames.len();
         frames.extend(contents(&test));

@@ -5,15 +5,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use ct_model::ModelSpec;
-use ct_signals::{Columns, Hold, ReadOptions, Reading};
+use ct_signals::{Columns, ReadOptions, Reading};
 use ctid::own_model::{AnyModelFile, OwnModelFile, OwnSettings, Records};
 use greybox::{FitOptions, PriorValue};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
 use crate::fit::Fit;
 use crate::frame::{Content, Frame};
+use crate::monitor::Monitor;
 use crate::{bytes, error, work};
 
 /// A model; it never changes.
@@ -157,16 +158,9 @@ impl Model {
                 .priors
                 .insert(name, PriorValue { value, std_error });
         }
-        settings.hold = match hold {
-            None => settings.hold,
-            Some("zero") => Hold::Zero,
-            Some("first") => Hold::First,
-            Some(other) => {
-                return Err(error::of_model(format!(
-                    "hold is \"zero\" or \"first\", and not \"{other}\""
-                )));
-            }
-        };
+        if let Some(hold) = hold {
+            settings.hold = crate::identify::hold_of(hold)?;
+        }
         let kept = Kept {
             settings,
             ..self.0.kept()
@@ -206,6 +200,26 @@ impl Model {
     fn to_modelica(&self) -> PyResult<String> {
         let spec = self.0.valued().map_err(|error| error::of(&error))?;
         Ok(spec.to_string())
+    }
+
+    /// The matrices of the model about values of its states and inputs.
+    fn linearize<'py>(
+        &self,
+        py: Python<'py>,
+        at: BTreeMap<String, f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let spec = self.0.valued().map_err(|error| error::of(&error))?;
+        crate::linear::linearize(py, spec, &at)
+    }
+
+    /// The model beside a running plant.
+    fn monitor(
+        &self,
+        time_unit: f64,
+        rows_between_false_alarms: f64,
+        learning_rows: usize,
+    ) -> PyResult<Monitor> {
+        Monitor::of(&self.0, time_unit, rows_between_false_alarms, learning_rows)
     }
 
     #[getter]

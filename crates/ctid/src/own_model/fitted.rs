@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use ct_signals::{Reading, Record};
+use ct_signals::{Columns, Reading, Record};
 use effect_search::held_out;
 use greybox::{Fit, FitOptions, FitUncertainty, ModelSetup, Robust, TimeLimit};
 
@@ -148,7 +148,11 @@ impl FittedModel {
     /// Where an input is not whole, or the simulation does not go on, with the place and the mend.
     pub fn simulate(&self, reading: Reading, first: usize, level: f64) -> Result<Simulated, Error> {
         let name = std::path::PathBuf::from(&reading.record.name);
-        let mut read = ReadInputs::of(&name, reading, &self.model.columns)?;
+        let columns = Columns {
+            time: Some(reading.summary.time_header.clone()),
+            ..Columns::default()
+        };
+        let mut read = ReadInputs::of(&name, reading, &columns)?;
         self.model.convert(&mut read.record)?;
         let mut all = self.records.records.clone();
         all.push(read.record);

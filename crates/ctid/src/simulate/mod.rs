@@ -23,6 +23,7 @@ pub(crate) use self::curves::{Curves, FittedRecord};
 pub(crate) use self::inputs::{
     Inputs, ReadInputs, begins_with_readings, first_readings, read_inputs,
 };
+pub use self::plant::of_plant;
 pub(crate) use self::plant::simulate as simulate_plant;
 pub(crate) use self::plant_export::{export as export_plant, no_text};
 pub(crate) use self::text::said;

@@ -64,7 +64,7 @@ def _columns(
     columns = [str(column) for column in given]
     if len(columns) != len(names):
         raise ModelError(
-            f'{len(columns)} {role} are given, and {model.name} has {len(names)} ({", ".join(names)}): name a column for each'
+            f'{len(columns)} {role} are given, and {model.name} has {len(names)} ({", ".join(names)}): name a column for each, {role}=[...]'
         )
     return names if set(columns) == set(names) else columns
 

@@ -90,4 +90,5 @@ def test_a_linear_model(program, tmp_path, tour):
         record = found.pop("record")
         by_program = results(program, tmp_path, "identify", RECORDS / "tour.csv", "--method", method, "--order", "1,0")
         assert record == "data" and by_program.pop("record") == "tour.csv"
-        assert found == by_program
+        # The record's name is all that differs.
+        assert json.loads(json.dumps(found).replace('"data"', '"tour.csv"')) == by_program

@@ -4,7 +4,9 @@ use ct_rls::{
     ContinuousRls as Fixed, DynamicRls, Innovation, Outcome, RecursiveEstimator, Sample, Weights,
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -251,9 +253,10 @@ impl ContinuousRls {
             )));
         }
         let copied: Vec<f64>;
+        // A slice of an array in the order of Fortran would be its columns.
         let phi = match phi.as_slice() {
-            Ok(slice) => slice,
-            Err(_) => {
+            Ok(slice) if phi.is_c_contiguous() => slice,
+            _ => {
                 copied = phi.as_array().iter().copied().collect();
                 &copied
             }

@@ -1,6 +1,6 @@
 """Overhead of the package, as ratios in one run.
 
-`python bench.py CTID RLS`: the program, and the example `many_samples` of the crate ct-rls
+`python overhead.py CTID RLS`: the program, and the example `many_samples` of the crate ct-rls
 (`cargo build --release -p ctid` and `cargo build --release -p ct-rls --example many_samples`).
 """
 
@@ -18,7 +18,7 @@ import pandas as pd
 
 import ctid
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SAMPLES, PARAMETERS, REPEATS = 1_000_000, 3, 7
 
 

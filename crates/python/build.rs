@@ -1,10 +1,10 @@
-//! Links small: functions that are compiled alike in several crates are kept once.
+//! On macOS the interpreter's functions are found when it loads the module: the linker does not look for them.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    let target = std::env::var("TARGET").unwrap_or_default();
-    // Where the linker of this target is LLD.
-    if target == "x86_64-unknown-linux-gnu" {
-        println!("cargo::rustc-link-arg-cdylib=-Wl,--icf=all");
+    let system = std::env::var("CARGO_CFG_TARGET_OS").unwrap_or_default();
+    if system == "macos" {
+        println!("cargo::rustc-link-arg-cdylib=-undefined");
+        println!("cargo::rustc-link-arg-cdylib=dynamic_lookup");
     }
 }

@@ -31,6 +31,8 @@ impl<const P: usize> Online for Fixed<P> {
     }
 
     fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
+        // A copy of its own, which the compiler keeps in registers where it can.
+        let mut own = self.clone();
         let mut rows = theta.chunks_exact_mut(P);
         let samples = phi.chunks_exact(P).zip(y).zip(epsilon).enumerate();
         for (k, ((phi, y), epsilon)) in samples {
@@ -39,11 +41,12 @@ impl<const P: usize> Online for Fixed<P> {
                 y: *y,
             };
             let step = if dt.len() > 1 { dt[k] } else { dt[0] };
-            *epsilon = RecursiveEstimator::update(self, &sample, step).epsilon;
+            *epsilon = RecursiveEstimator::update(&mut own, &sample, step).epsilon;
             if let Some(row) = rows.next() {
-                row.copy_from_slice(RecursiveEstimator::theta(self).as_slice());
+                row.copy_from_slice(RecursiveEstimator::theta(&own).as_slice());
             }
         }
+        *self = own;
     }
 
     fn theta(&self) -> Vec<f64> {

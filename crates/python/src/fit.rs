@@ -40,6 +40,9 @@ struct KeptFit {
     fit: greybox::Fit,
 }
 
+/// Names and matrix; none where the records do not determine all that was fitted.
+pub type Covariance<'py> = Option<(Vec<String>, Bound<'py, PyArray2<f64>>)>;
+
 /// Measured and simulated series of an output: name, measured, simulated.
 type Series<'py> = (String, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
@@ -165,10 +168,7 @@ impl Fit {
     }
 
     /// Names and covariance of what the records determine; `None` where they do not.
-    fn covariance<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<Option<(Vec<String>, Bound<'py, PyArray2<f64>>)>> {
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Covariance<'py>> {
         let setup = self.fitted.setup().map_err(|error| error::of(&error))?;
         let robust = self.fitted.robust().map_err(|error| error::of(&error))?;
         let Some(matrix) = robust.and_then(|robust| robust.covariance) else {

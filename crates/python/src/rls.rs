@@ -26,21 +26,19 @@ trait Online: Send + Sync {
 
 impl<const P: usize> Online for Fixed<P> {
     fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation {
-        let phi = SVector::from_column_slice(phi);
-        RecursiveEstimator::update(self, &Sample { phi, y }, dt)
+        // Whoever calls this has counted them.
+        let phi = phi.first_chunk::<P>().copied().unwrap_or([f64::NAN; P]);
+        RecursiveEstimator::update(self, &Sample::new(phi, y), dt)
     }
 
     fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
         // A copy of its own, which the compiler keeps in registers where it can.
         let mut own = self.clone();
-        let mut rows = theta.chunks_exact_mut(P);
-        let samples = phi.chunks_exact(P).zip(y).zip(epsilon).enumerate();
-        for (k, ((phi, y), epsilon)) in samples {
-            let sample = Sample {
-                phi: SVector::from_column_slice(phi),
-                y: *y,
-            };
+        let mut rows = theta.as_chunks_mut::<P>().0.iter_mut();
+        let samples = phi.as_chunks::<P>().0.iter().zip(y).zip(epsilon);
+        for (k, ((phi, y), epsilon)) in samples.enumerate() {
             let step = if dt.len() > 1 { dt[k] } else { dt[0] };
+            let sample = Sample::new(*phi, *y);
             *epsilon = RecursiveEstimator::update(&mut own, &sample, step).epsilon;
             if let Some(row) = rows.next() {
                 row.copy_from_slice(RecursiveEstimator::theta(&own).as_slice());
@@ -201,8 +199,8 @@ impl ContinuousRls {
     /// it. A sample that cannot be used, a NaN say, changes nothing; `outcome` says why.
     fn update(&mut self, phi: &Bound<'_, PyAny>, y: f64, dt: f64) -> PyResult<f64> {
         let innovation = if let Ok(phi) = phi.cast::<PyArray1<f64>>() {
-            let phi = phi.readonly();
-            let Ok(phi) = phi.as_slice() else {
+            // A few numbers are copied faster than it is noted that they are read.
+            let Ok(phi) = phi.to_vec() else {
                 return Err(error::of_data(
                     "phi is a part of an array with steps: give phi.copy()",
                 ));
@@ -210,7 +208,7 @@ impl ContinuousRls {
             if phi.len() != self.size {
                 return Err(self.wrong_size(phi.len()));
             }
-            self.rls.update(phi, y, dt)
+            self.rls.update(&phi, y, dt)
         } else {
             let phi: Vec<f64> = phi.extract().map_err(|_| {
                 error::of_data("phi is a list of numbers, or an array of floats with one axis")

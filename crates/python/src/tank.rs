@@ -16,7 +16,7 @@ use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
 use crate::diagnosis::{Bin, bins, json};
-use crate::fit::simulation;
+use crate::fit::{Covariance, simulation};
 use crate::frame::{Content, Frame};
 use crate::model::contents;
 use crate::{bytes, error, work};
@@ -178,10 +178,7 @@ impl TankFit {
         Ok(all.map(|e| Some(e.2? * quantile?)).collect())
     }
 
-    fn covariance<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<Option<(Vec<String>, Bound<'py, PyArray2<f64>>)>> {
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Covariance<'py>> {
         let Some((names, matrix, _)) = &self.known else {
             return Ok(None);
         };

@@ -130,7 +130,7 @@ impl AnyModelFile {
     /// Reads the model file once: it may be a pipe.
     ///
     /// # Errors
-    /// As [`model_file::read`] and [`OwnModelFile::parse`].
+    /// As [`model_file::read`]; one line that names the file, the line, what is wrong and the mend.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = model_file::read_text(path)?;
         let table = text.parse::<toml::Table>().ok();
@@ -169,7 +169,7 @@ impl OwnModelFile {
     /// The same, the model from wherever `read` has it; it is given the name that stands in the file.
     ///
     /// # Errors
-    /// As [`OwnModelFile::parse`].
+    /// One line that names the file, the line, what is wrong and the mend.
     pub fn parse_with(
         path: &Path,
         text: &str,

@@ -5,7 +5,8 @@ use ct_rls::{
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray,
+    PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -210,9 +211,16 @@ impl ContinuousRls {
             }
             self.rls.update(&phi, y, dt)
         } else {
-            let phi: Vec<f64> = phi.extract().map_err(|_| {
-                error::of_data("phi is a list of numbers, or an array of floats with one axis")
-            })?;
+            let other =
+                || error::of_data("phi is a list of numbers, or an array of floats with one axis");
+            // Numpy makes a number of an array that holds one.
+            if phi
+                .cast::<PyUntypedArray>()
+                .is_ok_and(|phi| phi.ndim() != 1)
+            {
+                return Err(other());
+            }
+            let phi: Vec<f64> = phi.extract().map_err(|_| other())?;
             if phi.len() != self.size {
                 return Err(self.wrong_size(phi.len()));
             }

@@ -10,6 +10,7 @@
 //! **Reference**: T. Kailath, Linear Systems, 1980, appendix A.
 
 use crate::linearity::Linearity;
+use crate::scalar::{Dual, Scalar};
 use crate::simulation::Model;
 use crate::tape::{Register, Registers};
 
@@ -97,7 +98,82 @@ impl Model {
     }
 }
 
+impl Model {
+    /// The matrices of the model about a point, by exact derivatives; `state_offset` is the slope of each state there, `output_offset` each output
+    /// there, so that `d(x - x0)/dt = A (x - x0) + B (u - u0) + state_offset`. Branches are those that hold there; plays stand where they are. `None`
+    /// where the model delays something, or has no finite value or slope there.
+    ///
+    /// `parameters`, `states` and `inputs` in the order of the text, each in its unit; `time` in the model's unit.
+    ///
+    /// # Panics
+    /// Where one of them has another length than the model.
+    #[must_use]
+    pub fn linear_about(
+        &self,
+        parameters: &[f64],
+        states: &[f64],
+        inputs: &[f64],
+        time: f64,
+    ) -> Option<LinearForm> {
+        let tape = self.tape();
+        assert_eq!(parameters.len(), tape.parameters, "parameters");
+        assert_eq!(states.len(), tape.states, "states");
+        assert_eq!(inputs.len(), tape.inputs, "inputs");
+        if !tape.delays.is_empty() {
+            return None;
+        }
+        // One direction at a time: the derivatives by the state or the input at this position.
+        let column = |moved: Option<Register>| -> (Vec<Dual<1>>, Vec<Dual<1>>) {
+            let parameters: Vec<_> = parameters.iter().map(|p| Dual::constant(*p)).collect();
+            let mut registers = tape.registers(&parameters);
+            registers.values[0] = Dual::constant(time);
+            let of_states = states.iter().enumerate().map(|(i, x)| (tape.state(i), *x));
+            let of_inputs = inputs.iter().enumerate().map(|(i, u)| (tape.input(i), *u));
+            for (register, value) in of_states.chain(of_inputs) {
+                let lane = usize::from(moved != Some(register));
+                registers.values[register] = Dual::variable(value, lane);
+            }
+            tape.evaluate_with_guards(&mut registers);
+            let read = |at: &[Register]| at.iter().map(|&r| registers.values[r]).collect();
+            (read(&tape.derivatives), read(&tape.outputs))
+        };
+        let (slopes, read) = column(None);
+        let by_states: Vec<_> = (0..tape.states)
+            .map(|i| column(Some(tape.state(i))))
+            .collect();
+        let by_inputs: Vec<_> = (0..tape.inputs)
+            .map(|i| column(Some(tape.input(i))))
+            .collect();
+        let rows = |columns: &[(Vec<Dual<1>>, Vec<Dual<1>>)], outputs: bool, count: usize| {
+            let entry = |i: usize, (slopes, read): &(Vec<Dual<1>>, Vec<Dual<1>>)| match outputs {
+                true => read[i].eps[0],
+                false => slopes[i].eps[0],
+            };
+            (0..count)
+                .map(|i| columns.iter().map(|column| entry(i, column)).collect())
+                .collect::<Vec<Vec<f64>>>()
+        };
+        let (n, outputs) = (tape.states, tape.outputs.len());
+        let form = LinearForm {
+            a: rows(&by_states, false, n),
+            b: rows(&by_inputs, false, n),
+            c: rows(&by_states, true, outputs),
+            d: rows(&by_inputs, true, outputs),
+            state_offset: slopes.iter().map(|slope| slope.re).collect(),
+            output_offset: read.iter().map(|output| output.re).collect(),
+        };
+        form.is_finite().then_some(form)
+    }
+}
+
 impl LinearForm {
+    fn is_finite(&self) -> bool {
+        let matrices = [&self.a, &self.b, &self.c, &self.d];
+        let mut entries = matrices.into_iter().flatten().flatten();
+        let mut offsets = self.state_offset.iter().chain(&self.output_offset);
+        entries.all(|v| v.is_finite()) && offsets.all(|v| v.is_finite())
+    }
+
     /// From one input to one output, both counted from zero; all other inputs stand still.
     ///
     /// # Panics
@@ -141,5 +217,37 @@ impl LinearForm {
             numerator,
             denominator,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use crate::{Model, ModelSpec};
+
+    #[test]
+    fn about_a_point_the_matrices_are_the_slopes_there() {
+        let text = "model Tank\n  parameter Real k = 2;\n  input Real u;\n  output Real y = h^2 + u;\n  Real h(start = 1);\nequation\n  der(h) = u - k*sqrt(h);\nend Tank;";
+        let model = Model::new(ModelSpec::parse(text).unwrap());
+        assert!(model.linear(&[2.0]).is_none());
+        let form = model.linear_about(&[2.0], &[4.0], &[3.0], 0.0).unwrap();
+        assert_eq!(form.a, [[-0.5]]);
+        assert_eq!(form.b, [[1.0]]);
+        assert_eq!(form.c, [[8.0]]);
+        assert_eq!(form.d, [[1.0]]);
+        assert_eq!((form.state_offset[0], form.output_offset[0]), (-1.0, 19.0));
+        assert!(model.linear_about(&[2.0], &[0.0], &[3.0], 0.0).is_none());
+    }
+
+    #[test]
+    fn of_a_linear_model_they_are_its_own() {
+        let text = include_str!("../../../examples/models/heated-block.mo");
+        let model = Model::new(ModelSpec::parse(text).unwrap());
+        let parameters = model.parameters();
+        let own = model.linear(&parameters).unwrap();
+        let about = model.linear_about(&parameters, &[40.0], &[30.0, 20.0], 5.0);
+        let about = about.unwrap();
+        assert_eq!((&own.a, &own.b, &own.c), (&about.a, &about.b, &about.c));
     }
 }

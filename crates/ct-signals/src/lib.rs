@@ -87,8 +87,8 @@ pub use calendar::{Calendar, Clock, duration};
 pub use column_fault::ColumnFault;
 pub use columns::{Columns, Heading};
 pub use csv::{
-    Converted, MissingSamples, ReadOptions, ReadSummary, Reading, csv_header, parse_csv, read_csv,
-    read_inputs_csv,
+    Converted, MissingSamples, ReadOptions, ReadSummary, Reading, csv_header, parse_csv,
+    parse_inputs_csv, read_csv, read_inputs_csv,
 };
 pub use error::Error;
 pub use gaps::Gaps;

@@ -8,7 +8,7 @@ use serde::Deserialize;
 /// A limit on the time of a search.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum EffortLevel {
+pub enum EffortLevel {
     /// 5 s
     Quick,
     /// 20 s; 40 s for a model of your own
@@ -20,7 +20,8 @@ pub(crate) enum EffortLevel {
 
 impl EffortLevel {
     /// The limit.
-    pub(crate) fn limit(self) -> Duration {
+    #[must_use]
+    pub fn limit(self) -> Duration {
         match self {
             Self::Quick => Duration::from_secs(5),
             Self::Normal => missing_effect::TIME_LIMIT,
@@ -29,7 +30,8 @@ impl EffortLevel {
     }
 
     /// The limit for a model of its user's text, which is simulated in small steps beside more candidates.
-    pub(crate) fn limit_of_own_model(self) -> Duration {
+    #[must_use]
+    pub fn limit_of_own_model(self) -> Duration {
         match self {
             Self::Normal => 2 * self.limit(),
             other => other.limit(),

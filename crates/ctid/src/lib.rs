@@ -7,7 +7,8 @@
 //! | records and model, read and checked | [`input`] |
 //! | a missing term as a file | [`term_file`] |
 //! | the next experiment | [`mod@design`] |
-//! | a model on new inputs | `simulate` |
+//! | a model on new inputs | [`mod@simulate`] |
+//! | a model of the user's own, without the command line | [`own_model`] |
 //! | the tour | [`tour`] |
 //! | rows watched as they come | [`mod@monitor`] |
 //! | linear models from a record | [`mod@identify`] |
@@ -25,7 +26,7 @@ mod column_errors;
 mod commands;
 pub mod design;
 pub mod edit;
-mod effort;
+pub mod effort;
 mod error;
 mod findings;
 pub mod identify;
@@ -36,14 +37,14 @@ pub mod model_file;
 pub mod monitor;
 mod names;
 pub mod output;
-mod own_model;
+pub mod own_model;
 mod plot;
 mod program;
 pub mod progress;
 pub mod report;
 pub mod serve;
 mod signature;
-mod simulate;
+pub mod simulate;
 mod symptoms;
 pub mod tables;
 pub mod term_file;

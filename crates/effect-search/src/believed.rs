@@ -23,7 +23,7 @@ pub struct Believed {
     /// The model; the values of its parameters are fitted ones, in white noise.
     pub spec: ModelSpec,
     /// What of the records its effects are written in, by their identifiers.
-    pub record_numbers: BTreeMap<String, BTreeMap<&'static str, f64>>,
+    pub record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
 /// Fits the believed model, then adds the effects of [`Problem::effects`] one after the other.
@@ -37,7 +37,7 @@ pub fn believed(problem: &Problem, options: &Options) -> Result<Believed, Error>
         parameter.value = *value;
     }
     let record_numbers = node.added.iter().map(|&i| &context.candidates[i]);
-    let record_numbers = record_numbers.map(|c| (c.id.clone(), c.record_numbers.clone()));
+    let record_numbers = record_numbers.map(|c| (c.id.clone(), c.numbers_of_record()));
     Ok(Believed {
         spec,
         record_numbers: record_numbers.collect(),

@@ -342,7 +342,7 @@ fn report(context: &Context, grown: &Grown, finding: Finding) -> Result<Diagnosi
     let all = || context.candidates.iter().chain(&context.shapes);
     let record_numbers = said
         .filter_map(|id| all().find(|c| c.id == *id))
-        .map(|candidate| (candidate.id.clone(), candidate.record_numbers.clone()))
+        .map(|candidate| (candidate.id.clone(), candidate.numbers_of_record()))
         .collect();
     Ok(Diagnosis {
         schema: 2,

@@ -4,7 +4,7 @@ use ct_signals::ArModel;
 use ct_signals::residual_tests::prewhitened_input_test;
 use estimation::Fit;
 use greybox::ModelSetup;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::accept::NOISE_ORDER;
@@ -15,7 +15,7 @@ use crate::residual::{harmonics_p, instant, level_p, of_command, period, standar
 const NOT_NOISE: f64 = 1e-4;
 
 /// What a residual shows that noise does not.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Left {
     /// It depends on an input.

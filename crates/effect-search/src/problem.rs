@@ -9,6 +9,7 @@ use ct_model::ModelSpec;
 use ct_model::effects::OwnCandidate;
 use ct_signals::Record;
 use greybox::{ModelSetup, PriorValue, TimeLimit};
+use serde::{Deserialize, Serialize};
 
 /// A model and the records that it is held against.
 #[derive(Debug, Clone)]
@@ -36,7 +37,7 @@ pub struct Problem {
 }
 
 /// What is kept of an effect from an earlier record.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Kept {
     /// The numbers of that record that the effect is written in ([`ct_model::effects::Candidate::record_numbers`]).
     pub numbers: BTreeMap<String, f64>,

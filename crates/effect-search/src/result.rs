@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::left::Left;
 use crate::unknown::Unknown;
 
 /// The finding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Every added effect is singled out by the data.
@@ -24,7 +24,7 @@ pub enum Verdict {
 }
 
 /// A parameter or an initial state as it was fitted.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Its name.
     pub name: String,
@@ -42,7 +42,7 @@ pub struct Estimate {
 }
 
 /// A model on the way: the believed one, then with one effect more each.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// The effect that was added; `None` of the believed model.
     pub added: Option<String>,
@@ -73,7 +73,7 @@ pub struct Step {
 }
 
 /// A single effect beside the believed model.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Single {
     /// The effect.
     pub effect: String,
@@ -86,7 +86,7 @@ pub struct Single {
 }
 
 /// The noise of an output.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseFloor {
     /// The output.
     pub output: String,
@@ -99,7 +99,7 @@ pub struct NoiseFloor {
 }
 
 /// A diagnosis.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Version of this layout.
     pub schema: u32,
@@ -127,7 +127,7 @@ pub struct Diagnosis {
     pub singles: Vec<Single>,
     /// What of the records the named effects are written in ([`ct_model::effects::Candidate::record_numbers`]), by their identifiers: with
     /// these numbers an effect means the same beside another record.
-    pub record_numbers: BTreeMap<String, BTreeMap<&'static str, f64>>,
+    pub record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
     /// How many candidates were scored.
     pub candidates: usize,
     /// What the time limit left out of the search; empty where it is complete.

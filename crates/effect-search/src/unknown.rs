@@ -11,7 +11,7 @@ use ct_model::effects::{Candidate, Port, bells};
 use ct_model::{ModelSpec, Variable};
 use estimation::Noise;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::diagnose::sizes;
@@ -30,7 +30,7 @@ const LEAST_SHARE: f64 = 0.2;
 const PLACES: usize = 25;
 
 /// A smooth function at a port.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PortScore {
     /// Its identifier: `shape(T,u)`, `course(T)`.
     pub effect: String,
@@ -42,7 +42,7 @@ pub struct PortScore {
 }
 
 /// A missing term.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknown {
     /// The smooth function that stands for it: `ctid add` takes it as it takes an effect.
     pub effect: String,

@@ -2,6 +2,7 @@
 
 use ct_signals::ArModel;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     Error, Noise, Residuals, Squares, Stop, Stopping, Triangle, costs_more,
@@ -15,7 +16,7 @@ use crate::{
 const SAME_MINIMUM: f64 = 0.1;
 
 /// A fit.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Fit {
     /// The fitted vector.
     pub x: Vec<f64>,

@@ -5,10 +5,12 @@
 //! gradient; it is clipped to the box. `mu` follows the gain ratio (H. B. Nielsen, Damping parameter in Marquardt's
 //! method, 1999).
 
+use serde::{Deserialize, Serialize};
+
 use crate::Triangle;
 
 /// When to stop.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stopping {
     /// Most evaluations.
     pub evaluations: usize,
@@ -18,7 +20,7 @@ pub struct Stopping {
 }
 
 /// Why the iteration stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Stop {
     /// The cost falls no more, and a step of Gauss and Newton promises nothing.

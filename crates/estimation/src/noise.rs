@@ -1,6 +1,7 @@
 //! The noise of several outputs: an autoregressive process each, independent of each other.
 
 use ct_signals::{ArModel, Whitener};
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
@@ -8,9 +9,31 @@ use crate::Error;
 ///
 /// Its scales (the innovations' standard deviations) are those of the outputs, in their units. A fit estimates the scales itself and
 /// takes from the noise that it is given the colour alone.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<Reflections>", into = "Vec<Reflections>")]
 pub struct Noise {
     outputs: Vec<ArModel>,
+}
+
+/// The partial correlations of a process and the standard deviation of its innovations: what it is made of again, to the last digit.
+type Reflections = (Vec<f64>, f64);
+
+impl From<Noise> for Vec<Reflections> {
+    fn from(noise: Noise) -> Self {
+        let of = |model: &ArModel| (model.reflections().to_vec(), model.sigma());
+        noise.outputs.iter().map(of).collect()
+    }
+}
+
+impl TryFrom<Vec<Reflections>> for Noise {
+    type Error = ct_signals::Error;
+
+    fn try_from(all: Vec<Reflections>) -> Result<Self, Self::Error> {
+        let of = |(reflections, sigma): Reflections| ArModel::from_reflections(&reflections, sigma);
+        Ok(Self {
+            outputs: all.into_iter().map(of).collect::<Result<_, _>>()?,
+        })
+    }
 }
 
 impl Noise {

@@ -1,5 +1,7 @@
 //! Least squares on the fly: an upper triangle that rows are folded into, in `O(p^2)` memory.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Squares;
 
 /// Rows are collected in blocks and folded in by Householder reflections.
@@ -10,7 +12,7 @@ const BLOCK: usize = 128;
 ///
 /// Unlike the normal equations it does not square the condition number. Folding costs about `2 (p+1)^2`
 /// operations a row.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Triangle {
     columns: usize,
     /// Upper triangle, row by row.
@@ -26,7 +28,7 @@ pub struct Triangle {
 }
 
 /// The rows of each output, not weighted.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Outputs {
     triangles: Vec<Triangle>,
     /// The rows of priors, in standard errors.

@@ -24,10 +24,12 @@
 //!
 //! **Reference**: G. A. F. Seber, C. J. Wild, Nonlinear Regression, 1989, ch. 11 (multiresponse models), for independent responses.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{Residuals, prior::free_priors};
 
 /// Sums of squares of each output, and how many samples they are of.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Squares {
     /// Sum of squares of each output's whitened residual \[its unit squared\].
     pub sums: Vec<f64>,

@@ -2,11 +2,12 @@
 
 use estimation::{Error as NoFit, Noise, Robust, Stopping};
 pub use estimation::{Fit, Start};
+use serde::{Deserialize, Serialize};
 
 use crate::{Error, Setup, random_starts, starts::extend_levels};
 
 /// How to fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FitOptions {
     /// How many random starts.
     pub starts: usize,

@@ -57,6 +57,14 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// [`Candidate::record_numbers`] as results keep them.
+    #[must_use]
+    pub fn numbers_of_record(&self) -> BTreeMap<String, f64> {
+        let all = self.record_numbers.iter();
+        all.map(|(name, value)| ((*name).to_string(), *value))
+            .collect()
+    }
+
     /// Whether the outputs have a derivative by every size where the effect is not there: it can be scored there, over the starts of its
     /// shapes.
     #[must_use]

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::candidate::{Candidate, EffectParameter};
 use super::effect::Role;
 use super::fragment::{Action, Counts, Fragment, Target, signed};
@@ -15,7 +17,7 @@ use crate::text::{Scope, TextError, is_reserved};
 const DECADE: f64 = 10.0;
 
 /// A candidate as the model file has it.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnCandidate {
     /// Its parameters, by name.
     pub parameters: BTreeMap<String, OwnParameter>,
@@ -26,7 +28,7 @@ pub struct OwnCandidate {
 }
 
 /// A parameter of a candidate.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnParameter {
     /// Its unit; empty where none is given.
     pub unit: String,
@@ -39,7 +41,7 @@ pub struct OwnParameter {
 }
 
 /// A state of a candidate.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnState {
     /// Its unit; empty where none is given.
     pub unit: String,

@@ -130,6 +130,19 @@ pub fn parse_csv(
     parse(file, content, columns, (options, Purpose::Fit))
 }
 
+/// As [`read_inputs_csv`], from the content of a file; `file` names it in messages and is the record's name.
+///
+/// # Errors
+/// As [`read_inputs_csv`], but for those of opening.
+pub fn parse_inputs_csv(
+    file: &str,
+    content: &[u8],
+    columns: &Columns,
+    options: &ReadOptions,
+) -> Result<Reading, Error> {
+    parse(file, content, columns, (options, Purpose::Simulation))
+}
+
 fn parse(
     file: &str,
     content: &[u8],

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use ct_model::ModelSpec;
 use ct_model::effects::Candidate;
+use effect_search::{Diagnosis, Estimate, Kept};
 use serde::Deserialize;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
 
@@ -86,6 +87,56 @@ impl Findings {
     }
 }
 
+impl Findings {
+    /// What is kept of an effect: where fits of its parameters begin, and the numbers of its records.
+    ///
+    /// # Errors
+    /// Where the result says nothing of it.
+    pub fn kept(&self, candidate: &Candidate) -> Result<Kept, String> {
+        let id = &candidate.id;
+        let Some(numbers) = self.record_numbers.get(id) else {
+            let known: Vec<&str> = self.record_numbers.keys().map(String::as_str).collect();
+            return Err(format!(
+                "the result says nothing of {id}: it has {}; without --from the effect is fitted anew",
+                known.join(", ")
+            ));
+        };
+        let start = candidate.parameters.iter().filter_map(|parameter| {
+            let size = self.value(&parameter.name)?;
+            Some((parameter.short.clone(), rounded(size, 7)))
+        });
+        Ok(Kept {
+            numbers: numbers.clone(),
+            start: start.collect(),
+        })
+    }
+}
+
+impl From<&Diagnosis> for Findings {
+    fn from(found: &Diagnosis) -> Self {
+        let all = |parameters: &[Estimate]| -> Vec<FoundParameter> {
+            let found = parameters.iter().map(|parameter| FoundParameter {
+                name: parameter.name.clone(),
+                value: Some(parameter.value).filter(|value| value.is_finite()),
+            });
+            found.collect()
+        };
+        let step = |parameters: &[Estimate]| FoundStep {
+            parameters: all(parameters),
+        };
+        let singles = found.singles.iter().map(|single| FoundSingle {
+            sizes: all(&single.sizes),
+        });
+        Self {
+            model: found.model.clone(),
+            steps: found.steps.iter().map(|s| step(&s.parameters)).collect(),
+            unknown: found.unknown.as_ref().map(|u| step(&u.parameters)),
+            singles: singles.collect(),
+            record_numbers: found.record_numbers.clone(),
+        }
+    }
+}
+
 /// Whether a text is the model file of a model of its user's own.
 pub(super) fn is_own(text: &str) -> bool {
     let table = text.parse::<toml::Table>();
@@ -155,19 +206,8 @@ fn keep(
     found: &Findings,
 ) -> Result<String, String> {
     let id = &candidate.id;
-    let Some(numbers) = found.record_numbers.get(id) else {
-        let known: Vec<&str> = found.record_numbers.keys().map(String::as_str).collect();
-        return Err(format!(
-            "the result says nothing of {id}: it has {}; without --from the effect is fitted anew",
-            known.join(", ")
-        ));
-    };
-    let sizes = candidate.parameters.iter().filter_map(|parameter| {
-        let size = rounded(found.value(&parameter.name)?, 7);
-        Some((parameter.short.as_str(), size))
-    });
-    let sizes: Vec<(&str, f64)> = sizes.collect();
-    if sizes.is_empty() && numbers.is_empty() {
+    let kept = found.kept(candidate)?;
+    if kept.start.is_empty() && kept.numbers.is_empty() {
         return Ok(", of which the result has no size".to_string());
     }
     let no_table = || format!("[effect.\"{id}\"] is not a table; make it one");
@@ -185,13 +225,16 @@ fn keep(
         .as_table_like_mut()
         .ok_or_else(no_table)?;
     let mut said = Vec::new();
-    for (short, size) in sizes {
-        said.push(format!("{short} = {size}"));
-        set(table, short, value(size));
+    for parameter in &candidate.parameters {
+        let Some(&size) = kept.start.get(&parameter.short) else {
+            continue;
+        };
+        said.push(format!("{} = {size}", parameter.short));
+        set(table, &parameter.short, value(size));
     }
-    if !numbers.is_empty() {
+    if !kept.numbers.is_empty() {
         let mut inline = InlineTable::new();
-        for (name, number) in numbers {
+        for (name, number) in &kept.numbers {
             inline.insert(name, (*number).into());
         }
         set(table, RECORD, value(inline));

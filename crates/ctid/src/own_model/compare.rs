@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use effect_search::{Estimate, NoiseFloor, Options, Step, held_out};
 use greybox::{Fit, FitOptions, ModelSetup, TimeLimit, weighted_rms};
@@ -11,31 +10,36 @@ use missing_effect::Effort;
 use serde::Serialize;
 
 use super::file::{OwnModelFile, Records};
+use super::fitted::{FitLimit, FittedModel, blame};
 use super::problem::RecordNumbers;
 use crate::Error;
 
 /// Estimates whose correlation is above this are not known one without the other.
 const TOGETHER: f64 = 0.999;
-/// The effects of the file are added one after the other within this share of the time, ...
-const OF_EFFECTS: f64 = 0.5;
-/// ... and the initial states of held-out records are fitted within this share of it, whatever the fit took.
+/// The initial states of held-out records are fitted within this share of the time, whatever the fit took.
 const OF_HELD_OUT: f64 = 0.25;
 
 /// Measured and model, of one output of one record.
-#[derive(Debug)]
-pub(crate) struct Curves {
+#[derive(Debug, Clone)]
+pub struct Curves {
+    /// The record's name.
     pub record: String,
+    /// The output's name.
     pub output: String,
+    /// Its unit.
     pub unit: String,
     /// Length of the record \[s\].
     pub length: f64,
+    /// What was measured, NaN where nothing was \[unit of the output\].
     pub measured: Vec<f64>,
+    /// What the model gives \[unit of the output\].
     pub model: Vec<f64>,
 }
 
 /// What `ctid compare` finds.
-#[derive(Debug, Serialize)]
-pub(crate) struct Comparison {
+#[derive(Debug, Clone, Serialize)]
+pub struct Comparison {
+    /// Version of this layout.
     pub schema: u32,
     /// The model's name.
     pub model: String,
@@ -43,6 +47,7 @@ pub(crate) struct Comparison {
     pub effects: Vec<String>,
     /// What of the records they are written in.
     pub record_numbers: RecordNumbers,
+    /// The fitted model.
     pub steps: [Step; 1],
     /// What a linear prediction from the past of each output's residual leaves.
     pub noise: Vec<NoiseFloor>,
@@ -50,7 +55,9 @@ pub(crate) struct Comparison {
     pub not_determined: Vec<Vec<String>>,
     /// The limit on the time, and what it cut short.
     pub effort: Effort,
+    /// How long it took \[s\].
     pub seconds: f64,
+    /// Measured and model, of each output of each record.
     #[serde(skip)]
     pub curves: Vec<Curves>,
 }
@@ -59,69 +66,65 @@ pub(crate) struct Comparison {
 ///
 /// # Errors
 /// Where nothing can be fitted, with the file that is to blame.
-pub(crate) fn compare(
+pub fn compare(
     file: &OwnModelFile,
     records: &Records,
     options: &Options,
 ) -> Result<Comparison, Error> {
     let began = Instant::now();
-    let share = |share: f64| options.time_limit.map(|limit| limit.mul_f64(share));
-    let of_effects = Options {
-        time_limit: share(OF_EFFECTS),
-        ..*options
-    };
-    let file = &file.mended_within(Some(records), &of_effects)?;
-    let effects_are_cut =
-        !file.effects.on.is_empty() && of_effects.time_limit.is_some_and(|t| began.elapsed() >= t);
-    let rest = options
-        .time_limit
-        .map(|t| t.saturating_sub(began.elapsed()));
-    let limit = Arc::new(TimeLimit::new(rest));
-    if effects_are_cut {
-        limit.leave_out("steps of the fits of the effects");
-    }
     let fit_options = FitOptions {
         seed: options.seed,
         ..FitOptions::default()
     };
-    let spec = file.model.spec();
-    let blame = |error: greybox::Error| Error::File {
-        file: records
-            .records
-            .iter()
-            .map(|r| r.name.as_str())
-            .collect::<Vec<_>>()
-            .join(", "),
-        what: error.to_string(),
+    let limit = FitLimit {
+        time: options.time_limit,
+        interrupt: options.interrupt,
     };
-    let setup = ModelSetup::new(
-        &file.model,
-        &records.records,
-        &file.known,
-        records.time_unit,
-    )
-    .map_err(blame)?;
-    let setup = setup.with_priors(&file.priors).map_err(blame)?;
-    let parameters = setup.free().len();
-    ct_signals::require_samples(&records.records, parameters)?;
-    let limited = setup
-        .clone()
-        .with_time_limit(limit.clone(), options.interrupt);
-    let fit = limited.fit(&fit_options).map_err(blame)?;
-    if limit.passed() {
-        limit.leave_out("steps of the fit");
+    let fitted = FittedModel::fit(file, records.clone(), &fit_options, limit)?;
+    let mut comparison = fitted.compare()?;
+    comparison.seconds = began.elapsed().as_secs_f64();
+    Ok(comparison)
+}
+
+impl FittedModel {
+    /// How far the fitted model is off, on its records and on those that are held out.
+    ///
+    /// # Errors
+    /// Where a simulation is not finite, or the initial states of a held-out record cannot be fitted.
+    pub fn compare(&self) -> Result<Comparison, Error> {
+        let began = Instant::now();
+        let (file, records, fit) = (self.model(), self.records(), self.estimate());
+        let mut comparison = compared(self, file, records, fit)?;
+        comparison.seconds = began.elapsed().as_secs_f64();
+        Ok(comparison)
     }
-    let afterwards = Arc::new(TimeLimit::new(share(OF_HELD_OUT)));
-    let setup = setup.with_time_limit(afterwards.clone(), None);
+}
+
+fn compared(
+    fitted: &FittedModel,
+    file: &OwnModelFile,
+    records: &Records,
+    fit: &Fit,
+) -> Result<Comparison, Error> {
+    let spec = file.model.spec();
+    let blame = |error: greybox::Error| blame(&records.records, &error);
+    let options = fitted.options();
+    let mut effort = fitted.effort().clone();
+    let share = effort
+        .limit
+        .map(|limit| Duration::from_secs_f64(OF_HELD_OUT * limit));
+    let afterwards = Arc::new(TimeLimit::new(share));
+    let setup = fitted.setup()?.with_time_limit(afterwards.clone(), None);
     let simulated = setup
         .simulate(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
-    let test = held_out(&setup, &fit, &records.test).map_err(|error| match error {
+    let test = held_out(&setup, fit, &records.test).map_err(|error| match error {
         effect_search::Error::Fit(error) => blame(error),
         other => Error::Columns(other.to_string()),
     })?;
     if test.is_some() && afterwards.passed() {
-        limit.leave_out("steps of the fit of the held-out records' initial states");
+        let left_out = "steps of the fit of the held-out records' initial states";
+        effort.left_out.push(left_out.to_string());
     }
     let noise = setup
         .output_noise(&fit.x)
@@ -154,7 +157,7 @@ pub(crate) fn compare(
     let noise_floors = noise_floors.collect();
     // The fit is one by simulation error: its residual has the noise's colour.
     let errors = setup
-        .robust(&fit, fit_options.noise_order)
+        .robust(fit, options.noise_order)
         .map_or_else(|_| fit.std_errors(), |robust| robust.std_errors);
     let free = setup.free();
     let entries = setup.names().iter().zip(units.chain(states)).enumerate();
@@ -202,18 +205,12 @@ pub(crate) fn compare(
         model: spec.name.clone(),
         effects: file.effects.on.clone(),
         record_numbers: file.record_numbers.clone(),
-        not_determined: not_determined(&setup, &fit),
+        not_determined: not_determined(&setup, fit),
         curves: curves.collect(),
         steps: [step],
         noise: noise_floors,
-        effort: Effort {
-            limit: options.time_limit.map(|limit| limit.as_secs_f64()),
-            left_out: limit.left_out(),
-            interrupted: options
-                .interrupt
-                .is_some_and(|flag| flag.load(Ordering::Relaxed)),
-        },
-        seconds: began.elapsed().as_secs_f64(),
+        effort,
+        seconds: 0.0,
     })
 }
 

@@ -26,7 +26,7 @@ const NEEDED: f64 = 6.0;
 ///
 /// # Errors
 /// Where the effects or the limits do not allow one, or nothing can be fitted.
-pub(crate) fn design(
+pub fn design(
     file: &OwnModelFile,
     records: &Records,
     between: [&str; 2],

@@ -17,7 +17,7 @@ const LISTED: usize = 8;
 ///
 /// # Errors
 /// Where nothing can be fitted, with the file that is to blame.
-pub(crate) fn diagnose(
+pub fn diagnose(
     file: &OwnModelFile,
     records: &Records,
     options: &Options,

@@ -33,7 +33,7 @@ pub(super) enum Setting {
 
 /// The effects of a model file.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct OwnEffects {
+pub struct OwnEffects {
     /// Identifiers of those that are on, in order.
     pub on: Vec<String>,
     /// What is kept of them.
@@ -92,13 +92,48 @@ pub(super) fn read(
         effects.kept.insert(candidate.id.clone(), kept);
         effects.fixed.extend(fixed);
     }
+    effects.parameters = parameters_of(&on);
+    effects.on = on.iter().map(|candidate| candidate.id.clone()).collect();
+    Ok(effects)
+}
+
+/// The effects of these identifiers, each with what is kept of it.
+///
+/// # Errors
+/// In words where one cannot act in the model, or stands there twice.
+pub(super) fn of_ids(
+    spec: &ModelSpec,
+    own: &BTreeMap<String, OwnCandidate>,
+    (ids, kept): (&[String], &BTreeMap<String, Kept>),
+) -> Result<OwnEffects, Error> {
+    let mut effects = OwnEffects::default();
+    if ids.is_empty() {
+        return Ok(effects);
+    }
+    let all = every_candidate(spec, own)?;
+    let mut on: Vec<&Candidate> = Vec::new();
+    for written in ids {
+        let candidate = find(spec, &all, written).map_err(Error::UnknownEffect)?;
+        if on.iter().any(|other| other.id == candidate.id) {
+            let what = format!("{} is listed twice: once is enough", candidate.id);
+            return Err(Error::Usage(what));
+        }
+        on.push(candidate);
+    }
+    apply(spec, &on).map_err(|error| Error::Usage(error.to_string()))?;
+    effects.on = on.iter().map(|candidate| candidate.id.clone()).collect();
+    effects.parameters = parameters_of(&on);
+    effects.kept = kept.clone();
+    Ok(effects)
+}
+
+/// All parameters of effects, with the effect of each.
+fn parameters_of(on: &[&Candidate]) -> BTreeMap<String, String> {
     let parameters = on.iter().flat_map(|candidate| {
         let names = candidate.parameters.iter().map(|p| p.name.clone());
         names.map(|name| (name, candidate.id.clone()))
     });
-    effects.parameters = parameters.collect();
-    effects.on = on.iter().map(|candidate| candidate.id.clone()).collect();
-    Ok(effects)
+    parameters.collect()
 }
 
 /// All that can act in a model, of the catalogue and of the model file.

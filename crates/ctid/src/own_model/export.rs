@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use ct_model::{Expression, Given, ModelSpec};
-use ct_signals::{Heading, ReadSummary};
-use greybox::{FitOptions, FitUncertainty};
+use ct_signals::{Heading, ReadSummary, Record};
+use greybox::FitOptions;
 use serde::Serialize;
 
 use super::file::{OwnModelFile, Records};
-use super::simulate::{Fitted, blame, fitted};
+use super::fitted::{FitLimit, FittedModel, blame};
 use crate::Error;
 use crate::numbers;
 use crate::output::Found;
@@ -40,6 +40,86 @@ impl Found for Exported {
     }
 }
 
+/// The text of a model with the values that it has, and those of `[known]`; `source`: where it is from, for its first line.
+///
+/// # Errors
+/// Where the model file lacks a number that its effects need.
+pub fn text(file: &OwnModelFile, source: &str) -> Result<String, Error> {
+    let file = file.mended(None)?;
+    let head = [format!(
+        "Written by ctid export from {source}; nothing was fitted."
+    )];
+    Ok(commented(&head, &with_known(&file)))
+}
+
+/// A model whose known parameters have their values.
+fn with_known(file: &OwnModelFile) -> ModelSpec {
+    let mut spec = file.model.spec().clone();
+    for parameter in &mut spec.parameters {
+        if let Some(value) = file.known.get(&parameter.about.name) {
+            parameter.value = *value;
+        }
+    }
+    spec
+}
+
+impl FittedModel {
+    /// The model's text with its fitted values, and their standard errors in comments; it begins where the first record does. `source`: where
+    /// the model is from, for the first line.
+    ///
+    /// # Errors
+    /// Where the simulation is not finite at the fit.
+    pub fn text(&self, source: &str) -> Result<String, Error> {
+        let setup = self.setup()?;
+        let known = self.uncertainty(&setup)?;
+        let file = self.model();
+        let own = &self.records().records;
+        let fit = self.estimate();
+        let mut spec = with_known(file);
+        let count = spec.parameters.len();
+        for (parameter, value) in spec.parameters.iter_mut().zip(&fit.x) {
+            parameter.value = *value;
+        }
+        // Where a simulation begins: as the first record does.
+        for (state, value) in spec.states.iter_mut().zip(&fit.x[count..]) {
+            if !state.fixed {
+                state.start = number(*value);
+            }
+        }
+        let mut head = vec![format!(
+            "Written by ctid export from {source}, fitted to {}.",
+            names_of(own).join(", ")
+        )];
+        head.push("Standard errors (fitted values are below):".to_string());
+        for (i, parameter) in spec.parameters.iter().enumerate() {
+            let (name, unit) = (&parameter.about.name, &parameter.about.unit);
+            let error = known.as_ref().and_then(|known| {
+                let at = known.entries.iter().position(|entry| *entry == i)?;
+                Some(known.covariance[at][at].sqrt())
+            });
+            let said = match error {
+                Some(error) => format!("{} {unit}", numbers::significant(error, 3)),
+                None if parameter.given != Given::Fitted || file.known.contains_key(name) => {
+                    "known, not fitted".to_string()
+                }
+                None => "none: at a bound, or not determined".to_string(),
+            };
+            head.push(format!("  {name}: {}", said.trim_end()));
+        }
+        if own.len() > 1 && !spec.states.is_empty() {
+            head.push(format!("Initial states are those of {}.", own[0].name));
+        }
+        Ok(commented(&head, &spec))
+    }
+}
+
+/// The names of records, parts of one file once.
+fn names_of(records: &[Record]) -> Vec<String> {
+    let mut names: Vec<String> = records.iter().map(|record| record.name.clone()).collect();
+    names.dedup();
+    names
+}
+
 /// The model with the values of its text and of `[known]` or, where there are records, those of a fit to them.
 ///
 /// # Errors
@@ -49,16 +129,9 @@ pub(crate) fn export(
     records: Option<(Records, &[PathBuf])>,
     options: &FitOptions,
 ) -> Result<(Exported, Vec<ReadSummary>), Error> {
-    let file = &file.mended(records.as_ref().map(|(records, _)| records))?;
-    let mut spec = file.model.spec().clone();
-    for parameter in &mut spec.parameters {
-        if let Some(value) = file.known.get(&parameter.about.name) {
-            parameter.value = *value;
-        }
-    }
     let mut exported = Exported {
         schema: 1,
-        model: spec.name.clone(),
+        model: file.base.name.clone(),
         fitted_to: Vec::new(),
         text: None,
         curves: None,
@@ -68,55 +141,17 @@ pub(crate) fn export(
         |name| name.to_string_lossy().into_owned(),
     );
     let Some((records, paths)) = records else {
-        let head = [format!(
-            "Written by ctid export from {source}; nothing was fitted."
-        )];
-        exported.text = Some(commented(&head, &spec));
+        exported.text = Some(text(file, &source)?);
         return Ok((exported, Vec::new()));
     };
+    let fitted = FittedModel::fit(file, records, options, FitLimit::default())?;
+    exported.text = Some(fitted.text(&source)?);
+    let (file, records) = (fitted.model(), fitted.records());
+    let spec = file.model.spec();
     let own = &records.records;
-    let count = spec.parameters.len();
-    let Fitted { setup, fit } = fitted(file, own, records.time_unit, options)?;
-    let known = FitUncertainty::of(&setup, &fit, count, options.noise_order);
-    let known = known.map_err(|error| blame(own, &error))?;
-    let Some(model) = setup.simulate(&fit.x) else {
+    let Some(model) = fitted.setup()?.simulate(&fitted.estimate().x) else {
         return Err(blame(own, &greybox::Error::Stopped));
     };
-    for (parameter, value) in spec.parameters.iter_mut().zip(&fit.x) {
-        parameter.value = *value;
-    }
-    // Where a simulation begins: as the first record does.
-    for (state, value) in spec.states.iter_mut().zip(&fit.x[count..]) {
-        if !state.fixed {
-            state.start = number(*value);
-        }
-    }
-    let mut names: Vec<String> = own.iter().map(|record| record.name.clone()).collect();
-    names.dedup();
-    let mut head = vec![format!(
-        "Written by ctid export from {source}, fitted to {}.",
-        names.join(", ")
-    )];
-    head.push("Standard errors (fitted values are below):".to_string());
-    for (i, parameter) in spec.parameters.iter().enumerate() {
-        let (name, unit) = (&parameter.about.name, &parameter.about.unit);
-        let error = known.as_ref().and_then(|known| {
-            let at = known.entries.iter().position(|entry| *entry == i)?;
-            Some(known.covariance[at][at].sqrt())
-        });
-        let said = match error {
-            Some(error) => format!("{} {unit}", numbers::significant(error, 3)),
-            None if parameter.given != Given::Fitted || file.known.contains_key(name) => {
-                "known, not fitted".to_string()
-            }
-            None => "none: at a bound, or not determined".to_string(),
-        };
-        head.push(format!("  {name}: {}", said.trim_end()));
-    }
-    if own.len() > 1 && !spec.states.is_empty() {
-        head.push(format!("Initial states are those of {}.", own[0].name));
-    }
-    exported.text = Some(commented(&head, &spec));
     let outputs = spec.outputs.len();
     let input_names = file
         .columns
@@ -147,13 +182,13 @@ pub(crate) fn export(
             model: model.to_vec(),
         });
     }
-    exported.fitted_to = names;
+    exported.fitted_to = names_of(own);
     exported.curves = Some(Curves {
         inputs: input_names.zip(input_units).collect(),
         outputs: output_names.zip(output_units).collect(),
         records: all,
     });
-    Ok((exported, records.summaries))
+    Ok((exported, records.summaries.clone()))
 }
 
 /// A number as a text has it.

@@ -9,14 +9,16 @@ use ct_signals::{
     Channel, ColumnFault, Columns, Conversion, Heading, Hold, Reading, Record, Unit, Zone,
     csv_header, quoted, read_csv, read_file,
 };
+use effect_search::{Diagnosis, Kept};
 use greybox::PriorValue;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::candidates::{self, RawCandidates};
 use super::controller::{self, OwnController, RawControllers};
 use super::effects::{self, OwnEffects, RawEffects};
 use super::problem::RecordNumbers;
+use crate::edit::own::Findings;
 use crate::input::Files;
 use crate::look::Look;
 use crate::model_file::{self, ModelFile, Source};
@@ -59,7 +61,7 @@ enum Column {
 
 /// A model file with `model = "x.mo"`, and the model.
 #[derive(Clone)]
-pub(crate) struct OwnModelFile {
+pub struct OwnModelFile {
     /// The file's name.
     pub name: String,
     /// The model as its text has it.
@@ -83,13 +85,33 @@ pub(crate) struct OwnModelFile {
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
     /// What moved inputs in a loop.
-    pub controllers: Vec<OwnController>,
+    pub(crate) controllers: Vec<OwnController>,
     /// What stands in the file and is not used yet.
     pub unused: Vec<String>,
 }
 
+/// What is said of a model in place of a model file.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct OwnSettings {
+    /// Which column is which input and output, in the order of the model; the time.
+    pub columns: Columns,
+    /// Parameters that are not fitted \[unit of the text\].
+    pub known: BTreeMap<String, f64>,
+    /// Side measurements of parameters.
+    pub priors: BTreeMap<String, PriorValue>,
+    /// What the inputs do between rows.
+    pub hold: Hold,
+    /// Identifiers of the effects that are in the model, in order.
+    pub effects: Vec<String>,
+    /// What is kept of them.
+    pub kept: BTreeMap<String, Kept>,
+    /// Effects of the user's own.
+    pub candidates: BTreeMap<String, OwnCandidate>,
+}
+
 /// Records as the model takes them.
-pub(crate) struct Records {
+#[derive(Debug, Clone)]
+pub struct Records {
     /// Fitted.
     pub records: Vec<Record>,
     /// Held out.
@@ -101,7 +123,7 @@ pub(crate) struct Records {
 }
 
 /// A model file, of a plant or of its user's own.
-pub(crate) enum AnyModelFile {
+pub enum AnyModelFile {
     /// It names one of the plants.
     Plant(Box<ModelFile>),
     /// It names a text.
@@ -112,7 +134,7 @@ impl AnyModelFile {
     /// Reads the model file once: it may be a pipe.
     ///
     /// # Errors
-    /// As [`model_file::read`] and [`OwnModelFile::parse`].
+    /// As [`model_file::read`]; one line that names the file, the line, what is wrong and the mend.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = model_file::read_text(path)?;
         let table = text.parse::<toml::Table>().ok();
@@ -159,7 +181,7 @@ impl OwnModelFile {
     /// The same, the model from wherever `read` has it; it is given the name that stands in the file.
     ///
     /// # Errors
-    /// As [`OwnModelFile::parse`].
+    /// One line that names the file, the line, what is wrong and the mend.
     pub fn parse_with(
         path: &Path,
         text: &str,
@@ -179,27 +201,9 @@ impl OwnModelFile {
         let own_candidates = candidates::read(&spec, &raw.candidates, &source)?;
         let listed = (&raw.effects[..], &raw.effect);
         let effects = effects::read(&spec, &own_candidates, listed, &source)?;
-        let parameters = spec.parameters.iter().map(|p| p.about.name.as_str());
-        let parameters: Vec<&str> = parameters
-            .chain(effects.parameters.keys().map(String::as_str))
-            .collect();
-        let is_parameter = |name: &Spanned<String>| {
-            if parameters.contains(&name.as_ref().as_str()) {
-                return Ok(());
-            }
-            Err(source.at(
-                name.span().start,
-                format!(
-                    "{} is no parameter of {}: it has {}{}",
-                    quoted(name.as_ref()),
-                    spec.name,
-                    parameters.join(", "),
-                    names::suggestion(name.as_ref(), parameters.iter().copied())
-                ),
-            ))
-        };
+        let is_parameter = |name: &str| is_parameter(&spec, &effects, name);
         for name in raw.known.keys().chain(raw.prior.keys()) {
-            is_parameter(name)?;
+            is_parameter(name.as_ref()).map_err(|what| source.at(name.span().start, what))?;
         }
         let columns = columns(&spec, &raw, &source)?;
         let own = |name: Spanned<String>| name.into_inner();
@@ -234,6 +238,109 @@ impl OwnModelFile {
             effects,
             controllers,
             unused,
+        })
+    }
+
+    /// A model with what is said of it in place of a model file; `name` stands for the file in messages. Columns that are not named are those
+    /// of the model's own names.
+    ///
+    /// # Errors
+    /// Where a name is none of a parameter, an effect cannot act in the model, or the numbers of columns are not those of its signals.
+    pub fn new(name: &str, spec: ModelSpec, settings: OwnSettings) -> Result<Self, Error> {
+        let OwnSettings {
+            mut columns,
+            known,
+            priors,
+            hold,
+            effects,
+            kept,
+            candidates,
+        } = settings;
+        let effects = effects::of_ids(&spec, &candidates, (&effects, &kept))?;
+        for parameter in known.keys().chain(priors.keys()) {
+            is_parameter(&spec, &effects, parameter).map_err(Error::Usage)?;
+        }
+        let inputs = spec.inputs.iter().map(|input| input.about.name.clone());
+        let inputs: Vec<String> = inputs.collect();
+        let outputs = spec.outputs.iter();
+        let outputs = outputs.map(|output| spec.about(output.variable).name.clone());
+        let outputs: Vec<String> = outputs.collect();
+        let own = [
+            (&mut columns.inputs, inputs, "inputs"),
+            (&mut columns.outputs, outputs, "outputs"),
+        ];
+        for (given, signals, role) in own {
+            if given.is_empty() {
+                given.clone_from(&signals);
+            }
+            if given.len() != signals.len() {
+                return Err(Error::Usage(format!(
+                    "{} {role} are given, and {} has {} ({}): name a column for each, in this order",
+                    given.len(),
+                    spec.name,
+                    signals.len(),
+                    signals.join(", ")
+                )));
+            }
+        }
+        columns.without_inputs = spec.inputs.is_empty();
+        Ok(Self {
+            name: name.to_string(),
+            model: Model::new(spec.clone()),
+            base: spec,
+            record_numbers: RecordNumbers::new(),
+            text: PathBuf::from(name),
+            columns,
+            known,
+            priors,
+            hold,
+            candidates,
+            effects,
+            controllers: Vec::new(),
+            unused: Vec::new(),
+        })
+    }
+
+    /// What is said of the model beside its text.
+    #[must_use]
+    pub fn settings(&self) -> OwnSettings {
+        OwnSettings {
+            columns: self.columns.clone(),
+            known: self.known.clone(),
+            priors: self.priors.clone(),
+            hold: self.hold,
+            effects: self.effects.on.clone(),
+            kept: self.effects.kept.clone(),
+            candidates: self.candidates.clone(),
+        }
+    }
+
+    /// The same with one effect more, or with what a diagnosis found of one that it has: sizes, where fits begin, and the numbers of its records.
+    ///
+    /// # Errors
+    /// Where it cannot act in the model, or the diagnosis says nothing of it.
+    pub fn with_effect(&self, effect: &str, found: &Diagnosis) -> Result<Self, Error> {
+        let all = effects::every_candidate(&self.base, &self.candidates)?;
+        let candidate = effects::find(&self.base, &all, effect).map_err(Error::UnknownEffect)?;
+        let kept = Findings::from(found).kept(candidate);
+        let kept = kept.map_err(|what| Error::File {
+            file: self.name.clone(),
+            what,
+        })?;
+        let mut ids = self.effects.on.clone();
+        if !ids.contains(&candidate.id) {
+            ids.push(candidate.id.clone());
+        }
+        let mut all_kept = self.effects.kept.clone();
+        all_kept.insert(candidate.id.clone(), kept);
+        let effects = effects::of_ids(&self.base, &self.candidates, (&ids, &all_kept))?;
+        Ok(Self {
+            effects: OwnEffects {
+                fixed: self.effects.fixed.clone(),
+                waiting: self.effects.waiting.clone(),
+                ..effects
+            },
+            ..self.clone()
         })
     }
 
@@ -320,6 +427,9 @@ impl OwnModelFile {
 
     /// Puts the channels into the units of the model, where the model file reads them in others, and gives them the names of its signals:
     /// results name these, whatever the columns are called.
+    ///
+    /// # Errors
+    /// Where a column is in a unit of another dimension.
     pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
         for (channel, about) in channels.zip(self.signals()) {
@@ -341,6 +451,9 @@ impl OwnModelFile {
     }
 
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.
+    ///
+    /// # Errors
+    /// Where the file of the record cannot be read.
     pub fn time_unit(&self, first: &Path) -> Result<f64, Error> {
         if self.columns.time.is_some() {
             return Ok(self.columns.time_header().1);
@@ -371,6 +484,24 @@ fn unnamed_controller(text: &str) -> Option<usize> {
         .find("[controller]")
         .or_else(|| text.find("controller"));
     at.filter(|_| controller.values().any(is_setting))
+}
+
+/// Whether a model, or an effect in it, has a parameter of this name; in words where not.
+fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<(), String> {
+    let parameters = spec.parameters.iter().map(|p| p.about.name.as_str());
+    let parameters: Vec<&str> = parameters
+        .chain(effects.parameters.keys().map(String::as_str))
+        .collect();
+    if parameters.contains(&name) {
+        return Ok(());
+    }
+    Err(format!(
+        "{} is no parameter of {}: it has {}{}",
+        quoted(name),
+        spec.name,
+        parameters.join(", "),
+        names::suggestion(name, parameters.iter().copied())
+    ))
 }
 
 /// Puts a channel of a record into the unit of the model's signal.

@@ -1,4 +1,16 @@
-//! Models of their user's own: `model = "block.mo"` in the model file instead of a plant.
+//! Models of their user's own: a text in a flat subset of Modelica, fitted to records and searched for what it lacks.
+//!
+//! | question | answer |
+//! |---|---|
+//! | Where do I start? | [`OwnModelFile::new`] with a [`ct_model::ModelSpec`], or [`AnyModelFile::read`] with a model file |
+//! | How are records put in? | [`OwnModelFile::gathered`], from what [`ct_signals::parse_csv`] has read |
+//! | How far is it off? | [`FittedModel::fit`], then [`FittedModel::compare`] |
+//! | On other inputs? | [`FittedModel::simulate`], [`FittedModel::score`] |
+//! | What is it missing? | [`diagnose`], then [`OwnModelFile::with_effect`] |
+//! | Which experiment tells two effects apart? | [`fn@design`] |
+//! | As text? | [`FittedModel::text`], [`text`](fn@text) |
+//!
+//! The commands of the program call these functions, so results agree to the last digit.
 
 mod candidates;
 mod compare;
@@ -8,6 +20,7 @@ mod diagnose;
 pub(crate) mod effects;
 mod export;
 mod file;
+mod fitted;
 mod identify;
 pub(crate) mod ports;
 mod problem;
@@ -17,19 +30,27 @@ mod text;
 mod unknown;
 pub(crate) mod words;
 
-pub(crate) use self::compare::{Comparison, compare};
+pub use self::compare::{Comparison, Curves, compare};
+pub use self::design::design;
 pub(crate) use self::design::{
-    OwnProposal, design, experiments, limits as design_limits, said as design_said,
+    OwnProposal, experiments, limits as design_limits, said as design_said,
     sentences as design_sentences,
 };
+pub use self::diagnose::diagnose;
 pub(crate) use self::diagnose::{
-    diagnose, heading as diagnosis_heading, remaining as diagnosis_remaining,
-    said as diagnosis_said, sizes,
+    heading as diagnosis_heading, remaining as diagnosis_remaining, said as diagnosis_said, sizes,
 };
+pub use self::effects::OwnEffects;
+pub use self::export::text;
 pub(crate) use self::export::{Exported, commented, export, number};
-pub(crate) use self::file::{AnyModelFile, OwnModelFile, Records, conversion, read_model};
+pub use self::file::{AnyModelFile, OwnModelFile, OwnSettings, Records};
+pub(crate) use self::file::{conversion, read_model};
+pub use self::fitted::{FitLimit, FittedModel, OutputScore};
 pub(crate) use self::identify::{Beside, OneByOne};
-pub(crate) use self::problem::{RecordNumbers, options};
+pub use self::problem::RecordNumbers;
+pub(crate) use self::problem::options;
+pub use self::report::{Document, compared as compared_page, diagnosed as diagnosed_page};
 pub(crate) use self::simulate::simulate;
 pub(crate) use self::text::said;
 pub(crate) use self::unknown::file as unknown_file;
+pub use crate::simulate::{Band, Simulated, SimulatedOutput, StateSource, TimeColumn};

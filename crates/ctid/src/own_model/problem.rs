@@ -11,7 +11,7 @@ use crate::effort::EffortLevel;
 use crate::{Error, interrupt, numbers};
 
 /// The numbers of a record that effects are written in, by the effects' identifiers.
-pub(crate) type RecordNumbers = BTreeMap<String, BTreeMap<&'static str, f64>>;
+pub type RecordNumbers = BTreeMap<String, BTreeMap<String, f64>>;
 
 /// How a command searches, which Ctrl-C ends.
 pub(crate) fn options(seed: u64, effort: EffortLevel) -> Options<'static> {
@@ -110,7 +110,7 @@ impl OwnModelFile {
                     lacks.join(", ")
                 )));
             }
-            record_numbers.insert(id.clone(), candidate.record_numbers.clone());
+            record_numbers.insert(id.clone(), candidate.numbers_of_record());
             for parameter in &candidate.parameters {
                 let kept = kept.and_then(|kept| kept.start.get(&parameter.short).copied());
                 let own = candidate.effect.is_none().then(|| own_start(parameter));
@@ -192,7 +192,7 @@ impl OwnModelFile {
         let lacking = on.filter_map(|id| {
             let kept = self.effects.kept.get(id);
             let numbers = used.get(id)?.iter();
-            let lacks = numbers.filter(|(n, _)| !kept.is_some_and(|k| k.numbers.contains_key(**n)));
+            let lacks = numbers.filter(|(n, _)| !kept.is_some_and(|k| k.numbers.contains_key(*n)));
             let lacks =
                 lacks.map(|(name, value)| format!("{name} = {}", numbers::significant(*value, 4)));
             let lacks: Vec<String> = lacks.collect();

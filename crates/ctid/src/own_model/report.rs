@@ -57,14 +57,16 @@ impl<T: Serialize> Found for Paged<'_, T> {
 
 /// What the report shows.
 #[derive(Debug, Clone)]
-pub(crate) struct Document {
+pub struct Document {
+    /// Curves, table and sentences.
     pub diagnosis: Diagnosis,
     /// What nothing explains, as a function at a port.
-    pub term: Option<MissingTerm>,
+    pub(crate) term: Option<MissingTerm>,
 }
 
 impl Document {
     /// The report as a complete HTML file.
+    #[must_use]
     pub fn html(&self) -> String {
         report::html_with(&self.diagnosis, self.term.as_ref())
     }
@@ -102,7 +104,7 @@ pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTer
 }
 
 /// What the report shows of a comparison.
-pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Document {
+pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Document {
     let source = "what the past of the model's residual does not predict";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
     shown.effort.clone_from(&found.effort);
@@ -114,7 +116,7 @@ pub(crate) fn compared(file: &OwnModelFile, records: &Records, found: &Compariso
 }
 
 /// What the report shows of a diagnosis.
-pub(crate) fn diagnosed(
+pub fn diagnosed(
     file: &OwnModelFile,
     records: &Records,
     found: &effect_search::Diagnosis,

@@ -3,48 +3,15 @@
 use std::path::Path;
 
 use ct_signals::{Heading, ReadSummary, Record};
-use greybox::{Fit, FitOptions, FitUncertainty, InitialStates, ModelSetup, output_errors};
+use greybox::{FitOptions, FitUncertainty, InitialStates, ModelSetup, output_errors};
 
 use super::file::{OwnModelFile, Records};
+use super::fitted::{FitLimit, FittedModel};
 use crate::Error;
 use crate::simulate::{
-    Band, Inputs, LEVEL, Simulated, SimulatedOutput, StateSource, begins_with_readings,
+    Band, Inputs, LEVEL, ReadInputs, Simulated, SimulatedOutput, StateSource, begins_with_readings,
     first_readings, read_inputs,
 };
-
-/// A fit and how well it is known.
-pub(super) struct Fitted<'a> {
-    pub setup: ModelSetup<'a>,
-    pub fit: Fit,
-}
-
-/// Fits the model to records.
-///
-/// # Errors
-/// Where nothing can be fitted, with the files that are to blame.
-pub(super) fn fitted<'a>(
-    file: &'a OwnModelFile,
-    records: &'a [Record],
-    time_unit: f64,
-    options: &FitOptions,
-) -> Result<Fitted<'a>, Error> {
-    let setup = ModelSetup::new(&file.model, records, &file.known, time_unit)
-        .and_then(|setup| setup.with_priors(&file.priors))
-        .map_err(|error| blame(records, &error))?;
-    ct_signals::require_samples(records, setup.free().len())?;
-    let fit = setup.fit(options).map_err(|error| blame(records, &error))?;
-    Ok(Fitted { setup, fit })
-}
-
-/// An error of the computation, with the records that it is of.
-pub(super) fn blame(records: &[Record], error: &greybox::Error) -> Error {
-    let mut names: Vec<&str> = records.iter().map(|r| r.name.as_str()).collect();
-    names.dedup();
-    Error::File {
-        file: names.join(", "),
-        what: error.to_string(),
-    }
-}
 
 /// Simulates the model on the inputs of a record, after a fit to others where there are any.
 ///
@@ -77,32 +44,64 @@ pub(crate) fn simulate(
             records.time_unit
         }
     };
-    summaries.push(read.summary);
+    summaries.push(read.summary.clone());
+    let name = &inputs.path;
+    let fitted = match records {
+        None => None,
+        Some(records) => Some(FittedModel::fit(
+            file,
+            records,
+            options,
+            FitLimit::default(),
+        )?),
+    };
+    let mended;
+    let model = match &fitted {
+        None => {
+            mended = file.mended(None)?;
+            &mended
+        }
+        Some(fitted) => fitted.model(),
+    };
+    let of = (model, fitted.as_ref(), time_unit);
+    let found = simulated(of, (&read, name, inputs.first), LEVEL, options)?;
+    Ok((found, summaries))
+}
+
+/// A model with its effects in it on the inputs of a record, of which the initial states are fitted to so many first readings. `path` is what
+/// is blamed.
+///
+/// # Errors
+/// Where the simulation does not go on.
+pub(super) fn simulated(
+    (file, fitted, time_unit): (&OwnModelFile, Option<&FittedModel>, f64),
+    (read, path, first): (&ReadInputs, &Path, usize),
+    level: f64,
+    options: &FitOptions,
+) -> Result<Simulated, Error> {
     let record = &read.record;
-    let file = &file.mended(records.as_ref())?;
     let spec = file.model.spec();
     let count = spec.parameters.len();
-    let fit = match &records {
-        None => None,
-        Some(records) => Some(fitted(file, &records.records, time_unit, options)?),
-    };
     let own = std::slice::from_ref(record);
-    let wrong = |error: greybox::Error| Error::file(&inputs.path, error.to_string());
+    let wrong = |error: greybox::Error| Error::file(path, error.to_string());
+    let fit = match fitted {
+        None => None,
+        Some(fitted) => Some((fitted, fitted.setup()?)),
+    };
     let setup = match &fit {
         None => ModelSetup::new(&file.model, own, &file.known, time_unit),
-        Some(fit) => fit.setup.with_records(own),
+        Some((_, setup)) => setup.with_records(own),
     };
     let setup = setup.map_err(wrong)?;
     let parameters = match &fit {
         None => setup.start()[..count].to_vec(),
-        Some(fit) => fit.fit.x[..count].to_vec(),
+        Some((fitted, _)) => fitted.estimate().x[..count].to_vec(),
     };
     let mut warnings = Vec::new();
     let known = match &fit {
         None => None,
-        Some(Fitted { setup, fit }) => {
-            let known = FitUncertainty::of(setup, fit, count, options.noise_order);
-            let known = known.map_err(|error| blame(own, &error))?;
+        Some((fitted, setup)) => {
+            let known = fitted.uncertainty(setup)?;
             if known.is_none() {
                 warnings.push(
                     "the records do not determine all parameters, so there is no band: `ctid compare` says which; fix some of them under [known], or give a [prior]".to_string(),
@@ -114,7 +113,7 @@ pub(crate) fn simulate(
     let (initial, states_from) = states(
         &setup,
         &parameters,
-        (record, inputs.first),
+        (record, first),
         known.as_ref(),
         options,
     )
@@ -128,13 +127,13 @@ pub(crate) fn simulate(
     let mut x = parameters.clone();
     x.extend(&initial.values);
     let Some(mean) = setup.simulate(&x) else {
-        return Err(runs_away(&setup, record, &inputs.path, &x, &spec.name));
+        return Err(runs_away(&setup, record, path, &x, &spec.name));
     };
     let errors = match &known {
         None => None,
         Some(known) => {
             let errors = output_errors(&setup, &x, count, known, &initial);
-            Some(errors.ok_or_else(|| runs_away(&setup, record, &inputs.path, &x, &spec.name))?)
+            Some(errors.ok_or_else(|| runs_away(&setup, record, path, &x, &spec.name))?)
         }
     };
     let names = file
@@ -148,7 +147,7 @@ pub(crate) fn simulate(
         SimulatedOutput {
             name,
             unit: spec.about(output.variable).unit.clone(),
-            band: band.map(|(errors, known)| Band::of(&errors[o], known, o)),
+            band: band.map(|(errors, known)| Band::of(&errors[o], known, o, level)),
             mean,
             measured: record.outputs[o].values.clone(),
         }
@@ -158,38 +157,36 @@ pub(crate) fn simulate(
         let at = known.entries.iter().position(|entry| *entry == i)?;
         Some(known.covariance[at][at].sqrt())
     };
-    let mut fitted_to: Vec<String> = records.map_or_else(Vec::new, |records| {
-        records.records.iter().map(|r| r.name.clone()).collect()
+    let mut fitted_to: Vec<String> = fitted.map_or_else(Vec::new, |fitted| {
+        let records = fitted.records().records.iter();
+        records.map(|record| record.name.clone()).collect()
     });
     fitted_to.dedup();
     let names = spec.parameters.iter().map(|p| p.about.name.clone());
-    Ok((
-        Simulated {
-            schema: 1,
-            model: spec.name.clone(),
-            inputs: record.name.clone(),
-            fitted_to,
-            parameters: names
-                .zip(parameters)
-                .enumerate()
-                .map(|(i, (name, value))| (name, value, std_errors(i)))
-                .collect(),
-            states: spec
-                .states
-                .iter()
-                .map(|state| format!("{}(0)", state.about.name))
-                .zip(initial.values.iter().copied())
-                .collect(),
-            states_from,
-            level: LEVEL,
-            outputs: outputs.collect(),
-            warnings,
-            length: record.duration(),
-            time: read.time,
-            readings: false,
-        },
-        summaries,
-    ))
+    Ok(Simulated {
+        schema: 1,
+        model: spec.name.clone(),
+        inputs: record.name.clone(),
+        fitted_to,
+        parameters: names
+            .zip(parameters)
+            .enumerate()
+            .map(|(i, (name, value))| (name, value, std_errors(i)))
+            .collect(),
+        states: spec
+            .states
+            .iter()
+            .map(|state| format!("{}(0)", state.about.name))
+            .zip(initial.values.iter().copied())
+            .collect(),
+        states_from,
+        level,
+        outputs: outputs.collect(),
+        warnings,
+        length: record.duration(),
+        time: read.time.clone(),
+        readings: false,
+    })
 }
 
 /// The initial states: fitted to the first readings, on more of them where these do not tell, or as the text has them.

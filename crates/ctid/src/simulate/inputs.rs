@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use ct_signals::{
-    Channel, Clock, Columns, ReadOptions, ReadSummary, Record, escaped, quoted, read_inputs_csv,
+    Channel, Clock, Columns, ReadOptions, ReadSummary, Reading, Record, escaped, quoted,
+    read_inputs_csv,
 };
 
 use super::TimeColumn;
@@ -38,19 +39,29 @@ pub(crate) fn read_inputs(
     named: impl Fn(ct_signals::Error) -> Error,
 ) -> Result<ReadInputs, Error> {
     let reading = read_inputs_csv(path, columns, options).map_err(named)?;
-    let (mut record, summary) = (reading.record, reading.summary);
-    record.name = escaped(&record.name).into_owned();
-    check_whole(path, &record)?;
-    if record.outputs.is_empty() {
-        let none = vec![f64::NAN; record.len()];
-        record.outputs.push(Channel::new("y", "", none));
+    ReadInputs::of(path, reading, columns)
+}
+
+impl ReadInputs {
+    /// Inputs that were read, which have to be whole; `path` names them in messages.
+    ///
+    /// # Errors
+    /// Where a sample of an input is missing, or rows are, with the place and the mend.
+    pub fn of(path: &Path, reading: Reading, columns: &Columns) -> Result<Self, Error> {
+        let (mut record, summary) = (reading.record, reading.summary);
+        record.name = escaped(&record.name).into_owned();
+        check_whole(path, &record)?;
+        if record.outputs.is_empty() {
+            let none = vec![f64::NAN; record.len()];
+            record.outputs.push(Channel::new("y", "", none));
+        }
+        let time = TimeColumn::of(path, columns, &record)?;
+        Ok(Self {
+            record,
+            summary,
+            time,
+        })
     }
-    let time = TimeColumn::of(path, columns, &record)?;
-    Ok(ReadInputs {
-        record,
-        summary,
-        time,
-    })
 }
 
 /// What an input did in a gap nobody knows.

@@ -20,11 +20,14 @@ use greybox::FitUncertainty;
 use serde::Serialize;
 
 pub(crate) use self::curves::{Curves, FittedRecord};
-pub(crate) use self::inputs::{Inputs, begins_with_readings, first_readings, read_inputs};
+pub(crate) use self::inputs::{
+    Inputs, ReadInputs, begins_with_readings, first_readings, read_inputs,
+};
+pub use self::plant::of_plant;
 pub(crate) use self::plant::simulate as simulate_plant;
 pub(crate) use self::plant_export::{export as export_plant, no_text};
 pub(crate) use self::text::said;
-pub(crate) use self::time_column::TimeColumn;
+pub use self::time_column::TimeColumn;
 use crate::output::Found;
 
 /// The band holds with this probability.
@@ -34,7 +37,7 @@ pub(crate) const FIRST_READINGS: usize = 5;
 
 /// Half the widths of the bands of an output \[its unit\].
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Band {
+pub struct Band {
     /// Of the model's output, from the uncertainty of parameters and initial states, row by row.
     pub output: Vec<f64>,
     /// Of a reading, whose noise comes to that.
@@ -43,7 +46,7 @@ pub(crate) struct Band {
 
 /// A simulated output.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct SimulatedOutput {
+pub struct SimulatedOutput {
     /// The column that holds it where it is measured, without its unit.
     pub name: String,
     /// Its unit; empty where nobody says.
@@ -60,7 +63,7 @@ pub(crate) struct SimulatedOutput {
 /// Where an initial state comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum StateSource {
+pub enum StateSource {
     /// Fitted to the first readings.
     Readings,
     /// The model's text.
@@ -71,7 +74,8 @@ pub(crate) enum StateSource {
 
 /// What `ctid simulate` finds.
 #[derive(Debug, Serialize)]
-pub(crate) struct Simulated {
+pub struct Simulated {
+    /// Version of this layout.
     pub schema: u32,
     /// The model.
     pub model: String,
@@ -87,6 +91,7 @@ pub(crate) struct Simulated {
     pub states_from: StateSource,
     /// The probability with which each band holds.
     pub level: f64,
+    /// The outputs, in the order of the model.
     pub outputs: Vec<SimulatedOutput>,
     /// What should be known before it is used.
     pub warnings: Vec<String>,
@@ -102,8 +107,8 @@ pub(crate) struct Simulated {
 
 impl Band {
     /// Of one output, from the standard errors of its mean.
-    pub fn of(errors: &[f64], known: &FitUncertainty, output: usize) -> Self {
-        let quantile = known.quantile(LEVEL);
+    pub fn of(errors: &[f64], known: &FitUncertainty, output: usize, level: f64) -> Self {
+        let quantile = known.quantile(level);
         let noise = known.reading[output];
         Self {
             output: errors.iter().map(|error| quantile * error).collect(),

@@ -1,14 +1,16 @@
 //! One of the plants on new inputs.
 
+use std::path::Path;
+
 use ct_signals::{Heading, ReadOptions, Record};
 use greybox::{
     FitUncertainty, InitialStates, Setup, Stopping, levels_from_readings, output_errors,
     steady_state,
 };
-use missing_effect::{Fitted, Options};
+use missing_effect::{Fitted, Options, Problem};
 
 use super::{
-    Band, Inputs, LEVEL, Simulated, SimulatedOutput, StateSource, begins_with_readings,
+    Band, Inputs, LEVEL, Simulated, SimulatedOutput, StateSource, TimeColumn, begins_with_readings,
     first_readings, read_inputs,
 };
 use crate::Error;
@@ -36,31 +38,59 @@ pub(crate) fn simulate(
         hold: model.hold,
         ..inputs.options.clone()
     };
-    let name = model.plant.id().to_string();
-    let mut read = read_inputs(&inputs.path, &columns, &read_options, Error::from)?;
+    let read = read_inputs(&inputs.path, &columns, &read_options, Error::from)?;
     let input::Input {
-        mut problem,
+        problem,
         mut summaries,
     } = files.read_with(model)?;
     summaries.push(read.summary);
+    let names = columns.outputs.clone();
+    let found = of_plant(
+        problem,
+        (read.record, read.time, &names),
+        (&inputs.path, inputs.first),
+        LEVEL,
+        options,
+    );
+    Ok((
+        found.map_err(|error| match error {
+            Error::Diagnosis(error) => files.blame(error),
+            other => other,
+        })?,
+        summaries,
+    ))
+}
+
+/// A plant on the inputs of a record, after a fit to the records of a problem. `names`: the columns of its outputs, where they are named;
+/// `path` is what is blamed for the record, whose initial levels are fitted to the `first` readings of each output. `level`: the probability with
+/// which the band holds, within 0 and 1.
+///
+/// # Errors
+/// Where the records do not allow a fit, or the simulation does not go on.
+pub fn of_plant(
+    mut problem: Problem,
+    (mut record, time, names): (Record, TimeColumn, &[String]),
+    (path, first): (&Path, usize),
+    level: f64,
+    options: &Options,
+) -> Result<Simulated, Error> {
+    let name = problem.plant.id().to_string();
     let outputs = problem.known.outputs(problem.plant).len();
-    while read.record.outputs.len() < outputs {
-        let none = vec![f64::NAN; read.record.len()];
-        read.record
-            .outputs
-            .push(ct_signals::Channel::new("y", "", none));
+    while record.outputs.len() < outputs {
+        let none = vec![f64::NAN; record.len()];
+        record.outputs.push(ct_signals::Channel::new("y", "", none));
     }
-    same_units(inputs, &mut read.record, &problem.records[0])?;
+    same_units(path, &mut record, &problem.records[0])?;
     let mut all = std::mem::take(&mut problem.records);
-    all.push(read.record);
+    all.push(record);
     input::on_one_clock(&mut all);
     let record = all.pop().unwrap_or_default();
     problem.records = all;
     let fitted = missing_effect::fitted(&problem, options, |fitted| {
-        simulated(fitted, inputs, &record)
+        simulated(fitted, (path, first, level), &record)
     });
-    let found = fitted.map_err(|error| files.blame(error))??;
-    let names = (0..outputs).map(|o| match columns.outputs.get(o) {
+    let found = fitted??;
+    let names = (0..outputs).map(|o| match names.get(o) {
         Some(name) => Heading::of(name).name,
         None => problem.records[0].outputs[o].name.clone(),
     });
@@ -78,31 +108,28 @@ pub(crate) fn simulate(
             "the records do not determine all parameters, so there is no band: give a constant under [known], or a [prior]".to_string(),
         );
     }
-    Ok((
-        Simulated {
-            schema: 1,
-            model: name,
-            inputs: record.name.clone(),
-            fitted_to: problem.records.iter().map(|r| r.name.clone()).collect(),
-            parameters: found.parameters,
-            states: found.states,
-            states_from: found.states_from,
-            level: LEVEL,
-            outputs: outputs.collect(),
-            warnings,
-            length: record.duration(),
-            time: read.time,
-            readings: false,
-        },
-        summaries,
-    ))
+    Ok(Simulated {
+        schema: 1,
+        model: name,
+        inputs: record.name.clone(),
+        fitted_to: problem.records.iter().map(|r| r.name.clone()).collect(),
+        parameters: found.parameters,
+        states: found.states,
+        states_from: found.states_from,
+        level,
+        outputs: outputs.collect(),
+        warnings,
+        length: record.duration(),
+        time,
+        readings: false,
+    })
 }
 
 /// The inputs and outputs have the units of the record that was fitted.
-fn same_units(inputs: &Inputs, record: &mut Record, fitted: &Record) -> Result<(), Error> {
+fn same_units(path: &Path, record: &mut Record, fitted: &Record) -> Result<(), Error> {
     if record.inputs.len() != fitted.inputs.len() {
         return Err(Error::file(
-            &inputs.path,
+            path,
             format!(
                 "it has {} inputs, and {} has {}; name all of them under [columns]",
                 record.inputs.len(),
@@ -116,7 +143,7 @@ fn same_units(inputs: &Inputs, record: &mut Record, fitted: &Record) -> Result<(
         let there = own.missing() < own.values.len();
         if there && own.unit != fitted.unit {
             return Err(Error::file(
-                &inputs.path,
+                path,
                 format!(
                     "column \"{}\" is in [{}], and in the record that is fitted in [{}]; convert one of them, or name it with its unit under [columns]",
                     ct_signals::quoted(&own.name),
@@ -139,8 +166,12 @@ struct Found {
     warnings: Vec<String>,
 }
 
-fn simulated(fitted: Fitted, inputs: &Inputs, record: &Record) -> Result<Found, Error> {
-    let wrong = |error: greybox::Error| Error::file(&inputs.path, error.to_string());
+fn simulated(
+    fitted: Fitted,
+    (path, first, level): (&Path, usize, f64),
+    record: &Record,
+) -> Result<Found, Error> {
+    let wrong = |error: greybox::Error| Error::file(path, error.to_string());
     let Fitted {
         setup: own,
         fit,
@@ -153,11 +184,11 @@ fn simulated(fitted: Fitted, inputs: &Inputs, record: &Record) -> Result<Found, 
     (setup.time_limit, setup.interrupt) = (None, None);
     let count = setup.parameter_count();
     let parameters = &fit.x[..count];
-    let (initial, states_from) = states(&setup, parameters, (record, inputs.first), uncertainty)
+    let (initial, states_from) = states(&setup, parameters, (record, first), uncertainty)
         .map_err(wrong)?
         .ok_or_else(|| {
             Error::file(
-                &inputs.path,
+                path,
                 "the plant comes to no rest under its first inputs, so nothing says where it begins; put the first readings of the output into the file: initial levels are fitted to them",
             )
         })?;
@@ -171,7 +202,7 @@ fn simulated(fitted: Fitted, inputs: &Inputs, record: &Record) -> Result<Found, 
         let k = k.min().unwrap_or(0);
         let at = ct_signals::Clock::of([record]).at(record.time[k]);
         Error::file(
-            &inputs.path,
+            path,
             format!(
                 "the simulation does not go on behind {at}: a level grows without bound; correct the inputs there, or the model file"
             ),
@@ -187,7 +218,7 @@ fn simulated(fitted: Fitted, inputs: &Inputs, record: &Record) -> Result<Found, 
             let errors = errors.iter().enumerate();
             Some(
                 errors
-                    .map(|(o, errors)| Band::of(errors, known, o))
+                    .map(|(o, errors)| Band::of(errors, known, o, level))
                     .collect(),
             )
         }

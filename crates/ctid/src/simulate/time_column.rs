@@ -9,7 +9,7 @@ use crate::Error;
 
 /// A column of times.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub(crate) struct TimeColumn {
+pub struct TimeColumn {
     /// Its header.
     pub header: String,
     /// Its cells.

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use estimation::Prior;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::Setup;
 use crate::Error;
 
 /// A side measurement of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PriorValue {
     /// What was measured \[unit of the parameter\].
     pub value: f64,

@@ -1,0 +1,291 @@
+//! A model of its user's own fitted to records: what comparisons, simulations and exports begin with.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use ct_signals::{Columns, Reading, Record};
+use effect_search::{Options, held_out};
+use greybox::{Fit, FitOptions, FitUncertainty, ModelSetup, Robust, TimeLimit};
+use missing_effect::Effort;
+
+use super::file::{OwnModelFile, Records};
+use super::simulate::simulated;
+use crate::Error;
+use crate::simulate::{ReadInputs, Simulated};
+
+/// The effects of the file are added one after the other within this share of the time.
+const OF_EFFECTS: f64 = 0.5;
+
+/// A model, the records that it is fitted to, and the fit.
+#[derive(Clone)]
+pub struct FittedModel {
+    given: OwnModelFile,
+    model: OwnModelFile,
+    records: Records,
+    options: FitOptions,
+    fit: Fit,
+    effort: Effort,
+}
+
+/// What ends a fit before its end: it takes no further steps then, and is what it is.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct FitLimit<'a> {
+    /// A time.
+    pub time: Option<Duration>,
+    /// A flag that is set.
+    pub interrupt: Option<&'a AtomicBool>,
+}
+
+/// How well a simulation agrees with an output that was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutputScore {
+    /// The output.
+    pub output: String,
+    /// Root mean square of the simulation error \[unit of the output\].
+    pub rmse: f64,
+    /// `100 (1 - rmse/s)` with the standard deviation s of the readings that are scored, %.
+    pub fit_percent: f64,
+}
+
+impl FittedModel {
+    /// Fits a model, with its effects in it, to records.
+    ///
+    /// # Errors
+    /// Where the records do not allow a fit, with the names of those that are to blame.
+    pub fn fit(
+        file: &OwnModelFile,
+        records: Records,
+        options: &FitOptions,
+        limit: FitLimit,
+    ) -> Result<Self, Error> {
+        let began = Instant::now();
+        let of_effects = Options {
+            seed: options.seed,
+            time_limit: limit.time.map(|time| time.mul_f64(OF_EFFECTS)),
+            interrupt: limit.interrupt,
+            ..Options::default()
+        };
+        let model = file.mended_within(Some(&records), &of_effects)?;
+        let effects_are_cut = !file.effects.on.is_empty()
+            && of_effects.time_limit.is_some_and(|t| began.elapsed() >= t);
+        let setup = setup_of(&model, &records)?;
+        ct_signals::require_samples(&records.records, setup.free().len())?;
+        let rest = limit.time.map(|t| t.saturating_sub(began.elapsed()));
+        let time = Arc::new(TimeLimit::new(rest));
+        if effects_are_cut {
+            time.leave_out("steps of the fits of the effects");
+        }
+        let setup = setup.with_time_limit(time.clone(), limit.interrupt);
+        let fit = setup.fit(options);
+        let fit = fit.map_err(|error| blame(&records.records, &error))?;
+        if time.passed() {
+            time.leave_out("steps of the fit");
+        }
+        let effort = Effort {
+            limit: limit.time.map(|time| time.as_secs_f64()),
+            left_out: time.left_out(),
+            interrupted: limit
+                .interrupt
+                .is_some_and(|flag| flag.load(Ordering::Relaxed)),
+        };
+        Ok(Self {
+            given: file.clone(),
+            model,
+            records,
+            options: *options,
+            fit,
+            effort,
+        })
+    }
+
+    /// The same of a fit that was kept: of this model to these records.
+    ///
+    /// # Errors
+    /// Where it is none of this model and these records.
+    pub fn of_fit(
+        file: &OwnModelFile,
+        records: Records,
+        options: &FitOptions,
+        fit: Fit,
+    ) -> Result<Self, Error> {
+        let model = file.mended(Some(&records))?;
+        let entries = setup_of(&model, &records)?.names().len();
+        if entries != fit.x.len() {
+            return Err(Error::Usage(format!(
+                "the fit has {} entries, and {} has {entries} with these records: fit it again",
+                fit.x.len(),
+                file.base.name
+            )));
+        }
+        Ok(Self {
+            given: file.clone(),
+            model,
+            records,
+            options: *options,
+            fit,
+            effort: Effort::default(),
+        })
+    }
+
+    /// The model as it was given, its effects beside it.
+    #[must_use]
+    pub fn given(&self) -> &OwnModelFile {
+        &self.given
+    }
+
+    /// The model with its effects in it.
+    #[must_use]
+    pub fn model(&self) -> &OwnModelFile {
+        &self.model
+    }
+
+    /// The records.
+    #[must_use]
+    pub fn records(&self) -> &Records {
+        &self.records
+    }
+
+    /// The fit.
+    #[must_use]
+    pub fn estimate(&self) -> &Fit {
+        &self.fit
+    }
+
+    /// How it was fitted.
+    #[must_use]
+    pub fn options(&self) -> &FitOptions {
+        &self.options
+    }
+
+    /// The limit on the time of the fit, and what it cut short.
+    #[must_use]
+    pub fn effort(&self) -> &Effort {
+        &self.effort
+    }
+
+    /// The model against its records, as it was fitted.
+    ///
+    /// # Errors
+    /// Those of the fit, which has passed them.
+    pub fn setup(&self) -> Result<ModelSetup<'_>, Error> {
+        setup_of(&self.model, &self.records)
+    }
+
+    /// The uncertainty of all that was fitted, under the noise of the residual; `None` where the simulation at the fit is not finite.
+    ///
+    /// # Errors
+    /// As [`FittedModel::setup`].
+    pub fn robust(&self) -> Result<Option<Robust>, Error> {
+        let setup = self.setup()?;
+        Ok(setup.robust(&self.fit, self.options.noise_order).ok())
+    }
+
+    /// How well the parameters are known; `None` where the records do not determine all of them.
+    pub(super) fn uncertainty(&self, setup: &ModelSetup) -> Result<Option<FitUncertainty>, Error> {
+        let count = setup.parameter_count();
+        let known = FitUncertainty::of(setup, &self.fit, count, self.options.noise_order);
+        known.map_err(|error| blame(&self.records.records, &error))
+    }
+
+    /// The model on the inputs of another record. Where that has readings its initial states are fitted to the `first` of each output, or
+    /// more where these do not tell. `level`: the probability with which the band holds, within 0 and 1.
+    ///
+    /// # Errors
+    /// Where an input is not whole, or the simulation does not go on, with the place and the mend.
+    pub fn simulate(&self, reading: Reading, first: usize, level: f64) -> Result<Simulated, Error> {
+        let name = std::path::PathBuf::from(&reading.record.name);
+        let columns = Columns {
+            time: Some(reading.summary.time_header.clone()),
+            ..Columns::default()
+        };
+        let mut read = ReadInputs::of(&name, reading, &columns)?;
+        self.model.convert(&mut read.record)?;
+        let mut all = self.records.records.clone();
+        all.push(read.record);
+        crate::input::on_one_clock(&mut all);
+        read.record = all.pop().unwrap_or_default();
+        let whole = Self {
+            records: Records {
+                records: all,
+                ..self.records.clone()
+            },
+            ..self.clone()
+        };
+        let of = (&self.model, Some(&whole), whole.records.time_unit);
+        simulated(of, (&read, &name, first), level, &self.options)
+    }
+
+    /// How well simulations of other records agree with what was measured there, output by output. Initial states are fitted to the first
+    /// rows of each record, which are not scored; all else stays.
+    ///
+    /// # Errors
+    /// Where a record is not one of this model, or its initial states cannot be fitted.
+    pub fn score(&self, test: &[Record]) -> Result<Vec<OutputScore>, Error> {
+        let setup = self.setup()?;
+        let found = held_out(&setup, &self.fit, test).map_err(|error| match error {
+            effect_search::Error::Fit(error) => blame(test, &error),
+            other => Error::Columns(other.to_string()),
+        })?;
+        let Some(found) = found else {
+            return Ok(Vec::new());
+        };
+        let scored = |o: usize| -> Vec<f64> {
+            let all = test.iter().zip(&found.state_rows);
+            let all = all.flat_map(|(record, rows)| record.outputs[o].values.iter().skip(*rows));
+            all.copied().filter(|value| !value.is_nan()).collect()
+        };
+        let all = found.rmse.iter().enumerate();
+        Ok(self.scores(all.map(|(o, &rmse)| (rmse, scored(o)))))
+    }
+
+    /// How well the model agrees with the records that it was fitted to, output by output.
+    #[must_use]
+    pub fn score_of_fit(&self) -> Vec<OutputScore> {
+        let of = |(o, &rmse): (usize, &f64)| {
+            let records = self.records.records.iter();
+            let values = records.flat_map(|record| record.outputs[o].present());
+            (rmse, values.collect())
+        };
+        self.scores(self.fit.rmse.iter().enumerate().map(of))
+    }
+
+    /// Of each output, from its error and the readings that are scored.
+    fn scores(&self, errors: impl Iterator<Item = (f64, Vec<f64>)>) -> Vec<OutputScore> {
+        let spec = self.model.model.spec();
+        let outputs = spec.outputs.iter().zip(errors);
+        let outputs = outputs.map(|(output, (rmse, values))| {
+            let count = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / count;
+            let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+            OutputScore {
+                output: spec.about(output.variable).name.clone(),
+                rmse,
+                fit_percent: 100.0 * (1.0 - rmse / (squares / count).sqrt()),
+            }
+        });
+        outputs.collect()
+    }
+}
+
+/// A model with its effects in it against records.
+fn setup_of<'a>(model: &'a OwnModelFile, records: &'a Records) -> Result<ModelSetup<'a>, Error> {
+    let setup = ModelSetup::new(
+        &model.model,
+        &records.records,
+        &model.known,
+        records.time_unit,
+    );
+    let setup = setup.and_then(|setup| setup.with_priors(&model.priors));
+    setup.map_err(|error| blame(&records.records, &error))
+}
+
+/// An error of the computation, with the records that it is of.
+pub(super) fn blame(records: &[Record], error: &greybox::Error) -> Error {
+    let mut names: Vec<&str> = records.iter().map(|r| r.name.as_str()).collect();
+    names.dedup();
+    Error::File {
+        file: names.join(", "),
+        what: error.to_string(),
+    }
+}

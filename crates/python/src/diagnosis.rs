@@ -1,0 +1,241 @@
+//! A diagnosis.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ctid::effort::EffortLevel;
+use ctid::own_model::{Records, design, diagnosed_page};
+use effect_search::Options;
+use effect_search::design::Limits;
+use missing_effect::Failures;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
+
+use crate::frame::Content;
+use crate::model::{Inner, Kept, Model};
+use crate::{bytes, error, work};
+
+/// What a model is missing; it never changes.
+#[pyclass(frozen, module = "ctid._ctid")]
+pub struct Diagnosis {
+    model: Arc<Inner>,
+    frames: Vec<Content>,
+    fitted: usize,
+    records: Records,
+    found: effect_search::Diagnosis,
+}
+
+/// The same as it is pickled.
+#[derive(Serialize, Deserialize)]
+struct KeptDiagnosis {
+    model: Kept,
+    frames: Vec<Content>,
+    fitted: usize,
+    found: effect_search::Diagnosis,
+    simulated: Vec<Vec<Vec<f64>>>,
+}
+
+/// Where a model fails: position of the record of a window, from, to, samples, mean, root mean square, whether it is clear.
+pub type Bin = (Option<usize>, f64, f64, usize, f64, f64, bool);
+
+/// Where a model fails, by what.
+pub fn bins(failures: &Failures) -> Vec<(&'static str, Bin)> {
+    let Failures {
+        by_time,
+        by_level,
+        by_flow,
+        by_direction,
+        by_frequency,
+        ..
+    } = failures;
+    let all = [
+        ("time", by_time),
+        ("level", by_level),
+        ("input", by_flow),
+        ("direction", by_direction),
+        ("frequency", by_frequency),
+    ];
+    let all = all.into_iter().flat_map(|(by, bins)| {
+        bins.iter().map(move |b| {
+            (
+                by,
+                (b.record, b.from, b.to, b.count, b.mean, b.rms, b.fails),
+            )
+        })
+    });
+    all.collect()
+}
+
+/// A result as the program writes it.
+pub fn json(found: &impl Serialize) -> PyResult<String> {
+    serde_json::to_string(found).map_err(|error| error::Error::new_err(error.to_string()))
+}
+
+impl Diagnosis {
+    pub fn new(
+        model: Arc<Inner>,
+        (frames, fitted): (Vec<Content>, usize),
+        records: Records,
+        found: effect_search::Diagnosis,
+    ) -> Self {
+        Self {
+            model,
+            frames,
+            fitted,
+            records,
+            found,
+        }
+    }
+}
+
+#[pymethods]
+impl Diagnosis {
+    /// The result as `ctid diagnose --json` writes it, without its mark.
+    fn json(&self) -> PyResult<String> {
+        json(&self.found)
+    }
+
+    /// The finding in sentences.
+    #[getter]
+    fn sentences(&self) -> Vec<String> {
+        diagnosed_page(&self.model.file, &self.records, &self.found)
+            .diagnosis
+            .sentences
+    }
+
+    /// The page of `ctid diagnose --report`.
+    fn html(&self, py: Python<'_>) -> String {
+        py.detach(|| diagnosed_page(&self.model.file, &self.records, &self.found).html())
+    }
+
+    /// The model with the effects that were found, and its values in the last step.
+    #[getter]
+    fn model(&self) -> PyResult<Model> {
+        let mut file = self.model.file.clone();
+        for effect in &self.found.effects {
+            let with = file.with_effect(effect, &self.found);
+            file = with.map_err(|error| error::of(&error))?;
+        }
+        let last = self.found.steps.last();
+        let estimates = last.into_iter().flat_map(|step| &step.parameters);
+        Ok(Model(Arc::new(Inner {
+            text: self.model.text.clone(),
+            file,
+            values: estimates.map(|p| (p.name.clone(), p.value)).collect(),
+        })))
+    }
+
+    /// The experiment that tells two effects apart best; what `ctid design --json` writes, without its mark, and the unit of the model's time
+    /// \[s\].
+    #[pyo3(signature = (between, *, ranges, slews, inputs, duration, seed, effort, time_limit, progress=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    fn design(
+        &self,
+        py: Python<'_>,
+        between: (String, String),
+        ranges: BTreeMap<String, (f64, f64)>,
+        slews: BTreeMap<String, f64>,
+        inputs: Vec<String>,
+        duration: Option<f64>,
+        seed: u64,
+        effort: &str,
+        time_limit: Option<f64>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(String, f64)> {
+        let limit = crate::fit::limit(effort, time_limit, EffortLevel::limit_of_own_model)?;
+        let limits = Limits {
+            inputs,
+            ranges,
+            slews,
+            duration,
+            seed,
+        };
+        let found = work::run(py, progress.as_ref(), |stop, phases| {
+            let options = Options {
+                seed,
+                time_limit: Some(limit),
+                interrupt: Some(stop),
+                ..Options::default()
+            };
+            let between = [between.0.as_str(), between.1.as_str()];
+            let tell = |progress: effect_search::Progress| phases.tell(progress.phase);
+            design(
+                &self.model.file,
+                &self.records,
+                between,
+                &limits,
+                &options,
+                &tell,
+            )
+        })?;
+        Ok((json(&found)?, self.records.time_unit))
+    }
+
+    /// Of each record, fitted ones first: its name, whether it is held out, its times \[s\], and of each output its name, what was measured and
+    /// what each step gives.
+    #[getter]
+    #[allow(clippy::type_complexity)]
+    fn series<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Vec<(
+        String,
+        bool,
+        Bound<'py, PyArray1<f64>>,
+        Vec<(
+            String,
+            Bound<'py, PyArray1<f64>>,
+            Vec<Bound<'py, PyArray1<f64>>>,
+        )>,
+    )> {
+        let Records { records, test, .. } = &self.records;
+        let all = records.iter().map(|r| (r, false));
+        let all = all.chain(test.iter().map(|r| (r, true))).enumerate();
+        let all = all.map(|(i, (record, held_out))| {
+            let count = record.outputs.len();
+            let outputs = record.outputs.iter().enumerate().map(|(o, output)| {
+                let steps = self.found.steps.iter();
+                let series = steps.filter_map(|step| step.simulated.get(i * count + o));
+                let series = series.map(|values| PyArray1::from_slice(py, values));
+                let measured = PyArray1::from_slice(py, &output.values);
+                (output.name.clone(), measured, series.collect())
+            });
+            let time = PyArray1::from_slice(py, &record.time);
+            (record.name.clone(), held_out, time, outputs.collect())
+        });
+        all.collect()
+    }
+
+    /// As bytes, to be pickled.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let steps = self.found.steps.iter();
+        let bytes = bytes::of(&KeptDiagnosis {
+            model: self.model.kept(),
+            frames: self.frames.clone(),
+            fitted: self.fitted,
+            found: self.found.clone(),
+            simulated: steps.map(|step| step.simulated.clone()).collect(),
+        })?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    #[staticmethod]
+    fn from_bytes(content: &[u8]) -> PyResult<Self> {
+        let KeptDiagnosis {
+            model,
+            frames,
+            fitted,
+            mut found,
+            simulated,
+        } = bytes::read(content)?;
+        let model = Arc::new(Inner::of_kept(model)?);
+        let records = model.records(&frames, fitted);
+        let records = records.map_err(|error| error::of(&error))?;
+        for (step, simulated) in found.steps.iter_mut().zip(simulated) {
+            step.simulated = simulated;
+        }
+        Ok(Self::new(model, (frames, fitted), records, found))
+    }
+}

@@ -1,0 +1,41 @@
+//! What the program refuses, as Python exceptions with its messages.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+pyo3::create_exception!(
+    ctid,
+    Error,
+    PyValueError,
+    "Something that ctid refuses; the message is one line that names the place and the mend."
+);
+pyo3::create_exception!(ctid, DataError, Error, "Something about records.");
+pyo3::create_exception!(
+    ctid,
+    ModelError,
+    Error,
+    "Something about a model, its parameters or its effects."
+);
+
+/// The exception of an error of the program.
+pub fn of(error: &ctid::Error) -> PyErr {
+    use ctid::Error as E;
+    let message = ctid::one_line(&error.to_string());
+    match error {
+        E::AtLine { .. } | E::Text { .. } | E::UnknownEffect(_) | E::Usage(_) | E::Plant(_) => {
+            ModelError::new_err(message)
+        }
+        E::File { .. } | E::Columns(_) | E::Record(_) => DataError::new_err(message),
+        _ => Error::new_err(message),
+    }
+}
+
+/// The exception of an error of the records.
+pub fn of_data(error: impl ToString) -> PyErr {
+    DataError::new_err(ctid::one_line(&error.to_string()))
+}
+
+/// The exception of an error of the model or the arguments.
+pub fn of_model(error: impl ToString) -> PyErr {
+    ModelError::new_err(ctid::one_line(&error.to_string()))
+}

@@ -1,0 +1,390 @@
+//! A fit.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+use ct_signals::ReadOptions;
+use ctid::effort::EffortLevel;
+use ctid::own_model::{
+    Comparison, FitLimit, FittedModel, Simulated, StateSource, compared_page, diagnose,
+};
+use effect_search::Options;
+use greybox::FitOptions;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use serde::{Deserialize, Serialize};
+
+use crate::diagnosis::Diagnosis;
+use crate::frame::{Content, Frame};
+use crate::model::{Inner, Kept, Model, contents, records};
+use crate::{bytes, error, work};
+
+/// A model that was fitted to frames; it never changes.
+#[pyclass(frozen, module = "ctid._ctid")]
+pub struct Fit {
+    model: Arc<Inner>,
+    frames: Arc<Vec<Content>>,
+    fitted: FittedModel,
+    comparison: Comparison,
+    /// What the program's page shows, once somebody asks.
+    page: OnceLock<missing_effect::Diagnosis>,
+}
+
+/// The same as it is pickled: what it is of, and the fit.
+#[derive(Serialize, Deserialize)]
+struct KeptFit {
+    model: Kept,
+    frames: Vec<Content>,
+    options: FitOptions,
+    fit: greybox::Fit,
+}
+
+/// Names and matrix; none where the records do not determine all that was fitted.
+pub type Covariance<'py> = Option<(Vec<String>, Bound<'py, PyArray2<f64>>)>;
+
+/// Measured and simulated series of an output: name, measured, simulated.
+type Series<'py> = (String, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+impl Fit {
+    pub fn of(
+        model: Arc<Inner>,
+        frames: Vec<Content>,
+        options: &FitOptions,
+        stop: &AtomicBool,
+    ) -> Result<Self, ctid::Error> {
+        let records = model.records(&frames, frames.len())?;
+        let limit = FitLimit {
+            time: None,
+            interrupt: Some(stop),
+        };
+        let fitted = FittedModel::fit(&model.file, records, options, limit)?;
+        Self::of_fitted(model, frames, fitted)
+    }
+
+    fn of_fitted(
+        model: Arc<Inner>,
+        frames: Vec<Content>,
+        fitted: FittedModel,
+    ) -> Result<Self, ctid::Error> {
+        Ok(Self {
+            model,
+            frames: Arc::new(frames),
+            comparison: fitted.compare()?,
+            fitted,
+            page: OnceLock::new(),
+        })
+    }
+
+    fn page(&self) -> &missing_effect::Diagnosis {
+        let of = || compared_page(self.fitted.given(), self.fitted.records(), &self.comparison);
+        self.page.get_or_init(|| of().diagnosis)
+    }
+
+    fn step(&self) -> &effect_search::Step {
+        let [step] = &self.comparison.steps;
+        step
+    }
+}
+
+/// How long a search may take.
+pub fn limit(
+    effort: &str,
+    seconds: Option<f64>,
+    of: impl Fn(EffortLevel) -> Duration,
+) -> PyResult<Duration> {
+    let effort = match effort {
+        "quick" => EffortLevel::Quick,
+        "normal" => EffortLevel::Normal,
+        "thorough" => EffortLevel::Thorough,
+        other => {
+            return Err(error::of_model(format!(
+                "effort is \"quick\", \"normal\" or \"thorough\", and not \"{other}\""
+            )));
+        }
+    };
+    match seconds {
+        None => Ok(of(effort)),
+        Some(seconds) => Duration::try_from_secs_f64(seconds)
+            .map_err(|_| error::of_model("time_limit is a number of seconds above zero")),
+    }
+}
+
+/// A simulation as Python takes it.
+pub fn simulation<'py>(py: Python<'py>, found: &Simulated) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    let outputs = PyDict::new(py);
+    for output in &found.outputs {
+        let own = PyDict::new(py);
+        own.set_item("mean", PyArray1::from_slice(py, &output.mean))?;
+        if let Some(band) = &output.band {
+            for (name, half) in [("", &band.output), ("reading ", &band.reading)] {
+                for (side, sign) in [("lower", -1.0), ("upper", 1.0)] {
+                    let edge = output.mean.iter().zip(half);
+                    let edge: Vec<f64> = edge.map(|(mean, half)| mean + sign * half).collect();
+                    own.set_item(format!("{name}{side}"), PyArray1::from_vec(py, edge))?;
+                }
+            }
+        }
+        outputs.set_item(&output.name, own)?;
+    }
+    all.set_item("outputs", outputs)?;
+    all.set_item("warnings", &found.warnings)?;
+    let from = match found.states_from {
+        StateSource::Readings => "readings",
+        StateSource::Text => "text",
+        StateSource::Rest => "rest",
+    };
+    all.set_item("states_from", from)?;
+    let states: BTreeMap<&String, f64> = found.states.iter().map(|(n, v)| (n, *v)).collect();
+    all.set_item("states", states)?;
+    Ok(all)
+}
+
+#[pymethods]
+impl Fit {
+    /// Name, value, standard error, unit and whether it is known, of each parameter and initial state.
+    #[getter]
+    fn estimates(&self) -> Vec<(String, f64, Option<f64>, String, bool)> {
+        let all = self.step().parameters.iter();
+        all.map(|p| {
+            (
+                p.name.clone(),
+                p.value,
+                p.std_error,
+                p.unit.clone(),
+                p.known,
+            )
+        })
+        .collect()
+    }
+
+    /// Half the width of the interval that holds each of them with probability `level`.
+    fn half_widths(&self, level: f64) -> PyResult<Vec<Option<f64>>> {
+        if !(level > 0.0 && level < 1.0) {
+            return Err(error::of_model(format!(
+                "a probability is within 0 and 1, and {level} is not"
+            )));
+        }
+        let robust = self.fitted.robust().map_err(|error| error::of(&error))?;
+        let none = || vec![None; self.step().parameters.len()];
+        Ok(robust.map_or_else(none, |robust| robust.half_widths(level)))
+    }
+
+    /// Names and covariance of what the records determine; `None` where they do not.
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Covariance<'py>> {
+        let setup = self.fitted.setup().map_err(|error| error::of(&error))?;
+        let robust = self.fitted.robust().map_err(|error| error::of(&error))?;
+        let Some(matrix) = robust.and_then(|robust| robust.covariance) else {
+            return Ok(None);
+        };
+        let free = setup.free();
+        let interior = self.fitted.estimate().interior();
+        let names = interior.iter().map(|&i| setup.names()[free[i]].clone());
+        let matrix = PyArray2::from_vec2(py, &matrix);
+        let matrix = matrix.map_err(|error| error::of_data(error.to_string()))?;
+        Ok(Some((names.collect(), matrix)))
+    }
+
+    /// Of each record, and each part that gaps leave of one: its name, its times \[s\] and its outputs.
+    #[getter]
+    fn series<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Vec<(String, Bound<'py, PyArray1<f64>>, Vec<Series<'py>>)> {
+        let records = &self.fitted.records().records;
+        let count = self.step().rmse_per_output.len().max(1);
+        let curves = self.comparison.curves.chunks(count);
+        let all = records.iter().zip(curves).map(|(record, curves)| {
+            let outputs = curves.iter().map(|curve| {
+                let measured = PyArray1::from_slice(py, &curve.measured);
+                let model = PyArray1::from_slice(py, &curve.model);
+                (curve.output.clone(), measured, model)
+            });
+            let time = PyArray1::from_slice(py, &record.time);
+            (record.name.clone(), time, outputs.collect())
+        });
+        all.collect()
+    }
+
+    /// Output, error and fit % on the fitted records.
+    #[getter]
+    fn scores(&self) -> Vec<(String, f64, f64)> {
+        let all = self.fitted.score_of_fit().into_iter();
+        all.map(|s| (s.output, s.rmse, s.fit_percent)).collect()
+    }
+
+    /// The same on others.
+    fn score(
+        &self,
+        py: Python<'_>,
+        frames: Vec<Bound<'_, Frame>>,
+    ) -> PyResult<Vec<(String, f64, f64)>> {
+        let frames = contents(&frames);
+        let found = work::run(py, None, |_, _| {
+            let file = self.fitted.given();
+            let records = records(file, &frames, frames.len())?;
+            self.fitted.score(&records.records)
+        })?;
+        let all = found.into_iter();
+        Ok(all.map(|s| (s.output, s.rmse, s.fit_percent)).collect())
+    }
+
+    /// The model on the inputs of a frame.
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        frame: &Bound<'py, Frame>,
+        first: usize,
+        level: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        if !(level > 0.0 && level < 1.0) || first == 0 {
+            return Err(error::of_model(format!(
+                "the interval is a probability within 0 and 1, and first a whole number above zero; they are {level} and {first}"
+            )));
+        }
+        let frame = &frame.get().0;
+        let found = work::run(py, None, |_, _| {
+            let file = self.fitted.model();
+            let options = ReadOptions::from(file.hold);
+            let reading = frame.inputs(&file.columns, &options)?;
+            self.fitted.simulate(reading, first, level)
+        })?;
+        simulation(py, &found)
+    }
+
+    /// Of each output: its name, the p-values of the tests of its residual (whiteness, trace of the inputs), where it fails, and the same in
+    /// sentences. Where it fails: by what, and a [`crate::diagnosis::Bin`].
+    #[getter]
+    #[allow(clippy::type_complexity)]
+    fn outputs(
+        &self,
+    ) -> Vec<(
+        String,
+        (f64, f64),
+        Vec<(&'static str, crate::diagnosis::Bin)>,
+        Vec<String>,
+    )> {
+        let steps = &self.page().steps;
+        let outputs = steps.first().map_or(&[][..], |step| &step.outputs);
+        let all = outputs.iter().map(|output| {
+            let tests = (output.tests.whiteness_p, output.tests.input_p);
+            let bins = crate::diagnosis::bins(&output.failures);
+            let sentences = output.failures.sentences.clone();
+            (output.name.clone(), tests, bins, sentences)
+        });
+        all.collect()
+    }
+
+    #[getter]
+    fn starts(&self) -> (usize, usize) {
+        (self.step().starts, self.step().starts_agree)
+    }
+
+    #[getter]
+    fn bic(&self) -> f64 {
+        self.step().bic
+    }
+
+    /// Entries that the records do not determine, alone or together.
+    #[getter]
+    fn not_determined(&self) -> Vec<Vec<String>> {
+        self.comparison.not_determined.clone()
+    }
+
+    /// The result as `ctid compare --json` writes it, without its mark.
+    fn json(&self) -> PyResult<String> {
+        crate::diagnosis::json(&self.comparison)
+    }
+
+    /// The page of `ctid compare --report`.
+    fn html(&self, py: Python<'_>) -> String {
+        py.detach(|| ctid::report::html(self.page()))
+    }
+
+    /// The model with its fitted values, as `ctid export --modelica` writes it.
+    fn to_modelica(&self) -> PyResult<String> {
+        let text = self.fitted.text(&self.model.file.name);
+        text.map_err(|error| error::of(&error))
+    }
+
+    /// The model with its fitted values.
+    #[getter]
+    fn model(&self) -> Model {
+        let estimates = self.step().parameters.iter();
+        Model(Arc::new(Inner {
+            text: self.model.text.clone(),
+            file: self.model.file.clone(),
+            values: estimates.map(|p| (p.name.clone(), p.value)).collect(),
+        }))
+    }
+
+    /// What the model is missing.
+    #[pyo3(signature = (test, *, effort, time_limit, max_effects, seed, progress=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    fn diagnose(
+        &self,
+        py: Python<'_>,
+        test: Vec<Bound<'_, Frame>>,
+        effort: &str,
+        time_limit: Option<f64>,
+        max_effects: Option<usize>,
+        seed: u64,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Diagnosis> {
+        let limit = limit(effort, time_limit, EffortLevel::limit_of_own_model)?;
+        let mut frames = self.frames.to_vec();
+        let fitted = frames.len();
+        frames.extend(contents(&test));
+        let file = self.fitted.given();
+        let (found, records) = work::run(py, progress.as_ref(), |stop, phases| {
+            let records = records(file, &frames, fitted)?;
+            let mut options = Options {
+                seed,
+                time_limit: Some(limit),
+                interrupt: Some(stop),
+                ..Options::default()
+            };
+            options.max_effects = max_effects.unwrap_or(options.max_effects);
+            let found = diagnose(file, &records, &options, &|progress| {
+                phases.tell(progress.phase);
+            })?;
+            Ok((found, records))
+        })?;
+        Ok(Diagnosis::new(
+            self.model.clone(),
+            (frames, fitted),
+            records,
+            found,
+        ))
+    }
+
+    /// As bytes, to be pickled.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = bytes::of(&KeptFit {
+            model: self.model.kept(),
+            frames: self.frames.to_vec(),
+            options: *self.fitted.options(),
+            fit: self.fitted.estimate().clone(),
+        })?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    #[staticmethod]
+    fn from_bytes(py: Python<'_>, content: &[u8]) -> PyResult<Self> {
+        let KeptFit {
+            model,
+            frames,
+            options,
+            fit,
+        } = bytes::read(content)?;
+        let model = Arc::new(Inner::of_kept(model)?);
+        work::run(py, None, move |_, _| {
+            let records = model.records(&frames, frames.len())?;
+            let fitted = FittedModel::of_fit(&model.file, records, &options, fit)?;
+            Self::of_fitted(model, frames, fitted)
+        })
+    }
+}

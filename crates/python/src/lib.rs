@@ -1,0 +1,61 @@
+//! The native part of the Python package `ctid`: arrays in, results of the crates out. No algorithm is in it.
+//!
+//! | what | where |
+//! |---|---|
+//! | exceptions | `error.rs` |
+//! | long work: the interpreter's lock is released, Ctrl-C is heard | `work.rs` |
+//! | frames as the program reads its records | `frame.rs` |
+//! | a model of the user's own, its fit, its diagnosis | `model.rs`, `fit.rs`, `diagnosis.rs` |
+//! | the matrices of a model about a point | `linear.rs` |
+//! | one of the plants | `tank.rs` |
+//! | a model beside a running plant | `monitor.rs` |
+//! | linear models from records | `identify.rs` |
+//! | recursive estimators, and output error in a loop | `rls.rs`, `oe.rs` |
+//! | published tables | `tables.rs` |
+//! | objects as bytes, for `pickle` | `bytes.rs` |
+//!
+//! What users see is in `python/ctid`: it makes frames of these arrays and says what types there are.
+
+mod bytes;
+mod diagnosis;
+mod error;
+mod fit;
+mod frame;
+mod identify;
+mod linear;
+mod model;
+mod monitor;
+mod oe;
+mod rls;
+mod tables;
+mod tank;
+mod work;
+
+use pyo3::prelude::*;
+
+/// Native classes and functions.
+#[pymodule]
+mod _ctid {
+    #[pymodule_export]
+    use crate::diagnosis::Diagnosis;
+    #[pymodule_export]
+    use crate::error::{DataError, Error, ModelError};
+    #[pymodule_export]
+    use crate::fit::Fit;
+    #[pymodule_export]
+    use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::identify::identify;
+    #[pymodule_export]
+    use crate::model::Model;
+    #[pymodule_export]
+    use crate::monitor::Monitor;
+    #[pymodule_export]
+    use crate::oe::{StabilizedOe, fcloe_fit};
+    #[pymodule_export]
+    use crate::rls::ContinuousRls;
+    #[pymodule_export]
+    use crate::tables::udink_tables;
+    #[pymodule_export]
+    use crate::tank::{Tank, TankFit};
+}

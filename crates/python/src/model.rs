@@ -1,0 +1,299 @@
+//! A model of the user's own.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use ct_model::ModelSpec;
+use ct_signals::{Columns, ReadOptions, Reading};
+use ctid::own_model::{AnyModelFile, OwnModelFile, OwnSettings, Records};
+use greybox::{FitOptions, PriorValue};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use serde::{Deserialize, Serialize};
+
+use crate::fit::Fit;
+use crate::frame::{Content, Frame};
+use crate::monitor::Monitor;
+use crate::{bytes, error, work};
+
+/// A model; it never changes.
+#[pyclass(frozen, module = "ctid._ctid")]
+pub struct Model(pub Arc<Inner>);
+
+/// A model and, where it comes from a fit, its values.
+pub struct Inner {
+    /// What a user reads of it.
+    pub text: String,
+    pub file: OwnModelFile,
+    /// Fitted values by name, of parameters and of `x(0)`; empty where nothing was fitted.
+    pub values: BTreeMap<String, f64>,
+}
+
+/// The same as it is pickled.
+#[derive(Serialize, Deserialize)]
+pub struct Kept {
+    name: String,
+    text: String,
+    settings: OwnSettings,
+    values: BTreeMap<String, f64>,
+}
+
+impl Inner {
+    pub fn kept(&self) -> Kept {
+        Kept {
+            name: self.file.name.clone(),
+            text: self.text.clone(),
+            settings: self.file.settings(),
+            values: self.values.clone(),
+        }
+    }
+
+    pub fn of_kept(kept: Kept) -> PyResult<Self> {
+        let Kept {
+            name,
+            text,
+            settings,
+            values,
+        } = kept;
+        let spec = parsed(&name, &text)?;
+        let file = OwnModelFile::new(&name, spec, settings).map_err(|e| error::of(&e))?;
+        Ok(Self { text, file, values })
+    }
+
+    /// Frames as the model takes them, of which so many come first that are fitted.
+    pub fn records(&self, frames: &[Content], fitted: usize) -> Result<Records, ctid::Error> {
+        records(&self.file, frames, fitted)
+    }
+}
+
+pub fn records(
+    file: &OwnModelFile,
+    frames: &[Content],
+    fitted: usize,
+) -> Result<Records, ctid::Error> {
+    let options = ReadOptions::from(file.hold);
+    let read = |frame: &Content| frame.record(&file.columns, &options);
+    let all = frames.iter().map(read);
+    let all = all.collect::<Result<Vec<Reading>, _>>()?;
+    file.gathered(all, fitted, time_unit(frames))
+}
+
+/// Seconds in one unit of the time of frames, of which there is at least one.
+fn time_unit(frames: &[Content]) -> f64 {
+    let time = frames.first().map(|frame| frame.time.clone());
+    let columns = Columns {
+        time,
+        ..Columns::default()
+    };
+    columns.time_header().1
+}
+
+fn parsed(name: &str, text: &str) -> PyResult<ModelSpec> {
+    ModelSpec::parse_to_simulate(text).map_err(|source| {
+        error::of(&ctid::Error::Text {
+            file: name.to_string(),
+            source,
+        })
+    })
+}
+
+/// Frames that Python hands over.
+pub fn contents(frames: &[Bound<'_, Frame>]) -> Vec<Content> {
+    frames.iter().map(|frame| frame.get().0.clone()).collect()
+}
+
+#[pymethods]
+impl Model {
+    /// From its text; `name` stands for it in messages.
+    #[staticmethod]
+    fn from_text(text: String, name: &str) -> PyResult<Self> {
+        let spec = parsed(name, &text)?;
+        let file = OwnModelFile::new(name, spec, OwnSettings::default());
+        let file = file.map_err(|error| error::of(&error))?;
+        Ok(Self(Arc::new(Inner {
+            text,
+            file,
+            values: BTreeMap::new(),
+        })))
+    }
+
+    /// From a model file of `ctid`, which names the text.
+    #[staticmethod]
+    fn from_model_file(path: &str) -> PyResult<Self> {
+        let file = AnyModelFile::read(Path::new(path)).map_err(|error| error::of(&error))?;
+        let AnyModelFile::Own(file) = file else {
+            return Err(error::of_model(format!(
+                "{path}: it names a plant: use Model.tank"
+            )));
+        };
+        let text = file.base.to_string();
+        Ok(Self(Arc::new(Inner {
+            text,
+            file: *file,
+            values: BTreeMap::new(),
+        })))
+    }
+
+    /// The same with these columns, known parameters, side measurements and hold (`zero`, `first`); what is not given stays.
+    #[pyo3(signature = (*, inputs=None, outputs=None, known=None, priors=None, hold=None))]
+    fn with_settings(
+        &self,
+        inputs: Option<Vec<String>>,
+        outputs: Option<Vec<String>>,
+        known: Option<BTreeMap<String, f64>>,
+        priors: Option<BTreeMap<String, (f64, f64)>>,
+        hold: Option<&str>,
+    ) -> PyResult<Self> {
+        let mut settings = self.0.file.settings();
+        if let Some(inputs) = inputs {
+            settings.columns.inputs = inputs;
+        }
+        if let Some(outputs) = outputs {
+            settings.columns.outputs = outputs;
+        }
+        settings.known.extend(known.unwrap_or_default());
+        for (name, (value, std_error)) in priors.unwrap_or_default() {
+            settings
+                .priors
+                .insert(name, PriorValue { value, std_error });
+        }
+        if let Some(hold) = hold {
+            settings.hold = crate::identify::hold_of(hold)?;
+        }
+        let kept = Kept {
+            settings,
+            ..self.0.kept()
+        };
+        Ok(Self(Arc::new(Inner::of_kept(kept)?)))
+    }
+
+    /// Fits the model to frames.
+    #[pyo3(signature = (frames, *, starts, seed, noise_order, progress=None))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        frames: Vec<Bound<'_, Frame>>,
+        starts: usize,
+        seed: u64,
+        noise_order: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Fit> {
+        let options = FitOptions {
+            starts,
+            seed,
+            noise_order,
+            ..FitOptions::default()
+        };
+        let frames = contents(&frames);
+        if frames.is_empty() {
+            return Err(error::of_data("no record: give a frame, or a list of them"));
+        }
+        let model = self.0.clone();
+        work::run(py, progress.as_ref(), move |stop, phases| {
+            phases.tell("fitting the model");
+            Fit::of(model, frames, &options, stop)
+        })
+    }
+
+    /// The model with its effects in it as text, its values the fitted ones where it comes from a fit.
+    fn to_modelica(&self) -> PyResult<String> {
+        let spec = self.0.valued().map_err(|error| error::of(&error))?;
+        Ok(spec.to_string())
+    }
+
+    /// The matrices of the model about values of its states and inputs.
+    fn linearize<'py>(
+        &self,
+        py: Python<'py>,
+        at: BTreeMap<String, f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let spec = self.0.valued().map_err(|error| error::of(&error))?;
+        crate::linear::linearize(py, spec, &at)
+    }
+
+    /// The model beside a running plant.
+    fn monitor(
+        &self,
+        time_unit: f64,
+        rows_between_false_alarms: f64,
+        learning_rows: usize,
+    ) -> PyResult<Monitor> {
+        Monitor::of(&self.0, time_unit, rows_between_false_alarms, learning_rows)
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.file.base.name
+    }
+
+    #[getter]
+    fn file(&self) -> &str {
+        &self.0.file.name
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        &self.0.text
+    }
+
+    #[getter]
+    fn effects(&self) -> Vec<String> {
+        self.0.file.effects.on.clone()
+    }
+
+    /// Names of the inputs, and the columns that they are read from.
+    #[getter]
+    fn inputs(&self) -> Vec<(String, String)> {
+        let spec = &self.0.file.base;
+        let names = spec.inputs.iter().map(|input| input.about.name.clone());
+        names.zip(self.0.file.columns.inputs.clone()).collect()
+    }
+
+    /// The same of the outputs.
+    #[getter]
+    fn outputs(&self) -> Vec<(String, String)> {
+        let spec = &self.0.file.base;
+        let names = spec.outputs.iter();
+        let names = names.map(|output| spec.about(output.variable).name.clone());
+        names.zip(self.0.file.columns.outputs.clone()).collect()
+    }
+
+    /// Names, values and units of the parameters, of its effects too.
+    #[getter]
+    fn parameters(&self) -> PyResult<Vec<(String, f64, String)>> {
+        let spec = self.0.valued().map_err(|error| error::of(&error))?;
+        let all = spec.parameters.into_iter();
+        Ok(all.map(|p| (p.about.name, p.value, p.about.unit)).collect())
+    }
+
+    /// Names of the states.
+    #[getter]
+    fn states(&self) -> PyResult<Vec<String>> {
+        let spec = self.0.valued().map_err(|error| error::of(&error))?;
+        Ok(spec.states.into_iter().map(|s| s.about.name).collect())
+    }
+
+    /// As bytes, to be pickled.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &bytes::of(&self.0.kept())?))
+    }
+
+    #[staticmethod]
+    fn from_bytes(content: &[u8]) -> PyResult<Self> {
+        Ok(Self(Arc::new(Inner::of_kept(bytes::read(content)?)?)))
+    }
+}
+
+impl Inner {
+    /// The model with its effects in it and all values that are known of it.
+    pub fn valued(&self) -> Result<ModelSpec, ctid::Error> {
+        let mut spec = self.file.mended(None)?.model.spec().clone();
+        for parameter in &mut spec.parameters {
+            let name = &parameter.about.name;
+            let value = self.file.known.get(name).or(self.values.get(name));
+            parameter.value = *value.unwrap_or(&parameter.value);
+        }
+        Ok(spec)
+    }
+}

@@ -1,0 +1,302 @@
+//! Output error methods: the stabilised one sample by sample, that of a closed loop over whole records.
+
+use ct_lti::Hold;
+use ct_rls::{ContinuousRls, RecursiveEstimator, Weights};
+use fcloe::{Controller, LoopRecord, Offsets, Orders, Problem, Settings, start};
+use nalgebra::{SMatrix, SVector};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use stabilized_oe::{BlockDiagonal, IoSample, StabilizedOe as Estimator, StateVariableFilters};
+
+use crate::error;
+
+/// One of the crate's estimators, whose orders are known when it is compiled.
+trait Oe: Send + Sync {
+    fn update(&mut self, u: f64, y: f64, dt: f64) -> f64;
+    fn theta(&self) -> Vec<f64>;
+    fn filter(&self) -> Vec<f64>;
+    fn model_output(&self) -> f64;
+    fn boxed(&self) -> Box<dyn Oe>;
+}
+
+type Own<const N: usize, const P: usize> =
+    Estimator<N, P, BlockDiagonal<N, P>, StateVariableFilters<N>>;
+
+impl<const N: usize, const P: usize> Oe for Own<N, P> {
+    fn update(&mut self, u: f64, y: f64, dt: f64) -> f64 {
+        RecursiveEstimator::update(self, &IoSample { u, y }, dt).epsilon
+    }
+
+    fn theta(&self) -> Vec<f64> {
+        RecursiveEstimator::theta(self).as_slice().to_vec()
+    }
+
+    fn filter(&self) -> Vec<f64> {
+        Estimator::filter(self).as_slice().to_vec()
+    }
+
+    fn model_output(&self) -> f64 {
+        Estimator::model_output(self)
+    }
+
+    fn boxed(&self) -> Box<dyn Oe> {
+        Box::new(self.clone())
+    }
+}
+
+/// What an estimator is made of.
+struct Start<'a> {
+    theta: &'a [f64],
+    filter: &'a [f64],
+    p_theta: f64,
+    p_filter: f64,
+    forgetting: f64,
+    bandwidth: f64,
+    hold: Hold,
+}
+
+fn own<const N: usize, const P: usize>(start: &Start) -> Result<Own<N, P>, stabilized_oe::Error> {
+    let weights = Weights::least_squares(start.forgetting)?;
+    let still = Weights::least_squares(0.0)?;
+    let theta = SVector::<f64, P>::from_column_slice(start.theta);
+    let filter = SVector::<f64, N>::from_column_slice(start.filter);
+    let theta = ContinuousRls::new(theta, SMatrix::identity() * start.p_theta, weights)?;
+    let filter = ContinuousRls::new(filter, SMatrix::identity() * start.p_filter, still)?;
+    let filters = StateVariableFilters::<N>::with_input(start.bandwidth, start.hold)?;
+    Own::<N, P>::new(BlockDiagonal::new(theta, filter), filters)
+}
+
+fn made<const N: usize, const P: usize>(
+    start: &Start,
+) -> Result<Box<dyn Oe>, stabilized_oe::Error> {
+    Ok(Box::new(own::<N, P>(start)?))
+}
+
+/// The last parameter is the offset.
+fn with_offset<const N: usize, const P: usize>(
+    start: &Start,
+) -> Result<Box<dyn Oe>, stabilized_oe::Error> {
+    Ok(Box::new(own::<N, P>(start)?.with_offset()))
+}
+
+/// Recursive output error in continuous time, `A(s) y = B(s) u`, with a filter of its error that is adapted beside it.
+///
+/// `order`: `(n, m)`, n from 1 to 3 and m below n. `theta0`: `a_1..a_n, b_0..b_m`, and an offset where there is one; A has to be stable.
+/// `forgetting`: rate in 1/s. `bandwidth`: of the filters that make the derivatives, in 1/s, 2 to 10 times that of the plant. `P0`, `P0_filter`: how
+/// little is known, on the diagonals. `filter0`: start of the filter's coefficients, without it those of A.
+///
+/// Raises `ctid.ModelError`.
+#[pyclass(module = "ctid._ctid")]
+pub struct StabilizedOe(Box<dyn Oe>);
+
+#[pymethods]
+impl StabilizedOe {
+    #[new]
+    #[pyo3(signature = (
+        order, theta0, forgetting, bandwidth, *, P0=1e3, P0_filter=1.0, filter0=None, hold="zero", offset=false
+    ))]
+    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    #[allow(non_snake_case, reason = "it is the name of the matrix")]
+    fn new(
+        order: (usize, usize),
+        theta0: Vec<f64>,
+        forgetting: f64,
+        bandwidth: f64,
+        P0: f64,
+        P0_filter: f64,
+        filter0: Option<Vec<f64>>,
+        hold: &str,
+        offset: bool,
+    ) -> PyResult<Self> {
+        let (n, m) = order;
+        let own = n + m + 1;
+        let count = own + usize::from(offset);
+        if !(1..=3).contains(&n) || m >= n {
+            return Err(error::of_model(format!(
+                "an order is (n, m) with n from 1 to 3 and m below n; it is ({n}, {m})"
+            )));
+        }
+        if theta0.len() != count {
+            return Err(error::of_model(format!(
+                "theta0 has {} numbers, and the order ({n}, {m}) has {count} parameters: a_1..a_n, b_0..b_m{}",
+                theta0.len(),
+                if offset { ", offset" } else { "" }
+            )));
+        }
+        let filter = filter0.unwrap_or_else(|| theta0[..n].to_vec());
+        if filter.len() != n {
+            return Err(error::of_model(format!(
+                "filter0 has {} numbers: it needs {n}",
+                filter.len()
+            )));
+        }
+        let hold = match crate::identify::hold_of(hold)? {
+            ct_signals::Hold::Zero => Hold::Zero,
+            ct_signals::Hold::First => Hold::First,
+        };
+        let start = Start {
+            theta: &theta0,
+            filter: &filter,
+            p_theta: P0,
+            p_filter: P0_filter,
+            forgetting,
+            bandwidth,
+            hold,
+        };
+        let made = match (n, m, offset) {
+            (1, _, false) => made::<1, 2>(&start),
+            (1, _, true) => with_offset::<1, 3>(&start),
+            (2, 0, false) => made::<2, 3>(&start),
+            (2, 0, true) => with_offset::<2, 4>(&start),
+            (2, _, false) => made::<2, 4>(&start),
+            (2, _, true) => with_offset::<2, 5>(&start),
+            (_, 0, false) => made::<3, 4>(&start),
+            (_, 0, true) => with_offset::<3, 5>(&start),
+            (_, 1, false) => made::<3, 5>(&start),
+            (_, 1, true) => with_offset::<3, 6>(&start),
+            (_, _, false) => made::<3, 6>(&start),
+            (_, _, true) => with_offset::<3, 7>(&start),
+        };
+        Ok(Self(made.map_err(error::of_model)?))
+    }
+
+    /// Takes in a sample, held over `dt` seconds. Returns the innovation before it.
+    fn update(&mut self, u: f64, y: f64, dt: f64) -> f64 {
+        self.0.update(u, y, dt)
+    }
+
+    /// Takes in many samples, one `dt` in s for all. Returns the estimates after each, a row for each sample.
+    fn run<'py>(
+        &mut self,
+        py: Python<'py>,
+        u: PyReadonlyArray1<'py, f64>,
+        y: PyReadonlyArray1<'py, f64>,
+        dt: f64,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (u, y) = (u.as_array().to_vec(), y.as_array().to_vec());
+        if u.len() != y.len() {
+            return Err(error::of_data(format!(
+                "u has {} values and y {}: give one of each for every sample",
+                u.len(),
+                y.len()
+            )));
+        }
+        let rows = u.len();
+        let own = &mut self.0;
+        let columns = own.theta().len();
+        let all = py.detach(|| {
+            let mut all = Vec::with_capacity(rows * columns);
+            for (u, y) in u.iter().zip(&y) {
+                own.update(*u, *y, dt);
+                all.extend(own.theta());
+            }
+            all
+        });
+        PyArray1::from_vec(py, all).reshape([rows, columns])
+    }
+
+    /// `a_1..a_n, b_0..b_m`, and the offset.
+    #[getter]
+    fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.0.theta())
+    }
+
+    /// Coefficients of the filter of the error.
+    #[getter]
+    fn filter<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.0.filter())
+    }
+
+    /// What the model gives now.
+    #[getter]
+    fn model_output(&self) -> f64 {
+        self.0.model_output()
+    }
+
+    fn __copy__(&self) -> Self {
+        Self(self.0.boxed())
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__()
+    }
+}
+
+/// Where zero of the signals is.
+fn offsets(levels: &str) -> PyResult<Offsets> {
+    match levels {
+        "estimated" => Ok(Offsets::Estimated),
+        "deviations" => Ok(Offsets::Deviations),
+        "mean" => Ok(Offsets::Means),
+        other => Err(error::of_model(format!(
+            "levels is \"estimated\", \"deviations\" or \"mean\", and not \"{other}\""
+        ))),
+    }
+}
+
+/// Closed-loop output error over a whole record, sampled evenly: the plant in the loop of a known controller, or without one in open loop.
+#[pyfunction]
+#[pyo3(signature = (dt, r, u, y, *, order, controller, levels, theta0, level))]
+#[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+pub fn fcloe_fit<'py>(
+    py: Python<'py>,
+    dt: f64,
+    r: Option<Vec<f64>>,
+    u: Option<Vec<f64>>,
+    y: Vec<f64>,
+    order: (usize, usize),
+    controller: Option<(Vec<f64>, Vec<f64>)>,
+    levels: &str,
+    theta0: Option<Vec<f64>>,
+    level: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let orders = Orders {
+        n: order.0,
+        m: order.1,
+    };
+    let controller = crate::identify::controller(controller)?;
+    let controller = controller.unwrap_or_else(Controller::none);
+    let offsets = offsets(levels)?;
+    let record = match (r, u) {
+        (Some(r), u) if !controller.is_open_loop() => LoopRecord::closed_loop(dt, r, u, y, offsets),
+        (_, Some(u)) => LoopRecord::open_loop(dt, u, y, offsets),
+        _ => {
+            return Err(error::of_data(
+                "a loop needs its reference r, and a plant without a controller its input u",
+            ));
+        }
+    };
+    let records = [record];
+    let found = py.detach(|| -> Result<_, fcloe::Error> {
+        let problem = Problem::new(&records, &controller, orders)?;
+        let start = match &theta0 {
+            Some(theta) => fcloe::PlantModel::from_theta(orders, theta)?,
+            None => {
+                let settings = start::PipelineSettings::default();
+                let all = start::pipeline(&records, &controller, orders, &settings)?;
+                all.into_iter().next().ok_or(fcloe::Error::NoRecord)?.plant
+            }
+        };
+        let fit = problem.fit(&start, &Settings::default())?;
+        let known = problem.uncertainty(&fit, None)?;
+        let halves = known.half_widths(level)?;
+        Ok((fit, known, halves))
+    });
+    let (fit, known, halves) = found.map_err(error::of_data)?;
+    let all = PyDict::new(py);
+    let theta = fit.plant.theta().to_vec();
+    let count = theta.len();
+    all.set_item("theta", PyArray1::from_vec(py, theta))?;
+    all.set_item("std_errors", PyArray1::from_slice(py, &known.std_errors))?;
+    all.set_item("half_widths", PyArray1::from_vec(py, halves))?;
+    let covariance = known.covariance.iter().take(count);
+    let covariance: Vec<Vec<f64>> = covariance.map(|row| row[..count].to_vec()).collect();
+    let covariance = PyArray2::from_vec2(py, &covariance).map_err(error::of_data)?;
+    all.set_item("cov", covariance)?;
+    all.set_item("residual_rms", fit.residual_rms())?;
+    all.set_item("stop", format!("{:?}", fit.stop))?;
+    all.set_item("successful", fit.stop.was_successful())?;
+    all.set_item("iterations", fit.iterations)?;
+    Ok(all)
+}

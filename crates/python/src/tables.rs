@@ -1,0 +1,16 @@
+//! Published tables, computed again.
+
+use ctid::tables::udink;
+use pyo3::prelude::*;
+
+use crate::work;
+
+/// What `ctid tables udink --json` writes, without its mark.
+#[pyfunction]
+pub fn udink_tables(py: Python<'_>, runs: usize, seed: u64) -> PyResult<String> {
+    let settings = udink::Settings::default();
+    let found = work::run(py, None, |_, _| {
+        udink::study(&settings, runs, seed, &|_| {})
+    })?;
+    crate::diagnosis::json(&found)
+}

@@ -1,0 +1,382 @@
+//! One of the plants: tanks, and what is linear like them.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use ct_signals::{ReadOptions, Reading};
+use ctid::effort::EffortLevel;
+use ctid::input;
+use ctid::model_file::{self, ModelFile};
+use ctid::simulate::{TimeColumn, of_plant};
+use missing_effect::{Diagnosis as Found, Options, Problem, compare, diagnose};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use serde::{Deserialize, Serialize};
+
+use crate::diagnosis::{Bin, bins, json};
+use crate::fit::{Covariance, simulation};
+use crate::frame::{Content, Frame};
+use crate::model::contents;
+use crate::{bytes, error, work};
+
+/// What stands for the model file in messages.
+const NAME: &str = "the model";
+
+/// A plant, from the text of a model file; it never changes.
+#[pyclass(frozen, module = "ctid._ctid")]
+pub struct Tank {
+    text: String,
+    file: ModelFile,
+}
+
+/// A plant that was fitted to frames, or diagnosed; it never changes.
+#[pyclass(frozen, module = "ctid._ctid")]
+pub struct TankFit {
+    text: String,
+    frames: Arc<Vec<Content>>,
+    /// So many of them are fitted.
+    fitted: usize,
+    problem: Problem,
+    found: Found,
+    known: Known,
+}
+
+/// How well the parameters are known: names, covariance, degrees of freedom.
+type Known = Option<(Vec<String>, Vec<Vec<f64>>, f64)>;
+
+fn parsed(text: &str) -> Result<ModelFile, ctid::Error> {
+    model_file::parse(NAME, text)
+}
+
+/// The records of a plant as the program checks them.
+fn problem(file: ModelFile, frames: &[Content], fitted: usize) -> Result<Problem, ctid::Error> {
+    let options = ReadOptions::from(file.hold);
+    let read = |frame: &Content| frame.record(&file.columns, &options);
+    let all = frames
+        .iter()
+        .map(read)
+        .collect::<Result<Vec<Reading>, _>>()?;
+    let mut records: Vec<_> = all.into_iter().map(|reading| reading.record).collect();
+    input::on_one_clock(&mut records);
+    let test = records.split_off(fitted);
+    input::problem(NAME, file, records, test)
+}
+
+/// Ctrl-C ends a search; of a fit the result is dropped.
+fn options(limit: std::time::Duration, stop: &AtomicBool) -> Options<'_> {
+    Options {
+        time_limit: Some(limit),
+        interrupt: Some(stop),
+        ..Options::default()
+    }
+}
+
+#[pymethods]
+impl Tank {
+    #[new]
+    fn new(text: String) -> PyResult<Self> {
+        let file = parsed(&text).map_err(|error| error::of(&error))?;
+        Ok(Self { text, file })
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    #[getter]
+    fn name(&self) -> &'static str {
+        self.file.plant.id()
+    }
+
+    #[getter]
+    fn effects(&self) -> Vec<&'static str> {
+        self.file.effects.iter().map(|e| e.effect.id).collect()
+    }
+
+    /// The columns of the inputs and of the outputs, where they are named.
+    #[getter]
+    fn columns(&self) -> (Vec<String>, Vec<String>) {
+        let columns = &self.file.columns;
+        (columns.inputs.clone(), columns.outputs.clone())
+    }
+
+    /// How many inputs and outputs it has.
+    #[getter]
+    fn signals(&self) -> (usize, usize) {
+        let inputs = match self.file.plant.joined() || self.file.known.disturbance.is_some() {
+            true => 2,
+            false => 1,
+        };
+        (inputs, self.file.known.outputs(self.file.plant).len())
+    }
+
+    #[pyo3(signature = (frames, progress=None))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        frames: Vec<Bound<'_, Frame>>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<TankFit> {
+        let frames = contents(&frames);
+        if frames.is_empty() {
+            return Err(error::of_data("no record: give a frame, or a list of them"));
+        }
+        let (text, file) = (self.text.clone(), self.file.clone());
+        work::run(py, progress.as_ref(), |stop, phases| {
+            phases.tell("fitting the model");
+            let fitted = frames.len();
+            let problem = problem(file, &frames, fitted)?;
+            let options = options(EffortLevel::Normal.limit(), stop);
+            let found = compare(&problem, &options)?;
+            let known = missing_effect::fitted(&problem, &options, |fitted| {
+                let known = fitted.uncertainty?;
+                let names = known
+                    .entries
+                    .iter()
+                    .map(|&i| fitted.setup.names()[i].clone());
+                let covariance = known.covariance.clone();
+                Some((names.collect(), covariance, known.freedom))
+            })?;
+            Ok(TankFit {
+                text,
+                frames: Arc::new(frames),
+                fitted,
+                problem,
+                found,
+                known,
+            })
+        })
+    }
+}
+
+#[pymethods]
+impl TankFit {
+    /// Name, value, standard error, unit and whether it is known, of each parameter and initial state of the last step.
+    #[getter]
+    fn estimates(&self) -> Vec<(String, f64, Option<f64>, String, bool)> {
+        let last = self.found.steps.last();
+        let all = last.into_iter().flat_map(|step| &step.parameters);
+        all.map(|p| (p.name.clone(), p.value, p.std_error, p.unit.clone(), false))
+            .collect()
+    }
+
+    /// Half the width of the interval that holds each of them with probability `level`; none of the initial states.
+    fn half_widths(&self, level: f64) -> PyResult<Vec<Option<f64>>> {
+        if !(level > 0.0 && level < 1.0) {
+            return Err(error::of_model(format!(
+                "a probability is within 0 and 1, and {level} is not"
+            )));
+        }
+        let quantile = self
+            .known
+            .as_ref()
+            .map(|(_, _, freedom)| ct_signals::student_half_width(level, *freedom));
+        let all = self.estimates().into_iter();
+        Ok(all.map(|e| Some(e.2? * quantile?)).collect())
+    }
+
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Covariance<'py>> {
+        let Some((names, matrix, _)) = &self.known else {
+            return Ok(None);
+        };
+        let matrix = PyArray2::from_vec2(py, matrix).map_err(error::of_data)?;
+        Ok(Some((names.clone(), matrix)))
+    }
+
+    /// As of a diagnosis of a model of the user's own.
+    #[getter]
+    #[allow(clippy::type_complexity)]
+    fn series<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Vec<(
+        String,
+        bool,
+        Bound<'py, PyArray1<f64>>,
+        Vec<(
+            String,
+            Bound<'py, PyArray1<f64>>,
+            Vec<Bound<'py, PyArray1<f64>>>,
+        )>,
+    )> {
+        let count = self.found.outputs.len().max(1);
+        let all = self.found.records.iter().enumerate();
+        let all = all.map(|(i, record)| {
+            let outputs = record.outputs.iter().enumerate().map(|(o, measured)| {
+                let steps = self.found.steps.iter();
+                let series = steps.filter_map(|step| step.simulated.get(i * count + o));
+                let series = series.map(|values| PyArray1::from_slice(py, values));
+                let name = self.found.outputs.get(o).cloned().unwrap_or_default();
+                (name, PyArray1::from_slice(py, measured), series.collect())
+            });
+            let time = PyArray1::from_slice(py, &record.time);
+            (
+                record.name.clone(),
+                record.held_out,
+                time,
+                outputs.collect(),
+            )
+        });
+        all.collect()
+    }
+
+    #[getter]
+    #[allow(clippy::type_complexity)]
+    fn outputs(&self) -> Vec<(String, (f64, f64), Vec<(&'static str, Bin)>, Vec<String>)> {
+        let last = self.found.steps.last();
+        let all = last.into_iter().flat_map(|step| &step.outputs);
+        all.map(|output| {
+            let tests = (output.tests.whiteness_p, output.tests.input_p);
+            let sentences = output.failures.sentences.clone();
+            (
+                output.name.clone(),
+                tests,
+                bins(&output.failures),
+                sentences,
+            )
+        })
+        .collect()
+    }
+
+    #[getter]
+    fn starts(&self) -> (usize, usize) {
+        let last = self.found.steps.last();
+        last.map_or((0, 0), |step| (step.starts, step.starts_agree))
+    }
+
+    #[getter]
+    fn bic(&self) -> f64 {
+        self.found.steps.last().map_or(f64::NAN, |step| step.bic)
+    }
+
+    #[getter]
+    fn sentences(&self) -> Vec<String> {
+        self.found.sentences.clone()
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The result as `ctid compare --json` or `ctid diagnose --json` writes it, without its mark.
+    fn json(&self) -> PyResult<String> {
+        json(&self.found)
+    }
+
+    fn html(&self, py: Python<'_>) -> String {
+        py.detach(|| ctid::report::html(&self.found))
+    }
+
+    /// The model on the inputs of a frame.
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        frame: &Bound<'py, Frame>,
+        first: usize,
+        level: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        if !(level > 0.0 && level < 1.0) || first == 0 {
+            return Err(error::of_model(format!(
+                "the interval is a probability within 0 and 1, and first a whole number above zero; they are {level} and {first}"
+            )));
+        }
+        let frame = &frame.get().0;
+        let found = work::run(py, None, |stop, _| {
+            let file = parsed(&self.text)?;
+            let options = ReadOptions::from(file.hold);
+            let reading = frame.inputs(&file.columns, &options)?;
+            let mut problem = self.problem.clone();
+            problem.test.clear();
+            let path = PathBuf::from(&reading.record.name);
+            let options = self::options(EffortLevel::Normal.limit(), stop);
+            of_plant(
+                problem,
+                (reading.record, TimeColumn::default(), &file.columns.outputs),
+                (Path::new(&path), first),
+                level,
+                &options,
+            )
+        })?;
+        simulation(py, &found)
+    }
+
+    /// The same fit with records that are held out, for their scores.
+    fn with_test(&self, py: Python<'_>, test: Vec<Bound<'_, Frame>>) -> PyResult<Self> {
+        let mut frames = self.frames[..self.fitted].to_vec();
+        frames.extend(contents(&test));
+        let known = self.known.clone();
+        work::run(py, None, |stop, _| {
+            let problem = problem(parsed(&self.text)?, &frames, self.fitted)?;
+            let found = compare(&problem, &options(EffortLevel::Normal.limit(), stop))?;
+            Ok(Self {
+                text: self.text.clone(),
+                frames: Arc::new(frames),
+                fitted: self.fitted,
+                problem,
+                found,
+                known,
+            })
+        })
+    }
+
+    /// What the plant is missing.
+    #[pyo3(signature = (test, *, effort, time_limit, max_effects, seed, progress=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    fn diagnose(
+        &self,
+        py: Python<'_>,
+        test: Vec<Bound<'_, Frame>>,
+        effort: &str,
+        time_limit: Option<f64>,
+        max_effects: Option<usize>,
+        seed: u64,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Self> {
+        let limit = crate::fit::limit(effort, time_limit, EffortLevel::limit)?;
+        let mut frames = self.frames[..self.fitted].to_vec();
+        frames.extend(contents(&test));
+        work::run(py, progress.as_ref(), |stop, phases| {
+            let problem = problem(parsed(&self.text)?, &frames, self.fitted)?;
+            let mut options = options(limit, stop);
+            options.seed = seed;
+            options.max_effects = max_effects.unwrap_or(options.max_effects);
+            let found = diagnose(&problem, &options, &|progress| phases.tell(progress.phase))?;
+            Ok(Self {
+                text: self.text.clone(),
+                frames: Arc::new(frames),
+                fitted: self.fitted,
+                problem,
+                found,
+                known: None,
+            })
+        })
+    }
+
+    /// What it is made of again: the text and the records, with the fit repeated.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let kept = KeptTank {
+            text: self.text.clone(),
+            frames: self.frames[..self.fitted].to_vec(),
+        };
+        Ok(PyBytes::new(py, &bytes::of(&kept)?))
+    }
+
+    #[staticmethod]
+    fn from_bytes(py: Python<'_>, content: &[u8]) -> PyResult<Self> {
+        let KeptTank { text, frames } = bytes::read(content)?;
+        let tank = Tank::new(text)?;
+        let frames = frames.into_iter().map(|frame| Bound::new(py, Frame(frame)));
+        tank.fit(py, frames.collect::<PyResult<_>>()?, None)
+    }
+}
+
+/// A fit of a plant as it is pickled.
+#[derive(Serialize, Deserialize)]
+struct KeptTank {
+    text: String,
+    frames: Vec<Content>,
+}

@@ -1,0 +1,87 @@
+//! Long work beside the interpreter: its lock is released, and Ctrl-C is heard.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+
+use crate::error;
+
+/// How often Ctrl-C is looked for.
+const LOOK: Duration = Duration::from_millis(50);
+/// As much as a main thread has: the texts of models are parsed by recursion.
+const STACK: usize = 8 << 20;
+
+/// What the work says.
+enum Said<T> {
+    Phase(&'static str),
+    Done(T),
+}
+
+/// Tells the caller which phase has begun.
+pub struct Phases<T>(Sender<Said<T>>);
+
+impl<T> Phases<T> {
+    pub fn tell(&self, phase: &'static str) {
+        // Who does not listen any more does not mind.
+        let _ = self.0.send(Said::Phase(phase));
+    }
+}
+
+/// Does work that may take long. It is handed a flag, which Ctrl-C sets: it ends soon then, and its result is dropped for a
+/// `KeyboardInterrupt`. `progress`: called with every phase that begins.
+pub fn run<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(&AtomicBool, &Phases<Result<T, ctid::Error>>) -> Result<T, ctid::Error> + Send,
+) -> PyResult<T> {
+    let stop = AtomicBool::new(false);
+    py.detach(|| {
+        thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            let stop = &stop;
+            let worker = thread::Builder::new().stack_size(STACK);
+            let worker = worker.spawn_scoped(scope, move || {
+                let phases = Phases(sender);
+                let found = work(stop, &phases);
+                let _ = phases.0.send(Said::Done(found));
+            });
+            let worker = worker.map_err(|error| {
+                error::Error::new_err(format!("no thread can be started: {error}"))
+            })?;
+            let mut raised = None;
+            let found = loop {
+                match receiver.recv_timeout(LOOK) {
+                    Ok(Said::Done(found)) => break Some(found),
+                    Ok(Said::Phase(phase)) => {
+                        let Some(progress) = progress.filter(|_| raised.is_none()) else {
+                            continue;
+                        };
+                        raised = Python::attach(|py| progress.call1(py, (phase,)).err());
+                    }
+                    Err(RecvTimeoutError::Timeout) if raised.is_none() => {
+                        raised = Python::attach(|py| py.check_signals().err());
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => break None,
+                }
+                if raised.is_some() {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            };
+            // A panic is a mistake of ctid's; it has said its line.
+            let ended = worker.join();
+            if let Some(raised) = raised {
+                return Err(raised);
+            }
+            match (ended, found) {
+                (Ok(()), Some(found)) => found.map_err(|error| error::of(&error)),
+                _ => Err(error::Error::new_err(
+                    "ctid has failed where it should not: please report the line above",
+                )),
+            }
+        })
+    })
+}

@@ -1,0 +1,213 @@
+"""Frames of measured data in, frames of results out. Without pandas: mappings of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from ._ctid import DataError, Frame
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array: TypeAlias = npt.NDArray[np.float64]
+#: One record: a frame whose index is the time, or a mapping of arrays with one that holds the time.
+Data: TypeAlias = "pd.DataFrame | Mapping[str, npt.ArrayLike]"
+#: One record or several experiments.
+Records: TypeAlias = "Data | Sequence[Data]"
+
+#: Keys of a mapping under which the time is looked for, in this order.
+TIMES = ("t", "time", "Time", "T")
+
+
+def pandas() -> Any:
+    """The module pandas, or None where it is not installed."""
+    try:
+        import pandas
+    except ImportError:
+        return None
+    return pandas
+
+
+def need_pandas() -> Any:
+    """The module pandas; where it is not installed, an error that says so."""
+    module = pandas()
+    if module is None:
+        raise ImportError("this result is a table: install pandas (pip install pandas)")
+    return module
+
+
+def is_frame(data: object) -> bool:
+    module = pandas()
+    return module is not None and isinstance(data, module.DataFrame)
+
+
+def as_list(data: Records | None, what: str = "data") -> list[Data]:
+    """Records as a list."""
+    if data is None:
+        return []
+    if isinstance(data, Mapping) or is_frame(data):
+        return [cast("Data", data)]
+    if isinstance(data, Sequence) and not isinstance(data, (str, bytes)):
+        return list(data)
+    raise DataError(
+        f"{what}: a {type(data).__name__} is no record: give a pandas frame whose index is the time, a mapping of arrays, or a list of them"
+    )
+
+
+def _numbers(name: str, column: str, values: Any) -> Array:
+    """One column as numbers, NaN where a reading is missing."""
+    dtype = getattr(values, "dtype", None)
+    kind = getattr(dtype, "kind", None)
+    if hasattr(values, "to_numpy") and kind in ("f", "i", "u", "b"):
+        # The nullable types of pandas too.
+        array = values.to_numpy(dtype=np.float64, na_value=np.nan)
+    else:
+        try:
+            array = np.asarray(values)
+        except ValueError as error:
+            raise DataError(f'{name}, column "{column}": {error}: give one number for each instant') from None
+    if array.ndim != 1:
+        shape = " by ".join(str(n) for n in array.shape) or "one number"
+        raise DataError(f'{name}, column "{column}": it is {shape}: give one number for each instant')
+    if array.dtype.kind not in "fiub":
+        for row, value in enumerate(array.tolist()):
+            if not isinstance(value, (int, float)):
+                raise DataError(
+                    f'{name}, row {row + 2}, column "{column}": {value!r} is no number: '
+                    f'make it one, pd.to_numeric(df["{column}"], errors="coerce") makes such readings missing'
+                )
+        raise DataError(
+            f'{name}, column "{column}": it holds objects of Python: convert it, df["{column}"].astype(float)'
+        )
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _time(name: str, header: str, values: Any) -> Array | list[str]:
+    """The time as numbers, or dates in words."""
+    module = pandas()
+    if module is not None and isinstance(values, module.MultiIndex):
+        raise DataError(f"{name}: the index has several levels: the time alone has to be the index, one frame for each experiment")
+    if module is not None and isinstance(values, module.DatetimeIndex) and values.tz is not None:
+        raise DataError(
+            f'{name}, column "{header}": its dates have the time zone {values.tz}: '
+            'take it off, df.index = df.index.tz_convert("UTC").tz_localize(None)'
+        )
+    if module is not None and isinstance(values, module.TimedeltaIndex):
+        raise DataError(
+            f'{name}, column "{header}": it holds durations: make seconds of them, df.index = df.index.total_seconds()'
+        )
+    if module is not None and isinstance(values, module.PeriodIndex):
+        raise DataError(f'{name}, column "{header}": it holds periods: make dates of them, df.index = df.index.to_timestamp()')
+    array = np.asarray(values)
+    if array.dtype.kind == "M":
+        if np.isnat(array).any():
+            row = int(np.flatnonzero(np.isnat(array))[0])
+            raise DataError(f'{name}, row {row + 2}, column "{header}": the date is missing: leave the row out')
+        return cast("list[str]", np.datetime_as_string(array.astype("datetime64[ns]"), unit="ns").tolist())
+    return _numbers(name, header, array)
+
+
+def _sorted(name: str, header: str, time: Array | list[str]) -> None:
+    """Refuses instants that do not rise, with the mend of a frame."""
+    values: Any = time if isinstance(time, np.ndarray) else np.array(time, dtype="datetime64[ns]")
+    if isinstance(time, np.ndarray) and np.isnan(time).any():
+        row = int(np.flatnonzero(np.isnan(time))[0])
+        raise DataError(f'{name}, row {row + 2}, column "{header}": the time is missing: leave the row out')
+    back = np.flatnonzero(values[1:] < values[:-1])
+    if back.size:
+        row = int(back[0]) + 1
+        raise DataError(
+            f'{name}, row {row + 2}, column "{header}": the time goes back from {values[row - 1]} to {values[row]}: '
+            "sort it, df.sort_index(), or give a list of frames where these are several experiments"
+        )
+
+
+def to_frame(data: Data, name: str, wanted: Sequence[str]) -> Frame:
+    """A record for the native part. Row 1 in messages is the header, as in a file. `wanted`: the columns that the model reads."""
+    columns: dict[str, Any]
+    if is_frame(data):
+        table = cast("pd.DataFrame", data)
+        if not table.columns.is_unique:
+            twice = [str(c) for c in table.columns[table.columns.duplicated()]]
+            raise DataError(f'{name}: there are two columns "{twice[0]}": name them apart')
+        if table.columns.nlevels > 1:
+            raise DataError(f"{name}: the columns have several levels: one name for each column is needed")
+        columns = {str(c): table[c] for c in table.columns}
+        header = "t" if table.index.name is None else str(table.index.name)
+        times: Any = table.index
+        if isinstance(times, need_pandas().RangeIndex) and table.index.name is None:
+            named = [c for c in columns if c.split(" ")[0].split("[")[0] in TIMES]
+            if named and not any(c in wanted for c in named):
+                raise DataError(
+                    f'{name}: the index counts rows, and there is a column "{named[0]}": make it the index, df.set_index("{named[0]}")'
+                )
+    else:
+        if not isinstance(data, Mapping):
+            as_list(cast("Records", data), name)
+        columns = {str(c): v for c, v in cast("Mapping[str, npt.ArrayLike]", data).items()}
+        found = [c for c in TIMES if c in columns and c not in wanted]
+        found += [c for c in columns if c.split(" [")[0] in TIMES and c not in wanted and c not in found]
+        if not found:
+            raise DataError(f'{name}: there is no time: give its instants under "t"')
+        header = found[0]
+        times = columns.pop(header)
+    time = _time(name, header, times)
+    _sorted(name, header, time)
+    headers: list[str] = []
+    values: list[Array] = []
+    for column, cells in columns.items():
+        if column == header:
+            continue
+        needed = column in wanted or column.split(" [")[0] in wanted
+        if needed:
+            headers.append(column)
+            values.append(_numbers(name, column, cells))
+    for column in wanted:
+        if column not in headers and not any(h.split(" [")[0] == column for h in headers):
+            has = ", ".join(columns) or "none"
+            raise DataError(f'{name}: there is no column "{column}"; it has {has}: say which it is, inputs=[...], outputs=[...]')
+    return Frame(name, header, time, headers, values)
+
+
+def to_frames(data: Records | None, name: str, wanted: Sequence[str]) -> list[Frame]:
+    """Records for the native part."""
+    records = as_list(data, name)
+    named = [name] if len(records) == 1 else [f"{name} {k + 1}" for k in range(len(records))]
+    return [to_frame(record, one, wanted) for record, one in zip(records, named, strict=True)]
+
+
+def index_of(data: Data, rows: int) -> Any:
+    """The index of a record, where it has so many rows; else None."""
+    if is_frame(data):
+        index = cast("pd.DataFrame", data).index
+        return index if len(index) == rows else None
+    columns = cast("Mapping[str, npt.ArrayLike]", data)
+    for key in columns:
+        if str(key).split(" [")[0] in TIMES:
+            times = np.asarray(columns[key])
+            return times if times.size == rows else None
+    return None
+
+
+def table(columns: Mapping[Any, Any], index: Any = None, name: str | None = None) -> Any:
+    """A frame where pandas is installed; else a dict of arrays."""
+    module = pandas()
+    if module is None:
+        return dict(columns)
+    frame = module.DataFrame(dict(columns), index=index)
+    if name is not None:
+        frame.index.name = name
+    return frame
+
+
+def series(names: Sequence[str], values: Sequence[float | None], name: str) -> Any:
+    """A series where pandas is installed; else a dict."""
+    numbers = [np.nan if value is None else float(value) for value in values]
+    module = pandas()
+    if module is None:
+        return dict(zip(names, numbers, strict=True))
+    return module.Series(numbers, index=list(names), name=name, dtype=np.float64)

@@ -1,0 +1,94 @@
+"""Results equal the program's to the last digit."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import pandas as pd
+from conftest import MODELS, RECORDS
+
+import ctid
+
+#: What depends on the clock, and the mark of a file.
+OTHER = ("seconds", "written_by", "effort")
+
+
+def results(program: str, folder: Path, *arguments: str | Path) -> dict[str, object]:
+    out = folder / "result.json"
+    subprocess.run([program, *map(str, arguments), "--json", str(out)], check=True, capture_output=True, cwd=folder)
+    found = json.loads(out.read_text(encoding="utf-8"))
+    out.unlink()
+    return {key: value for key, value in found.items() if key not in OTHER}
+
+
+def own(found: dict[str, object]) -> dict[str, object]:
+    """A result of the package, as the program's reads back."""
+    return {key: value for key, value in found.items() if key not in OTHER}
+
+
+def read(path: Path, index: str) -> pd.DataFrame:
+    return pd.read_csv(path, index_col=index, float_precision="round_trip")
+
+
+def test_a_model_of_ones_own(program, tmp_path):
+    toml, csv = MODELS / "heated-block.toml", MODELS / "heated-block.csv"
+    fit = ctid.Model.from_file(toml).fit(read(csv, "t [s]"))
+    assert own(fit.to_dict()) == results(program, tmp_path, "compare", csv, "--model", toml)
+    found = own(fit.diagnose(progress=False).to_dict())
+    assert found == results(program, tmp_path, "diagnose", csv, "--model", toml)
+    # The columns named in the call, in the place of the model file.
+    signals = {"inputs": {"u": "heater [%]", "Ta": "room [degC]"}, "outputs": {"y": "block [degC]"}}
+    again = ctid.Model.from_file(MODELS / "heated-block.mo").fit(read(csv, "t [s]"), known={"C": 52.0}, **signals)
+    assert own(again.to_dict()) == own(fit.to_dict())
+
+
+def test_several_outputs_and_the_mended_model(program, tmp_path):
+    toml, csv = MODELS / "coupled-heaters.toml", MODELS / "coupled-heaters.csv"
+    frame = pd.read_csv(csv, float_precision="round_trip")
+    frame = frame.set_index(frame.columns[0])
+    fit = ctid.Model.from_file(toml).fit(frame)
+    assert own(fit.to_dict()) == results(program, tmp_path, "compare", csv, "--model", toml)
+
+
+def test_an_effect_is_added_as_the_program_adds_it(program, tmp_path):
+    toml, csv = MODELS / "heated-block.toml", MODELS / "heated-block.csv"
+    for name in (toml, csv, MODELS / "heated-block.mo"):
+        (tmp_path / name.name).write_bytes(name.read_bytes())
+    d = ctid.Model.from_file(toml).fit(read(csv, "t [s]")).diagnose(progress=False)
+    subprocess.run([program, "diagnose", csv.name, "--model", toml.name, "--json", "d.json"], check=True, capture_output=True, cwd=tmp_path)
+    for effect in d.effects:
+        command = [program, "add", effect, "--model", toml.name, "--from", "d.json"]
+        subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
+    better = d.model.fit(read(csv, "t [s]"))
+    assert own(better.to_dict()) == results(program, tmp_path, "compare", csv.name, "--model", toml.name)
+
+
+def test_a_simulation(program, tmp_path):
+    toml, csv = MODELS / "heated-block.toml", MODELS / "heated-block.csv"
+    command = [program, "simulate", str(toml), str(csv), "--fit", str(csv), "--out", "y.csv"]
+    subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
+    by_program = pd.read_csv(tmp_path / "y.csv", float_precision="round_trip")
+    band = ctid.Model.from_file(toml).fit(read(csv, "t [s]")).simulate(read(csv, "t [s]"))
+    assert band["y", "mean"].tolist() == by_program.iloc[:, 1].tolist()
+    assert band["y", "lower"].tolist() == by_program.iloc[:, 2].tolist()
+    assert band["y", "upper"].tolist() == by_program.iloc[:, 3].tolist()
+
+
+def test_a_tank(program, tmp_path, tour, tour_test):
+    data = [RECORDS / "tour.csv", "--model", RECORDS / "tour.toml"]
+    fit = ctid.Model.tank("single-tank", known={"area": 154.0}).fit(tour, inputs=["u"], outputs=["y"])
+    assert own(fit.to_dict()) == results(program, tmp_path, "compare", *data)
+    found = own(fit.diagnose(test=tour_test, progress=False).to_dict())
+    assert found == results(program, tmp_path, "diagnose", *data, "--test", RECORDS / "tour-test.csv")
+
+
+def test_a_linear_model(program, tmp_path, tour):
+    for method in ("srivc", "fcloe", "stabilized-oe"):
+        found = own(ctid.identify(tour, method, (1, 0)).to_dict())
+        record = found.pop("record")
+        by_program = results(program, tmp_path, "identify", RECORDS / "tour.csv", "--method", method, "--order", "1,0")
+        assert record == "data" and by_program.pop("record") == "tour.csv"
+        # The record's name is all that differs.
+        assert json.loads(json.dumps(found).replace('"data"', '"tour.csv"')) == by_program

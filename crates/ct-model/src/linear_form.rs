@@ -237,7 +237,11 @@ mod tests {
         assert_eq!(form.c, [[8.0]]);
         assert_eq!(form.d, [[1.0]]);
         assert_eq!((form.state_offset[0], form.output_offset[0]), (-1.0, 19.0));
-        assert!(model.linear_about(&[f64::INFINITY], &[4.0], &[3.0], 0.0).is_none());
+        assert!(
+            model
+                .linear_about(&[f64::INFINITY], &[4.0], &[3.0], 0.0)
+                .is_none()
+        );
     }
 
     #[test]

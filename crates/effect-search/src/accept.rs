@@ -102,11 +102,11 @@ impl Context<'_> {
         noise: &Noise,
     ) -> Option<(usize, usize)> {
         const TELLING: f64 = 0.5;
-        let squares = |of: &Node| {
+        let whitened = |of: &Node| {
             let setup = self.setup(&of.model).ok()?;
             Some(noise.whiten(&estimation::residuals(&setup, &of.fit.x)?))
         };
-        let (with, lacks) = (squares(node)?, squares(lacking)?);
+        let (with, lacks) = (whitened(node)?, whitened(lacking)?);
         let scales = node.fit.scales();
         let falls = with
             .iter()
@@ -115,6 +115,7 @@ impl Context<'_> {
             .map(|(s, (with, lacks))| {
                 let scale = scales[s % scales.len()].powi(2);
                 let rows = with.iter().zip(lacks);
+                // A reading that is missing has no part in it.
                 rows.map(|(a, b)| (b * b - a * a) / scale)
                     .map(|fall| if fall.is_nan() { 0.0 } else { fall })
                     .collect::<Vec<f64>>()

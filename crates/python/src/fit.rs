@@ -112,6 +112,16 @@ pub fn limit(
     }
 }
 
+/// What a simulation is asked for: the probability of its band, and how many first readings its initial states are fitted to.
+pub fn check_simulation(level: f64, first: usize) -> PyResult<()> {
+    if level > 0.0 && level < 1.0 && first > 0 {
+        return Ok(());
+    }
+    Err(error::of_model(format!(
+        "the interval is a probability within 0 and 1, and first a whole number above zero; they are {level} and {first}"
+    )))
+}
+
 /// A simulation as Python takes it.
 pub fn simulation<'py>(py: Python<'py>, found: &Simulated) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
@@ -240,11 +250,7 @@ impl Fit {
         first: usize,
         level: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        if !(level > 0.0 && level < 1.0) || first == 0 {
-            return Err(error::of_model(format!(
-                "the interval is a probability within 0 and 1, and first a whole number above zero; they are {level} and {first}"
-            )));
-        }
+        check_simulation(level, first)?;
         let frame = &frame.get().0;
         let found = work::run(py, None, |_, _| {
             let file = self.fitted.model();

@@ -16,7 +16,7 @@ use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
 use crate::diagnosis::{Bin, bins, json};
-use crate::fit::{Covariance, simulation};
+use crate::fit::{Covariance, check_simulation, simulation};
 use crate::frame::{Content, Frame};
 use crate::model::contents;
 use crate::{bytes, error, work};
@@ -279,11 +279,7 @@ impl TankFit {
         first: usize,
         level: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        if !(level > 0.0 && level < 1.0) || first == 0 {
-            return Err(error::of_model(format!(
-                "the interval is a probability within 0 and 1, and first a whole number above zero; they are {level} and {first}"
-            )));
-        }
+        check_simulation(level, first)?;
         let frame = &frame.get().0;
         let found = work::run(py, None, |stop, _| {
             let file = parsed(&self.text)?;

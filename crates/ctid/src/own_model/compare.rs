@@ -93,19 +93,14 @@ impl FittedModel {
     /// Where a simulation is not finite, or the initial states of a held-out record cannot be fitted.
     pub fn compare(&self) -> Result<Comparison, Error> {
         let began = Instant::now();
-        let (file, records, fit) = (self.model(), self.records(), self.estimate());
-        let mut comparison = compared(self, file, records, fit)?;
+        let mut comparison = compared(self)?;
         comparison.seconds = began.elapsed().as_secs_f64();
         Ok(comparison)
     }
 }
 
-fn compared(
-    fitted: &FittedModel,
-    file: &OwnModelFile,
-    records: &Records,
-    fit: &Fit,
-) -> Result<Comparison, Error> {
+fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
+    let (file, records, fit) = (fitted.model(), fitted.records(), fitted.estimate());
     let spec = file.model.spec();
     let blame = |error: greybox::Error| blame(&records.records, &error);
     let options = fitted.options();

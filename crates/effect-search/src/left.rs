@@ -5,11 +5,13 @@ use ct_signals::residual_tests::prewhitened_input_test;
 use estimation::Fit;
 use greybox::ModelSetup;
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::Error;
 use crate::accept::NOISE_ORDER;
 use crate::node::{Context, Node};
 use crate::residual::{harmonics_p, instant, level_p, of_command, period, standardised};
+use crate::stationarity::stationary_p;
 
 /// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
 const NOT_NOISE: f64 = 1e-4;
@@ -47,6 +49,20 @@ pub enum Left {
     Level {
         /// The output.
         output: String,
+    },
+    /// It is not the same noise in all parts of a record: its spectrum changes.
+    Spectrum {
+        /// The output.
+        output: String,
+        /// The record.
+        record: String,
+    },
+    /// A smooth function of a signal, or of time, somewhere in the model lowers it by more than chance would.
+    Function {
+        /// The function, as the shapes of what is missing are named: `shape(T,u)`, `course(T)`.
+        effect: String,
+        /// What it depends on: a state or an input, or `time`.
+        variable: String,
     },
     /// It wanders so slowly that the records hold too few independent samples of it to be taken for noise.
     Slow {
@@ -143,9 +159,49 @@ impl Context<'_> {
             if level_p(&models[i], &white) < level {
                 return Ok(Some(Left::Level { output: name(i) }));
             }
+            if stationary_p(own.noise.of_series(i), residual) < level {
+                return Ok(Some(Left::Spectrum {
+                    output: name(i),
+                    record: record.name.clone(),
+                }));
+            }
+        }
+        if let Some(function) = self.function(node, own) {
+            return Ok(Some(function));
         }
         let slow = self.slow_output(&own.noise);
         Ok(slow.map(|o| Left::Slow { output: name(o) }))
+    }
+
+    /// The smooth function that lowers the deviance of a set by more than chance would, in the metric of the noise of its own residual: the
+    /// score test of each that the shape of what is missing may have.
+    fn function(&self, node: &Node, own: &Fit) -> Option<Left> {
+        /// Functions are alike, so that the count of all of them corrects for more than is looked at.
+        const CHANCE: f64 = 1e-3;
+        let with_shapes = Context {
+            candidates: [&self.candidates[..], &self.shapes[..]].concat(),
+            ..self.clone()
+        };
+        let of: Vec<usize> = (self.candidates.len()..with_shapes.candidates.len()).collect();
+        let node = Node {
+            fit: own.clone(),
+            ..node.clone()
+        };
+        let trials = with_shapes.trials_among(&node, &of, &own.noise);
+        let least = trials
+            .iter()
+            .filter_map(|trial| {
+                let candidate = &with_shapes.candidates[trial.candidate];
+                let freedom = candidate.fitted() as f64;
+                let p = ChiSquared::new(freedom).ok()?.sf(trial.fall.max(0.0));
+                Some((p, candidate))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let (p, candidate) = least?;
+        (p * (of.len() as f64) < CHANCE).then(|| Left::Function {
+            effect: candidate.id.clone(),
+            variable: self.variable_of(candidate).0,
+        })
     }
 
     /// Half the period of an effect of a set whose harmonics a residual holds \[unit of the model's time\], and which residual.

@@ -26,6 +26,7 @@ mod result;
 mod score;
 mod search;
 mod spectral_line;
+mod stationarity;
 mod unknown;
 
 pub use believed::{Believed, all_candidates, believed};

@@ -164,7 +164,7 @@ impl Context<'_> {
     }
 
     /// What a function depends on, and its unit.
-    fn variable_of(&self, candidate: &Candidate) -> (String, String) {
+    pub fn variable_of(&self, candidate: &Candidate) -> (String, String) {
         let spec: &ModelSpec = &self.problem.spec;
         let variable = match candidate.port {
             _ if candidate.follows_time() => None,

@@ -162,6 +162,12 @@ fn said_of(left: &Left) -> String {
         Left::Level { output } => {
             format!("the residual of {output} depends on what the model gives there")
         }
+        Left::Spectrum { output, record } => format!(
+            "the spectrum of the residual of {output} changes during {record}: one noise model does not explain it"
+        ),
+        Left::Function { effect, variable } => {
+            format!("a function of {variable} lowers the error by more than noise would: {effect}")
+        }
         Left::Slow { output } => format!(
             "the residual of {output} wanders too slowly to be taken for noise in records of this length"
         ),

@@ -6,7 +6,7 @@ use ct_model::effects::{OwnCandidate, OwnParameter};
 use ct_model::{Model, ModelSpec, Simulation};
 use ct_signals::{Channel, Record, noise};
 use effect_search::{
-    Believed, Diagnosis, Error, Kept, Options, Problem, Verdict, believed, diagnose,
+    Believed, Diagnosis, Error, Kept, Left, Options, Problem, Verdict, believed, diagnose,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -262,6 +262,25 @@ fn what_no_candidate_holds_is_not_called_noise() {
         diagnosis.groups
     );
     assert!(diagnosis.left.is_some());
+}
+
+/// The gain at one block rises and falls with the temperature of the other: effects of the catalogue imitate a part of it, and a noise model
+/// takes the rest.
+#[test]
+fn a_function_that_no_candidate_has_is_found_in_what_the_noise_model_takes_for_noise() {
+    for correlation in [0.0, 0.8] {
+        let truth = PAIR.replace("g*u", "g*u*(1 + 0.2*sin(0.12*T2))");
+        let diagnosis = found(&problem(PAIR, record(&truth, correlation, 0.5, 3)));
+        let told = (diagnosis.verdict, &diagnosis.groups, &diagnosis.left);
+        let Some(Left::Function { variable, .. }) = &diagnosis.left else {
+            panic!("{told:?}");
+        };
+        assert_eq!(variable, "T2");
+        assert!(
+            matches!(diagnosis.verdict, Verdict::Unexplained | Verdict::Partial),
+            "{told:?}"
+        );
+    }
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! The page of `ctid tables baysse`.
 
+use paper_tables::baysse::{Cell, Study, TRUTH};
+
 use super::figures::{self, Colour, Curve, Figure, Panel, Values};
 use super::page::{self, NOTICES, Page, figure, items, large, section};
 use super::tables::table;
 use super::text::{escape, significant};
-use crate::tables::baysse::{Cell, Study, TRUTH};
 use crate::tables::baysse_text::{band, figure_of, notes, of_the_paper, printed};
 
 /// The page as a complete HTML file. The same study gives the same bytes.

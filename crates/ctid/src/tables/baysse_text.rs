@@ -1,13 +1,13 @@
 //! What `ctid tables baysse` prints.
 
-use super::baysse::{Cell, Study};
+use paper_tables::baysse::{Cell, Study};
+
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 
-/// The whole of it.
-#[must_use]
-pub fn text(study: &Study, look: Look) -> String {
+/// The text, complete.
+pub(crate) fn text(study: &Study, look: Look) -> String {
     let title =
         "A. Baysse, F. J. Carrillo, A. Habbadi, identification in closed loop: tables I and II";
     let mut text = format!("{}\n", look.heading(title));

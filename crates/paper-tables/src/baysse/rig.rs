@@ -1,4 +1,4 @@
-//! Table II: the level of a tank of the DTS200 under a PI controller with a sensor filter, emulated.
+//! The rig of table II, emulated: the level of a tank of the DTS200 under a PI controller with a sensor filter.
 //!
 //! ```text
 //! S dH/dt = k max(u - u_dz, 0) - alpha sqrt(H)      the tank and its pump, which moves nothing below a dead zone
@@ -10,21 +10,16 @@
 //! the secant `H0/u0` instead: the paper's own 2.60.
 
 use ct_signals::{Channel, Record, excitation, noise};
-use fcloe::start::first_order::{self, Discretisation, Form};
 use fcloe::{
-    Controller, Coordinates, Damping, LoopRecord, LoopSimulator, Offsets, OperatingPoint,
-    PlantModel, Problem, Quantiser,
+    Controller, LoopRecord, LoopSimulator, Offsets, OperatingPoint, PlantModel, Quantiser,
 };
-use missing_effect::Progress;
 use plants::controller::Pi;
 use plants::{CATALOGUE, Command, Known, Placed, Plant, Scales, Simulator, Structure};
 use serde::Serialize;
 
-use super::super::paper_baysse::{Measured, RIG_INSTRUMENTS, RIG_NORMALISED, RIG_PLAIN};
-use super::{Asked, Cell, gain_and_time, iterations, mean, settings, variance};
 use crate::Error;
 
-/// The rig: what is printed, and what is not.
+/// The rig. What the paper does not print was chosen so that table II comes out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rig {
     /// Area of the tank, cm^2. Of the DTS200.
@@ -57,14 +52,8 @@ pub struct Rig {
 
 /// Sampling interval, s. Printed.
 const STEP: f64 = 1.0;
-/// Bandwidth of the state variable filters, 1/s. Printed.
-const LAMBDA: f64 = 0.5372;
-/// The first mu. Printed.
-const MU: f64 = 1.0;
 /// Bits of the converters. Printed.
-const CONVERTER: u32 = 16;
-/// Ki as it is printed, V/(cm s).
-const KI_PRINTED: f64 = 0.074;
+pub(super) const CONVERTER: u32 = 16;
 /// Ranges of sensor and pump: cm and V.
 const SENSOR: [f64; 2] = [0.0, 60.0];
 const PUMP: [f64; 2] = [0.0, 10.0];
@@ -89,52 +78,21 @@ impl Default for Rig {
     }
 }
 
-/// What the paper leaves open, and is assumed.
-pub(super) fn assumptions() -> Vec<String> {
-    let rig = Rig::default();
-    let [gain, tau] = rig.tangent();
-    vec![
-        format!(
-            "Table II: the rig is emulated. {} cm^2, outflow {} sqrt(H), pump {} cm^3/(V s), so that the tangent at {} cm is K = {gain:.2} cm/V, tau = {tau:.1} s.",
-            rig.area, rig.alpha, rig.pump_gain, rig.level
-        ),
-        format!(
-            "The pump moves nothing below {} V. The paper says nothing of it; with it the secant H0/u0 is {:.2}, which the paper prints for K by instruments, without it {:.2}.",
-            rig.dead_zone,
-            rig.level / rig.command_at_rest(),
-            rig.level / (rig.command_at_rest() - rig.dead_zone),
-        ),
-        format!(
-            "The controller runs every {} s on the filtered reading; {CONVERTER} bits; sensor noise of {} cm, white, drawn as often; the record holds the filtered reading.",
-            rig.period, rig.noise
-        ),
-        format!(
-            "r is one period of a PRBS of {} cells, ±{} cm about {} cm, each bit {} s, {} samples, from rest.",
-            rig.cells,
-            rig.amplitude,
-            rig.level,
-            rig.bit,
-            rig.samples()
-        ),
-        "Instruments get the raw levels, as the paper's can only have had; the output error gets r and y less the operating point, and knows the filter.".to_owned(),
-        "Variances are those a fit says of itself, taking its residual for white, mean over the runs; for instruments, whose own are not known, from run to run.".to_owned(),
-        "Gain, time constant, dead zone, noise and reference were chosen to match the table; what is not chosen is that instruments find the secant, and that the output error does not.".to_owned(),
-    ]
-}
-
 impl Rig {
-    /// K and tau at the operating point.
+    /// K (cm/V) and tau (s) at the operating point.
+    #[must_use]
     pub fn tangent(&self) -> [f64; 2] {
         let slope = 2.0 * self.level.sqrt() / self.alpha;
         [slope * self.pump_gain, slope * self.area]
     }
 
-    /// V.
-    fn command_at_rest(&self) -> f64 {
+    /// Command at the operating point, V.
+    pub(super) fn command_at_rest(&self) -> f64 {
         self.alpha * self.level.sqrt() / self.pump_gain + self.dead_zone
     }
 
-    fn samples(&self) -> usize {
+    /// Samples of a record: one period of the reference.
+    pub(super) fn samples(&self) -> usize {
         self.bit * ((1 << self.cells) - 1)
     }
 
@@ -163,10 +121,11 @@ impl Rig {
         })
     }
 
-    /// An experiment: raw levels, as the rig would record them.
+    /// Records an experiment: command u (V), filtered level y (cm) and set point r (cm), each second. The noise is that of run `run` of a study
+    /// with this seed.
     ///
     /// # Errors
-    /// Where the settings are no rig.
+    /// [`Error::Signals`], [`Error::Plant`] or [`Error::Loop`] for settings that no rig can have.
     pub fn record(&self, seed: u64, run: usize) -> Result<Record, Error> {
         let r = self.reference()?;
         let at_rest = self.command_at_rest();
@@ -203,7 +162,8 @@ impl Rig {
         })
     }
 
-    fn controller(&self, with_filter: bool) -> Result<Controller, Error> {
+    /// As the paper gives it to the fit, with the sensor's filter or without.
+    pub(super) fn controller(&self, with_filter: bool) -> Result<Controller, Error> {
         let pi = Controller::pi(self.kp, self.ki)?;
         Ok(if with_filter {
             pi.with_sensor_filter(self.filter)?
@@ -213,7 +173,7 @@ impl Rig {
     }
 
     /// Signals about the operating point.
-    fn centred(&self, record: &Record) -> Result<LoopRecord, Error> {
+    pub(super) fn centred(&self, record: &Record) -> Result<LoopRecord, Error> {
         let point = OperatingPoint {
             r: self.level,
             u: self.command_at_rest(),
@@ -222,8 +182,8 @@ impl Rig {
         Ok(LoopRecord::from_record(record, Offsets::Known(point))?)
     }
 
-    /// What the loop does with this plant in it, about the operating point.
-    fn simulated(&self, plant: &PlantModel, r: &[f64]) -> Result<Vec<f64>, Error> {
+    /// Output of the loop with this linear plant about the operating point, cm; `r`: the set point, cm.
+    pub(super) fn simulated(&self, plant: &PlantModel, r: &[f64]) -> Result<Vec<f64>, Error> {
         let controller = self.controller(true)?;
         let mut model = LoopSimulator::new(plant, &controller, ct_lti::Hold::Zero, STEP)?;
         let drive: Vec<f64> = r.iter().map(|r| r - self.level).collect();
@@ -232,229 +192,19 @@ impl Rig {
     }
 }
 
-/// Estimates of K and tau of all runs, in one order.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SecondTable {
-    /// The emulated rig.
-    pub rig: Rig,
-    /// K and tau of the tangent at the operating point.
-    pub tangent: [f64; 2],
-    /// Instruments on raw levels.
-    pub instruments: Vec<[f64; 2]>,
-    /// Closed-loop output error, iterated in theta.
-    pub plain: Fits,
-    /// The same, iterated in delta.
-    pub normalised: Fits,
-    /// With a model that does not know of the sensor's filter.
-    pub filter_ignored: Vec<[f64; 2]>,
-    /// With the controller as it is printed, in the rig and in the model; NaN (`null`) where no fit came to its end.
-    pub ki_as_printed: Vec<[f64; 2]>,
-    /// The paper's figure 3, for the first of the runs.
-    #[serde(skip)]
-    pub figure: Figure,
-    /// The first record: raw levels.
-    #[serde(skip)]
-    pub record: Record,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Fits of all runs.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Fits {
-    /// K and tau.
-    pub estimates: Vec<[f64; 2]>,
-    /// Their variances, as each fit says them.
-    pub variances: Vec<[f64; 2]>,
-    /// Iterations until no parameter changes by more than 1 %.
-    pub iterations: Vec<usize>,
-}
-
-/// Output measured and simulated.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Figure {
-    /// Time, s.
-    pub time: Vec<f64>,
-    /// Set point, cm.
-    pub reference: Vec<f64>,
-    /// Output, cm.
-    pub measured: Vec<f64>,
-    /// The loop with the plant that instruments give.
-    pub instruments: Vec<f64>,
-    /// The loop with the plant that the output error gives.
-    pub output_error: Vec<f64>,
-}
-
-/// One run.
-struct Run {
-    record: Record,
-    start: PlantModel,
-    /// In theta and in delta.
-    fits: [Estimate; 2],
-    filter_ignored: [f64; 2],
-    ki_as_printed: [f64; 2],
-}
-
-struct Estimate {
-    plant: PlantModel,
-    variance: [f64; 2],
-    iterations: usize,
-}
-
-/// What instruments give from raw levels.
-fn instruments(record: &Record) -> Result<PlantModel, Error> {
-    let rule = Discretisation::Euler;
-    let raw = LoopRecord::from_record(record, Offsets::Deviations)?;
-    let start = first_order::least_squares(&raw, LAMBDA, rule)?;
-    let form = Form::Standard;
-    Ok(first_order::instruments(&raw, LAMBDA, rule, &start, form)?)
-}
-
-/// K and tau by output error; NaN where the fit does not come to its end.
-fn fitted(rig: &Rig, record: &Record, with_filter: bool) -> Result<[f64; 2], Error> {
-    let (start, controller) = (instruments(record)?, rig.controller(with_filter)?);
-    // The wrong controller would be refused by its u.
-    let silent = LoopRecord {
-        u: None,
-        ..rig.centred(record)?
-    };
-    let fit = Problem::new(&[silent], &controller, start.orders())
-        .and_then(|problem| problem.fit(&start, &fcloe::Settings::default()));
-    Ok(match fit {
-        Ok(fit) if fit.stop.was_successful() => gain_and_time(&fit.plant),
-        _ => [f64::NAN; 2],
-    })
-}
-
-fn run(rig: &Rig, seed: u64, index: usize) -> Result<Run, Error> {
-    let record = rig.record(seed, index)?;
-    let start = instruments(&record)?;
-    let centred = rig.centred(&record)?;
-    let problem = Problem::new(&[centred], &rig.controller(true)?, start.orders())?;
-    let estimate = |coordinates| -> Result<Estimate, Error> {
-        let fit = problem.fit(&start, &settings(MU, Damping::Identity, coordinates))?;
-        // Those of a white residual, as the paper's will have been.
-        let errors = problem.uncertainty(&fit, None)?.white_std_errors;
-        let variance = match errors[..] {
-            [tau, gain] => [gain * gain, tau * tau],
-            _ => [f64::NAN; 2],
+    #[test]
+    fn the_loop_rests_at_its_operating_point() {
+        let quiet = Rig {
+            noise: 0.0,
+            amplitude: 1e-9,
+            ..Rig::default()
         };
-        Ok(Estimate {
-            variance,
-            iterations: iterations(&fit),
-            plant: fit.plant,
-        })
-    };
-    let fits = [estimate(Coordinates::Theta)?, estimate(Coordinates::Delta)?];
-    let printed = Rig {
-        ki: KI_PRINTED,
-        ..*rig
-    };
-    let other = printed.record(seed, index)?;
-    Ok(Run {
-        fits,
-        filter_ignored: fitted(rig, &record, false)?,
-        ki_as_printed: fitted(&printed, &other, true)?,
-        start,
-        record,
-    })
-}
-
-impl SecondTable {
-    pub(super) fn new(
-        runs: usize,
-        seed: u64,
-        progress: &(impl Fn(Progress) + Sync),
-    ) -> Result<Self, Error> {
-        let rig = Rig::default();
-        let phase = "table II, the emulated rig";
-        let runs = super::all(runs, phase, progress, |index| run(&rig, seed, index))?;
-        let fits = |which: usize| {
-            let fits = || runs.iter().map(|run| &run.fits[which]);
-            Fits {
-                estimates: fits().map(|fit| gain_and_time(&fit.plant)).collect(),
-                variances: fits().map(|fit| fit.variance).collect(),
-                iterations: fits().map(|fit| fit.iterations).collect(),
-            }
-        };
-        let figure = runs.first().map(|run| Figure::new(&rig, run));
-        Ok(Self {
-            tangent: rig.tangent(),
-            instruments: runs.iter().map(|run| gain_and_time(&run.start)).collect(),
-            plain: fits(0),
-            normalised: fits(1),
-            filter_ignored: runs.iter().map(|run| run.filter_ignored).collect(),
-            ki_as_printed: runs.iter().map(|run| run.ki_as_printed).collect(),
-            figure: figure.transpose()?.unwrap_or_default(),
-            record: rig.record(seed, 0)?,
-            rig,
-        })
-    }
-
-    /// The paper's columns, and what the filter and the printed controller do.
-    pub(super) fn cells(&self) -> Vec<Cell> {
-        let runs = &self.instruments;
-        let of_runs: [(&'static str, Statistic); 4] = [
-            ("K", |runs| mean(&of(0, runs))),
-            ("tau", |runs| mean(&of(1, runs))),
-            ("var K", |runs| variance(&of(0, runs))),
-            ("var tau", |runs| variance(&of(1, runs))),
-        ];
-        let [k, tau, ..] = of_runs;
-        let raw = [Some([2.55, 2.70]), Some([22.0, 26.0]), None, None];
-        let mut cells = Vec::new();
-        let mut push = |method, (of, statistic): (_, Statistic), paper, band, runs: &[[f64; 2]]| {
-            let asked = Asked {
-                table: 2,
-                method,
-                of,
-                paper,
-                band,
-            };
-            cells.push(Cell::new(asked, runs, statistic));
-        };
-        for ((statistic, paper), band) in of_runs.into_iter().zip(RIG_INSTRUMENTS).zip(raw) {
-            push("IV raw", statistic, paper, band, runs);
-        }
-        let bands = [[6.88, 7.02], [107.5, 109.8], [0.8e-4, 3e-4], [0.02, 0.09]].map(Some);
-        let columns: [(&'static str, &Fits, Measured); 2] = [
-            ("F-CLOE theta", &self.plain, RIG_PLAIN),
-            ("F-CLOE delta", &self.normalised, RIG_NORMALISED),
-        ];
-        for (method, fits, paper) in columns {
-            let (estimates, variances) = (&fits.estimates, &fits.variances);
-            push(method, k, paper[0], bands[0], estimates);
-            push(method, tau, paper[1], bands[1], estimates);
-            push(method, ("var K", k.1), paper[2], bands[2], variances);
-            push(method, ("var tau", tau.1), paper[3], bands[3], variances);
-        }
-        let above = Some([7.5, f64::INFINITY]);
-        push("filter ignored", k, None, above, &self.filter_ignored);
-        push("filter ignored", tau, None, None, &self.filter_ignored);
-        push("Ki = 0.074", k, None, None, &self.ki_as_printed);
-        push("Ki = 0.074", tau, None, None, &self.ki_as_printed);
-        cells
-    }
-}
-
-type Statistic = fn(&[[f64; 2]]) -> f64;
-
-/// K or tau of all runs that came to their end.
-fn of(which: usize, runs: &[[f64; 2]]) -> Vec<f64> {
-    let values = runs.iter().map(|run| run[which]);
-    values.filter(|value| value.is_finite()).collect()
-}
-
-impl Figure {
-    fn new(rig: &Rig, run: &Run) -> Result<Self, Error> {
-        let [_, fit] = &run.fits;
-        let record = &run.record;
-        let reference = record.references.first().map(|r| r.values.clone());
-        let reference = reference.unwrap_or_default();
-        Ok(Self {
-            time: record.time.clone(),
-            measured: record.outputs[0].values.clone(),
-            instruments: rig.simulated(&run.start, &reference)?,
-            output_error: rig.simulated(&fit.plant, &reference)?,
-            reference,
-        })
+        let record = quiet.record(1, 0).unwrap();
+        let moved = |signal: &Channel| signal.range().1 - signal.range().0;
+        assert!(moved(&record.outputs[0]) < 2e-3 && moved(&record.inputs[0]) < 2e-3);
     }
 }

@@ -1,70 +1,26 @@
-//! Published tables, computed again: what a paper prints beside what many runs of the same experiment give.
-//!
-//! A paper prints one run of one noise. It is consistent with a computation where its figures lie among those of many runs; that is all
-//! that can be said without its noise.
-
-pub mod baysse;
-pub mod baysse_text;
-mod gain_bounds;
-pub mod gains;
-pub mod paper_baysse;
-pub mod paper_udink;
-pub mod udink;
-pub mod udink_contrasts;
-pub mod udink_power;
-mod udink_run;
-pub mod udink_text;
+//! A printed figure beside the same figure of many runs: median, 5 to 95 % range, and whether the printed one lies inside.
 
 use serde::Serialize;
 use statrs::statistics::{Data, OrderStatistics};
 
-use crate::numbers;
+use crate::Printed;
 
-/// A figure as it is printed: value and decimals, so that its rounding is known.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Printed {
-    /// The figure.
-    pub value: f64,
-    /// The rounding it may hide, either way.
-    pub rounding: f64,
-    /// Decimals.
-    pub decimals: usize,
-}
+/// Share of cells inside from which on tables are called consistent: nine of ten are expected, less what chance takes.
+const CONSISTENT: f64 = 0.85;
 
-impl Printed {
-    /// A figure with so many decimals.
-    pub(crate) const fn new(value: f64, decimals: usize) -> Self {
-        const HALF_DIGIT: [f64; 7] = [0.5, 0.05, 0.005, 5e-4, 5e-5, 5e-6, 5e-7];
-        Self {
-            value,
-            rounding: HALF_DIGIT[decimals],
-            decimals,
-        }
-    }
-
-    /// The difference of two figures; both may be rounded.
-    pub(crate) fn minus(self, other: Self) -> Self {
-        Self {
-            value: self.value - other.value,
-            rounding: self.rounding + other.rounding,
-            decimals: self.decimals.max(other.decimals),
-        }
-    }
-}
-
-/// One figure of a table against many runs.
+/// One figure of a table beside many runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cell {
-    /// Number of the table in the paper.
+    /// Number of the table in the paper, 1 to 4.
     pub table: usize,
-    /// What it is of.
+    /// What it is of, as in [`CELLS`](super::printed::CELLS).
     pub cell: &'static str,
-    /// The figure that is printed, or a difference of such.
+    /// The printed figure, or a difference of two; its unit is that of the cell: 1 for K, s for tau, c and the criterion.
     pub paper: f64,
-    /// Decimals of it.
+    /// Decimals of it, 0 to 6.
     #[serde(skip)]
     pub decimals: usize,
-    /// Median of the runs; NaN (`null`) where none came to its end.
+    /// Median of the runs; NaN (`null`) where all failed.
     pub median: f64,
     /// 5 % of the runs lie below.
     pub q05: f64,
@@ -77,7 +33,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// A printed figure against `runs`; those that are not finite count as lost, and lie nowhere.
+    /// A printed figure beside `runs`; values that are not finite are those of runs that failed, and are left out.
     pub(crate) fn new(
         table: usize,
         cell: &'static str,
@@ -104,31 +60,18 @@ impl Cell {
     }
 }
 
-impl Cell {
-    /// The 5 to 95 % range, both ends with the decimals that its width deserves: of 20 to 200 last digits.
-    pub(crate) fn range(&self, between: &str) -> String {
-        let width = self.q95 - self.q05;
-        if !width.is_finite() {
-            return "-".to_owned();
-        }
-        let places = (1 - numbers::exponent(0.5 * width)).max(0);
-        let [low, high] = [self.q05, self.q95].map(|end| numbers::decimals(end, places));
-        format!("{low}{between}{high}")
-    }
-}
-
-/// Median of what is finite, NaN of nothing.
+/// Median of the finite values; NaN where there is none.
 pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
     quantile(values, 0.5)
 }
 
-/// What this share of the finite values lies below.
+/// The value below which this share of the finite values lies; NaN where there is none.
 pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     Data::new(finite).quantile(share)
 }
 
-/// All figures of a paper against many runs.
+/// All figures of tables 1 to 4 beside many runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// The figures, in the paper's order.
@@ -137,34 +80,24 @@ pub struct Comparison {
     pub inside: usize,
     /// How many there are.
     pub of: usize,
-    /// Those that do not, and why.
+    /// Those that lie outside, and why.
     pub outside: Vec<Outside>,
-    /// Runs that did not come to their end, of all tables.
+    /// Runs that failed, of all tables.
     pub failed: usize,
 }
-
-/// Share of cells inside from which on tables are called consistent.
-const CONSISTENT: f64 = 0.85;
 
 /// A figure that lies outside.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outside {
-    /// Number of the table in the paper.
+    /// Number of the table in the paper, 1 to 4.
     pub table: usize,
-    /// What it is of.
+    /// What it is of, as in [`CELLS`](super::printed::CELLS).
     pub cell: &'static str,
     /// What is known of the reason.
     pub why: &'static str,
 }
 
 impl Comparison {
-    /// Whether so many lie inside as can be expected of figures of the same process: nine of ten, less
-    /// what chance takes; and no run was lost, as none of the paper's was.
-    #[must_use]
-    pub fn consistent(&self) -> bool {
-        self.failed == 0 && self.inside as f64 >= CONSISTENT * self.of as f64
-    }
-
     pub(crate) fn new(
         tables: Vec<Cell>,
         failed: usize,
@@ -186,6 +119,13 @@ impl Comparison {
             tables,
             failed,
         }
+    }
+
+    /// Whether as many lie inside as can be expected of figures of the same process, 85 % of them, and no run failed, as none of the
+    /// paper's did.
+    #[must_use]
+    pub fn consistent(&self) -> bool {
+        self.failed == 0 && self.inside as f64 >= CONSISTENT * self.of as f64
     }
 }
 
@@ -209,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn lost_runs_lie_nowhere_and_no_run_is_no_agreement() {
+    fn failed_runs_are_left_out_and_no_run_is_no_agreement() {
         let some = [1.0, f64::NAN, 2.0, 3.0, f64::INFINITY];
         assert_eq!(
             Cell::new(1, "x", Printed::new(2.0, 1), some.into_iter()).median,
@@ -220,19 +160,12 @@ mod tests {
     }
 
     #[test]
-    fn lost_runs_are_not_consistent() {
+    fn failed_runs_are_not_consistent() {
         let cells = || {
             let runs = (0..=100).map(f64::from);
             vec![Cell::new(1, "x", Printed::new(50.0, 0), runs)]
         };
         assert!(Comparison::new(cells(), 0, |_| "").consistent());
         assert!(!Comparison::new(cells(), 1, |_| "").consistent());
-    }
-
-    #[test]
-    fn a_difference_has_both_roundings() {
-        let difference = Printed::new(371.18, 2).minus(Printed::new(369.8, 1));
-        assert!((difference.value - 1.38).abs() < 1e-9);
-        assert!((difference.rounding - 0.055).abs() < 1e-12);
     }
 }

@@ -1,61 +1,68 @@
-//! Tables 1 to 4 of A. J. Udink ten Cate, WP-85-54, IIASA, 1985, with many noises, and what goes with them: table 1 with larger P(0), the
-//! three gains, and figure 1.
+//! Tables 1 to 4 of A. J. Udink ten Cate, WP-85-54, IIASA, 1985, with many noises, and what goes with them: figure 1, differences between
+//! tables, other settings, constant gains, larger `P(0)`, and three gains on an experiment of second order.
 //!
-//! Reference: [`paper_udink`](super::paper_udink).
+//! The experiment is in [`Settings`], one run of it in [`run`]; what the paper prints is in [`printed`].
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+mod cell;
+mod constant_gains;
+mod contrasts;
+mod experiment;
+pub mod gains;
+mod larger_p;
+mod other_settings;
+pub mod printed;
+mod run;
 
 use ct_constrained::Bounds;
-use missing_effect::Progress;
-use rayon::prelude::*;
 use serde::Serialize;
 use stabilized_oe::check_filter_bounds;
 
-use super::gains::{self, Gains};
-use super::paper_udink::{CELLS, TABLES};
-use super::udink_contrasts::{Contrast, contrasts};
-use super::udink_power::{Changed, ConstantGain, constant_gains, power};
-use super::udink_run::run_from;
-pub use super::udink_run::{Cells, END, Rule, Settings, run};
-use super::{Cell, Comparison};
-use crate::Error;
+pub use cell::{Cell, Comparison, Outside};
+pub use constant_gains::ConstantGain;
+pub use contrasts::Contrast;
+pub use experiment::{END, Rule, Settings};
+pub use larger_p::LargerP;
+pub use other_settings::Changed;
+pub use run::{Cells, run};
 
-/// Factors of P(0) in the table of what larger ones do.
-const FACTORS: [f64; 12] = [
-    1.0, 10.0, 15.0, 18.0, 20.0, 30.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e8,
-];
+use self::cell::{median, quantile};
+use self::gains::Gains;
+use self::printed::{CELLS, TABLES};
+use self::run::run_from;
+use crate::progress::in_parallel;
+use crate::{Error, Progress, Stage};
 
-/// Runs for each factor, at most.
-const FACTOR_RUNS: usize = 50;
+/// The fewest runs of which a 5 to 95 % range can be told: of fewer, none lies beyond 5 %.
+pub const FEWEST: usize = 20;
 
-/// What `ctid tables udink` finds.
+/// Tables 1 to 4 with many noises, and what goes with them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Study {
     /// Version of this record.
     pub schema: u32,
     /// `udink`
     pub paper: &'static str,
-    /// Noises; the same ones in every table and for both rules.
+    /// Noises, 20 or more; the same ones in every table and for both rules.
     pub runs: usize,
     /// What they were drawn from.
     pub seed: u64,
     /// The experiment.
     pub settings: Settings,
-    /// What the paper leaves open, in words.
+    /// What the paper leaves open and is assumed, a sentence each.
     pub assumptions: Vec<String>,
-    /// Whether C^/A0 - gamma/(2 c) is strictly positive real inside the paper's bounds on c^, in a sentence.
+    /// Whether `C^/A0 - gamma/(2 c)` is strictly positive real inside the paper's bounds on c^, in a sentence.
     pub filter_bounds: String,
-    /// With Euler's rule.
+    /// The tables by Euler's rule.
     pub euler: Comparison,
-    /// With the exact step.
+    /// The tables by the exact step.
     pub exact: Comparison,
-    /// Differences between tables by Euler's rule.
+    /// Differences between tables, by Euler's rule.
     pub contrasts: Vec<Contrast>,
-    /// The tables with other settings.
+    /// The tables with one setting changed, by Euler's rule.
     pub power: Vec<Changed>,
     /// Constant gains, a slow one among them.
     pub constant_gains: Vec<ConstantGain>,
-    /// Table 1 with larger P(0).
+    /// Table 1 with larger `P(0)`.
     pub larger_p: Vec<LargerP>,
     /// The three gains on one experiment of second order.
     pub gains: Gains,
@@ -64,59 +71,25 @@ pub struct Study {
     pub figure: Figure,
 }
 
+/// What can be said of the paper's tables: never that they are identical.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// By both rules the cells are consistent with the paper's, one by one.
+    Consistent,
+    /// By Euler's rule they are, by the exact step they are not.
+    ConsistentByEulerOnly,
+    /// By Euler's rule, which the paper used, they are not.
+    NotConsistent,
+}
+
 impl Study {
-    /// What can be said of the paper's tables: never that they are identical.
+    /// What can be said of the paper's tables, cell by cell.
     #[must_use]
-    pub fn verdict(&self) -> &'static str {
-        if self.euler.consistent() && self.exact.consistent() {
-            "cell by cell statistically consistent"
-        } else if self.euler.consistent() {
-            "cell by cell statistically consistent with Euler's rule only"
-        } else {
-            "not consistent"
-        }
-    }
-
-    /// What the verdict on the cells leaves out.
-    #[must_use]
-    pub fn beside_the_verdict(&self) -> String {
-        let sentence = |contrast: &Contrast| {
-            let [first, second] = contrast.between;
-            format!(
-                "Tables {first} and {second} have one noise, so that their differences say more than the cells: {} of {} are inside. The \
-                 assumed experiment is not the paper's in every respect.",
-                contrast.inside,
-                contrast.cells.len()
-            )
-        };
-        self.contrasts.first().map(sentence).unwrap_or_default()
-    }
-}
-
-/// Table 1 with P(0) times a factor.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct LargerP {
-    /// The factor.
-    pub factor: f64,
-    /// Runs.
-    pub runs: usize,
-    /// Runs that did not come to their end with Euler's rule.
-    pub euler_failed: usize,
-    /// The same with the exact step.
-    pub exact_failed: usize,
-    /// Median of the criterion at 1000 s with Euler's rule, of the runs that came to their end.
-    pub euler_criterion: f64,
-    /// The same with the exact step.
-    pub exact_criterion: f64,
-}
-
-impl LargerP {
-    /// The factor as a person writes it.
-    pub(crate) fn factor_name(&self) -> String {
-        if self.factor < 1e6 {
-            format!("{}", self.factor)
-        } else {
-            format!("{:e}", self.factor)
+    pub fn verdict(&self) -> Verdict {
+        match (self.euler.consistent(), self.exact.consistent()) {
+            (true, true) => Verdict::Consistent,
+            (true, false) => Verdict::ConsistentByEulerOnly,
+            (false, _) => Verdict::NotConsistent,
         }
     }
 }
@@ -134,16 +107,16 @@ pub struct Figure {
     pub time_constant: Vec<f64>,
     /// c^, s
     pub filter: Vec<f64>,
-    /// The criterion, s.
+    /// The criterion (6.2), s.
     pub criterion: Vec<f64>,
 }
 
-/// Runs the tables with `runs` noises drawn from `seed`, and what goes with them.
+/// Runs the tables with `runs` noises, 20 or more, drawn from `seed`, and what goes with them.
 ///
 /// The same seed gives the same numbers, whatever the number of threads.
 ///
 /// # Errors
-/// [`Error::Usage`] for fewer than 20 runs, of which no 5 % could be told; [`Error::Estimator`] where the settings make no sense.
+/// [`Error::TooFewRunsForRange`], [`Error::Span`]; [`Error::Estimator`] where the settings make no sense.
 pub fn study(
     settings: &Settings,
     runs: usize,
@@ -151,24 +124,14 @@ pub fn study(
     progress: &(impl Fn(Progress) + Sync),
 ) -> Result<Study, Error> {
     if runs < FEWEST {
-        return Err(Error::Usage(format!(
-            "--runs is {runs}, but the 5 to 95 % range needs {FEWEST} or more; 200 is usual"
-        )));
+        return Err(Error::TooFewRunsForRange {
+            runs,
+            fewest: FEWEST,
+        });
     }
-    let done = AtomicUsize::new(0);
-    let results: Vec<[Tables; 2]> = (0..runs)
-        .into_par_iter()
-        .map(|run| {
-            let result = one_noise(settings, &settings.noise(seed, run));
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress(Progress {
-                phase: "running tables 1 to 4",
-                done,
-                total: runs,
-            });
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let results = in_parallel(runs, Stage::UdinkTables, progress, |run| {
+        with_one_noise(settings, &settings.noise(seed, run))
+    })?;
     let [by_euler, by_exact] = [0, 1].map(|rule| {
         results
             .iter()
@@ -185,22 +148,20 @@ pub fn study(
         filter_bounds: filter_bounds(settings)?,
         euler: comparison(&by_euler, Rule::Euler),
         exact: comparison(&by_exact, Rule::Exact),
-        contrasts: contrasts(&by_euler),
-        power: power(settings, runs, seed, progress)?,
-        constant_gains: constant_gains(settings, runs, seed)?,
-        larger_p: larger_p(settings, runs.min(FACTOR_RUNS), seed, progress)?,
+        contrasts: contrasts::contrasts(&by_euler),
+        power: other_settings::with_other_settings(settings, runs, seed, progress)?,
+        constant_gains: constant_gains::constant_gains(settings, runs, seed)?,
+        larger_p: larger_p::larger_p(settings, runs, seed, progress)?,
         gains: gains::compare(seed, progress)?,
         figure: figure(settings, seed)?,
     })
 }
 
-/// Below that, no run lies beyond 5 %.
-pub const FEWEST: usize = 20;
-
-pub(super) type Tables = [Option<Cells>; TABLES.len()];
+/// The cells of each table; `None` where its run failed.
+type Tables = [Option<Cells>; TABLES.len()];
 
 /// All tables by both rules with one noise.
-fn one_noise(settings: &Settings, noise: &[f64]) -> Result<[Tables; 2], Error> {
+fn with_one_noise(settings: &Settings, noise: &[f64]) -> Result<[Tables; 2], Error> {
     let mut result = [[None; TABLES.len()]; 2];
     for (rule, tables) in Rule::ALL.into_iter().zip(&mut result) {
         let level = settings.noise_level(rule);
@@ -214,12 +175,12 @@ fn one_noise(settings: &Settings, noise: &[f64]) -> Result<[Tables; 2], Error> {
 /// Of the paper's bounds on c^, for plants with half to twice the tank's time constant and the least-squares gain.
 fn filter_bounds(settings: &Settings) -> Result<String, Error> {
     let (limit, tau) = (settings.filter_limit, settings.time_constant);
-    let bounds = |low, high| Bounds::new([low], [high]).map_err(stabilized_oe::Error::from);
-    let plausible = bounds(0.5 * tau, 2.0 * tau)?;
-    Ok(check_filter_bounds(&bounds(-limit, limit)?, &plausible, 0.5)?.to_string())
+    let plausible = Bounds::new([0.5 * tau], [2.0 * tau])?;
+    let bounds = Bounds::new([-limit], [limit])?;
+    Ok(check_filter_bounds(&bounds, &plausible, 0.5)?.to_string())
 }
 
-pub(super) fn comparison(runs: &[&Tables], rule: Rule) -> Comparison {
+fn comparison(runs: &[&Tables], rule: Rule) -> Comparison {
     let mut cells = Vec::new();
     for (index, table) in TABLES.iter().enumerate() {
         for (place, printed) in table.cells().into_iter().enumerate() {
@@ -232,7 +193,7 @@ pub(super) fn comparison(runs: &[&Tables], rule: Rule) -> Comparison {
     let failed = runs
         .iter()
         .flat_map(|run| run.iter())
-        .filter(|c| c.is_none());
+        .filter(|cells| cells.is_none());
     Comparison::new(cells, failed.count(), |cell| why(cell, rule))
 }
 
@@ -257,55 +218,6 @@ fn why(cell: &Cell, rule: Rule) -> &'static str {
         }
         _ => "not known; one cell in ten lies outside by chance",
     }
-}
-
-/// What larger P(0) do in table 1.
-fn larger_p(
-    settings: &Settings,
-    runs: usize,
-    seed: u64,
-    progress: &(impl Fn(Progress) + Sync),
-) -> Result<Vec<LargerP>, Error> {
-    let [table, ..] = &TABLES;
-    let place = CELLS.iter().position(|name| *name == "E1000");
-    let total = FACTORS.len() * runs;
-    let done = AtomicUsize::new(0);
-    let levels = Rule::ALL.map(|rule| settings.noise_level(rule));
-    let criteria: Vec<[Option<f64>; 2]> = (0..total)
-        .into_par_iter()
-        .map(|index| {
-            let factor = FACTORS[index / runs];
-            let noise = settings.noise(seed, index % runs);
-            let mut criterion = [None; 2];
-            for ((rule, level), criterion) in Rule::ALL.iter().zip(levels).zip(&mut criterion) {
-                let cells = run_from(settings, table, *rule, factor, (level, &noise), |_| {})?;
-                *criterion = cells.zip(place).map(|(cells, place)| cells[place]);
-            }
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress(Progress {
-                phase: "running table 1 with larger P(0)",
-                done,
-                total,
-            });
-            Ok(criterion)
-        })
-        .collect::<Result<_, Error>>()?;
-    Ok(FACTORS
-        .iter()
-        .zip(criteria.chunks(runs))
-        .map(|(&factor, runs)| {
-            let of = |rule: usize| runs.iter().filter_map(move |run| run[rule]);
-            let failed = |rule| runs.len() - of(rule).count();
-            LargerP {
-                factor,
-                runs: runs.len(),
-                euler_failed: failed(0),
-                exact_failed: failed(1),
-                euler_criterion: super::median(of(0)),
-                exact_criterion: super::median(of(1)),
-            }
-        })
-        .collect())
 }
 
 fn figure(settings: &Settings, seed: u64) -> Result<Figure, Error> {

@@ -77,12 +77,12 @@ fn of_rule(cell: &Cell, look: Look) -> [String; 2] {
     [figure(cell.median), sentences::range(cell, " .. ") + &mark]
 }
 
-/// As the paper prints it.
+/// The printed figure with the decimals of the paper.
 fn printed(cell: &Cell) -> String {
     format!("{:.*}", cell.decimals, cell.paper)
 }
 
-/// Three digits, and a fourth from 100 on.
+/// A number with three digits, four from 100 on.
 fn figure(value: f64) -> String {
     numbers::significant(value, if value.abs() >= 100.0 { 4 } else { 3 })
 }

@@ -72,7 +72,6 @@ pub(super) fn contrasts(runs: &[&Tables]) -> Vec<Contrast> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Cells;
     use super::*;
 
     #[test]

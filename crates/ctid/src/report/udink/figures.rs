@@ -1,11 +1,11 @@
 //! The figures on the page of `ctid tables udink`.
 
-use paper_tables::udink::gains::{Gains, Kind, Limits, TRUTH};
+use paper_tables::udink::gains::{GainKind, Gains, Limits, TRUTH};
 use paper_tables::udink::{Cell, Comparison, Rule, Study};
 
 use super::super::figures::{Colour, Curve, Figure, Panel, Values};
 
-/// All of them, in the page's order.
+/// All figures, in the order of the page.
 pub(super) fn all_figures(study: &Study) -> Vec<Figure> {
     let mut all = vec![responses_figure(study)];
     all.extend(
@@ -97,11 +97,11 @@ fn cells_figure(study: &Study, number: usize) -> Figure {
 }
 
 /// A gain's colour and dash, the same in both figures.
-fn look(kind: Kind) -> (Colour, &'static str) {
+fn look(kind: GainKind) -> (Colour, &'static str) {
     match kind {
-        Kind::BlockDiagonal => (Colour::Of(0), "solid"),
-        Kind::Full => (Colour::Of(1), "dash"),
-        Kind::Constant => (Colour::Of(2), "dot"),
+        GainKind::BlockDiagonal => (Colour::Of(0), "solid"),
+        GainKind::Full => (Colour::Of(1), "dash"),
+        GainKind::Constant => (Colour::Of(2), "dot"),
     }
 }
 
@@ -127,7 +127,7 @@ fn counterexample_figure(gains: &Gains) -> Figure {
     Figure::over_time("counterexample", 660, panels, curves)
 }
 
-/// A panel for each bounds; Euler's rule thin.
+/// Errors over time, a panel for each of the bounds; lines of Euler's rule are thin.
 fn gains_figure(gains: &Gains) -> Figure {
     let titles = [
         "error, no bounds",

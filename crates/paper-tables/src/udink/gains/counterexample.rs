@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::super::Rule;
 use super::run::run;
 use super::signals::{Grid, samples};
-use super::{DRAWN, Kind, Limits, Variant};
+use super::{DRAWN, GainKind, Limits, Variant};
 use crate::Error;
 
 /// A step so small that the curves are those of the differential equations, and the end, s.
@@ -20,7 +20,7 @@ const FINE: Grid = Grid {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Counterexample {
     /// The gain.
-    pub gain: Kind,
+    pub gain: GainKind,
     /// `a^_1` (s), `a^_2` (s^2), `b^_0` at 2000 s; the truth is [`TRUTH`](super::TRUTH).
     pub end: [f64; 3],
     /// Time, s.
@@ -40,7 +40,7 @@ pub struct Counterexample {
 /// None in practice: all settings are fixed and sound.
 ///
 /// # Example
-/// ```no_run
+/// ```
 /// use paper_tables::udink::gains::{TRUTH, counterexample};
 ///
 /// let found = counterexample()?;
@@ -51,7 +51,7 @@ pub struct Counterexample {
 /// ```
 pub fn counterexample() -> Result<Vec<Counterexample>, Error> {
     let samples = samples(FINE, None)?;
-    Kind::ALL
+    GainKind::ALL
         .into_par_iter()
         .map(|gain| {
             let variant = Variant {

@@ -45,7 +45,7 @@ const DRAWN: usize = 400;
 /// What multiplies the regressor and the filtered error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum GainKind {
     /// The paper's (4.11): one matrix for theta^, another for c^.
     BlockDiagonal,
     /// One matrix over theta^ and c^ (4.9b).
@@ -54,7 +54,7 @@ pub enum Kind {
     Constant,
 }
 
-impl Kind {
+impl GainKind {
     /// All.
     pub const ALL: [Self; 3] = [Self::BlockDiagonal, Self::Full, Self::Constant];
 
@@ -73,7 +73,7 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Variant {
     /// The gain.
-    pub gain: Kind,
+    pub gain: GainKind,
     /// The rule.
     pub rule: Rule,
     /// The bounds on c^.
@@ -84,7 +84,7 @@ pub struct Variant {
 #[must_use]
 pub fn variants() -> Vec<Variant> {
     let mut variants = Vec::new();
-    for gain in Kind::ALL {
+    for gain in GainKind::ALL {
         for bounds in Limits::ALL {
             for rule in Rule::ALL {
                 variants.push(Variant { gain, rule, bounds });

@@ -6,7 +6,7 @@ use stabilized_oe::{BlockDiagonal, Full, Gain, Integrator, Known, StabilizedOe};
 
 use super::super::Rule;
 use super::signals::{Grid, Sample};
-use super::{Kind, Limits, TRUTH, Variant};
+use super::{GainKind, Limits, TRUTH, Variant};
 use crate::Error;
 
 /// `a_1` (s) and `a_2` (s^2), to which `c^` has to converge.
@@ -48,13 +48,13 @@ fn run_by<I: Integrator>(
         distance(gain.theta_block(), TRUTH) + distance(gain.filter_block(), FILTER_TRUTH)
     };
     match variant.gain {
-        Kind::BlockDiagonal => {
+        GainKind::BlockDiagonal => {
             let theta = ContinuousRls::with_integrator(theta, unit, weights)?;
             let c = ContinuousRls::with_integrator(c, SMatrix::identity(), weights)?;
             let gain: BlockDiagonal<2, 3, I> = BlockDiagonal::new(theta, c);
             follow(gain, variant.bounds, (samples, grid), apart, watch)
         }
-        Kind::Full => {
+        GainKind::Full => {
             let [a1, a2, b0] = START;
             let [c1, c2] = FILTER_START;
             let both = SVector::from([a1, a2, b0, c1, c2]);
@@ -65,7 +65,7 @@ fn run_by<I: Integrator>(
             let together = |gain: &Full<2, 3, 5, I>| distance(gain.rls(), truth);
             follow(gain, variant.bounds, (samples, grid), together, watch)
         }
-        Kind::Constant => {
+        GainKind::Constant => {
             let gain: BlockDiagonal<2, 3, I> =
                 BlockDiagonal::constant((theta, unit), (c, SMatrix::identity()), 1.0)?;
             follow(gain, variant.bounds, (samples, grid), apart, watch)

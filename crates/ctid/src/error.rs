@@ -80,6 +80,24 @@ impl From<ct_rls::Error> for Error {
     }
 }
 
+impl From<paper_tables::Error> for Error {
+    fn from(error: paper_tables::Error) -> Self {
+        use paper_tables::Error as E;
+        match error {
+            E::Signals(error) => Self::Record(error),
+            E::Plant(error) => Self::Plant(error),
+            E::Estimator(error) => Self::Estimator(error),
+            E::Linear(error) => Self::Linear(error),
+            E::Loop(error) => Self::Loop(error),
+            // The message begins with the argument's name, which is that of the option.
+            E::TooFewRunsForRange { .. } | E::TooFewRunsForVariance { .. } => {
+                Self::Usage(format!("--{error}"))
+            }
+            error => Self::Usage(error.to_string()),
+        }
+    }
+}
+
 impl Error {
     /// Something about a file as a whole.
     pub(crate) fn file(path: &Path, what: impl Into<String>) -> Self {

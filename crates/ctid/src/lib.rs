@@ -13,11 +13,10 @@
 //! | rows watched as they come | [`mod@monitor`] |
 //! | linear models from a record | [`mod@identify`] |
 //! | the page | [`mod@serve`] |
-//! | a paper's tables, computed again | [`tables`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
 //!
-//! The algorithms are in the crate `missing-effect`; here is only what surrounds them.
+//! The algorithms are in the crates below, the search in `missing-effect`, the papers' tables in `paper-tables`; here is only what surrounds them.
 
 mod atomic;
 pub mod catalogue;
@@ -46,7 +45,7 @@ pub mod serve;
 mod signature;
 pub mod simulate;
 mod symptoms;
-pub mod tables;
+mod tables;
 pub mod term_file;
 pub mod terminal;
 pub mod tour;

@@ -1,6 +1,6 @@
 //! Published tables, computed again.
 
-use ctid::tables::udink;
+use paper_tables::udink;
 use pyo3::prelude::*;
 
 use crate::work;
@@ -10,7 +10,7 @@ use crate::work;
 pub fn udink_tables(py: Python<'_>, runs: usize, seed: u64) -> PyResult<String> {
     let settings = udink::Settings::default();
     let found = work::run(py, None, |_, _| {
-        udink::study(&settings, runs, seed, &|_| {})
+        Ok(udink::study(&settings, runs, seed, &|_| {})?)
     })?;
     crate::diagnosis::json(&found)
 }

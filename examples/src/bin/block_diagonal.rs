@@ -10,8 +10,8 @@
 use std::error::Error;
 use std::path::Path;
 
-use ctid::tables::gains::{Counterexample, TRUTH, counterexample};
 use ctid_examples::picture::{self, Curve, Panel};
+use paper_tables::udink::gains::{Counterexample, TRUTH, counterexample};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let found = counterexample()?;

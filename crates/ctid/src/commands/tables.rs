@@ -4,14 +4,17 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use paper_tables::{baysse, udink};
 
 use super::{Results, finish};
 use crate::Error;
 use crate::design::seed;
 use crate::look::Look;
-use crate::output::{self, Kind, Studies};
+use crate::output::{self, Kind};
 use crate::progress::Bar;
-use crate::tables::{baysse, baysse_text, udink, udink_text};
+use crate::tables::progress::for_bar;
+use crate::tables::results::Studies;
+use crate::tables::{baysse_text, udink_text};
 
 #[derive(Debug, Args)]
 pub(super) struct Tables {
@@ -68,7 +71,7 @@ impl Tables {
         let wanted: Vec<_> = self.results.wanted().chain(record).collect();
         let outputs = output::plan(&wanted, &[])?;
         let bar = Bar::new();
-        let progress = |progress| bar.show(progress);
+        let progress = |progress| bar.show(for_bar(progress));
         let udink = || {
             let runs = self.runs.unwrap_or(RUNS_UDINK);
             let study = udink::study(&udink::Settings::default(), runs, self.seed, &progress);

@@ -1,11 +1,12 @@
 //! The page of `ctid tables baysse`.
 
+use paper_tables::baysse::{Cell, Study, TRUTH};
+
 use super::figures::{self, Colour, Curve, Figure, Panel, Values};
 use super::page::{self, NOTICES, Page, figure, items, large, section};
 use super::tables::table;
 use super::text::{escape, significant};
-use crate::tables::baysse::{Cell, Study, TRUTH};
-use crate::tables::baysse_text::{band, figure_of, notes, of_the_paper, printed};
+use crate::tables::baysse_text::{band, figure_of, notes, printed, printed_inside_bands};
 
 /// The page as a complete HTML file. The same study gives the same bytes.
 pub fn html(study: &Study) -> String {
@@ -72,7 +73,11 @@ fn headline(study: &Study) -> String {
             "F-CLOE delta",
             &format!("by closed-loop output error; the truth is {} s", TRUTH[1])
         ),
-        items([of_the_paper(study)].into_iter().chain(notes(study))),
+        items(
+            [printed_inside_bands(study)]
+                .into_iter()
+                .chain(notes(study))
+        ),
         items(&study.assumptions),
     )
 }
@@ -179,7 +184,7 @@ fn figure_three_figure(study: &Study) -> Figure {
     Figure::over_time("outputs", 420, vec![Panel::new("level", "cm")], curves)
 }
 
-/// Points of K and tau.
+/// The runs as points: K across, tau (s) upwards.
 fn cloud(name: &str, colour: usize, marker: &'static str, runs: &[[f64; 2]]) -> Curve {
     Curve {
         marker: Some(marker),

@@ -1,13 +1,13 @@
 //! What `ctid tables baysse` prints.
 
-use super::baysse::{Cell, Study};
+use paper_tables::baysse::{Cell, Study};
+
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 
-/// The whole of it.
-#[must_use]
-pub fn text(study: &Study, look: Look) -> String {
+/// The text, complete.
+pub(crate) fn text(study: &Study, look: Look) -> String {
     let title =
         "A. Baysse, F. J. Carrillo, A. Habbadi, identification in closed loop: tables I and II";
     let mut text = format!("{}\n", look.heading(title));
@@ -80,7 +80,7 @@ fn cells(study: &Study, look: Look) -> String {
     text
 }
 
-/// As the paper prints it, small numbers in powers of ten.
+/// The printed figure as the paper prints it, numbers below 0.01 in powers of ten.
 pub(crate) fn printed(cell: &Cell) -> String {
     match cell.paper {
         Some(paper) if paper < SMALL => format!("{paper:.2e}"),
@@ -89,7 +89,7 @@ pub(crate) fn printed(cell: &Cell) -> String {
     }
 }
 
-/// What a printed figure outside the band is marked by.
+/// The mark of a printed figure outside the band.
 pub(crate) fn paper_mark(cell: &Cell) -> &'static str {
     match cell.paper_outside {
         Some(off) if off > 0.0 => "+",
@@ -97,8 +97,8 @@ pub(crate) fn paper_mark(cell: &Cell) -> &'static str {
     }
 }
 
-/// Of the printed figures, how many lie inside the bands, and which do not.
-pub(crate) fn of_the_paper(study: &Study) -> String {
+/// How many of the printed figures lie inside the bands, and which do not.
+pub(crate) fn printed_inside_bands(study: &Study) -> String {
     let of = study.printed().count();
     let outside: Vec<String> = study
         .printed()
@@ -113,20 +113,21 @@ pub(crate) fn of_the_paper(study: &Study) -> String {
         })
         .collect();
     let inside = of - outside.len();
-    let mut said = format!("Of the {of} printed figures that have a band {inside} lie inside it");
+    let mut sentence =
+        format!("Of the {of} printed figures that have a band {inside} lie inside it");
     if !outside.is_empty() {
-        said += &format!(
+        sentence += &format!(
             "; outside are {}: the paper's noises were others, and its bands are not known",
             outside.join(", ")
         );
     }
-    said + "."
+    sentence + "."
 }
 
-/// Below this, powers of ten.
+/// Numbers below this are written in powers of ten.
 const SMALL: f64 = 0.01;
 
-/// To the second digit of its deviation.
+/// The figure of the runs, to the second digit of its standard deviation.
 pub(crate) fn figure_of(cell: &Cell) -> String {
     if cell.mean.abs() < SMALL {
         return format!("{:.2e}", cell.mean);
@@ -135,10 +136,10 @@ pub(crate) fn figure_of(cell: &Cell) -> String {
     numbers::decimals(cell.mean, places.min(MOST_DECIMALS))
 }
 
-/// Nobody reads more, however sure it is.
+/// More decimals are not read, however small the standard deviation is.
 const MOST_DECIMALS: i32 = 4;
 
-/// Its ends, `> 7.5` where it is open, nothing without one.
+/// The ends of the band, `> 7.5` where it is open above; empty without a band.
 pub(crate) fn band(cell: &Cell, between: &str) -> String {
     match cell.band {
         None => String::new(),
@@ -154,7 +155,7 @@ pub(crate) fn band(cell: &Cell, between: &str) -> String {
     }
 }
 
-/// Without zeros at the end of its decimals.
+/// A number without trailing zeros of its decimals.
 fn short(number: &str) -> String {
     match number.contains('.') {
         true => number
@@ -171,7 +172,7 @@ fn summary(study: &Study, look: Look) -> String {
         "{inside} of {of} figures of the runs inside the bands of a reproduction"
     ));
     let mut text = format!("{verdict}\n");
-    text += &look.paragraph("  ", &of_the_paper(study));
+    text += &look.paragraph("  ", &printed_inside_bands(study));
     for cell in study.outside() {
         let line = format!("table {}, {}: {}", cell.table, cell.cell, figure_of(cell));
         text += &look.paragraph("    - ", &line);
@@ -182,7 +183,7 @@ fn summary(study: &Study, look: Look) -> String {
     text
 }
 
-/// What the cells do not say.
+/// Sentences on what the cells do not show: iterations, the tangent, the printed controller, figures that are not reproduced.
 pub(crate) fn notes(study: &Study) -> Vec<String> {
     let mean = |counts: &[usize]| {
         let mean = counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64;
@@ -243,17 +244,17 @@ pub(crate) fn notes(study: &Study) -> Vec<String> {
     notes
 }
 
-/// What misses the paper by orders of magnitude and has no band that says so.
+/// Figures without a band that differ from the printed ones by more than a factor of ten.
 fn not_reproduced(study: &Study) -> Option<String> {
     let misses = |cell: &&Cell| {
         let ratio = cell.paper.map(|paper| cell.mean / paper);
         cell.band.is_none() && ratio.is_some_and(|ratio| !(1.0 / FAR..=FAR).contains(&ratio))
     };
-    let said = |cell: &Cell| {
+    let sentence = |cell: &Cell| {
         let (paper, here) = (printed(cell), figure_of(cell));
         format!("{} ({paper} printed, {here} here)", cell.cell)
     };
-    let missed: Vec<String> = study.tables.iter().filter(misses).map(said).collect();
+    let missed: Vec<String> = study.tables.iter().filter(misses).map(sentence).collect();
     (!missed.is_empty()).then(|| {
         format!(
             "Not reproduced, and without a band: {}. They are not among the {} cells.",
@@ -263,10 +264,10 @@ fn not_reproduced(study: &Study) -> Option<String> {
     })
 }
 
-/// So many times more or less is another order of magnitude.
+/// A ratio of more than this, or less than its inverse, is another order of magnitude.
 const FAR: f64 = 10.0;
 
-/// What is further off, in standard deviations, is not chance.
+/// A difference of more than this many standard deviations is not taken for chance.
 const CHANCE: f64 = 3.0;
 
 fn figure(study: &Study, look: Look) -> String {

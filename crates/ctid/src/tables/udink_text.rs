@@ -1,16 +1,14 @@
 //! What `ctid tables udink` prints.
 
-use super::gains::Gains;
-use super::udink::{LargerP, Study};
-use super::udink_contrasts::{self, Contrast};
-use super::udink_power::{self, Changed, ConstantGain};
-use super::{Cell, Comparison};
+use paper_tables::udink::gains::Gains;
+use paper_tables::udink::{Cell, Changed, Comparison, ConstantGain, Contrast, LargerP, Study};
+
+use super::udink_sentences as sentences;
 use crate::look::{Look, Side, table};
 use crate::numbers;
 
-/// The whole of it.
-#[must_use]
-pub fn text(study: &Study, look: Look) -> String {
+/// The text, complete.
+pub(crate) fn text(study: &Study, look: Look) -> String {
     let mut text = format!(
         "{}\n",
         look.heading("A. J. Udink ten Cate, WP-85-54, IIASA, 1985: tables 1 to 4")
@@ -76,15 +74,15 @@ fn of_rule(cell: &Cell, look: Look) -> [String; 2] {
     } else {
         look.warning("*")
     };
-    [figure(cell.median), cell.range(" .. ") + &mark]
+    [figure(cell.median), sentences::range(cell, " .. ") + &mark]
 }
 
-/// As the paper prints it.
+/// The printed figure with the decimals of the paper.
 fn printed(cell: &Cell) -> String {
     format!("{:.*}", cell.decimals, cell.paper)
 }
 
-/// Three digits, and a fourth from 100 on.
+/// A number with three digits, four from 100 on.
 fn figure(value: f64) -> String {
     numbers::significant(value, if value.abs() >= 100.0 { 4 } else { 3 })
 }
@@ -92,9 +90,9 @@ fn figure(value: f64) -> String {
 fn summary(study: &Study, look: Look) -> String {
     let mut text = format!(
         "{}\n",
-        look.strong(format!("Against the paper: {}", study.verdict()))
+        look.strong(format!("Against the paper: {}", sentences::verdict(study)))
     );
-    text += &look.paragraph("  ", &study.beside_the_verdict());
+    text += &look.paragraph("  ", &sentences::beside_the_verdict(study));
     for (name, comparison) in [
         ("Euler's rule", &study.euler),
         ("the exact step", &study.exact),
@@ -120,8 +118,8 @@ fn summary(study: &Study, look: Look) -> String {
 }
 
 fn contrasts(contrasts: &[Contrast], look: Look) -> String {
-    let mut text = format!("{}\n", look.heading(udink_contrasts::TITLE));
-    text += &look.paragraph("  ", udink_contrasts::MEANING);
+    let mut text = format!("{}\n", look.heading(sentences::CONTRASTS));
+    text += &look.paragraph("  ", sentences::CONTRASTS_MEANING);
     let [left, right] = [Side::Left, Side::Right];
     for contrast in contrasts {
         let [first, second] = contrast.between;
@@ -143,15 +141,15 @@ fn contrasts(contrasts: &[Contrast], look: Look) -> String {
         for line in table(&[left, right, right, right], &rows) {
             text += &format!("{line}\n");
         }
-        text += &look.paragraph("  ", &contrast.sentence());
+        text += &look.paragraph("  ", &sentences::contrast(contrast));
     }
     text.push('\n');
     text
 }
 
 fn power(changed: &[Changed], look: Look) -> String {
-    let mut text = format!("{}\n", look.heading(udink_power::TITLE));
-    text += &look.paragraph("  ", &udink_power::sentence(changed));
+    let mut text = format!("{}\n", look.heading(sentences::OTHER_SETTINGS));
+    text += &look.paragraph("  ", &sentences::other_settings(changed));
     let mut rows = vec![
         ["other setting", "cells inside", "lost", "noticed"]
             .map(|name| look.faint(name))
@@ -190,7 +188,7 @@ fn constant_gains(gains: &[ConstantGain], look: Look) -> String {
     }
     let [left, right] = [Side::Left, Side::Right];
     let sides = [left, left, right, right, right, right, right, right];
-    let mut text = format!("{}\n", look.heading(udink_power::SLOW));
+    let mut text = format!("{}\n", look.heading(sentences::CONSTANT_GAINS));
     for line in table(&sides, &rows) {
         text += &format!("  {line}\n");
     }
@@ -213,7 +211,7 @@ fn larger_p(rows: &[LargerP], look: Look) -> String {
             if count > 0 { look.warning(text) } else { text }
         };
         lines.push(vec![
-            format!("x {}", row.factor_name()),
+            format!("x {}", sentences::factor(row)),
             lost(row.euler_failed),
             lost(row.exact_failed),
             figure(row.euler_criterion),

@@ -30,4 +30,3 @@ mod side_by_side;
 mod simulate;
 mod system_limits;
 mod tables;
-mod udink_reference;

@@ -7,44 +7,43 @@ use fcloe::{
     Controller, Coordinates, Damping, LoopRecord, Noise, Offsets, PlantModel, Problem,
     continuous_loop, noise_at_snr,
 };
-use missing_effect::Progress;
 use serde::Serialize;
 
-use super::super::paper_baysse::{INSTRUMENTS, NORMALISED, PLAIN, Simulated};
-use super::{
-    Asked, BAND_RUNS, Cell, band_for, gain_and_time, iterations, mean, settings, variance,
-};
-use crate::Error;
+use super::cell::{Asked, BAND_RUNS, Cell, band_for, mean, variance};
+use super::printed::{INSTRUMENTS, NORMALISED, PLAIN, Simulated};
+use super::{gain_and_time, iterations, settings};
+use crate::progress::in_parallel;
+use crate::{Error, Progress, Stage};
 
-/// K and tau of the tank. Printed.
+/// K and tau (s) of the tank. Printed.
 pub const TRUTH: [f64; 2] = [6.0, 110.0];
-/// The controller with the digits that are printed.
+/// Kp and Ki (1/s) of the controller, with the digits that are printed.
 const PI: [f64; 2] = [0.2292, 0.0021];
 /// Bandwidth of the state variable filters, 1/s. Printed.
 const LAMBDA: f64 = 40.0 / 110.0;
-/// dB. Printed.
+/// Signal to noise ratio, dB. Printed.
 const SNR: f64 = 20.0;
 /// Sampling interval, s. Printed.
 const STEP: f64 = 1.0;
 /// The first mu. Printed.
 const MU: f64 = 0.1;
-/// The reference: half the distance of its levels, the length of a bit, and the bits. Not printed.
+/// The reference: half the distance of its levels, the length of a bit (s), and the bits. Not printed.
 const AMPLITUDE: f64 = 0.82;
 const BIT: usize = 400;
 const BITS: [f64; 7] = [1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0];
 
-/// Estimates of K and tau of all runs, in one order.
+/// Estimates of K and tau (s) of all runs of table I, in the order of the runs; NaN (`null`) where a fit failed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FirstTable {
-    /// Least squares, (24).
+    /// Least squares, equation (24).
     pub least_squares: Vec<[f64; 2]>,
-    /// Instruments.
+    /// Instruments, equation (26) with `phi^ phi'` in the inverse.
     pub instruments: Vec<[f64; 2]>,
-    /// (26) as it is printed.
+    /// Equation (26) as it is printed, with `phi^ phi^'`.
     pub as_printed: Vec<[f64; 2]>,
-    /// Closed-loop output error, iterated in theta.
+    /// Closed-loop output error, iterated in theta with `mu I`.
     pub plain: Vec<[f64; 2]>,
-    /// The same, iterated in delta.
+    /// The same, iterated in the relative change delta of equation (28).
     pub normalised: Vec<[f64; 2]>,
     /// Iterations.
     pub iterations: Counts,
@@ -124,10 +123,10 @@ impl Setup {
         let problem = Problem::new(&[record], controller, start.orders())?;
         let mut fits = [([f64::NAN; 2], 0); 4];
         let damped = [Damping::Identity, Damping::Diagonal].into_iter();
-        let ways = damped.flat_map(|damping| {
+        let variants = damped.flat_map(|damping| {
             [Coordinates::Theta, Coordinates::Delta].map(|coordinates| (damping, coordinates))
         });
-        for (found, (damping, coordinates)) in fits.iter_mut().zip(ways) {
+        for (found, (damping, coordinates)) in fits.iter_mut().zip(variants) {
             let fit = problem.fit(&start, &settings(MU, damping, coordinates))?;
             *found = (gain_and_time(&fit.plant), iterations(&fit));
             if !fit.stop.was_successful() {
@@ -145,7 +144,9 @@ impl FirstTable {
         progress: &(impl Fn(Progress) + Sync),
     ) -> Result<Self, Error> {
         let setup = Setup::new()?;
-        let runs = super::all(runs, "table I", progress, |run| setup.run(seed, run))?;
+        let runs = in_parallel(runs, Stage::BaysseTableOne, progress, |run| {
+            setup.run(seed, run)
+        })?;
         let start = |which: usize| runs.iter().map(|run| run.starts[which]).collect();
         let fit = |which: usize| runs.iter().map(|run| run.fits[which].0).collect();
         let count = |which: usize| runs.iter().map(|run| run.fits[which].1).collect();
@@ -169,7 +170,7 @@ impl FirstTable {
         })
     }
 
-    /// The paper's columns, and two more: least squares, and (26) as printed.
+    /// The paper's columns, and two more: least squares, and equation (26) as printed.
     pub(super) fn cells(&self) -> Vec<Cell> {
         let nothing = Simulated {
             mean: [None; 2],
@@ -215,7 +216,7 @@ impl FirstTable {
     }
 }
 
-/// Means, variances and the distance: as many as there are bands.
+/// Means, variances and the distance D: as many as there are bands.
 fn column(
     method: &'static str,
     paper: &Simulated,
@@ -225,7 +226,7 @@ fn column(
     let of = |which: usize| {
         move |runs: &[[f64; 2]]| -> Vec<f64> { runs.iter().map(|run| run[which]).collect() }
     };
-    // (34) grows with the root of the number of runs.
+    // D of (34) grows with the root of the number of runs.
     let distance = |runs: &[[f64; 2]]| {
         let squares = runs
             .iter()

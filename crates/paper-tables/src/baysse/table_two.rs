@@ -1,93 +1,26 @@
-//! Table II: the level of a tank of the DTS200 under a PI controller with a sensor filter, emulated.
+//! Table II and figure 3: the emulated rig, identified by instruments from raw levels and by closed-loop output error.
 //!
-//! ```text
-//! S dH/dt = k max(u - u_dz, 0) - alpha sqrt(H)      the tank and its pump, which moves nothing below a dead zone
-//! x = quantised(H + noise)                           each period of the controller
-//! y_f' = zeta (x - y_f)                              the filter, x held over a period
-//! u = quantised(u0 + Kp (r - y_f) + Ki int (r - y_f) dt), between 0 and 10 V
-//! ```
-//! The tangent at the operating point is `K = 2 k sqrt(H0)/alpha`, `tau = 2 S sqrt(H0)/alpha`. What instruments find in raw levels is
-//! the secant `H0/u0` instead: the paper's own 2.60.
+//! The tangent at the operating point is `K = 2 k sqrt(H0)/alpha`, `tau = 2 S sqrt(H0)/alpha`. Instruments find in raw levels the secant
+//! `H0/u0` instead: the paper's own 2.60.
 
-use ct_signals::{Channel, Record, excitation, noise};
+use ct_signals::Record;
 use fcloe::start::first_order::{self, Discretisation, Form};
-use fcloe::{
-    Controller, Coordinates, Damping, LoopRecord, LoopSimulator, Offsets, OperatingPoint,
-    PlantModel, Problem, Quantiser,
-};
-use missing_effect::Progress;
-use plants::controller::Pi;
-use plants::{CATALOGUE, Command, Known, Placed, Plant, Scales, Simulator, Structure};
+use fcloe::{Coordinates, Damping, LoopRecord, Offsets, PlantModel, Problem};
 use serde::Serialize;
 
-use super::super::paper_baysse::{Measured, RIG_INSTRUMENTS, RIG_NORMALISED, RIG_PLAIN};
-use super::{Asked, Cell, gain_and_time, iterations, mean, settings, variance};
-use crate::Error;
+use super::cell::{Asked, Cell, mean, variance};
+use super::printed::{Measured, RIG_INSTRUMENTS, RIG_NORMALISED, RIG_PLAIN};
+use super::rig::{CONVERTER, Rig};
+use super::{gain_and_time, iterations, settings};
+use crate::progress::in_parallel;
+use crate::{Error, Progress, Stage};
 
-/// The rig: what is printed, and what is not.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rig {
-    /// Area of the tank, cm^2. Of the DTS200.
-    pub area: f64,
-    /// Level about which it runs, cm. Printed.
-    pub level: f64,
-    /// Outflow coefficient, cm^2.5/s. Not printed.
-    pub alpha: f64,
-    /// Inflow for one volt above the dead zone, cm^3/(V s). Not printed.
-    pub pump_gain: f64,
-    /// Command below which nothing flows, V. Not printed, and nothing in the paper speaks of it.
-    pub dead_zone: f64,
-    /// Kp, V/cm. Printed.
-    pub kp: f64,
-    /// Ki, V/(cm s). Printed as 0.074.
-    pub ki: f64,
-    /// Bandwidth of the sensor's filter, 1/s. Printed.
-    pub filter: f64,
-    /// Period of the controller, s. Not printed.
-    pub period: f64,
-    /// Standard deviation of the sensor's noise, drawn each period, cm. Not printed.
-    pub noise: f64,
-    /// Half the distance of the reference's levels, cm. Not printed.
-    pub amplitude: f64,
-    /// Length of a bit of the reference, s. Not printed.
-    pub bit: usize,
-    /// Register of the reference. Not printed.
-    pub cells: u32,
-}
-
-/// Sampling interval, s. Printed.
-const STEP: f64 = 1.0;
 /// Bandwidth of the state variable filters, 1/s. Printed.
 const LAMBDA: f64 = 0.5372;
 /// The first mu. Printed.
 const MU: f64 = 1.0;
-/// Bits of the converters. Printed.
-const CONVERTER: u32 = 16;
 /// Ki as it is printed, V/(cm s).
 const KI_PRINTED: f64 = 0.074;
-/// Ranges of sensor and pump: cm and V.
-const SENSOR: [f64; 2] = [0.0, 60.0];
-const PUMP: [f64; 2] = [0.0, 10.0];
-
-impl Default for Rig {
-    fn default() -> Self {
-        Self {
-            area: 154.0,
-            level: 20.0,
-            alpha: 12.75,
-            pump_gain: 9.84,
-            dead_zone: 1.895,
-            kp: 0.5515,
-            ki: 0.0074,
-            filter: 0.6618,
-            period: 0.1,
-            noise: 0.1,
-            amplitude: 2.0,
-            bit: 50,
-            cells: 5,
-        }
-    }
-}
 
 /// What the paper leaves open, and is assumed.
 pub(super) fn assumptions() -> Vec<String> {
@@ -122,122 +55,12 @@ pub(super) fn assumptions() -> Vec<String> {
     ]
 }
 
-impl Rig {
-    /// K and tau at the operating point.
-    pub fn tangent(&self) -> [f64; 2] {
-        let slope = 2.0 * self.level.sqrt() / self.alpha;
-        [slope * self.pump_gain, slope * self.area]
-    }
-
-    /// V.
-    fn command_at_rest(&self) -> f64 {
-        self.alpha * self.level.sqrt() / self.pump_gain + self.dead_zone
-    }
-
-    fn samples(&self) -> usize {
-        self.bit * ((1 << self.cells) - 1)
-    }
-
-    fn reference(&self) -> Result<Vec<f64>, Error> {
-        let [low, high] = [-1.0, 1.0].map(|sign| self.level + sign * self.amplitude);
-        let n = self.samples();
-        Ok(excitation::prbs(n, self.bit, low, high, self.cells)?)
-    }
-
-    fn structure(&self) -> Result<Structure, Error> {
-        let known = Known {
-            area: [Some(self.area), None, None],
-            ..Known::default()
-        };
-        let scales = Scales::from_ranges(
-            (PUMP[0], PUMP[1]),
-            (SENSOR[0], SENSOR[1]),
-            self.period,
-            self.samples() as f64 * STEP,
-        );
-        let tank = Structure::new(Plant::SingleTank, known, scales);
-        let pump = CATALOGUE.iter().find(|info| info.id == "pump_deadzone");
-        Ok(match pump {
-            Some(effect) => tank.with(Placed { effect, vessel: 0 })?,
-            None => tank,
-        })
-    }
-
-    /// An experiment: raw levels, as the rig would record them.
-    ///
-    /// # Errors
-    /// Where the settings are no rig.
-    pub fn record(&self, seed: u64, run: usize) -> Result<Record, Error> {
-        let r = self.reference()?;
-        let at_rest = self.command_at_rest();
-        let theta = [self.pump_gain, self.alpha, self.dead_zone];
-        let mut tank = Simulator::<f64>::new(&self.structure()?, &theta, &[self.level], at_rest)?;
-        let mut pi = Pi::new(self.kp, self.kp / self.ki, (PUMP[0], PUMP[1]), at_rest)?;
-        let sensor = Quantiser::new(SENSOR[0], SENSOR[1], CONVERTER)?;
-        let pump = Quantiser::new(PUMP[0], PUMP[1], CONVERTER)?;
-        let periods = (STEP / self.period).round() as usize;
-        let share = -(-self.filter * self.period).exp_m1();
-        let mut rng = super::generator(seed, 1, run);
-        let noise = noise::white(r.len() * periods, self.noise, &mut rng);
-        let (mut u, mut y) = (Vec::with_capacity(r.len()), Vec::with_capacity(r.len()));
-        let mut filtered = self.level;
-        for (r, noise) in r.iter().zip(noise.chunks(periods)) {
-            for (period, noise) in noise.iter().enumerate() {
-                let reading = sensor.value(tank.read(0) + noise);
-                let command = pump.value(pi.command(*r, filtered, self.period));
-                if period == 0 {
-                    y.push(filtered);
-                    u.push(command);
-                }
-                filtered += share * (reading - filtered);
-                tank.advance(Command::held(command), self.period);
-            }
-        }
-        Ok(Record {
-            name: "emulated rig".to_owned(),
-            time: (0..r.len()).map(|k| k as f64 * STEP).collect(),
-            inputs: vec![Channel::new("u", "V", u)],
-            outputs: vec![Channel::new("y", "cm", y)],
-            references: vec![Channel::new("r", "cm", r)],
-            calendar: None,
-        })
-    }
-
-    fn controller(&self, with_filter: bool) -> Result<Controller, Error> {
-        let pi = Controller::pi(self.kp, self.ki)?;
-        Ok(if with_filter {
-            pi.with_sensor_filter(self.filter)?
-        } else {
-            pi
-        })
-    }
-
-    /// Signals about the operating point.
-    fn centred(&self, record: &Record) -> Result<LoopRecord, Error> {
-        let point = OperatingPoint {
-            r: self.level,
-            u: self.command_at_rest(),
-            y: self.level,
-        };
-        Ok(LoopRecord::from_record(record, Offsets::Known(point))?)
-    }
-
-    /// What the loop does with this plant in it, about the operating point.
-    fn simulated(&self, plant: &PlantModel, r: &[f64]) -> Result<Vec<f64>, Error> {
-        let controller = self.controller(true)?;
-        let mut model = LoopSimulator::new(plant, &controller, ct_lti::Hold::Zero, STEP)?;
-        let drive: Vec<f64> = r.iter().map(|r| r - self.level).collect();
-        let (y, _) = model.outputs_and_inputs(&drive);
-        Ok(y.iter().map(|y| y + self.level).collect())
-    }
-}
-
-/// Estimates of K and tau of all runs, in one order.
+/// Estimates of K (cm/V) and tau (s) of all runs of table II, in the order of the runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SecondTable {
     /// The emulated rig.
     pub rig: Rig,
-    /// K and tau of the tangent at the operating point.
+    /// K (cm/V) and tau (s) of the tangent at the operating point.
     pub tangent: [f64; 2],
     /// Instruments on raw levels.
     pub instruments: Vec<[f64; 2]>,
@@ -245,9 +68,9 @@ pub struct SecondTable {
     pub plain: Fits,
     /// The same, iterated in delta.
     pub normalised: Fits,
-    /// With a model that does not know of the sensor's filter.
+    /// By a model without the sensor's filter; NaN (`null`) where the fit failed.
     pub filter_ignored: Vec<[f64; 2]>,
-    /// With the controller as it is printed, in the rig and in the model; NaN (`null`) where no fit came to its end.
+    /// With the controller as it is printed, in the rig and in the model; NaN (`null`) where the fit failed.
     pub ki_as_printed: Vec<[f64; 2]>,
     /// The paper's figure 3, for the first of the runs.
     #[serde(skip)]
@@ -260,11 +83,11 @@ pub struct SecondTable {
 /// Fits of all runs.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Fits {
-    /// K and tau.
+    /// K (cm/V) and tau (s).
     pub estimates: Vec<[f64; 2]>,
-    /// Their variances, as each fit says them.
+    /// Their variances as each fit estimates them, for a white residual.
     pub variances: Vec<[f64; 2]>,
-    /// Iterations until no parameter changes by more than 1 %.
+    /// Iterations to the first that changes no parameter by more than 1 %.
     pub iterations: Vec<usize>,
 }
 
@@ -275,11 +98,11 @@ pub struct Figure {
     pub time: Vec<f64>,
     /// Set point, cm.
     pub reference: Vec<f64>,
-    /// Output, cm.
+    /// Output of the rig, cm.
     pub measured: Vec<f64>,
-    /// The loop with the plant that instruments give.
+    /// Output of the loop simulated with the plant that instruments give, cm.
     pub instruments: Vec<f64>,
-    /// The loop with the plant that the output error gives.
+    /// The same with the plant that the output error gives, cm.
     pub output_error: Vec<f64>,
 }
 
@@ -299,7 +122,7 @@ struct Estimate {
     iterations: usize,
 }
 
-/// What instruments give from raw levels.
+/// The plant by instruments, from raw levels.
 fn instruments(record: &Record) -> Result<PlantModel, Error> {
     let rule = Discretisation::Euler;
     let raw = LoopRecord::from_record(record, Offsets::Deviations)?;
@@ -308,15 +131,15 @@ fn instruments(record: &Record) -> Result<PlantModel, Error> {
     Ok(first_order::instruments(&raw, LAMBDA, rule, &start, form)?)
 }
 
-/// K and tau by output error; NaN where the fit does not come to its end.
+/// K and tau by output error; NaN where the fit fails.
 fn fitted(rig: &Rig, record: &Record, with_filter: bool) -> Result<[f64; 2], Error> {
     let (start, controller) = (instruments(record)?, rig.controller(with_filter)?);
-    // The wrong controller would be refused by its u.
-    let silent = LoopRecord {
+    // With u in the record, a controller that disagrees with it would be refused.
+    let without_u = LoopRecord {
         u: None,
         ..rig.centred(record)?
     };
-    let fit = Problem::new(&[silent], &controller, start.orders())
+    let fit = Problem::new(&[without_u], &controller, start.orders())
         .and_then(|problem| problem.fit(&start, &fcloe::Settings::default()));
     Ok(match fit {
         Ok(fit) if fit.stop.was_successful() => gain_and_time(&fit.plant),
@@ -365,8 +188,8 @@ impl SecondTable {
         progress: &(impl Fn(Progress) + Sync),
     ) -> Result<Self, Error> {
         let rig = Rig::default();
-        let phase = "table II, the emulated rig";
-        let runs = super::all(runs, phase, progress, |index| run(&rig, seed, index))?;
+        let stage = Stage::BaysseTableTwo;
+        let runs = in_parallel(runs, stage, progress, |index| run(&rig, seed, index))?;
         let fits = |which: usize| {
             let fits = || runs.iter().map(|run| &run.fits[which]);
             Fits {
@@ -389,7 +212,7 @@ impl SecondTable {
         })
     }
 
-    /// The paper's columns, and what the filter and the printed controller do.
+    /// The paper's columns, and two more: the filter ignored, and the controller as it is printed.
     pub(super) fn cells(&self) -> Vec<Cell> {
         let runs = &self.instruments;
         let of_runs: [(&'static str, Statistic); 4] = [
@@ -437,7 +260,7 @@ impl SecondTable {
 
 type Statistic = fn(&[[f64; 2]]) -> f64;
 
-/// K or tau of all runs that came to their end.
+/// K or tau of all runs that did not fail.
 fn of(which: usize, runs: &[[f64; 2]]) -> Vec<f64> {
     let values = runs.iter().map(|run| run[which]);
     values.filter(|value| value.is_finite()).collect()

@@ -1,4 +1,4 @@
-//! Bounds on c^ in the comparison of the gains, and whether C^/A0 - gamma/(2 c) is strictly positive real inside them.
+//! Bounds on c^ in the comparison of the gains, and whether `C^/A0 - gamma/(2 c)` is strictly positive real inside them.
 
 use ct_constrained::Bounds;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use stabilized_oe::check_filter_bounds;
 
 use crate::Error;
 
-/// `a_1, a_2` of the plants that the bounds on c are checked for.
+/// `a_1` (s) and `a_2` (s^2) of the plants that the bounds on c are checked for.
 const PLAUSIBLE: ([f64; 2], [f64; 2]) = ([0.9, 0.9], [1.1, 1.1]);
 
 /// Bounds on c^.
@@ -15,9 +15,9 @@ const PLAUSIBLE: ([f64; 2], [f64; 2]) = ([0.9, 0.9], [1.1, 1.1]);
 pub enum Limits {
     /// None.
     None,
-    /// Wide ones, which reach to where C^/A0 is not positive real.
+    /// `c_1` in 0.5 to 3 s, `c_2` in 0.4 to 3 s^2: at the corner (0.5, 3) `C^/A0` is not positive real.
     Wide,
-    /// Inside them C^/A0 - gamma/(2 c) is strictly positive real.
+    /// `c_1` in 0.9 to 3 s, `c_2` in 0.7 to 2 s^2: inside, `C^/A0 - 1/2` is strictly positive real.
     Sure,
 }
 
@@ -26,6 +26,7 @@ impl Limits {
     pub const ALL: [Self; 3] = [Self::None, Self::Wide, Self::Sure];
 
     /// Its name in tables.
+    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -35,35 +36,34 @@ impl Limits {
     }
 
     pub(super) fn bounds(self) -> Result<Option<Bounds<2>>, Error> {
-        let bounds = match self {
-            Self::None => return Ok(None),
-            Self::Wide => Bounds::new([0.5, 0.4], [3.0, 3.0]),
-            Self::Sure => Bounds::new([0.9, 0.7], [3.0, 2.0]),
-        };
-        Ok(Some(bounds.map_err(stabilized_oe::Error::from)?))
+        Ok(match self {
+            Self::None => None,
+            Self::Wide => Some(Bounds::new([0.5, 0.4], [3.0, 3.0])?),
+            Self::Sure => Some(Bounds::new([0.9, 0.7], [3.0, 2.0])?),
+        })
     }
 }
 
-/// What the check says of bounds on c^.
+/// Result of the check of bounds on c^.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Checked {
     /// Which.
     pub bounds: Limits,
-    /// Whether it is, for all plausible plants.
+    /// Whether `C^/A0 - gamma/(2 c)` is strictly positive real inside them for all plants within 10 % of the true one.
     pub hold: bool,
     /// The same in a sentence, with the place where they fail.
     pub says: String,
 }
 
-/// Asks of the wide and the sure bounds whether `C^/A0 - gamma/(2 c)` is strictly positive real inside them.
+/// Checks the wide and the sure bounds.
 pub(super) fn checked() -> Result<Vec<Checked>, Error> {
-    let plausible = Bounds::new(PLAUSIBLE.0, PLAUSIBLE.1).map_err(stabilized_oe::Error::from)?;
+    let plausible = Bounds::new(PLAUSIBLE.0, PLAUSIBLE.1)?;
     let mut all = Vec::new();
     for limits in Limits::ALL {
         let Some(bounds) = limits.bounds()? else {
             continue;
         };
-        // gamma/(2 c) of the adaptive gains; the constant one asks less, 0
+        // gamma/(2 c) of the adaptive gains; the constant one needs 0 only
         let found = check_filter_bounds(&bounds, &plausible, 0.5)?;
         all.push(Checked {
             bounds: limits,

@@ -1,22 +1,12 @@
-//! What the paper's tables say of each other: differences of the same cell in two of them.
+//! Differences of the same cell in two of the paper's tables.
 //!
 //! Tables with the same noise differ by their settings alone, so that a difference of two cells varies much less from noise to noise than
 //! either of them: it tells far more than the cells do one by one.
-//!
-//! Reference: [`paper_udink`](super::paper_udink).
 
 use serde::Serialize;
 
-use super::Cell;
-use super::paper_udink::{CELLS, TABLES};
-use super::udink_run::Cells;
-
-/// What the differences are called.
-pub const TITLE: &str = "Differences between tables, run by run";
-
-/// What they tell.
-pub const MEANING: &str = "By Euler's rule. Two tables with one noise differ by their settings alone: that their cells lie inside one \
-     by one does not say that their differences do.";
+use super::printed::{CELLS, TABLES};
+use super::{Cell, Tables};
 
 /// Pairs of tables, and what is known of their noises; first the one that surely shares it.
 const PAIRS: [([usize; 2], &str); 3] = [
@@ -37,7 +27,7 @@ const PAIRS: [([usize; 2], &str); 3] = [
 /// The second table minus the first, cell by cell, each run of both with the same noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contrast {
-    /// Numbers of the two tables.
+    /// Numbers of the two tables, 1 to 4.
     pub between: [usize; 2],
     /// What is known of their noises.
     pub noise: &'static str,
@@ -47,33 +37,19 @@ pub struct Contrast {
     pub inside: usize,
 }
 
-impl Contrast {
-    /// How many of the differences lie inside, and what is known of the noises.
-    #[must_use]
-    pub fn sentence(&self) -> String {
-        let [first, second] = self.between;
-        format!(
-            "{} of {} differences inside; tables {first} and {second}: {}.",
-            self.inside,
-            self.cells.len(),
-            self.noise
-        )
-    }
-}
-
-/// Cells that are neither made of others nor differences themselves.
-fn told_apart(name: &str) -> bool {
+/// Whether a cell is neither computed from others nor a difference itself.
+fn is_independent(name: &str) -> bool {
     !name.ends_with("rel.err") && !name.contains('-')
 }
 
 /// All pairs; `runs` holds the cells of every table, run by run.
-pub(super) fn contrasts(runs: &[&[Option<Cells>; TABLES.len()]]) -> Vec<Contrast> {
+pub(super) fn contrasts(runs: &[&Tables]) -> Vec<Contrast> {
     PAIRS
         .into_iter()
         .map(|([first, second], noise)| {
             let printed = [first, second].map(|number| TABLES[number - 1].cells());
             let cells: Vec<Cell> = (0..printed[0].len().min(printed[1].len()))
-                .filter(|&place| told_apart(CELLS[place]))
+                .filter(|&place| is_independent(CELLS[place]))
                 .map(|place| {
                     let differences = runs.iter().map(|run| {
                         let [a, b] = [first, second]
@@ -100,13 +76,13 @@ mod tests {
 
     #[test]
     fn a_contrast_is_the_second_table_minus_the_first_of_the_same_run() {
-        let runs: Vec<[Option<Cells>; 4]> = (0..40)
+        let runs: Vec<Tables> = (0..40)
             .map(|run| {
                 let noise = f64::from(run);
                 [1.0, 2.0, 4.0, 8.0].map(|of_table| Some([of_table + noise; CELLS.len()]))
             })
             .collect();
-        let runs: Vec<&[Option<Cells>; 4]> = runs.iter().collect();
+        let runs: Vec<&Tables> = runs.iter().collect();
         let found = contrasts(&runs);
         // What both have in common is gone: the differences do not vary.
         for (contrast, difference) in found.iter().zip([2.0, 1.0, 4.0]) {
@@ -124,12 +100,12 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_run_has_no_difference() {
+    fn a_failed_run_has_no_difference() {
         let whole = [Some([1.0; CELLS.len()]); 4];
-        let mut lost = whole;
-        lost[2] = None;
-        let found = contrasts(&[&whole, &lost, &whole]);
+        let mut failed = whole;
+        failed[2] = None;
+        let found = contrasts(&[&whole, &failed, &whole]);
         assert_eq!(found[0].cells[0].median, 0.0);
-        assert!(contrasts(&[&lost])[0].cells[0].median.is_nan());
+        assert!(contrasts(&[&failed])[0].cells[0].median.is_nan());
     }
 }

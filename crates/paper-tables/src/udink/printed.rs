@@ -1,28 +1,28 @@
-//! What the paper prints: its tables 1 to 4.
+//! What the paper prints: its tables 1 to 4, on a plant `K/(1 + tau s)` with K = 1 and tau = 10 s.
 //!
 //! A. J. Udink ten Cate, *Continuous-time constrained least-squares algorithms for recursive parameter estimation of stochastic linear
 //! systems by a stabilized output error method*, WP-85-54, IIASA, Laxenburg, 1985, section 6.
 
-use super::Printed;
+use crate::Printed;
 
 /// One of the tables.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Table {
-    /// Its number.
+    /// Its number, 1 to 4.
     pub number: usize,
-    /// Forgetting rate, 1/s; 0 where the gain is constant.
+    /// Forgetting rate eta, 1/s; 0 where the gain is constant.
     pub eta: f64,
-    /// P1(0): of tau, of tau and K, of K.
+    /// `P1(0)`: entries (tau, tau), (tau, K) and (K, K).
     pub p1: [f64; 3],
-    /// P2(0), of c.
+    /// `P2(0)`, of the error filter's coefficient c.
     pub p2: f64,
-    /// Whether P1 and P2 stay.
+    /// Whether P1 and P2 keep their initial values.
     pub constant: bool,
-    /// Average, relative variance and, for K and tau, relative error of K, tau, c.
+    /// Rows K, tau (s), c (s); columns average, relative variance and, for K and tau, relative error.
     pub estimates: [[Printed; 3]; 3],
-    /// The criterion at 250, 500, 750 and 1000 s.
+    /// The criterion (6.2) at 250, 500, 750 and 1000 s, s.
     pub criterion: [Printed; 4],
-    /// P1 at the end as `p1`, then P2.
+    /// At 1000 s: P1 as in `p1`, then P2.
     pub p: [Printed; 4],
 }
 
@@ -93,7 +93,7 @@ pub const TABLES: [Table; 4] = [
     },
 ];
 
-/// Names of the cells of a table, in the order of [`Table::cells`].
+/// Names of the cells of a table, in the order of [`Table::cells`]: `E250` is the criterion at 250 s, `P11`, `P12` and `P22` are entries of P1.
 pub const CELLS: [&str; 19] = [
     "K avg",
     "K rel.var",
@@ -117,7 +117,7 @@ pub const CELLS: [&str; 19] = [
 ];
 
 impl Table {
-    /// The printed figures and the differences of the criterion, 19; without P where it is given and stays, 15.
+    /// The printed figures and the differences of the criterion, 19; 15 without P where the gain is constant.
     pub fn cells(&self) -> Vec<Printed> {
         let [k, tau, [average, variance, _]] = self.estimates;
         let mut cells: Vec<Printed> = [k, tau].concat();

@@ -3,7 +3,7 @@
 //! A. Baysse, F. J. Carrillo, A. Habbadi, *Algorithme d'identification à erreur de sortie pour systèmes à temps continu en boucle fermée à
 //! partir de données échantillonnées*, section III.
 
-use super::Printed;
+use crate::Printed;
 
 const fn p(value: f64, decimals: usize) -> Option<Printed> {
     Some(Printed::new(value, decimals))
@@ -12,11 +12,11 @@ const fn p(value: f64, decimals: usize) -> Option<Printed> {
 /// What a column of table I prints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
-    /// Means of K and tau.
+    /// Means of K and tau (s) over the runs.
     pub mean: [Option<Printed>; 2],
-    /// Their variances.
+    /// Their variances; of tau s^2.
     pub variance: [Option<Printed>; 2],
-    /// The distance (34).
+    /// The distance D of equation (34).
     pub distance: Option<Printed>,
     /// Mean number of iterations; from the text.
     pub iterations: Option<Printed>,
@@ -53,7 +53,7 @@ pub const NORMALISED: Simulated = Simulated {
     iterations: p(2.8, 1),
 };
 
-/// A column of table II: K, tau and their variances.
+/// A column of table II: K (cm/V), tau (s) and their variances.
 pub type Measured = [Option<Printed>; 4];
 
 /// Table II: instruments.

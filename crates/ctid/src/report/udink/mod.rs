@@ -1,14 +1,16 @@
 //! The page of `ctid tables udink`.
 
-use super::figures::{self, Colour, Curve, Figure, Panel, Values};
+mod figures;
+
+use paper_tables::udink::gains::{Gains, Row};
+use paper_tables::udink::{Cell, Changed, Comparison, ConstantGain, Contrast, LargerP, Study};
+
+use self::figures::{all_figures, table_numbers};
+use super::figures::{SCRIPT, json};
 use super::page::{self, NOTICES, Page, figure, items, large, section};
 use super::tables::table;
 use super::text::{escape, significant};
-use crate::tables::gains::{Gains, Kind, Limits, Row, TRUTH};
-use crate::tables::udink::{LargerP, Rule, Study};
-use crate::tables::udink_contrasts::{self, Contrast};
-use crate::tables::udink_power::{self, Changed, ConstantGain};
-use crate::tables::{Cell, Comparison};
+use crate::tables::udink_sentences as sentences;
 
 /// The page as a complete HTML file. The same study gives the same bytes.
 pub fn html(study: &Study) -> String {
@@ -30,8 +32,8 @@ pub fn html(study: &Study) -> String {
     page::html(&Page {
         title: "ctid: tables 1 to 4 of Udink ten Cate",
         body: &body,
-        data: &figures::json(&all_figures(study)),
-        script: figures::SCRIPT,
+        data: &json(&all_figures(study)),
+        script: SCRIPT,
     })
 }
 
@@ -57,9 +59,9 @@ fn headline(study: &Study) -> String {
          <ol class=\"trail apart\">\n{trail}</ol>\n\
          <details><summary>What the paper does not print, and is assumed</summary><ul>\n{assumptions}</ul></details>\n<p>The paper\u{2019}s own bounds on c^: {}.</p>\n\
          {NOTICES}</header>\n",
-        study.verdict(),
+        sentences::verdict(study),
         study.runs,
-        escape(&study.beside_the_verdict()),
+        escape(&sentences::beside_the_verdict(study)),
         escape(&study.filter_bounds)
     )
 }
@@ -76,7 +78,7 @@ fn responses() -> String {
 
 fn cells(study: &Study) -> String {
     let mut content = String::from("<div class=\"pairs\">\n");
-    for number in numbers(study) {
+    for number in table_numbers(study) {
         content += &figure(
             &format!("cells-{number}"),
             &format!("Table {number}: share of the runs below the printed figure"),
@@ -84,7 +86,7 @@ fn cells(study: &Study) -> String {
         );
     }
     content += "</div>\n";
-    for number in numbers(study) {
+    for number in table_numbers(study) {
         content += &cells_table(study, number);
     }
     content += &outside(study);
@@ -94,12 +96,6 @@ fn cells(study: &Study) -> String {
         "Shaded: 5 to 95 %. E250 is the criterion at 250 s; differences of it are given besides, as its values share their past.",
         &content,
     )
-}
-
-fn numbers(study: &Study) -> Vec<usize> {
-    let mut numbers: Vec<usize> = study.euler.tables.iter().map(|cell| cell.table).collect();
-    numbers.dedup();
-    numbers
 }
 
 fn cells_table(study: &Study, number: usize) -> String {
@@ -138,7 +134,7 @@ fn of_rule(cell: &Cell) -> String {
     format!(
         "<td class=\"number\">{}</td><td class=\"number\">{}</td><td{class}>{word}</td>",
         significant(cell.median, 4),
-        cell.range(" to ").replace('-', "−")
+        sentences::range(cell, " to ").replace('-', "−")
     )
 }
 
@@ -175,14 +171,14 @@ fn contrasts(contrasts: &[Contrast]) -> String {
                 "<tr><th scope=\"col\">Cell</th><th scope=\"col\" class=\"number\">Paper</th>\
                  <th scope=\"col\" class=\"number\">Median</th><th scope=\"col\" class=\"number\">5 to 95 %</th><th scope=\"col\"></th></tr>",
                 &rows,
-                &contrast.sentence(),
+                &sentences::contrast(contrast),
             )
         })
         .collect();
     section(
         "contrasts",
-        udink_contrasts::TITLE,
-        udink_contrasts::MEANING,
+        sentences::CONTRASTS,
+        sentences::CONTRASTS_MEANING,
         &tables,
     )
 }
@@ -207,8 +203,8 @@ fn power(changed: &[Changed]) -> String {
         .collect();
     section(
         "power",
-        udink_power::TITLE,
-        &escape(&udink_power::sentence(changed)),
+        sentences::OTHER_SETTINGS,
+        &escape(&sentences::other_settings(changed)),
         &table(
             "Tables 1 to 4 with other settings",
             "<tr><th scope=\"col\">Changed</th><th scope=\"col\" class=\"number\">Cells inside</th><th scope=\"col\" class=\"number\">Runs lost</th><th scope=\"col\">Noticed</th></tr>",
@@ -237,7 +233,7 @@ fn constant_gains(gains: &[ConstantGain]) -> String {
         .collect();
     section(
         "constant",
-        udink_power::SLOW,
+        sentences::CONSTANT_GAINS,
         "The paper prints no figures of the diagonal one. Medians of the runs; E is the criterion, s.",
         &table(
             "Constant gains",
@@ -260,7 +256,7 @@ fn larger_p(rows: &[LargerP]) -> String {
             format!(
                 "<tr><th scope=\"row\">× {}</th><td class=\"number{}\">{}</td><td class=\"number{}\">{}</td>\
                  <td class=\"number\">{}</td><td class=\"number\">{}</td></tr>\n",
-                row.factor_name(),
+                sentences::factor(row),
                 class(row.euler_failed),
                 failed(row.euler_failed),
                 class(row.exact_failed),
@@ -349,142 +345,4 @@ fn gain_row(row: &Row, noises: usize) -> String {
         significant(row.noisy_q05, 2),
         significant(row.noisy_q95, 2),
     )
-}
-
-fn all_figures(study: &Study) -> Vec<Figure> {
-    let mut all = vec![responses_figure(study)];
-    all.extend(numbers(study).into_iter().map(|n| cells_figure(study, n)));
-    all.extend([
-        counterexample_figure(&study.gains),
-        gains_figure(&study.gains),
-    ]);
-    all
-}
-
-fn responses_figure(study: &Study) -> Figure {
-    let shown = &study.figure;
-    let panels = [
-        ("y", "", None),
-        ("K^", "", Some(study.settings.gain)),
-        ("tau^", "s", Some(study.settings.time_constant)),
-        ("c^", "s", None),
-        ("E", "s", None),
-    ]
-    .map(|(title, unit, truth)| Panel {
-        lines: truth.into_iter().collect(),
-        ..Panel::new(title, unit)
-    });
-    let curves = [
-        ("disturbed output y", &shown.y, Colour::Named("measured")),
-        ("K^", &shown.gain, Colour::Of(1)),
-        ("tau^", &shown.time_constant, Colour::Of(0)),
-        ("c^", &shown.filter, Colour::Of(2)),
-        ("criterion", &shown.criterion, Colour::Of(3)),
-    ];
-    let curves = curves
-        .into_iter()
-        .enumerate()
-        .map(|(panel, (name, values, colour))| {
-            Curve::line(name, panel, colour, (&shown.time, values))
-        });
-    Figure::over_time("responses", 820, panels.into(), curves.collect())
-}
-
-fn cells_figure(study: &Study, number: usize) -> Figure {
-    let curve = |name: &str, comparison: &Comparison, colour, marker| {
-        let cells: Vec<&Cell> = comparison
-            .tables
-            .iter()
-            .filter(|cell| cell.table == number)
-            .collect();
-        let shares: Vec<f64> = cells.iter().map(|cell| 100.0 * cell.below).collect();
-        Curve {
-            marker: Some(marker),
-            y: Values::Names(cells.iter().map(|cell| cell.cell).collect()),
-            x: shares,
-            ..Curve::line(name, 0, colour, (&[], &[]))
-        }
-        .named()
-    };
-    let curves = vec![
-        curve("Euler", &study.euler, Colour::Of(0), "circle"),
-        curve("exact", &study.exact, Colour::Of(1), "diamond"),
-    ];
-    let count = curves
-        .iter()
-        .map(|curve| curve.x.len())
-        .max()
-        .unwrap_or_default();
-    Figure {
-        x_title: "runs below the printed figure",
-        x_unit: "%".to_owned(),
-        x_range: Some([-3.0, 103.0]),
-        x_band: Some([5.0, 95.0]),
-        categories: true,
-        ..Figure::over_time(
-            &format!("cells-{number}"),
-            90 + 21 * count as u32,
-            vec![Panel::new("", "")],
-            curves,
-        )
-    }
-}
-
-/// A gain's colour and dash, the same in both figures.
-fn look(kind: Kind) -> (Colour, &'static str) {
-    match kind {
-        Kind::BlockDiagonal => (Colour::Of(0), "solid"),
-        Kind::Full => (Colour::Of(1), "dash"),
-        Kind::Constant => (Colour::Of(2), "dot"),
-    }
-}
-
-fn counterexample_figure(gains: &Gains) -> Figure {
-    let panels = [("a1", "s"), ("a2", "s^2"), ("b0", "")]
-        .into_iter()
-        .zip(TRUTH)
-        .map(|((name, unit), truth)| Panel {
-            lines: vec![truth],
-            ..Panel::new(name, unit)
-        });
-    let panels: Vec<Panel> = panels.chain([Panel::new("V", "")]).collect();
-    let mut curves = Vec::new();
-    for found in &gains.counterexample {
-        let (colour, dash) = look(found.gain);
-        let values = found.theta.iter().chain([&found.lyapunov]);
-        for (panel, values) in values.enumerate() {
-            let curve = Curve::line(found.gain.name(), panel, colour, (&found.time, values));
-            let curve = curve.dashed(dash);
-            curves.push(if panel == 0 { curve.named() } else { curve });
-        }
-    }
-    Figure::over_time("counterexample", 660, panels, curves)
-}
-
-/// A panel for each bounds; Euler's rule thin.
-fn gains_figure(gains: &Gains) -> Figure {
-    let titles = [
-        "error, no bounds",
-        "error, wide bounds",
-        "error, sure bounds",
-    ];
-    let panels = titles.map(|title| Panel {
-        log: true,
-        range: Some([-2.3, 1.3]),
-        ..Panel::new(title, "")
-    });
-    let curves = gains.rows.iter().map(|row| {
-        let (colour, dash) = look(row.variant.gain);
-        let exact = row.variant.rule == Rule::Exact;
-        let name = format!("{}, {}", row.variant.gain.name(), row.variant.rule.name());
-        let panel = row.variant.bounds as usize;
-        let data = (&row.curve.time[..], &row.curve.values[..]);
-        let curve = Curve {
-            width: if exact { 2.2 } else { 1.0 },
-            legend: row.variant.bounds == Limits::None,
-            ..Curve::line(&name, panel, colour, data)
-        };
-        curve.dashed(if exact { "solid" } else { dash })
-    });
-    Figure::over_time("gains", 760, panels.into(), curves.collect())
 }

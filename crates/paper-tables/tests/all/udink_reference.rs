@@ -2,12 +2,12 @@
 //! `ctid tables udink`, with another noise.
 //!
 //! Ten of the rows stand here as well, so that the test is one everywhere: both settings, all tables, both rules, with and without noise.
-#![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 
-use ctid::tables::paper_udink::{CELLS, TABLES};
-use ctid::tables::udink::{Cells, Rule, Settings, run};
+use paper_tables::Error::{ShortNoise, Span, TooFewRunsForRange};
+use paper_tables::udink::printed::{CELLS, TABLES};
+use paper_tables::udink::{Cells, Rule, Settings, run, study};
 
 const KEPT: &str = "\
 R1 v=0 y0 power 0.429678947
@@ -112,23 +112,26 @@ fn all_rows_of_the_record() {
 }
 
 #[test]
-fn what_cannot_be_run_is_refused() {
+fn what_cannot_be_run_is_refused_with_the_numbers() {
     let settings = Settings::default();
     let [table, ..] = &TABLES;
-    let refused = |settings: &Settings, noise: &[f64]| {
-        run(settings, table, Rule::Exact, noise)
-            .unwrap_err()
-            .to_string()
+    let run = |settings: &Settings, noise: &[f64]| run(settings, table, Rule::Exact, noise);
+    let short = run(&settings, &[0.0; 10]).unwrap_err();
+    let ShortNoise { values, needed } = short else {
+        panic!("{short}")
     };
-    let short = refused(&settings, &[0.0; 10]);
-    assert!(
-        short.contains("10 values") && short.contains("3201"),
-        "{short}"
-    );
+    assert_eq!((values, needed), (10, 3201));
     let noise = vec![0.0; settings.steps() + 1];
-    let span = Settings {
+    let other = Settings {
         span: 4,
         ..settings
     };
-    assert!(refused(&span, &noise).contains("span of the differences is 4"));
+    assert!(matches!(run(&other, &noise), Err(Span { span: 4 })));
+    assert!(matches!(
+        study(&settings, 19, 1, &|_| {}),
+        Err(TooFewRunsForRange {
+            runs: 19,
+            fewest: 20
+        })
+    ));
 }

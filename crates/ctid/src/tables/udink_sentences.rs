@@ -1,0 +1,85 @@
+//! Titles, sentences and numbers that the text and the page of `ctid tables udink` share.
+
+use paper_tables::udink::{Cell, Changed, Contrast, LargerP, Study, Verdict};
+
+use crate::numbers;
+
+/// Title of the differences between tables.
+pub(crate) const CONTRASTS: &str = "Differences between tables, run by run";
+
+/// What the differences tell.
+pub(crate) const CONTRASTS_MEANING: &str = "By Euler's rule. Two tables with one noise differ by their settings alone: that their cells lie inside one \
+     by one does not say that their differences do.";
+
+/// Title of the runs with other settings.
+pub(crate) const OTHER_SETTINGS: &str = "What the comparison would not notice";
+
+/// Title of the constant gains.
+pub(crate) const CONSTANT_GAINS: &str =
+    "Constant gains: that of table 4, and the diagonal one that the paper found slow";
+
+/// What can be said of the paper's tables, cell by cell.
+pub(crate) fn verdict(study: &Study) -> &'static str {
+    match study.verdict() {
+        Verdict::Consistent => "cell by cell statistically consistent",
+        Verdict::ConsistentByEulerOnly => {
+            "cell by cell statistically consistent with Euler's rule only"
+        }
+        Verdict::NotConsistent => "not consistent",
+    }
+}
+
+/// What the verdict on the cells leaves out: the differences of the two tables that have one noise.
+pub(crate) fn beside_the_verdict(study: &Study) -> String {
+    let sentence = |contrast: &Contrast| {
+        let [first, second] = contrast.between;
+        format!(
+            "Tables {first} and {second} have one noise, so that their differences say more than the cells: {} of {} are inside. The \
+             assumed experiment is not the paper's in every respect.",
+            contrast.inside,
+            contrast.cells.len()
+        )
+    };
+    study.contrasts.first().map(sentence).unwrap_or_default()
+}
+
+/// How many of the differences lie inside, and what is known of the noises.
+pub(crate) fn contrast(contrast: &Contrast) -> String {
+    let [first, second] = contrast.between;
+    format!(
+        "{} of {} differences inside; tables {first} and {second}: {}.",
+        contrast.inside,
+        contrast.cells.len(),
+        contrast.noise
+    )
+}
+
+/// How many of the other settings the comparison does not notice.
+pub(crate) fn other_settings(changed: &[Changed]) -> String {
+    let unnoticed = changed.iter().filter(|changed| !changed.noticed).count();
+    format!(
+        "The tables by Euler's rule with one setting changed: {unnoticed} of {} changes leave the tables \"consistent\", cell by cell. So \
+         much remains open after the comparison.",
+        changed.len()
+    )
+}
+
+/// The 5 to 95 % range, both ends with the decimals that its width deserves: of 20 to 200 last digits.
+pub(crate) fn range(cell: &Cell, between: &str) -> String {
+    let width = cell.q95 - cell.q05;
+    if !width.is_finite() {
+        return "-".to_owned();
+    }
+    let places = (1 - numbers::exponent(0.5 * width)).max(0);
+    let [low, high] = [cell.q05, cell.q95].map(|end| numbers::decimals(end, places));
+    format!("{low}{between}{high}")
+}
+
+/// The factor of `P(0)` as a person writes it.
+pub(crate) fn factor(row: &LargerP) -> String {
+    if row.factor < 1e6 {
+        format!("{}", row.factor)
+    } else {
+        format!("{:e}", row.factor)
+    }
+}

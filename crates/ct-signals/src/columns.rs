@@ -556,28 +556,10 @@ fn closest<'a>(wanted: &str, headers: &'a [String]) -> Option<&'a String> {
     headers
         .iter()
         .map(|header| {
-            (
-                edits(&wanted, &unit::split(header).0.to_lowercase()),
-                header,
-            )
+            let name = unit::split(header).0.to_lowercase();
+            (strsim::levenshtein(&wanted, &name), header)
         })
         .filter(|(edits, _)| 2 * edits <= wanted.chars().count())
         .min_by_key(|(edits, _)| *edits)
         .map(|(_, header)| header)
-}
-
-/// Insertions, deletions and replacements that lead from `a` to `b` (Levenshtein's distance).
-fn edits(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(from != *to);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }

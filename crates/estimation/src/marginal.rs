@@ -23,6 +23,7 @@
 //! J. R. Statist. Soc. B 51 (1989) 15-27.
 
 use ct_signals::ArModel;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::{Error, Noise, Rows};
@@ -109,40 +110,19 @@ pub(crate) fn freedom(
         .collect::<Option<Vec<_>>>()?
         .into_iter()
         .unzip();
-    let factor = cholesky(hessian)?;
+    // The lower triangle is all that the factorisation reads.
+    let hessian = DMatrix::from_fn(q, q, |i, j| hessian[i.max(j)][i.min(j)]);
+    let factor = hessian.cholesky()?;
     let count = variances(&model(&z, &orders).ok()?, centre.variance)?.len();
     Some(
         (0..count)
             .map(|entry| {
-                // |F^-1 g|^2 = g' H^-1 g.
-                let mut solved: Vec<f64> = Vec::with_capacity(q);
-                for i in 0..q {
-                    let known: f64 = factor[i].iter().zip(&solved).map(|(f, s)| f * s).sum();
-                    solved.push((gradient[i][entry] - known) / factor[i][i]);
-                }
-                let colour: f64 = solved.iter().map(|s| 2.0 * s * s).sum();
+                let slope = DVector::from_fn(q, |i, _| gradient[i][entry]);
+                let colour = 2.0 * slope.dot(&factor.solve(&slope));
                 2.0 / (2.0 / centre.left + colour)
             })
             .collect(),
     )
-}
-
-/// The lower triangle whose square a positive definite matrix is.
-fn cholesky(mut a: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
-    for i in 0..a.len() {
-        for j in 0..=i {
-            let known: f64 = (0..j).map(|k| a[i][k] * a[j][k]).sum();
-            let rest = a[i][j] - known;
-            if i > j {
-                a[i][j] = rest / a[j][j];
-            } else if rest > 0.0 {
-                a[i][i] = rest.sqrt();
-            } else {
-                return None;
-            }
-        }
-    }
-    Some(a)
 }
 
 /// Order of each output's model.

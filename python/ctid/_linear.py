@@ -130,7 +130,7 @@ class Identification:
         from ._plot import fit_axes
 
         time, measured, simulated = self._curves
-        return fit_axes([(str(self._found["record"]), time, [("output", measured, simulated)])], ax)
+        return fit_axes([(str(self._found["record"]), time, [("output", measured, simulated)])], [], ax)
 
     def __repr__(self) -> str:
         return f"<ctid.Identification by {self.method}, order {self.order}: {self.fit_percent:.1f} %>"

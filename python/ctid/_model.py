@@ -362,6 +362,10 @@ class Fit:
         return self._native.not_determined
 
     @property
+    def _units(self) -> list[str]:
+        return self._native.output_units
+
+    @property
     def _series(self) -> list[tuple[str, Array, list[tuple[str, Array, Array]]]]:
         return self._native.series
 
@@ -513,7 +517,7 @@ class Fit:
         """Measured and simulated outputs, and their residuals; returns matplotlib axes."""
         from ._plot import fit_axes
 
-        return fit_axes(self._series, ax)
+        return fit_axes(self._series, self._units, ax)
 
     def __repr__(self) -> str:
         percent = ", ".join(f"{name} {fit:.1f} %" for name, _, fit in self._scores)
@@ -638,6 +642,10 @@ class Diagnosis:
         return str(self._found["model"])
 
     @property
+    def _units(self) -> list[str]:
+        return self._native.output_units
+
+    @property
     def _series(self) -> list[tuple[str, bool, Array, list[tuple[str, Array, list[Array]]]]]:
         return self._native.series
 
@@ -687,7 +695,7 @@ class Diagnosis:
         """Measured outputs, the believed model and the last one, and the fall of the error; returns matplotlib axes."""
         from ._plot import diagnosis_axes
 
-        return diagnosis_axes(self._series, self._title, self._found, ax)
+        return diagnosis_axes(self._series, self._units, self._title, self._found, ax)
 
     def __repr__(self) -> str:
         effects = ", ".join(self.effects)

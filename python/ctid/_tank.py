@@ -274,7 +274,7 @@ class TankFit(Fit):
             )
         finally:
             _clear(progress)
-        return TankDiagnosis(found.json(), found.sentences, found.html(), found.series, self._parts)
+        return TankDiagnosis(found.json(), found.sentences, found.html(), (found.series, found.output_units), self._parts)
 
     def to_modelica(self) -> str:
         """Raises `ModelError`: a plant has no text."""
@@ -291,14 +291,14 @@ def _tank_fit_of(content: bytes, indexes: list[Any], parts: dict[str, Any]) -> T
 class TankDiagnosis(Diagnosis):
     """What a plant is missing; it never changes."""
 
-    __slots__ = ("_html", "_json", "_parts", "_sentences", "_series_of")
+    __slots__ = ("_html", "_json", "_parts", "_sentences", "_series_of", "_units_of")
 
-    def __init__(self, text: str, sentences: list[str], html: str, series: Any, parts: dict[str, Any]) -> None:
+    def __init__(self, text: str, sentences: list[str], html: str, outputs: tuple[Any, list[str]], parts: dict[str, Any]) -> None:
         self._json = text
         self._found = json.loads(text)
         self._sentences = sentences
         self._html = html
-        self._series_of = series
+        self._series_of, self._units_of = outputs
         self._parts = parts
 
     @property
@@ -361,11 +361,15 @@ class TankDiagnosis(Diagnosis):
         return self._series_of
 
     @property
+    def _units(self) -> list[str]:
+        return self._units_of
+
+    @property
     def _page(self) -> str:
         return self._html
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return TankDiagnosis, (self._json, self._sentences, self._html, self._series_of, self._parts)
+        return TankDiagnosis, (self._json, self._sentences, self._html, (self._series_of, self._units_of), self._parts)
 
 
 #: Plants that there are.

@@ -119,7 +119,8 @@ def test_a_tank_is_diagnosed(tour, tour_test):
     assert d.ranking["effect"].iloc[0] == "overflow" and d.ladder["rmse y"].iloc[-1] < 0.06
     assert pickle.loads(pickle.dumps(better)).params.equals(better.params)
     assert pickle.loads(pickle.dumps(d)).effects == d.effects
-    fit.plot(), d.plot()
+    for shown in (fit, d, pickle.loads(pickle.dumps(d))):
+        assert shown.plot()[0].get_ylabel() == "y [cm]"
 
 
 def test_an_alarm_is_raised_and_a_monitor_is_kept(block):

@@ -173,6 +173,12 @@ impl Diagnosis {
         Ok((json(&found)?, self.records.time_unit))
     }
 
+    /// The unit of each output; empty where no record says it.
+    #[getter]
+    fn output_units(&self) -> Vec<String> {
+        crate::fit::units_of(&self.records.records)
+    }
+
     /// Of each record, fitted ones first: its name, whether it is held out, its times \[s\], and of each output its name, what was measured and
     /// what each step gives.
     #[getter]

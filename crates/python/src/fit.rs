@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use ct_signals::ReadOptions;
+use ct_signals::{ReadOptions, Record};
 use ctid::effort::EffortLevel;
 use ctid::own_model::{
     Comparison, FitLimit, FittedModel, Simulated, StateSource, compared_page, diagnose,
@@ -153,6 +153,12 @@ pub fn simulation<'py>(py: Python<'py>, found: &Simulated) -> PyResult<Bound<'py
     Ok(all)
 }
 
+/// The unit of each output of records, which is that of the first one.
+pub fn units_of(records: &[Record]) -> Vec<String> {
+    let outputs = records.first().map_or(&[][..], |record| &record.outputs);
+    outputs.iter().map(|output| output.unit.clone()).collect()
+}
+
 #[pymethods]
 impl Fit {
     /// Name, value, standard error, unit and whether it is known, of each parameter and initial state.
@@ -217,6 +223,12 @@ impl Fit {
             (record.name.clone(), time, outputs.collect())
         });
         all.collect()
+    }
+
+    /// The unit of each output; empty where no record says it.
+    #[getter]
+    fn output_units(&self) -> Vec<String> {
+        units_of(&self.fitted.records().records)
     }
 
     /// Output, error and fit % on the fitted records.

@@ -16,7 +16,7 @@ use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
 use crate::diagnosis::{Bin, bins, json};
-use crate::fit::{Covariance, check_simulation, simulation};
+use crate::fit::{Covariance, check_simulation, simulation, units_of};
 use crate::frame::{Content, Frame};
 use crate::model::contents;
 use crate::{bytes, error, work};
@@ -184,6 +184,12 @@ impl TankFit {
         };
         let matrix = PyArray2::from_vec2(py, matrix).map_err(error::of_data)?;
         Ok(Some((names.clone(), matrix)))
+    }
+
+    /// The unit of each output; empty where no record says it.
+    #[getter]
+    fn output_units(&self) -> Vec<String> {
+        units_of(&self.problem.records)
     }
 
     /// As of a diagnosis of a model of the user's own.

@@ -193,7 +193,8 @@ fn restored_guard<M: Memory>(
     counts: Counts,
 ) -> Result<Guard, &'static str> {
     // The cap is one on the trace, or with directional forgetting one on each eigenvalue.
-    if !(trace <= MAX_TRACE * parameters.max(1) as f64 * (1.0 + ROUNDING)) {
+    let most = MAX_TRACE * parameters.max(1) as f64 * (1.0 + ROUNDING);
+    if trace.is_nan() || trace > most {
         return Err("the trace of P is above 1e100");
     }
     if !(bound >= 0.0 && bound.is_finite()) {

@@ -30,4 +30,5 @@ mod side_by_side;
 mod simulate;
 mod system_limits;
 mod tables;
+mod threads;
 mod udink_reference;

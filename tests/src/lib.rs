@@ -160,19 +160,13 @@ impl Rig {
     }
 
     /// The plant without what is hidden, beside one record; the controller is not told.
+    ///
+    /// # Panics
+    /// Where the record has other outputs than the plant.
+    #[allow(clippy::expect_used)]
     pub fn problem(&self, record: Record) -> Problem {
-        Problem {
-            plant: self.plant,
-            known: self.known(),
-            effects: Vec::new(),
-            terms: Vec::new(),
-            start: Default::default(),
-            fixed: Vec::new(),
-            priors: Default::default(),
-            controller: None,
-            records: vec![record],
-            test: Vec::new(),
-        }
+        let problem = Problem::builder(self.plant, self.known(), [record]).build();
+        problem.expect("a record of the plant")
     }
 
     /// Runs it.

@@ -287,23 +287,15 @@ const HEATERS: &[(&str, Option<&str>, &[usize])] = &[
     ),
 ];
 
+#[allow(clippy::expect_used)]
 fn problem(source: Source, record: Record, test: Vec<Record>) -> Problem {
-    Problem {
-        plant: if source == Source::Tanks {
-            Plant::CascadedTanks
-        } else {
-            Plant::SingleTankLinear
-        },
-        known: Known::default(),
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        priors: Default::default(),
-        controller: None,
-        records: vec![record],
-        test,
-    }
+    let plant = if source == Source::Tanks {
+        Plant::CascadedTanks
+    } else {
+        Plant::SingleTankLinear
+    };
+    let problem = Problem::builder(plant, Known::default(), [record]);
+    problem.test(test).build().expect("records of the plant")
 }
 
 fn csv_files(folder: &Path) -> Vec<String> {

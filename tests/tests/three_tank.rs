@@ -11,18 +11,8 @@ use plants::Plant;
 const SAMPLES: usize = 700;
 
 fn problem(record: Record) -> Problem {
-    Problem {
-        plant: Plant::ThreeTank,
-        known: known(),
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: [].into(),
-        fixed: Vec::new(),
-        priors: Default::default(),
-        records: vec![record],
-        controller: None,
-        test: Vec::new(),
-    }
+    let problem = Problem::builder(Plant::ThreeTank, known(), [record]);
+    problem.build().unwrap()
 }
 
 /// The hidden effect is in the group that is named, and where it is named first it is in its own tank.

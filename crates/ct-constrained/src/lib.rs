@@ -26,3 +26,7 @@ pub use error::Error;
 pub use filtered::{Filter, FilteredRow};
 pub use projection::{project, project_box};
 pub use row::{Relation, Row};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

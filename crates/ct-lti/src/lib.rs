@@ -83,3 +83,7 @@ pub use sampling::{Sampled, Simulator};
 pub use state_space::StateSpace;
 pub use state_variable_filter::StateVariableFilter;
 pub use transfer_function::TransferFunction;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -64,3 +64,7 @@ pub use simulation::{Method, Model, NoSolution, Simulation};
 pub use spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
 pub use text::{Position, TextError, unknown_units};
 pub use units::{UnitWarning, unit_warnings};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -69,6 +69,9 @@ use crate::{UdFactor, factor};
 pub struct Directional;
 
 impl Memory for Directional {
+    #[cfg(feature = "serde")]
+    const RAISES: bool = false;
+
     #[inline(always)]
     fn weak(squared: f64, weights: &Weights, cap: f64) -> bool {
         weights.gamma() * squared * cap < weights.eta()

@@ -26,11 +26,11 @@ pub struct DynamicSample {
 }
 
 #[derive(Clone, Debug)]
-struct Factors {
-    u: Vec<f64>,
-    d: Vec<f64>,
+pub(crate) struct Factors {
+    pub u: Vec<f64>,
+    pub d: Vec<f64>,
     /// Intensities of the random walk; empty without one.
-    q: Vec<f64>,
+    pub q: Vec<f64>,
 }
 
 impl Capped for Factors {
@@ -53,12 +53,12 @@ impl Capped for Factors {
 /// exponential forgetting, unless another [`FactoredIntegrator`] is named.
 #[derive(Clone, Debug)]
 pub struct DynamicRls<I: FactoredIntegrator = ExactHold> {
-    theta: DVector<f64>,
-    state: Factors,
-    scratch: [Vec<f64>; 2],
-    weights: Weights,
-    guard: Guard,
-    integrator: PhantomData<I>,
+    pub(crate) theta: DVector<f64>,
+    pub(crate) state: Factors,
+    pub(crate) scratch: [Vec<f64>; 2],
+    pub(crate) weights: Weights,
+    pub(crate) guard: Guard,
+    pub(crate) integrator: PhantomData<I>,
 }
 
 impl DynamicRls {

@@ -25,6 +25,51 @@ pub(crate) struct Guard {
     silent: u64,
 }
 
+/// How often what happened.
+#[cfg(feature = "serde")]
+#[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Counts {
+    used: u64,
+    unused: u64,
+    capped: u64,
+    silent: u64,
+}
+
+#[cfg(feature = "serde")]
+impl Guard {
+    /// The bound of the trace, and the counts. A factored `P` has no other state: its run does not stop.
+    pub fn saved(&self) -> (f64, Counts) {
+        let counts = Counts {
+            used: self.used,
+            unused: self.unused,
+            capped: self.capped,
+            silent: self.silent,
+        };
+        (self.bound, counts)
+    }
+
+    /// The guards as they were saved.
+    pub fn restored(guards: Guards, bound: f64, counts: Counts) -> Result<Self, Error> {
+        // The trace may be above the cap by rounding, and its bound is what counts.
+        let mut guard = Self::new(1.0)?;
+        guard.set(guards, 0.0)?;
+        let Counts {
+            used,
+            unused,
+            capped,
+            silent,
+        } = counts;
+        Ok(Self {
+            bound,
+            used,
+            unused,
+            capped,
+            silent,
+            ..guard
+        })
+    }
+}
+
 impl Guard {
     pub fn new(trace: f64) -> Result<Self, Error> {
         let guards = Guards {

@@ -37,10 +37,20 @@ pub(crate) mod sealed {
         fn intensity(&self) -> &[f64] {
             &[]
         }
+        /// Another intensity, one for each parameter; nothing where the rule has none.
+        #[cfg(feature = "serde")]
+        fn set_intensity(&mut self, _q: &[f64]) {}
     }
 
     /// What the guards have to know of a rule.
     pub trait Memory {
+        /// Whether a step may raise the trace of `P` above the bound that was known of it.
+        #[cfg(feature = "serde")]
+        const RAISES: bool = true;
+        /// Whether the parameters walk at random.
+        #[cfg(feature = "serde")]
+        const WALKS: bool = false;
+
         /// Whether a regressor of this squared length is too weak to forget with, under the cap.
         #[inline(always)]
         fn weak(_squared: f64, _weights: &Weights, _cap: f64) -> bool {

@@ -13,6 +13,7 @@
 //! | Can I trust the estimates? | [`health`](RecursiveEstimator::health): excitation, definiteness, trace |
 //! | Parameters that are related, or bounded | the crate `ct-constrained` |
 //! | Two blocks of parameters, one output, no covariance between them | [`update_blocks`] |
+//! | The program ends and goes on later | with the feature `serde` an estimator is saved as it stands; what is restored continues to the bit |
 //! | How does Euler's rule compare? | [`ContinuousRls::with_integrator`] with [`Euler`] or [`Rk4`] |
 //!
 //! # Which way to forget
@@ -61,6 +62,8 @@ mod integrator;
 mod random_walk;
 mod rk4;
 mod rls;
+#[cfg(feature = "serde")]
+mod saved;
 mod settings;
 mod statement;
 
@@ -82,3 +85,7 @@ pub use rk4::Rk4;
 pub use rls::{ContinuousRls, Sample};
 pub use settings::{Guards, MAX_REGRESSOR, Weights};
 pub use statement::absorb_blocks;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -106,6 +106,9 @@ impl<const P: usize> ContinuousRls<P, RandomWalk> {
 }
 
 impl Memory for RandomWalk {
+    #[cfg(feature = "serde")]
+    const WALKS: bool = true;
+
     #[inline(always)]
     fn raised(bound: f64, step: &Step, intensity: &[f64]) -> f64 {
         let walk: f64 = intensity.iter().sum();
@@ -218,6 +221,11 @@ impl<const P: usize> Capped for WalkState<P> {
     #[inline(always)]
     fn intensity(&self) -> &[f64] {
         &self.q
+    }
+
+    #[cfg(feature = "serde")]
+    fn set_intensity(&mut self, q: &[f64]) {
+        self.q.copy_from_slice(q);
     }
 }
 

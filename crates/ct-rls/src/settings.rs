@@ -108,11 +108,31 @@ pub struct Guards {
     /// A regressor that stays in a subspace for long makes the other directions reach the cap; while they are
     /// there, forgetting is nearly off in all directions. With [`Directional`](crate::Directional) it is not: no eigenvalue of `P`
     /// is raised above the cap, by not forgetting with a regressor too weak for it, `gamma |phi|^2 trace_limit < eta`.
+    ///
+    /// As a record `f64::INFINITY` is none, which JSON has no number for.
+    #[cfg_attr(feature = "serde", serde(with = "infinite_as_none"))]
     pub trace_limit: f64,
     /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`.
     /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's. Above 1e30 it
     /// is 1e30, the limit of a regressor. The intensity of a [`RandomWalk`](crate::RandomWalk) goes on.
     pub silent_below: f64,
+}
+
+#[cfg(feature = "serde")]
+mod infinite_as_none {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    // serde hands over a reference
+    #[allow(clippy::trivially_copy_pass_by_ref)]
+    pub fn serialize<S: Serializer>(limit: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        (*limit != f64::INFINITY)
+            .then_some(limit)
+            .serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+    }
 }
 
 impl Guards {

@@ -32,7 +32,7 @@
 //! P. J. Brockwell, R. A. Davis, *Time Series: Theory and Methods*, 2nd ed., Springer 1991, ch. 5
 //! and 8.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{Error, Whitener, ar_missing};
 
@@ -46,7 +46,10 @@ pub(crate) const NOTHING: f64 = 1e-200;
 const SAMPLES_PER_COEFFICIENT: usize = 5;
 
 /// A stationary autoregressive process of mean 0.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+///
+/// Read again from coefficients and `sigma`, it is checked to be stationary.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Written")]
 pub struct ArModel {
     /// Partial correlations `k_1..k_p`, each within -1..1.
     #[serde(skip)]
@@ -55,6 +58,21 @@ pub struct ArModel {
     coefficients: Vec<f64>,
     /// Standard deviation of the innovations, in the signal's unit.
     sigma: f64,
+}
+
+/// An [`ArModel`] as it is written.
+#[derive(Deserialize)]
+struct Written {
+    coefficients: Vec<f64>,
+    sigma: f64,
+}
+
+impl TryFrom<Written> for ArModel {
+    type Error = Error;
+
+    fn try_from(written: Written) -> Result<Self, Error> {
+        Self::from_coefficients(&written.coefficients, written.sigma)
+    }
 }
 
 impl ArModel {

@@ -104,3 +104,7 @@ pub use student::student_half_width;
 pub use timestamp::{Timestamp, TimestampError, TimestampReader, Zone};
 pub use unit::{Conversion, Dimension, Unit};
 pub use whitener::Whitener;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -13,18 +13,9 @@ use crate::look::Look;
 use crate::progress::Bar;
 use crate::{Error, edit, output, terminal};
 
-const DATA: (&str, &str) = (
-    "tour.csv",
-    include_str!("../../../examples/records/tour.csv"),
-);
-const TEST: (&str, &str) = (
-    "tour-test.csv",
-    include_str!("../../../examples/records/tour-test.csv"),
-);
-const MODEL: (&str, &str) = (
-    "tour.toml",
-    include_str!("../../../examples/records/tour.toml"),
-);
+const DATA: (&str, &str) = ("tour.csv", include_str!("../records/tour.csv"));
+const TEST: (&str, &str) = ("tour-test.csv", include_str!("../records/tour-test.csv"));
+const MODEL: (&str, &str) = ("tour.toml", include_str!("../records/tour.toml"));
 
 /// What the tour leaves behind.
 #[derive(Debug)]

@@ -25,6 +25,12 @@ pub enum Error {
     /// An experiment that cannot be proposed.
     #[error(transparent)]
     Design(#[from] crate::design::Refused),
+    /// The unit of the model's time is none.
+    #[error("a unit of the model's time of {seconds} s: it has to be above zero and finite")]
+    TimeUnit {
+        /// How many seconds it was to have.
+        seconds: f64,
+    },
     /// An effect of the model file that the model cannot have.
     #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can")]
     UnknownEffect {

@@ -1,10 +1,7 @@
-//! Finds the effect that a model written as text lacks.
+#![doc = include_str!("../README.md")]
 //!
-//! [`diagnose`] fits the believed model to records, scores all effects of the catalogue at all ports of the model and the candidates of the
-//! user's own, alone and in pairs, fits the promising ones, confirms what the noise does not explain, and groups what the data cannot tell
-//! apart. The result ([`Diagnosis`]) is plain values.
-//!
-//! The layers below: [`ct_model`] has the models, the effects and their simulation with exact derivatives, [`greybox::ModelSetup`] the
+//! # Layers
+//! [`ct_model`] has the models, the effects and their simulation with exact derivatives, [`greybox::ModelSetup`] the
 //! fit, [`estimation`] least squares under a noise model.
 
 mod accept;
@@ -13,6 +10,7 @@ pub mod design;
 mod diagnose;
 mod error;
 mod factor_score;
+mod found_model;
 mod groups;
 mod held_out;
 mod joined;
@@ -21,6 +19,7 @@ mod node;
 mod pairs;
 mod partial;
 mod problem;
+mod problem_builder;
 pub mod residual;
 mod result;
 mod score;
@@ -32,9 +31,11 @@ mod unknown;
 pub use believed::{Believed, all_candidates, believed};
 pub use diagnose::{MANY, Progress, diagnose};
 pub use error::Error;
+pub use found_model::with_effects;
 pub use held_out::{HeldOut, held_out};
 pub use left::Left;
 pub use problem::{Kept, Options, Problem};
+pub use problem_builder::ProblemBuilder;
 pub use result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 pub use spectral_line::{Line, strongest_line};
 pub use unknown::{PortScore, Unknown};

@@ -79,3 +79,7 @@ pub use rows::Rows;
 pub use sandwich::{Robust, robust, robust_with_memory};
 pub use triangle::Triangle;
 pub use weights::Squares;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -105,3 +105,7 @@ pub use recursive::{Filter, LoopHealth, LoopSample, RecursiveFcloe, RecursiveSet
 pub use simulation::{BLOCK, Block, LoopSimulator};
 pub use table_of_starts::{StartRun, TableOfStarts, factors_to_five};
 pub use uncertainty::Uncertainty;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,5 +1,4 @@
-//! Fits a plant to records by simulation error: bounds, many starts, exact sensitivities, a noise model,
-//! and uncertainty that is right.
+#![doc = include_str!("../README.md")]
 
 mod clock;
 mod error;

@@ -17,11 +17,12 @@ use ct_model::{Dual, Model};
 use estimation::{
     Fit, Noise, Prior, Residuals, Sample, Start, Stopping, fit_from, linearise, robust,
 };
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
 /// How well the parameters of a fit are known, and how large the noise of readings is.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitUncertainty {
     /// Positions in the vector of the parameters that have an error: fitted ones that are not at a bound.
     pub entries: Vec<usize>,
@@ -103,7 +104,7 @@ impl FitUncertainty {
 }
 
 /// Initial states of a simulation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InitialStates {
     /// Their values \[unit of the state\].
     pub values: Vec<f64>,

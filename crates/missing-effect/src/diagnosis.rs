@@ -4,12 +4,12 @@
 use ct_signals::{ArModel, Channel, Clock, Record};
 use greybox::{Noise, PriorValue};
 use plants::{Domain, Plant};
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::{MendedGaps, Unknown, numbers::value_and_error};
 
 /// What the search found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Every added effect is singled out by the data.
@@ -26,11 +26,12 @@ pub enum Verdict {
 }
 
 /// A fitted parameter.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Its name, `alpha` or `overflow.rim`; initial states are `level(0)` and the like.
     pub name: String,
     /// The estimate, in `unit`.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub value: f64,
     /// Its standard error, in `unit`; `None` where the data do not determine it or it sits at a bound.
     pub std_error: Option<f64>,
@@ -68,44 +69,54 @@ impl Parameter {
 }
 
 /// Residual tests of one fit, of its first record but for `input_p`; the bounds are for 95 %.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResidualTests {
     /// Autocorrelation of the simulation residual at lags 0, 1, ...
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub autocorrelation: Vec<f64>,
     /// Cross-correlation of the whitened input with the whitened residual at lags 0, 1, ...
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub cross_correlation: Vec<f64>,
     /// Half-width of the 95 % band of the autocorrelation.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub autocorrelation_bound: f64,
     /// Half-width of the 95 % band of the cross-correlation.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub cross_correlation_bound: f64,
     /// p-value of the Ljung-Box test: whiteness of the simulation residual.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub whiteness_p: f64,
     /// p-value of the portmanteau test of the cross-correlation with the input (in a simulated loop the reference), of all records.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub input_p: f64,
 }
 
 /// The residual in one bin of something: a time window, a range of level, of flow, ...
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Bin {
     /// Position of the record that a window lies in, fitted ones first; `None` where all fitted records are counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record: Option<usize>,
     /// Lower edge.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub from: f64,
     /// Upper edge.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub to: f64,
     /// Samples in it; of frequencies the lines of the spectrum.
     pub count: usize,
     /// Mean residual (measured minus model), in the output's unit; zero of frequencies.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub mean: f64,
     /// Root mean square of the residual, in the output's unit.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub rms: f64,
     /// It fails: its mean square is clearly above what the noise would show there.
     pub fails: bool,
 }
 
 /// Where a model fails, in all records that it was fitted to.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Failures {
     /// By time \[s\], record by record.
     pub by_time: Vec<Bin>,
@@ -122,14 +133,15 @@ pub struct Failures {
 }
 
 /// One model on the way: the base, or the base and the effects added so far.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// The effect that this step added; `None` for the base.
     pub added: Option<String>,
     /// The vessel or pump it acts in, where the plant has more than one: `upper` or `lower` of two tanks.
     pub place: Option<String>,
     /// Root mean square of the simulation error on the fitted records, in the output's unit; NaN, and not written, of several outputs.
-    #[serde(skip_serializing_if = "none")]
+    #[serde(skip_serializing_if = "none", default = "no_number")]
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub rmse: f64,
     /// The same on the held-out record, whose first five samples set its initial states and are not scored.
     pub rmse_test: Option<f64>,
@@ -138,10 +150,12 @@ pub struct Step {
     /// `rmse_test` of each output by its name.
     pub rmse_test_per_output: Option<PerOutput>,
     /// Root mean square of the simulation errors of all outputs, each divided by the noise floor of its output: one is the noise.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub weighted_rmse: f64,
     /// The same on the held-out record.
     pub weighted_rmse_test: Option<f64>,
     /// Bayesian information criterion with this model's own noise colour; smaller is better.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub bic: f64,
     /// Parameters in chain order, initial states last.
     pub parameters: Vec<Parameter>,
@@ -157,11 +171,12 @@ pub struct Step {
 }
 
 /// What one model shows at one output.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutputStep {
     /// Its name.
     pub name: String,
     /// Root mean square of the simulation error on the fitted records, in the output's unit.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub rmse: f64,
     /// The same on the held-out records.
     pub rmse_test: Option<f64>,
@@ -177,6 +192,26 @@ pub struct OutputStep {
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
 fn none(value: &f64) -> bool {
     value.is_nan()
+}
+
+/// Reads a number that may not be finite, which JSON writes as `null`.
+pub(crate) fn number<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+/// The same of several.
+pub(crate) fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    let all = Vec::<Option<f64>>::deserialize(from)?;
+    Ok(all.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
+}
+
+fn no_number() -> f64 {
+    f64::NAN
+}
+
+/// How times are said where no calendar is known.
+fn plain_clock() -> Clock {
+    Clock::of([])
 }
 
 /// A number for each output, by its name, in order.
@@ -202,21 +237,50 @@ impl Serialize for PerOutput {
     }
 }
 
+impl<'de> Deserialize<'de> for PerOutput {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(InOrder)
+    }
+}
+
+/// Reads a [`PerOutput`] in the order in which it was written.
+struct InOrder;
+
+impl<'de> serde::de::Visitor<'de> for InOrder {
+    type Value = PerOutput;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str("a number for each output, by its name")
+    }
+
+    fn visit_map<A: serde::de::MapAccess<'de>>(self, mut map: A) -> Result<PerOutput, A::Error> {
+        let mut all = Vec::new();
+        while let Some((name, value)) = map.next_entry::<String, Option<f64>>()? {
+            all.push((name, value.unwrap_or(f64::NAN)));
+        }
+        Ok(PerOutput(all))
+    }
+}
+
 /// One candidate of the catalogue at the first step.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Score {
     /// The effect.
     pub effect: String,
     /// The vessel or pump it acts in, where the plant has more than one.
     pub place: Option<String>,
     /// Fall of the Bayesian information criterion when it is added and everything is refitted; larger is better.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub bic_gain: f64,
     /// Simulation error after the refit, in the output's unit; NaN, and not written, of several outputs.
-    #[serde(skip_serializing_if = "none")]
+    #[serde(skip_serializing_if = "none", default = "no_number")]
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub rmse: f64,
     /// The same of all outputs, each divided by the noise floor of its output.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub weighted_rmse: f64,
     /// `|p|/|j|`: the part of the effect's signature that the fitted parameters cannot imitate.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub visibility: f64,
     /// The size that was found: the effect's leading parameter.
     pub size: Option<Parameter>,
@@ -230,7 +294,7 @@ pub struct Score {
 ///
 /// An effect is the answer (`effect`, `undecided`) where it leaves noise, or explains `required` of the excess error; it is a
 /// part of the answer (`partial`) where it explains `required_partial`; else nothing explains the record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Acceptance {
     /// The effects that were tested; empty where no candidate lowers the error.
     pub effects: Vec<String>,
@@ -240,42 +304,49 @@ pub struct Acceptance {
     /// The same on the held-out records; it takes no part in the verdict.
     pub share_test: Option<f64>,
     /// Least `share` of an answer that leaves more than noise.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub required: f64,
     /// Least `share` of a partial answer.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub required_partial: f64,
     /// Standard deviation of the noise that is no excess, by output \[output unit\].
     pub floor: PerOutput,
     /// Fall of the criterion (BIC), each model under the noise model of its own residual.
     pub bic_fall: Option<f64>,
     /// What it has to exceed.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub required_bic_fall: f64,
     /// Why the effects were refused, or are a part of the answer only; empty where they are the answer.
     pub reasons: Vec<String>,
 }
 
 /// Where an effect may act, and how likely each place is.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceScore {
     /// The vessel or pump.
     pub place: String,
     /// Likelihood relative to the best place, 0 to 1, everything else refitted.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub relative_likelihood: f64,
 }
 
 /// The mean squared error on held-out records, split into what an offset, a gain and neither of them explains, as root mean
 /// squares \[output unit\].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOutError {
     /// Mean of measured minus model, record by record.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub offset: f64,
     /// What a factor on the model's deviations from its mean explains beside the offset.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub gain: f64,
     /// What is left: the shape.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub shape: f64,
 }
 
 /// The single effects ranked under two weightings of the residual.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rankings {
     /// By the simulation error (white noise), best first.
     pub white: Vec<String>,
@@ -286,7 +357,7 @@ pub struct Rankings {
 }
 
 /// What was spent, and what the limit on the time left out.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
     /// Limit on the search \[s\]; `None`: no limit.
     pub limit: Option<f64>,
@@ -297,15 +368,18 @@ pub struct Effort {
 }
 
 /// The noise floor of an output and how it was obtained.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseFloor {
     /// Name of the output.
     pub output: String,
     /// Standard deviation of the noise, in the output's unit.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub level: f64,
     /// Standard deviation of what cannot be predicted from its own past, in the output's unit.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub innovation: f64,
     /// Autoregressive coefficients of the noise: `v[k] = sum a_i v[k-i] + e[k]`; empty for white noise.
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub coefficients: Vec<f64>,
     /// In words: which model's residual it was estimated from.
     pub source: String,
@@ -355,7 +429,7 @@ impl Floors {
 }
 
 /// The loop that the records come from.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ControlLoop {
     /// The loop was simulated from its reference; otherwise the model ran on the measured command.
     pub simulated: bool,
@@ -386,13 +460,14 @@ impl ControlLoop {
 }
 
 /// A record as the report shows it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shown {
     /// Name.
     pub name: String,
     /// It took no part in any fit or choice.
     pub held_out: bool,
     /// Sampling instants \[s\].
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub time: Vec<f64>,
     /// The inputs that the model runs on; of a plant the command first.
     pub inputs: Vec<ShownInput>,
@@ -401,13 +476,14 @@ pub struct Shown {
 }
 
 /// An input of a record as the report shows it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShownInput {
     /// How it is called: `input`, `input 2`, or its own name.
     pub name: String,
     /// Its unit; empty where none is known.
     pub unit: String,
     /// Its samples \[unit\].
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub values: Vec<f64>,
 }
 
@@ -445,15 +521,15 @@ impl Shown {
     }
 }
 
-/// What a diagnosis found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// What a diagnosis found. Read again from JSON it has all that is written there; records, simulated series and the clock are not.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Version of this layout.
     pub schema: u32,
     /// The finding.
     pub verdict: Verdict,
     /// How the times of the records are said.
-    #[serde(skip)]
+    #[serde(skip, default = "plain_clock")]
     pub clock: Clock,
     /// What was done about rows and samples of inputs that are missing; `None` where none are.
     pub gaps: Option<MendedGaps>,
@@ -475,7 +551,8 @@ pub struct Diagnosis {
     /// The base model and every model after it.
     pub steps: Vec<Step>,
     /// Standard deviation of the noise, in the output's unit; NaN, and not written, of several outputs.
-    #[serde(skip_serializing_if = "none")]
+    #[serde(skip_serializing_if = "none", default = "no_number")]
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub noise_floor: f64,
     /// The noise floor of each output, and how it was found.
     pub noise: Vec<NoiseFloor>,
@@ -508,6 +585,7 @@ pub struct Diagnosis {
     #[serde(skip)]
     pub records: Vec<Shown>,
     /// How long it took \[s\].
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub seconds: f64,
 }
 

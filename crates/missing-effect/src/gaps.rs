@@ -5,7 +5,7 @@
 //! drift runs through them. What is reported is joined again to the records that were given.
 
 use ct_signals::{Gaps, Record};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     Diagnosis, Error, Options, Problem, Shown, control_loop::fastest_time_constant, problem::base,
@@ -20,14 +20,16 @@ const FIRST_HOLD: f64 = 20.0;
 const FITTED: f64 = 0.1;
 
 /// What was done about gaps in records.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MendedGaps {
     /// Rows and places.
     #[serde(flatten)]
     pub gaps: Gaps,
     /// The fastest time constant of the plant \[s\], by a first fit.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub time_constant: f64,
     /// The longest time for which an input would have been held \[s\].
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub limit: f64,
 }
 

@@ -1,8 +1,4 @@
-//! Compares a plant with records, locates the failure, names the missing effect and confirms it.
-//!
-//! [`compare`] fits the believed model and says where it fails. [`diagnose`] then searches the catalogue for sets
-//! of effects that explain the failure, confirms each of them, groups what the data cannot tell apart, and returns
-//! the trail of the falling error. [`design()`](design::design) proposes the experiment that tells two of them apart.
+#![doc = include_str!("../README.md")]
 
 mod check;
 mod closed_loop;
@@ -34,6 +30,7 @@ mod pairs;
 mod partial;
 mod plausible;
 mod problem;
+mod problem_builder;
 mod proposal;
 mod random_walk;
 mod remains;
@@ -62,4 +59,5 @@ pub use gaps::{LONGEST_HOLD, MendedGaps};
 pub use groups::GROUP_MARGIN;
 pub use locate::{Located, Series, locate};
 pub use problem::{Options, Problem, Progress, TIME_LIMIT};
+pub use problem_builder::ProblemBuilder;
 pub use unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window};

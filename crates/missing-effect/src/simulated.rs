@@ -117,16 +117,5 @@ fn through(
 
 /// A plant without effects that is believed of the records.
 pub(crate) fn problem(plant: Plant, known: Known, records: Vec<Record>) -> Problem {
-    Problem {
-        plant,
-        known,
-        effects: Vec::new(),
-        terms: Vec::new(),
-        start: Default::default(),
-        fixed: Vec::new(),
-        priors: Default::default(),
-        records,
-        controller: None,
-        test: Vec::new(),
-    }
+    Problem::builder(plant, known, records).build().unwrap()
 }

@@ -85,3 +85,7 @@ pub use scatter::{ScatterAlarm, ScatterEvent};
 pub use settings::Settings;
 pub use time_axis::TimeAxis;
 pub use watched::Watched;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -9,7 +9,7 @@ use crate::{Each, intake::Sample};
 pub(crate) const MOST_LANES: usize = 16;
 
 /// A simulation with derivatives by the parameters of its structure.
-pub(crate) trait Model: Send {
+pub(crate) trait Model: Send + Sync {
     /// Reads all outputs now, under the inputs of this row; once a sample.
     fn observe(&mut self, sample: &Sample);
     /// The reading of an output as it was observed, once a sample; its derivatives go to `row`, as many as there are lanes.

@@ -40,3 +40,8 @@ pub mod udink;
 pub use error::Error;
 pub use printed::Printed;
 pub use progress::{Progress, Stage};
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -40,7 +40,7 @@ pub enum Balance {
 ///
 /// Smoothness is part of the contract: at the absent value the law returns its argument bit for bit,
 /// and its derivative there is the one of the limit.
-pub trait Law<T: Scalar>: Send {
+pub trait Law<T: Scalar>: Send + Sync {
     /// Actuator: where what the command moves stands, for a law with memory, which must be the first in the chain. Asked
     /// once for each recorded command, in the order of time; on a ramp it runs straight between the two ends.
     fn position(&mut self, _u: T) -> Option<T> {

@@ -65,3 +65,7 @@ pub use simulator::{Command, Simulator};
 pub use structure::{Known, MAX_VESSELS, Placed, Site, Structure, WIDENED};
 pub use term::{Fitted, MOST_KNOTS, Term, Variable};
 pub use unit::Unit;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -30,7 +30,7 @@
 //! F. Chen, H. Garnier, M. Gilson, Journal of Process Control 25 (2015) 19-27, for the delay.
 
 use ct_signals::ArModel;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::delay::beginnings;
 use crate::finish::finish;
@@ -50,7 +50,7 @@ const MOVES: usize = 4;
 const NOISE_ORDER: usize = 8;
 
 /// What is taken for the noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Noise {
     /// White: SRIVC. Other noise costs efficiency; the standard errors allow for it.
@@ -85,7 +85,7 @@ impl Settings {
 }
 
 /// Which parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// `a_i` of A.
@@ -113,7 +113,7 @@ pub enum Kind {
 }
 
 /// One parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Which one.
     pub kind: Kind,
@@ -123,11 +123,15 @@ pub struct Parameter {
     pub std_error: Option<f64>,
 }
 
+/// A name that the program has: of a type of its own, as serde would borrow a plain reference from what is read.
+type Name = &'static str;
+
 /// The estimate. `A = 1 + a_1 p + .. + a_n p^n`, with an integrator `A = p + a_2 p^2 + .. + a_n p^n`.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// SRIVC, RIVC, CLSRIVC or CLRIVC.
-    pub method: &'static str,
+    #[serde(deserialize_with = "method")]
+    pub method: Name,
     /// All a that are estimated, all b, input by input, the estimated delays, and the offset of each record.
     pub parameters: Vec<Parameter>,
     /// Covariance of [`Estimate::parameters`], row by row; 0 for a delay at the end of its range.
@@ -151,6 +155,15 @@ pub struct Estimate {
     pub first: Vec<usize>,
     /// Of each record from there on, the simulated output on the measured inputs; output unit.
     pub simulated: Vec<Vec<f64>>,
+}
+
+/// Reads the name of a method.
+fn method<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static str, D::Error> {
+    let name = String::deserialize(from)?;
+    let known = ["SRIVC", "RIVC", "CLSRIVC", "CLRIVC"]
+        .into_iter()
+        .find(|known| *known == name);
+    known.ok_or_else(|| serde::de::Error::custom(format_args!("no method is called `{name}`")))
 }
 
 impl Estimate {

@@ -86,3 +86,7 @@ pub use error::Error;
 pub use estimate::{Estimate, Kind, Noise, Parameter, Settings, estimate};
 pub use plant::Plant;
 pub use structure::{Delay, Structure};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,7 +1,7 @@
 //! A plant that is known, on a record of its own: what it says from the inputs alone.
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::model::Model;
 use crate::pass::{Instruments, Pass};
@@ -12,7 +12,7 @@ use crate::{Data, Delay, Error, Structure};
 const UNSEEN: f64 = 1e-9;
 
 /// `A(p) y = sum_j B_j(p) u_j(t - d_j)`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
     /// A, from p^0; the last coefficient is not 0.
     pub a: Vec<f64>,

@@ -112,3 +112,7 @@ pub use rows::CoupledRow;
 #[cfg(feature = "alloc")]
 pub use spr::{FilterBounds, check_filter_bounds};
 pub use summed::AdaptivePlusConstant;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -7,3 +7,4 @@ mod gamma;
 mod oracle;
 mod projection;
 mod rows;
+mod threads;

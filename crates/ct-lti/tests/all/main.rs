@@ -6,4 +6,5 @@ mod positive_real;
 mod roots;
 mod sampling;
 mod state_variable_filters;
+mod threads;
 mod transfer_functions;

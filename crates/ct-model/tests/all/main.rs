@@ -13,4 +13,5 @@ mod refused;
 mod round_trip;
 mod simulated;
 mod support;
+mod threads;
 mod units;

@@ -10,6 +10,7 @@ mod guards;
 mod integrators;
 mod lyapunov;
 mod random_walk;
+mod saved;
 mod stress;
 mod support;
 mod tracking;

@@ -6,4 +6,5 @@ mod csv_file;
 mod residual_tests;
 mod signals;
 mod simulated_inputs;
+mod threads;
 mod tolerant_reading;

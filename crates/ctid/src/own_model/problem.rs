@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ct_model::Model;
 use ct_model::effects::{Candidate, Role, Visited, apply};
-use effect_search::{Believed, Options, Problem, all_candidates, believed};
+use effect_search::{Believed, Options, Problem, all_candidates, believed, with_effects};
 
 use super::file::{OwnModelFile, Records};
 use crate::effort::EffortLevel;
@@ -124,12 +124,8 @@ impl OwnModelFile {
                 values.insert(parameter.name.clone(), value);
             }
         }
-        let mut spec = apply(&self.base, &on).map_err(|error| refuse(error.to_string()))?;
-        for parameter in &mut spec.parameters {
-            if let Some(value) = values.get(&parameter.about.name) {
-                parameter.value = *value;
-            }
-        }
+        let spec = with_effects(&self.base, &on, &values);
+        let spec = spec.map_err(|error| refuse(error.to_string()))?;
         Ok(Believed {
             spec,
             record_numbers,

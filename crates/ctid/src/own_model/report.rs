@@ -425,7 +425,7 @@ mod tests {
     /// Where the term acts, what it depends on, its units and the command stand in the report, and its values are those of its figure.
     #[test]
     fn what_nothing_explains_is_shown_with_its_port_and_units() {
-        let text = include_str!("../../../../examples/models/heated-block.mo");
+        let text = include_str!("../../models/heated-block.mo");
         let spec = ct_model::ModelSpec::parse(text).unwrap();
         let words = EffectWords::of(&spec, &BTreeMap::new());
         let term = missing_term(&words, &unknown("shape(T,u)", ["u", "%"], "W"));

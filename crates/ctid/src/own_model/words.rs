@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn ports_are_named_with_what_the_text_says_of_them() {
-        let spec = ModelSpec::parse(include_str!("../../../../examples/models/heated-block.mo"));
+        let spec = ModelSpec::parse(include_str!("../../models/heated-block.mo"));
         let words = EffectWords::of(&spec.unwrap(), &BTreeMap::new());
         let said = [
             ("lag(u)", "lag(u) at the input u (power of the heater)"),
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_candidate_of_the_model_file_is_where_its_terms_are() {
-        let spec = ModelSpec::parse(include_str!("../../../../examples/models/heated-block.mo"));
+        let spec = ModelSpec::parse(include_str!("../../models/heated-block.mo"));
         let parameter = ct_model::effects::OwnParameter {
             unit: String::new(),
             min: None,

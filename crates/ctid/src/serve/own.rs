@@ -44,9 +44,9 @@ macro_rules! examples {
     ($($name:literal),*) => {
         [$((
             $name,
-            include_str!(concat!("../../../../examples/models/", $name, ".mo")),
-            include_str!(concat!("../../../../examples/models/", $name, ".toml")),
-            include_str!(concat!("../../../../examples/models/", $name, ".csv")),
+            include_str!(concat!("../../models/", $name, ".mo")),
+            include_str!(concat!("../../models/", $name, ".toml")),
+            include_str!(concat!("../../models/", $name, ".csv")),
         )),*]
     };
 }

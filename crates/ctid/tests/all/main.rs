@@ -30,3 +30,4 @@ mod side_by_side;
 mod simulate;
 mod system_limits;
 mod tables;
+mod threads;

@@ -113,18 +113,8 @@ pub(crate) fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Rec
 }
 
 pub(crate) fn problem(believed: &str, record: Record) -> Problem {
-    Problem {
-        spec: ModelSpec::parse(believed).unwrap(),
-        effects: Vec::new(),
-        kept: BTreeMap::new(),
-        records: vec![record],
-        test: Vec::new(),
-        known: BTreeMap::new(),
-        priors: BTreeMap::new(),
-        candidates: BTreeMap::new(),
-        time_unit: 1.0,
-        time_unit_name: "s".to_string(),
-    }
+    let spec = ModelSpec::parse(believed).unwrap();
+    Problem::builder(spec, [record]).build().unwrap()
 }
 
 fn found(problem: &Problem) -> Diagnosis {

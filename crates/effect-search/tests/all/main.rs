@@ -3,3 +3,4 @@
 
 mod design;
 mod hidden;
+mod results;

@@ -15,3 +15,4 @@ mod recursive;
 mod sensitivities;
 mod starts;
 mod support;
+mod threads;

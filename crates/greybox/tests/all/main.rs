@@ -15,4 +15,5 @@ mod prediction;
 mod records;
 mod sandwich;
 mod support;
+mod threads;
 mod three_tank;

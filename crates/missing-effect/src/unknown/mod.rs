@@ -14,7 +14,7 @@ mod smooth_tests;
 
 use plants::{Fitted, Place, Structure, Term, Variable};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use self::primitive::Primitive;
 pub(crate) use self::sentence::of_unknown;
@@ -37,41 +37,67 @@ const NAMED: f64 = 0.8;
 /// ... by so many standard errors.
 const CLEARLY: f64 = 1.64;
 
+/// A name that the program has: of a type of its own, as serde would borrow a plain reference from what is read.
+type Name = &'static str;
+
 /// How likely the missing term acts at a place.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceLikelihood {
     /// `actuator`, `vessel` (`upper` or `lower` of two) or `sensor` (`sensor upper` of several).
     pub place: String,
     /// Restricted log-likelihood below that of the best place.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub below_best: f64,
 }
 
 /// How much of the missing term a variable predicts.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Share {
     /// The place.
     pub place: String,
     /// `level`, `rate` or `input`.
-    pub variable: &'static str,
+    #[serde(deserialize_with = "variable_name")]
+    pub variable: Name,
     /// Share of the fall of the squared error that is reached on parts of the data that were not fitted; one is all of it.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub share: f64,
     /// Its standard error, from the scatter between the parts.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub std_error: f64,
 }
 
+/// Reads the name of a variable.
+fn variable_name<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static str, D::Error> {
+    let name = String::deserialize(from)?;
+    let all = [
+        Variable::Level,
+        Variable::Rate,
+        Variable::Input,
+        Variable::Time,
+    ];
+    let known = all
+        .iter()
+        .map(|variable| variable.name())
+        .find(|known| *known == name);
+    known.ok_or_else(|| serde::de::Error::custom(format_args!("no variable is called `{name}`")))
+}
+
 /// A stretch of time in which the missing term is clearly not zero.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Window {
     /// Its beginning, in the record's time \[s\].
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub from: f64,
     /// Its end \[s\].
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub to: f64,
     /// Mean of the missing term in it, in the term's unit.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub mean: f64,
 }
 
 /// What is missing where the catalogue does not explain it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknown {
     /// Where it acts: `actuator`, `vessel` (of several by its name, `upper` or `T1`) or `sensor`.
     pub place: String,
@@ -80,30 +106,40 @@ pub struct Unknown {
     /// Every place, the most likely first.
     pub places: Vec<PlaceLikelihood>,
     /// The first record's time, in its own count \[s\].
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub time: Vec<f64>,
     /// The missing term beside the fitted model.
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub value: Vec<f64>,
     /// Its standard error.
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub std_error: Vec<f64>,
     /// The random walk's standard deviation after one second, in the term's unit.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub intensity: f64,
     /// Standard deviation of the measurement noise beside it, in the output's unit; of several outputs relative to the weighted mean.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub noise: f64,
     /// Where it is clearly not zero, the strongest first.
     pub windows: Vec<Window>,
     /// Root mean square of the residual that it leaves, in the output's unit.
+    #[serde(deserialize_with = "crate::diagnosis::number")]
     pub rmse: f64,
     /// Every variable, the best first.
     pub shares: Vec<Share>,
     /// What it depends on: `level`, `rate`, `input`, or `time` where none of them predicts it.
-    pub variable: &'static str,
+    #[serde(deserialize_with = "variable_name")]
+    pub variable: Name,
     /// Unit of the variable.
     pub variable_unit: String,
     /// Knots of the shape, in the variable's unit; time since the record began.
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub knots: Vec<f64>,
     /// The shape at the knots, without what the plant's own parameters imitate.
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub ordinates: Vec<f64>,
     /// Standard errors of the ordinates.
+    #[serde(deserialize_with = "crate::diagnosis::numbers")]
     pub ordinate_errors: Vec<f64>,
     /// The nearest simple shape, where one comes near.
     pub primitive: Option<Primitive>,

@@ -2,7 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 use plants::{Domain, EffectInfo, Place, Variable};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+
+use super::Name;
 
 /// A simple shape explains a polyline where it leaves less than this share of what the polyline tells.
 const LEFT: f64 = 0.2;
@@ -10,14 +12,34 @@ const LEFT: f64 = 0.2;
 const LOCATION: f64 = 6.6;
 
 /// A simple shape.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Primitive {
     /// `constant`, `line`, `square root`, `parabola`, `threshold`, `end of a range`, `step` or `swing`.
-    pub name: &'static str,
+    #[serde(deserialize_with = "family_name")]
+    pub name: Name,
     /// Where a threshold or a step lies, or the period of a swing, in the variable's unit.
     pub at: Option<f64>,
     /// Effects of the catalogue that leave such a shape.
+    #[serde(deserialize_with = "effect_names")]
     pub effects: Vec<&'static str>,
+}
+
+/// Reads the name of a shape.
+fn family_name<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static str, D::Error> {
+    let name = String::deserialize(from)?;
+    let known = FAMILIES.iter().find(|family| family.name == name);
+    let known = known.map(|family| family.name);
+    known.ok_or_else(|| serde::de::Error::custom(format_args!("no shape is called `{name}`")))
+}
+
+/// Reads identifiers of effects.
+fn effect_names<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<&'static str>, D::Error> {
+    let names = Vec::<String>::deserialize(from)?;
+    let known = names.iter().map(|name| {
+        let known = EffectInfo::find(name).map(|effect| effect.id);
+        known.ok_or_else(|| serde::de::Error::custom(format_args!("no effect is called `{name}`")))
+    });
+    known.collect()
 }
 
 /// A family of shapes: value of the shape at a point, for a location.

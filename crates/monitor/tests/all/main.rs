@@ -9,3 +9,4 @@ mod own;
 mod own_candidates;
 mod play;
 mod support;
+mod threads;

@@ -2,5 +2,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod baysse;
+mod threads;
 mod udink_bands;
 mod udink_reference;

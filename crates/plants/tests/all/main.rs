@@ -15,3 +15,4 @@ mod reference;
 mod robustness;
 mod support;
 mod terms;
+mod threads;

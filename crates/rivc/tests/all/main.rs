@@ -4,4 +4,5 @@
 mod bad_input;
 mod coverage;
 mod recovery;
+mod results;
 mod support;

@@ -13,4 +13,5 @@ mod printed_sign;
 mod rows;
 mod summed;
 mod support;
+mod threads;
 mod uneven_steps;

@@ -1,5 +1,4 @@
 //! Priors: one more row, whose weight is known.
-#![allow(clippy::unwrap_used)]
 
 use approx::assert_relative_eq;
 use estimation::{

@@ -1,0 +1,79 @@
+//! A fit is written as JSON and read again, and results cross threads.
+
+use estimation::{
+    Error, Fit, Noise, Residuals, Robust, Sample, Squares, Stopping, Triangle, coloured, fit_from,
+};
+
+/// `y = x_0 sin(t) + x_1` at one output.
+struct Curve(Vec<f64>);
+
+impl Residuals for Curve {
+    fn free(&self) -> &[usize] {
+        &[0, 1]
+    }
+    fn bounds(&self) -> &[(f64, f64)] {
+        &[(-10.0, 10.0), (0.0, 0.5)]
+    }
+    fn samples(&self) -> &[usize] {
+        std::slice::from_ref(&200)
+    }
+    fn each_row(&self, x: &[f64], mut each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        for (k, y) in self.0.iter().enumerate() {
+            let s = (0.1 * k as f64).sin();
+            let sample = Sample {
+                output: 0,
+                first: k == 0,
+                missing: false,
+            };
+            each(sample, &mut [s, 1.0, y - x[0] * s - x[1]]).then_some(())?;
+        }
+        Some(())
+    }
+    fn each_residual(
+        &self,
+        x: &[f64],
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        self.each_row(x, |sample, row| each(sample, &mut row[2..]))
+    }
+}
+
+#[test]
+fn a_fit_is_read_again() {
+    let y =
+        (0..200).map(|k| 3.0 * (0.1 * f64::from(k)).sin() + 0.2 * f64::from(k * 7919 % 13) / 13.0);
+    let curve = Curve(y.collect());
+    let stopping = Stopping {
+        evaluations: 50,
+        cost: 1e-12,
+    };
+    let white = fit_from(
+        &curve,
+        vec![vec![0.0, 0.1].into()],
+        &Noise::white(1),
+        stopping,
+    )
+    .unwrap();
+    let fit = coloured(&curve, white.clone(), 3, stopping).unwrap();
+    for fit in [white, fit] {
+        let text = serde_json::to_string(&fit).unwrap();
+        let again: Fit = serde_json::from_str(&text).unwrap();
+        assert_eq!(serde_json::to_string(&again).unwrap(), text);
+        assert_eq!(
+            (&again.x, &again.noise, again.bic()),
+            (&fit.x, &fit.noise, fit.bic())
+        );
+        assert_eq!(again.std_errors(), fit.std_errors());
+    }
+}
+
+const fn crosses<T: Send + Sync>() {}
+
+const _: () = {
+    crosses::<Fit>();
+    crosses::<Noise>();
+    crosses::<Robust>();
+    crosses::<Squares>();
+    crosses::<Triangle>();
+    crosses::<Error>();
+};

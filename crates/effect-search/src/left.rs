@@ -5,7 +5,7 @@ use ct_signals::residual_tests::prewhitened_input_test;
 use estimation::Fit;
 use greybox::ModelSetup;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::Error;
 use crate::accept::NOISE_ORDER;
@@ -188,12 +188,16 @@ impl Context<'_> {
             ..node.clone()
         };
         let trials = with_shapes.trials_among(&node, &of, &own.noise);
+        let samples = self.samples();
         let least = trials
             .iter()
             .filter_map(|trial| {
                 let candidate = &with_shapes.candidates[trial.candidate];
-                let freedom = candidate.fitted() as f64;
-                let p = ChiSquared::new(freedom).ok()?.sf(trial.fall.max(0.0));
+                let functions = candidate.fitted() as f64;
+                let rest = samples - own.parameters as f64 - functions;
+                // In a short record the fall is not chi-square yet: the ratio of the variances is F.
+                let ratio = (trial.fall.max(0.0) / samples).exp_m1() * rest / functions;
+                let p = FisherSnedecor::new(functions, rest).ok()?.sf(ratio);
                 Some((p, candidate))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));

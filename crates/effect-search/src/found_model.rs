@@ -56,7 +56,7 @@ impl Diagnosis {
         };
         let effects = problem.effects.iter().chain(&self.effects).map(find);
         let effects = effects.collect::<Result<Vec<&Candidate>, Error>>()?;
-        let last = self.steps.iter().next_back();
+        let last = self.steps.last();
         let values = last.into_iter().flat_map(|step| &step.parameters);
         let values = values.map(|found| (found.name.clone(), found.value));
         Ok(with_effects(&problem.spec, &effects, &values.collect())?)

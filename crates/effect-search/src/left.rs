@@ -13,7 +13,7 @@ use crate::node::{Context, Node};
 use crate::residual::{harmonics_p, instant, level_p, of_command, period, standardised};
 use crate::stationarity::stationary_p;
 
-/// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
+/// Below this p-value a residual is not noise, in each test of a residual, corrected for all that it looked at.
 const NOT_NOISE: f64 = 1e-4;
 
 /// What a residual shows that noise does not.
@@ -176,13 +176,10 @@ impl Context<'_> {
     /// The smooth function that lowers the deviance of a set by more than chance would, in the metric of the noise of its own residual: the
     /// score test of each that the shape of what is missing may have.
     fn function(&self, node: &Node, own: &Fit) -> Option<Left> {
-        /// Functions are alike, so that the count of all of them corrects for more than is looked at.
+        /// Below this p-value a function is more than chance. It is larger than [`NOT_NOISE`], as the functions are correlated: the
+        /// correction by their number is too strict.
         const CHANCE: f64 = 1e-3;
-        let with_shapes = Context {
-            candidates: [&self.candidates[..], &self.shapes[..]].concat(),
-            ..self.clone()
-        };
-        let of: Vec<usize> = (self.candidates.len()..with_shapes.candidates.len()).collect();
+        let (with_shapes, of) = self.with_shapes();
         let node = Node {
             fit: own.clone(),
             ..node.clone()

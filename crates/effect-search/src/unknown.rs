@@ -73,10 +73,16 @@ pub struct Unknown {
 impl Context<'_> {
     /// The missing term beside a set; `None` where no function lowers the criterion.
     pub fn unknown(&self, node: &Node, floors: &[f64]) -> Result<Option<Unknown>, Error> {
+        let (with_shapes, of) = self.with_shapes();
+        with_shapes.unknown_among(node, &of, floors)
+    }
+
+    /// The same search with the smooth functions behind its candidates, and their positions.
+    pub fn with_shapes(&self) -> (Self, Vec<usize>) {
         let mut with_shapes = self.clone();
         with_shapes.candidates.extend(self.shapes.iter().cloned());
-        let of: Vec<usize> = (self.candidates.len()..with_shapes.candidates.len()).collect();
-        with_shapes.unknown_among(node, &of, floors)
+        let of = (self.candidates.len()..with_shapes.candidates.len()).collect();
+        (with_shapes, of)
     }
 
     fn unknown_among(

@@ -71,8 +71,7 @@ pub fn diagnose(
         // What follows time alone imitates any slow disturbance, and leaves no room for others.
         let mut timeless = all.clone();
         timeless.retain(|&i| !context.candidates[i].follows_time());
-        let most = options.max_effects;
-        let grown = context.grow(base.clone(), (&timeless, &by_error.singles), &white, most)?;
+        let grown = context.grow(base.clone(), (&timeless, &by_error.singles), &white, few)?;
         by_error_sets.extend(grown.fitted);
         by_error_sets.push(grown.best);
     }
@@ -103,19 +102,33 @@ pub fn diagnose(
     let mut own = context.in_own_noise(&confirmed)?;
     let mut left = context.left(&confirmed, &own)?;
     let mut slowness = 1.0;
-    if left.is_some() {
-        // Its noise model takes physics for noise, and where that is slow the simulation drifts off in its metric: sets are compared by
-        // their simulation error.
+    let many = |set: &Node| set.added.len() >= base.added.len() + MANY;
+    if left.is_some() || many(&confirmed) {
+        context.limit.begin(Phase::Part);
         let mut sets = by_error_sets;
         sets.extend(grown.fitted.iter().cloned());
         sets.extend([grown.best.clone(), confirmed.clone()]);
-        let part = context.largest_part(&base, &sets)?;
-        if let Some(part) = part.and_then(|(part, _)| context.of_many_readings(part, &base)) {
-            confirmed = part;
-            own = context.in_own_noise(&confirmed)?;
-            noise = white.clone();
-            slowness = context.slowness(&own.noise);
-            (grown.singles, grown.base) = by_error_singles;
+        let timeless = context.floating(&base, &sets, options.max_effects);
+        if left.is_some() {
+            // Its noise model takes physics for noise, and where that is slow the simulation drifts off in its metric: sets are compared
+            // by their simulation error.
+            sets.extend(timeless);
+            let part = context.largest_part(&base, &sets)?;
+            if let Some(part) = part.and_then(|(part, _)| context.of_many_readings(part, &base)) {
+                confirmed = part;
+                own = context.in_own_noise(&confirmed)?;
+                noise = white.clone();
+                slowness = context.slowness(&own.noise);
+                (grown.singles, grown.base) = by_error_singles;
+                left = context.left(&confirmed, &own)?;
+            }
+        } else if let Some(better) = context.better_in_own_noise(timeless, &own) {
+            // So many effects may imitate others, and the coloured noise beside them what these leave.
+            noise = better.fit.noise.clone();
+            if let Ok(bare) = context.refitted(&grown.base, &noise, FINE) {
+                grown.base = bare;
+            }
+            (own, confirmed) = (better.fit.clone(), better);
             left = context.left(&confirmed, &own)?;
         }
     }
@@ -126,7 +139,7 @@ pub fn diagnose(
     // What a search did not reach its noise model explains: then the effects are a part of the answer at most.
     let open = grown.cut_short && own.noise.order() > 0;
     let whole = left.is_none() && !open;
-    let many = confirmed.added.len() >= base.added.len() + MANY;
+    let many = many(&confirmed);
     // All that remains is noise, or else what its past does not predict.
     let floors: Vec<f64> = if whole {
         own.noise.iter().map(ArModel::stationary_std).collect()

@@ -10,6 +10,7 @@ pub mod design;
 mod diagnose;
 mod error;
 mod factor_score;
+mod floating;
 mod found_model;
 mod groups;
 mod held_out;

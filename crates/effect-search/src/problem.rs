@@ -91,6 +91,8 @@ pub(crate) enum Phase {
     Coloured,
     /// What of the effects stays.
     Confirm,
+    /// The largest part of the error that effects explain.
+    Part,
     /// What can stand in for them.
     Groups,
 }
@@ -99,9 +101,10 @@ impl Phase {
     fn share(self) -> f64 {
         match self {
             Self::Believed => 0.2,
-            Self::White => 0.45,
-            Self::Coloured => 0.7,
-            Self::Confirm => 0.8,
+            Self::White => 0.4,
+            Self::Coloured => 0.6,
+            Self::Confirm => 0.65,
+            Self::Part => 0.9,
             Self::Groups => 1.0,
         }
     }

@@ -14,7 +14,7 @@ use crate::pairs::joint_scores;
 use crate::score::Trial;
 
 /// So many candidates beside a set are fitted, those with the best scores; beside the believed model this many.
-const REFITS: usize = 8;
+pub(crate) const REFITS: usize = 8;
 const FIRST_REFITS: usize = 28;
 /// So many single effects, the best, are fitted from starts of their own too, ...
 const OWN_STARTS: usize = 16;
@@ -30,10 +30,10 @@ const BEAM: usize = 4;
 const SHARE_OF_BEST: f64 = 0.6;
 /// A candidate is fitted beside a set where so many times its predicted fall of the deviance, and this margin, would lower the criterion: the
 /// prediction of one step is too small where an effect is far from linear.
-const FALL_FACTOR: f64 = 2.0;
-const FALL_MARGIN: f64 = 6.0;
+pub(crate) const FALL_FACTOR: f64 = 2.0;
+pub(crate) const FALL_MARGIN: f64 = 6.0;
 /// A larger set has to lower the criterion by this, or the search ends.
-const PAYS: f64 = 2.0;
+pub(crate) const PAYS: f64 = 2.0;
 /// What is left out where the time has passed.
 const LARGER: &str = "larger sets of effects";
 
@@ -184,6 +184,21 @@ impl Context<'_> {
             beam = best_first(beam);
             beam.truncate(BEAM);
             let Some(first) = beam.first() else { break };
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "DBG beam at {:.1} s, noise order {}",
+                    self.limit.seconds(),
+                    noise.order()
+                );
+                for n in &beam {
+                    eprintln!(
+                        "DBG    {:?} {:.1} {:?}",
+                        self.ids(&n.added),
+                        n.gain_over(&base),
+                        n.fit.rmse
+                    );
+                }
+            }
             let gain = first.gain_over(&best);
             if gain > 0.0 {
                 best = first.clone();
@@ -238,7 +253,7 @@ impl Context<'_> {
     }
 
     /// Whether a candidate might lower the criterion.
-    fn may_lower_the_criterion(&self, trial: &Trial) -> bool {
+    pub fn may_lower_the_criterion(&self, trial: &Trial) -> bool {
         let fitted = self.candidates[trial.candidate].fitted().max(1) as f64;
         FALL_FACTOR * trial.fall + FALL_MARGIN > fitted * self.samples().ln()
     }

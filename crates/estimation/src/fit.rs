@@ -431,11 +431,6 @@ pub fn coloured(
                 fit.freedom = freedom;
             }
         }
-    } else {
-        // A white metric's scale plays no part in a fit, and may stand for any: here it becomes the noise's own.
-        let sigma = fit.variance().sqrt();
-        let white = |weight: &f64| ArModel::white(sigma / weight);
-        fit.noise = Noise::of(fit.weights.iter().map(white).collect());
     }
     fit.starts = starts;
     fit.agree = agree;
@@ -471,6 +466,12 @@ pub fn prewhitened(
         if settled {
             break;
         }
+    }
+    if fit.noise.order() == 0 {
+        // A white metric's scale plays no part in a fit, and may stand for any: here it becomes the noise's own.
+        let sigma = fit.variance().sqrt();
+        let white = |weight: &f64| ArModel::white(sigma / weight);
+        fit.noise = Noise::of(fit.weights.iter().map(white).collect());
     }
     Ok(fit)
 }

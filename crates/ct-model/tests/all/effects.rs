@@ -492,6 +492,33 @@ fn effects_of_the_projects_models_are_written_out_and_fit_in_their_units() {
 }
 
 #[test]
+fn every_number_of_a_record_that_a_text_is_written_in_is_known() {
+    let names = [
+        "low", "high", "middle", "width", "first", "begin", "zero", "duration", "interval",
+        "balance",
+    ];
+    for effect in all_effects() {
+        let written = |name: &&str| effect.text.contains(&format!("constant Real {name}("));
+        let expected: Vec<&str> = names.into_iter().filter(written).collect();
+        assert_eq!(effect.record_numbers(), expected, "{}", effect.id);
+    }
+    // By its begin an effect is known to follow time.
+    let spec = ModelSpec::parse(BLOCK).unwrap();
+    let all = candidates(&spec, &Visited::nominal(&spec));
+    for (id, follows) in [
+        ("periodic(T)", true),
+        ("step(T)", true),
+        ("drift(k)", true),
+        ("gain_drift(u)", true),
+        ("constant(T)", false),
+        ("hidden_state(T)", false),
+    ] {
+        let candidate = all.iter().find(|c| c.id == id).unwrap();
+        assert_eq!(candidate.follows_time(), follows, "{id}");
+    }
+}
+
+#[test]
 fn an_effect_keeps_the_numbers_of_the_record_that_it_was_written_in() {
     let spec = ModelSpec::parse(BLOCK).unwrap();
     let visited = Visited::nominal(&spec);

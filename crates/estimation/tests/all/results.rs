@@ -2,7 +2,11 @@
 
 use estimation::{
     Error, Fit, Noise, Residuals, Robust, Sample, Squares, Stopping, Triangle, coloured, fit_from,
+    prewhitened,
 };
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 /// `y = x_0 sin(t) + x_1` at one output.
 struct Curve(Vec<f64>);
@@ -64,6 +68,28 @@ fn a_fit_is_read_again() {
             (&fit.x, &fit.noise, fit.bic())
         );
         assert_eq!(again.std_errors(), fit.std_errors());
+    }
+}
+
+#[test]
+fn white_noise_of_a_prewhitened_fit_has_the_size_of_the_residual() {
+    // Residuals without memory, in two units: the noise model's size goes with the unit, and is not that of the metric of the fit.
+    for unit in [1.0, 1000.0] {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let noise = StandardNormal.sample_iter(&mut rng);
+        let y = noise.take(200).enumerate();
+        let y = y.map(|(k, e): (usize, f64)| unit * ((0.1 * k as f64).sin() + 0.2 * e));
+        let curve = Curve(y.collect());
+        let stopping = Stopping {
+            evaluations: 50,
+            cost: 1e-12,
+        };
+        let start = vec![vec![0.0, 0.1].into()];
+        let fit = fit_from(&curve, start, &Noise::white(1), stopping).unwrap();
+        let own = prewhitened(&curve, fit, 3, Some(20.0), stopping).unwrap();
+        assert_eq!(own.noise.order(), 0);
+        let sigma = own.noise.iter().next().unwrap().sigma();
+        assert!((sigma / (0.2 * unit) - 1.0).abs() < 0.15, "{sigma}");
     }
 }
 

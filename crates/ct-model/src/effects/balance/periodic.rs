@@ -9,7 +9,7 @@ pub(super) const EFFECT: Effect = Effect {
 model periodic
   constant Real balance(unit="balance") = 1;
   constant Real begin(unit="time") = 0;
-  constant Real duration(unit="time") = 1;
+  constant Real duration(unit="time") = 100;
   constant Real interval(unit="time") = 1;
   constant Real turn = 6.283185307179586;
   parameter Real sine(unit="balance", min=-10*balance, max=10*balance) = 0 "amplitude of the sine";

@@ -1,0 +1,157 @@
+//! Sets of effects that grow from what earlier searches found: one effect more at a time, then each effect exchanged for others while that
+//! lowers the error (floating search).
+//!
+//! The effects of a measured record act together: two heaters on one board couple, their supply sags under both, and their sensors lag; any one
+//! of these explains little without the others. A beam of the best pairs loses such a set to effects that follow time, which imitate any slow
+//! error. Here sets are compared by their simulation error, without what follows time.
+//!
+//! **Reference**: P. Pudil, J. Novovicova, J. Kittler, Pattern Recognition Letters 15 (1994) 1119-1125 (floating search).
+
+use estimation::{Fit, Noise};
+use rayon::prelude::*;
+
+use crate::node::{Context, Node, ROUGH};
+use crate::search::{FALL_FACTOR, FALL_MARGIN, PAYS, REFITS, best_first, same_set};
+
+/// So many sets of each metric, the best, are fitted in white noise to see where the search begins.
+const SEEDS: usize = 8;
+/// It begins once from the best set of so many effects or fewer.
+const FEW: usize = 2;
+/// So many of the sets are compared with the noise models of their own residuals.
+const COMPARED: usize = 4;
+/// So many effects, those with the best scores, are tried in the place of one.
+const EXCHANGED: usize = 4;
+
+impl Context<'_> {
+    /// Sets of up to so many effects that do not follow time, fitted in white noise. `sets`: what earlier searches fitted, in whatever metric.
+    pub fn floating(&self, base: &Node, sets: &[Node], max_effects: usize) -> Vec<Node> {
+        let white = Noise::white(base.spec().outputs.len());
+        let all = 0..self.candidates.len();
+        let timeless: Vec<usize> = all
+            .filter(|&i| !self.candidates[i].follows_time())
+            .collect();
+        let most = base.added.len() + max_effects;
+        let mut fitted: Vec<Node> = Vec::new();
+        for seed in self.seeds(base, sets, &white) {
+            let mut set = self.exchanged(seed, base, &timeless, &white, &mut fitted);
+            while set.added.len() < most && !self.limit.passed() {
+                let Some(more) = self.one_more(&set, &timeless, &white, &mut fitted) else {
+                    break;
+                };
+                set = self.exchanged(more, base, &timeless, &white, &mut fitted);
+            }
+            fitted.push(set);
+        }
+        fitted
+    }
+
+    /// The set with the least criterion when each model has the noise model of its own residual, where that is less than a fit's.
+    pub fn better_in_own_noise(&self, sets: Vec<Node>, than: &Fit) -> Option<Node> {
+        let best = best_first(sets).into_iter().take(COMPARED);
+        let fits: Vec<Node> = best
+            .collect::<Vec<Node>>()
+            .into_par_iter()
+            .filter_map(|mut set| {
+                set.fit = self.in_own_noise(&set).ok()?;
+                Some(set)
+            })
+            .collect();
+        let least = best_first(fits).into_iter().next()?;
+        (least.fit.bic() < than.bic() - PAYS).then_some(least)
+    }
+
+    /// What of the best sets does not follow time, fitted in white noise.
+    fn seeds(&self, base: &Node, sets: &[Node], white: &Noise) -> Vec<Node> {
+        let (by_error, coloured): (Vec<Node>, Vec<Node>) = sets
+            .iter()
+            .cloned()
+            .partition(|set| set.fit.noise.order() == 0);
+        let mut seeds: Vec<Node> = Vec::new();
+        for of_metric in [by_error, coloured] {
+            let before = seeds.len();
+            for set in best_first(of_metric) {
+                let timeless =
+                    |i: &usize| base.added.contains(i) || !self.candidates[*i].follows_time();
+                let mut seed = set;
+                let kept: Vec<usize> = seed.added.iter().copied().filter(timeless).collect();
+                if kept.len() <= base.added.len() || seeds.len() - before >= SEEDS {
+                    continue;
+                }
+                if kept.len() < seed.added.len() {
+                    let Ok(part) = self.subset(&seed, kept, white, ROUGH) else {
+                        continue;
+                    };
+                    seed = part;
+                }
+                if !seeds.iter().any(|known| same_set(known, &seed)) {
+                    seeds.push(seed);
+                }
+            }
+        }
+        let fits = seeds
+            .into_par_iter()
+            .filter_map(|seed| self.refitted(&seed, white, ROUGH).ok());
+        let seeds = best_first(fits.collect());
+        // The best set of few effects, and the best of all: what grew beside effects that follow time may lead astray.
+        let few = |seed: &&Node| seed.added.len() <= base.added.len() + FEW;
+        let first = seeds.iter().find(few).into_iter();
+        let mut begin: Vec<Node> = first.chain(seeds.first()).cloned().collect();
+        begin.dedup_by(|a, b| same_set(a, b));
+        begin
+    }
+
+    /// The set with the one effect more that lowers the criterion most.
+    fn one_more(
+        &self,
+        set: &Node,
+        of: &[usize],
+        white: &Noise,
+        fitted: &mut Vec<Node>,
+    ) -> Option<Node> {
+        let mut trials = self.trials_among(set, of, white);
+        trials.retain(|trial| self.may_lower_the_criterion(trial));
+        trials.truncate(REFITS);
+        let children = self.refits(set, &trials, white);
+        fitted.extend(children.iter().cloned());
+        let best = children.into_iter().next()?;
+        (best.gain_over(set) > PAYS).then_some(best)
+    }
+
+    /// The set with effects exchanged for others, or left out, one by one, while that lowers the criterion.
+    fn exchanged(
+        &self,
+        mut set: Node,
+        base: &Node,
+        of: &[usize],
+        white: &Noise,
+        fitted: &mut Vec<Node>,
+    ) -> Node {
+        let mut position = base.added.len();
+        while position < set.added.len() && !self.limit.passed() {
+            let taken_out = set.added[position];
+            let others: Vec<usize> = of.iter().copied().filter(|i| *i != taken_out).collect();
+            let better = self.without(&set, position, white, ROUGH).ok();
+            let better = better.and_then(|lacking| {
+                if lacking.gain_over(&set) > 0.0 {
+                    return Some(lacking);
+                }
+                let loss = lacking.fit.deviance - set.fit.deviance;
+                let mut trials = self.trials_among(&lacking, &others, white);
+                trials.retain(|trial| FALL_FACTOR * trial.fall + FALL_MARGIN > loss);
+                trials.truncate(EXCHANGED);
+                let exchanged = self.refits(&lacking, &trials, white);
+                fitted.extend(exchanged.iter().cloned());
+                let best = exchanged.into_iter().next()?;
+                (best.gain_over(&set) > PAYS).then_some(best)
+            });
+            match better {
+                Some(better) => {
+                    set = better;
+                    position = base.added.len();
+                }
+                None => position += 1,
+            }
+        }
+        set
+    }
+}

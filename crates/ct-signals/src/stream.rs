@@ -6,6 +6,9 @@
 //! blank lines and comments, quotes, words where a sample is missing, times as numbers in a unit or as dates. The first row's time says how
 //! they are written. A line that cannot be used is refused by itself, and the next one is read on.
 
+mod bad_line;
+mod row;
+
 use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
 pub use self::bad_line::BadLine;
@@ -349,7 +352,5 @@ fn cells(line: &str, delimiter: u8) -> Vec<String> {
     record.iter().map(str::to_string).collect()
 }
 
-mod bad_line;
-mod row;
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,7 @@
 //! Least squares on the fly: an upper triangle that rows are folded into, in `O(p^2)` memory.
 
+mod outputs;
+
 use serde::{Deserialize, Serialize};
 
 use self::outputs::{Outputs, ROUNDS, SAME_WEIGHTS};
@@ -375,6 +377,5 @@ fn subtract_and_dot(b: &mut [f64], factor: f64, a: &[f64], c: &[f64]) -> f64 {
     rest + (((a + c) + (e + g)) + ((b + d) + (f + h)))
 }
 
-mod outputs;
 #[cfg(test)]
 mod tests;

@@ -28,6 +28,8 @@
 //!
 //! Reference: P. J. Huber, Proc. 5th Berkeley Symposium 1 (1967) 221-233, for the form of the covariance.
 
+mod series;
+
 use ct_lti::{Hold, Sampled, StateSpace};
 use ct_signals::{ArModel, StationaryNoise};
 use serde::Serialize;
@@ -298,6 +300,5 @@ fn of_sampled(ar: &ArModel, system: &StateSpace, sampled: &Sampled) -> Stationar
     StationaryNoise::new(a, &b, c, system.d())
 }
 
-mod series;
 #[cfg(test)]
 mod tests;

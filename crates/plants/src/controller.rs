@@ -10,6 +10,8 @@
 //! The states of a controller are in units of the command. The sum of those that the command sees is what it would be at
 //! `e = 0`: a PI has one, `b`, operating point and integral in one.
 
+mod regulator;
+
 use ct_lti::{Hold, StateSpace, TransferFunction};
 
 pub use self::regulator::{Pi, Regulator};
@@ -346,6 +348,5 @@ fn times(a: &[f64], b: &[f64], n: usize) -> Vec<f64> {
     product
 }
 
-mod regulator;
 #[cfg(test)]
 mod tests;

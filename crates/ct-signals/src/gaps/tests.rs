@@ -1,3 +1,5 @@
+//! Gaps that are held through, cut, or none at all.
+
 use super::*;
 
 fn record(rows: impl Iterator<Item = usize>) -> Record {

@@ -1,3 +1,5 @@
+//! Lines with and without a header, with dates, with missing samples.
+
 use super::*;
 
 fn rows(first: &str) -> (Rows, bool) {

@@ -1,3 +1,5 @@
+//! The R factor against dense linear algebra.
+
 use super::*;
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, DVector};

@@ -1,3 +1,5 @@
+//! Noise models of a loop against sums over impulse responses.
+
 use super::*;
 use crate::{Controller, PlantModel};
 

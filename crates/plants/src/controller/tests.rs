@@ -1,3 +1,5 @@
+//! Limits, impossible settings, and controllers that are the same one.
+
 use super::*;
 
 #[test]

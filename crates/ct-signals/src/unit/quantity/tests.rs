@@ -1,3 +1,5 @@
+//! Units as engineers write them in headers, and their conversions.
+
 use super::*;
 use approx::assert_relative_eq;
 use proptest::prelude::*;

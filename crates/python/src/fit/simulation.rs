@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::error;
-use crate::model::records;
 
 /// How long a search may take.
 pub fn limit(

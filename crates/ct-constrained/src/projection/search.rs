@@ -1,4 +1,4 @@
-//! The search for the active bounds.
+//! The dual method: rows enter the active set, and those that are in their way leave it.
 
 use nalgebra::{SMatrix, SVector};
 

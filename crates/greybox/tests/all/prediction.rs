@@ -1,7 +1,7 @@
 //! The band of a simulation on other inputs: its exact slopes against differences of whole predictions, initial states fitted anew, and how
 //! often it covers the output without noise.
 
-mod coverage;
+mod bands;
 
 use std::collections::BTreeMap;
 

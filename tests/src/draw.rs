@@ -1,5 +1,7 @@
 //! Rigs drawn at random, and effects in them whose size is set by what the believed model cannot follow.
 
+mod path;
+
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use ct_signals::{Channel, Record};
@@ -8,6 +10,7 @@ use plants::{EffectInfo, Known, ParameterInfo, Placed, Plant};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use self::path::Path;
 use crate::{Drive, Rig};
 
 /// The plants that are drawn from.
@@ -337,68 +340,6 @@ fn error(rig: &Rig, fit: &Fit) -> f64 {
     weighted_rms(&fit.rmse, &scales, &fit.samples_per_output)
 }
 
-/// The sizes of an effect in a rig, from absent at 0 to the end of the plausible range at 1.
-struct Path {
-    placed: Placed,
-    /// For each parameter its value at 0 and at 1.
-    ends: Vec<(f64, f64)>,
-}
-
-impl Path {
-    fn draw(rig: &Rig, placed: Placed, seed: u64, rng: &mut ChaCha8Rng) -> Option<Self> {
-        let records = [without_noise(rig, seed)];
-        let setup =
-            Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
-        let mut structure = setup.structure.clone();
-        let x = [rig.theta.as_slice(), &rig.levels].concat();
-        structure.scales = setup.scales_at(&x).ok()?;
-        let parameters = structure.effect_parameters(placed);
-        let leading = parameters.first()?;
-        // Sine and cosine of a swing are one size, in a direction of their own.
-        let sized = |p: &ParameterInfo| p.unit == leading.unit && p.absent == leading.absent;
-        let several = parameters.iter().filter(|p| sized(p)).count() > 1;
-        let ends = parameters.iter().map(|p| {
-            if !sized(p) {
-                let value = beside(p, rng);
-                (value, value)
-            } else if p.absent.is_finite() {
-                let end = if p.lower < p.absent && rng.random() {
-                    p.lower
-                } else {
-                    p.upper
-                };
-                let part = if several {
-                    between(rng, 0.1..=1.0)
-                } else {
-                    1.0
-                };
-                (p.absent, p.absent + part * (end - p.absent))
-            } else {
-                // A threshold, from a little beyond all that the believed model visits.
-                let first = p.starts.iter().copied().fold(p.lower, f64::max);
-                let beyond = first + 0.2 * (first - p.lower);
-                (beyond.min(p.upper), p.lower)
-            }
-        });
-        Some(Self {
-            placed,
-            ends: ends.collect(),
-        })
-    }
-
-    fn at(&self, rig: &Rig, size: f64) -> Rig {
-        let values = self
-            .ends
-            .iter()
-            .map(|(from, to)| from + size * (to - from))
-            .collect();
-        Rig {
-            hidden: vec![(self.placed.effect.id, self.placed.vessel, values)],
-            ..rig.clone()
-        }
-    }
-}
-
 /// A parameter that is not the size: anywhere between its first and its last start, or within a factor of two of its only
 /// one.
 fn beside(parameter: &ParameterInfo, rng: &mut ChaCha8Rng) -> f64 {
@@ -423,51 +364,4 @@ fn beside(parameter: &ParameterInfo, rng: &mut ChaCha8Rng) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn paired(one: &str, other: &str) -> bool {
-        let find = |id| EffectInfo::find(id).unwrap();
-        may_pair(find(one), find(other))
-    }
-
-    #[test]
-    fn twins_and_two_that_follow_the_clock_make_no_pair() {
-        assert!(paired("pump_deadzone", "overflow"));
-        assert!(paired("sensor_drift", "overflow"));
-        assert!(!paired("pump_lag", "sensor_lag"));
-        assert!(!paired("const_leak", "sensor_offset"));
-        assert!(!paired("valve_step", "sensor_drift"));
-        assert!(!paired("overflow", "const_leak"));
-    }
-
-    #[test]
-    fn a_converter_rounds_the_reading_with_its_noise() {
-        let effect = EffectInfo::find("coarse_quantisation").unwrap();
-        let rig = with_effect(effect, Levels::Last, 1.0, Drive::Open, 0.0, 300, 1).unwrap();
-        assert!((rig.converter / rig.noise - 12.0_f64.sqrt()).abs() < 1e-12);
-        let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1));
-        for y in &record.outputs[0].values {
-            let steps = y / rig.converter;
-            assert!((steps - steps.round()).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn stamps_jitter_and_increase() {
-        let rig = Rig {
-            jitter: 0.03,
-            walk: 0.05,
-            ..Rig::single_tank()
-        };
-        let record = rig.run(&mut ChaCha8Rng::seed_from_u64(1));
-        record.validate().unwrap();
-        let most = record
-            .time
-            .iter()
-            .enumerate()
-            .map(|(k, t)| (t / rig.interval - k as f64).abs())
-            .fold(0.0, f64::max);
-        assert!(most > 0.02 && most <= 0.03 + 1e-9);
-    }
-}
+mod tests;

@@ -21,13 +21,15 @@
 //! Cost: 60 to 90 ns a cell, 170 ns by a format that is given by hand.
 
 mod calendar;
+mod column_form;
+mod error;
 mod form;
 mod zone;
 
-use jiff::fmt::strtime::BrokenDownTime;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
+use self::column_form::{by_format, find_form, undecided};
+pub use self::error::TimestampError;
 use crate::quoted;
 use form::{DateForm, Fault, Fields, Form};
 use zone::KnownOffset;
@@ -113,97 +115,6 @@ impl TryFrom<(i64, u32)> for Timestamp {
         }
         Ok(Self::new(seconds, nanoseconds))
     }
-}
-
-/// Why a date or a time is refused; the caller knows the file, the row and the column.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum TimestampError {
-    /// There is no zone of this name.
-    #[error(
-        "there is no time zone \"{zone}\"; give a name such as \"Europe/Berlin\" or \"UTC\", or an offset such as \"+01:00\""
-    )]
-    UnknownZone {
-        /// The name.
-        zone: String,
-    },
-    /// No cell of the column holds anything.
-    #[error("there is no date or time to read; name another column")]
-    NoCells,
-    /// The first cell has no form that is known.
-    #[error(
-        "\"{text}\" is no date or time that is understood; say how it is written with time_format, such as \"%d.%m.%Y %H:%M:%S\", or give the time as a number"
-    )]
-    UnknownForm {
-        /// The cell.
-        text: String,
-    },
-    /// Day and month cannot be told apart.
-    #[error(
-        "\"{text}\" has two meanings, and no date of the column says which number is the day; set time_format = \"{day_first}\" or \"{month_first}\""
-    )]
-    DayOrMonth {
-        /// The cell.
-        text: String,
-        /// The format in which the day is first.
-        day_first: String,
-        /// The format in which the month is first.
-        month_first: String,
-    },
-    /// Some dates have the day first, others the month.
-    #[error(
-        "\"{text}\" has the {first_here} first, but dates elsewhere in the column have the other order; write all dates alike"
-    )]
-    BothOrders {
-        /// The cell.
-        text: String,
-        /// `day` or `month`.
-        first_here: &'static str,
-    },
-    /// A cell is written otherwise than the first one.
-    #[error(
-        "\"{text}\" is not written as \"{first}\" further up; write all times alike, or split the file there"
-    )]
-    OtherForm {
-        /// The cell.
-        text: String,
-        /// The first cell of the column.
-        first: String,
-    },
-    /// A cell does not fit the format that was given.
-    #[error(
-        "\"{text}\" does not fit time_format = \"{format}\" ({reason}); correct the format or the cell"
-    )]
-    Format {
-        /// The cell.
-        text: String,
-        /// The format.
-        format: String,
-        /// What does not fit.
-        reason: String,
-    },
-    /// There is no such date or time.
-    #[error("\"{text}\" is not in the calendar or on the clock; correct the cell")]
-    NoSuchTime {
-        /// The cell.
-        text: String,
-    },
-    /// Clocks go forward over this time.
-    #[error(
-        "\"{text}\" does not exist in {zone}, where the clocks go forward over it; if the clock of the record was not changed, set time_zone to its offset, such as \"+01:00\""
-    )]
-    SkippedTime {
-        /// The cell.
-        text: String,
-        /// The zone.
-        zone: String,
-    },
-    /// A bound that a person gave is not understood.
-    #[error("\"{text}\" is no date that has one meaning; write 2026-01-31 or \"2026-01-31 14:25\"")]
-    UnknownBound {
-        /// What was given.
-        text: String,
-    },
 }
 
 /// Reads the cells of one column, from the first row to the last.
@@ -432,133 +343,6 @@ impl TimestampReader {
         }
         Timestamp::new(seconds, fields.nanoseconds)
     }
-}
-
-/// The form of the first cell and whether it has a date, with the order of day and month from the others where it is not plain.
-fn find_form<'a>(
-    first: &'a str,
-    others: impl Iterator<Item = &'a str>,
-) -> Result<(Written, bool), TimestampError> {
-    let text = || quoted(first);
-    let form = Form::of(first).ok_or_else(|| TimestampError::UnknownForm { text: text() })?;
-    form.parse(first)
-        .map_err(|_| TimestampError::NoSuchTime { text: text() })?;
-    let DateForm::Undecided(separator) = form.date else {
-        return Ok((Written::Form(form), form.date != DateForm::TimeOnly));
-    };
-    let mut symmetric = true;
-    for cell in std::iter::once(first).chain(others) {
-        let date = match Form::day_first(cell) {
-            Some(true) => DateForm::DayFirst(separator),
-            Some(false) => DateForm::MonthFirst(separator),
-            None => {
-                symmetric &= Form::symmetric(cell);
-                continue;
-            }
-        };
-        return Ok((Written::Form(Form { date, ..form }), true));
-    }
-    if symmetric {
-        Ok((Written::Symmetric(form), true))
-    } else {
-        Err(undecided(first, &form))
-    }
-}
-
-/// The message that asks for a format, with the two that fit.
-fn undecided(cell: &str, form: &Form) -> TimestampError {
-    let separator = match form.date {
-        DateForm::Undecided(separator) => char::from(separator),
-        _ => '/',
-    };
-    let clock = cell.find(':').unwrap_or(cell.len());
-    let end = cell[clock..].find(['+', '-']).map(|sign| clock + sign);
-    let (local, offset) = cell.split_at(end.unwrap_or(cell.len()));
-    let half_day = local.trim_end().ends_with(['m', 'M']);
-    let mut time = String::new();
-    let colons = local.matches(':').count();
-    if colons > 0 {
-        time += if half_day { " %I:%M" } else { " %H:%M" };
-    }
-    if colons > 1 {
-        time += ":%S";
-        if local.contains('.') {
-            time += "%.f";
-        } else if local.contains(',') {
-            time += ",%f";
-        }
-    }
-    if half_day {
-        time += " %p";
-    }
-    if !offset.is_empty() {
-        time += if local.ends_with(' ') { " " } else { "" };
-        time += if offset.contains(':') { "%:z" } else { "%z" };
-    }
-    TimestampError::DayOrMonth {
-        text: quoted(cell),
-        day_first: format!("%d{separator}%m{separator}%Y{time}"),
-        month_first: format!("%m{separator}%d{separator}%Y{time}"),
-    }
-}
-
-/// Reads a cell by a format of `strftime`.
-fn by_format(format: &str, cell: &str) -> Result<Fields, TimestampError> {
-    let fault = |reason: String| TimestampError::Format {
-        text: quoted(cell),
-        format: quoted(format),
-        reason: quoted(&reason),
-    };
-    let parts = BrokenDownTime::parse(format, cell).map_err(|error| fault(error.to_string()))?;
-    if parts.iana_time_zone().is_some() {
-        return Err(fault("names of zones in cells are not read".into()));
-    }
-    if let Some(instant) = parts.timestamp() {
-        let seconds = instant.as_duration();
-        let nanoseconds = i64::from(seconds.subsec_nanos());
-        let whole = seconds.as_secs() - i64::from(nanoseconds < 0);
-        return Ok(Fields {
-            days: Some(whole.div_euclid(DAY)),
-            seconds: whole.rem_euclid(DAY),
-            nanoseconds: nanoseconds.rem_euclid(1_000_000_000) as u32,
-            offset: Some(0),
-            timed: true,
-        });
-    }
-    let dated = [
-        parts.year().is_some(),
-        parts.iso_week_year().is_some(),
-        parts.month().is_some(),
-        parts.day().is_some(),
-        parts.day_of_year().is_some(),
-    ];
-    let days = if dated.contains(&true) {
-        let date = parts.to_date().map_err(|error| fault(error.to_string()))?;
-        let [year, month, day] = [
-            i32::from(date.year()),
-            date.month().into(),
-            date.day().into(),
-        ]
-        .map(i32::unsigned_abs);
-        let days = calendar::days(year, month, day).filter(|_| date.year() > 0);
-        Some(days.ok_or_else(|| TimestampError::NoSuchTime { text: quoted(cell) })?)
-    } else {
-        None
-    };
-    let time = parts.to_time().map_err(|error| fault(error.to_string()))?;
-    let timed = parts.hour().is_some();
-    if days.is_none() && !timed {
-        return Err(fault("it has neither a date nor an hour".into()));
-    }
-    Ok(Fields {
-        days,
-        seconds: i64::from(time.hour()) * 3600
-            + i64::from(time.minute()) * 60
-            + i64::from(time.second()),
-        nanoseconds: time.subsec_nanosecond().unsigned_abs(),
-        offset: parts.offset().map(|offset| offset.seconds()),
-        timed,
-    })
 }
 
 #[cfg(test)]

@@ -28,11 +28,13 @@
 //!
 //! Reference: P. J. Huber, Proc. 5th Berkeley Symposium 1 (1967) 221-233, for the form of the covariance.
 
+mod series;
+
 use ct_lti::{Hold, Sampled, StateSpace};
 use ct_signals::{ArModel, StationaryNoise};
-use estimation::Triangle;
 use serde::Serialize;
 
+use self::series::{Series, autoregression};
 use crate::{ClosedLoop, Error};
 
 /// Where the noise enters.
@@ -225,110 +227,6 @@ impl NoiseModel {
     }
 }
 
-/// A series, and the signals in it that are no noise.
-struct Series {
-    values: Vec<f64>,
-    beside: Vec<Vec<f64>>,
-}
-
-/// The autoregression of what is left of all series, and minus twice the logarithm of its marginal likelihood, with
-/// the penalty of Bayes' information criterion for its coefficients.
-fn autoregression(mut all: Vec<Series>, max_order: usize) -> Result<(f64, ArModel), Error> {
-    all = all.into_iter().map(Series::without_others).collect();
-    let segments: Vec<&[f64]> = all.iter().map(|s| &s.values[..]).collect();
-    let ar = ArModel::fit(&segments, max_order)?;
-    let n: usize = segments.iter().map(|s| s.len()).sum();
-    let (mut squares, mut volume, mut left) = (0.0, 0.0, n as f64);
-    for series in &all {
-        volume += ar.log_det(series.values.len());
-        let whitened = Series {
-            values: ar.whiten(&series.values),
-            beside: series.beside.iter().map(|b| ar.whiten(b)).collect(),
-        };
-        let (triangle, x) = whitened.regression();
-        squares += triangle.predicted(&x);
-        if triangle.determined() {
-            volume += triangle.log_det();
-            left -= x.len() as f64;
-        }
-    }
-    let variance = (squares / left).max(f64::MIN_POSITIVE);
-    let penalty = ar.order() as f64 * (n as f64).ln();
-    Ok((left * variance.ln() + volume + penalty, ar))
-}
-
-impl Series {
-    /// The values less what they hold of the signals beside the noise.
-    fn without_others(mut self) -> Self {
-        let (triangle, x) = match self.values.iter().any(|v| v.is_nan()) {
-            true => self.there().regression(),
-            false => self.regression(),
-        };
-        if triangle.cost() > 0.0 {
-            for (x, beside) in x.iter().zip(&self.beside) {
-                for (v, b) in self.values.iter_mut().zip(beside) {
-                    *v -= x * b;
-                }
-            }
-        }
-        self
-    }
-
-    /// The rows whose value is there.
-    fn there(&self) -> Self {
-        let only = |signal: &Vec<f64>| {
-            let rows = signal.iter().zip(&self.values);
-            let there = rows.filter(|(_, value)| !value.is_nan());
-            there.map(|(signal, _)| *signal).collect()
-        };
-        Self {
-            values: only(&self.values),
-            beside: self.beside.iter().map(only).collect(),
-        }
-    }
-
-    /// The rows whose value is there, whitened as those of a process, and `log|R|` of them.
-    fn whitened(&self, process: &StationaryNoise) -> (Self, f64) {
-        let mut whitener = process.whitener(1 + self.beside.len());
-        let mut whitened = self.there();
-        let (mut log_det, mut k) = (0.0, 0);
-        let mut row = vec![0.0; 1 + self.beside.len()];
-        for value in &self.values {
-            if value.is_nan() {
-                whitener.skip();
-                continue;
-            }
-            let signals = std::iter::once(&mut whitened.values).chain(&mut whitened.beside);
-            let mut columns: Vec<&mut f64> = signals.map(|signal| &mut signal[k]).collect();
-            for (row, column) in row.iter_mut().zip(&columns) {
-                *row = **column;
-            }
-            log_det += whitener.push(&mut row).ln();
-            for (row, column) in row.iter().zip(&mut columns) {
-                **column = *row;
-            }
-            k += 1;
-        }
-        (whitened, log_det)
-    }
-
-    /// Least squares of the values on what is beside the noise; 0 where that is not determined.
-    fn regression(&self) -> (Triangle, Vec<f64>) {
-        let q = self.beside.len();
-        let mut columns: Vec<&[f64]> = self.beside.iter().map(Vec::as_slice).collect();
-        columns.push(&self.values);
-        let mut triangle = Triangle::new(q + 1);
-        triangle.push_columns(&columns);
-        triangle.finish();
-        let x = if triangle.determined() {
-            triangle.solve(&(0..q).collect::<Vec<_>>(), &[], 0.0)
-        } else {
-            vec![0.0; q]
-        };
-        (triangle, x)
-    }
-}
-
 /// `F w` from rest.
 fn filtered(system: &StateSpace, sampled: &Sampled, w: &[f64]) -> Vec<f64> {
     let mut x = vec![0.0; system.order()];
@@ -403,71 +301,4 @@ fn of_sampled(ar: &ArModel, system: &StateSpace, sampled: &Sampled) -> Stationar
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Controller, PlantModel};
-
-    fn closed() -> ClosedLoop {
-        let plant = PlantModel::new(&[3.0, 2.0], &[2.0, 0.5]).unwrap();
-        ClosedLoop::new(&plant, &Controller::pi(0.5, 0.2).unwrap()).unwrap()
-    }
-
-    /// Response of H to one innovation.
-    fn impulse(noise: &NoiseModel, closed: &ClosedLoop, step: f64, n: usize) -> Vec<f64> {
-        let ar = noise.ar.coefficients();
-        let mut w: Vec<f64> = Vec::new();
-        for k in 0..n {
-            let past = ar.iter().enumerate().filter(|(i, _)| *i < k);
-            let own: f64 = past.map(|(i, a)| a * w[k - 1 - i]).sum();
-            w.push(own + if k == 0 { 1.0 } else { 0.0 });
-        }
-        if noise.path == NoisePath::Record {
-            return w;
-        }
-        let system = StateSpace::controllable(&closed.disturbance().unwrap()).unwrap();
-        filtered(&system, &system.sampled(Hold::Zero, step).unwrap(), &w)
-    }
-
-    /// The filter's double sum against one over the autocovariance of the impulse response.
-    #[test]
-    fn the_coloured_sum_is_the_double_sum() {
-        let (closed, step) = (closed(), 0.4);
-        let coefficients: [&[f64]; 3] = [&[], &[0.8], &[1.2, -0.5]];
-        for ar in coefficients {
-            for path in [NoisePath::Record, NoisePath::Loop] {
-                let ar = ArModel::from_coefficients(ar, 1.0).unwrap();
-                let noise = NoiseModel { path, ar };
-                let h = impulse(&noise, &closed, step, 2000);
-                let r = |lag: usize| -> f64 { h.iter().zip(&h[lag..]).map(|(a, b)| a * b).sum() };
-                let rows: Vec<[f64; 2]> = (0..40)
-                    .map(|k| [(0.3 * k as f64).sin(), (0.05 * (k * k) as f64).cos()])
-                    .collect();
-                let process = noise.process(&closed, step).unwrap();
-                let mut filter = process.sum(2);
-                rows.iter().for_each(|row| filter.push(row));
-                let found = filter.finish();
-                for (ij, found) in found.iter().enumerate() {
-                    let (i, j) = (ij / 2, ij % 2);
-                    let mut expected = 0.0;
-                    for (k, a) in rows.iter().enumerate() {
-                        for (l, b) in rows.iter().enumerate() {
-                            expected += a[i] * b[j] * r(k.abs_diff(l));
-                        }
-                    }
-                    assert!((found - expected).abs() < 1e-9 * r(0) * 40.0, "{noise:?}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_inverse_undoes_the_loop() {
-        let system = StateSpace::controllable(&closed().disturbance().unwrap()).unwrap();
-        let sampled = system.sampled(Hold::Zero, 0.4).unwrap();
-        let w: Vec<f64> = (0..500)
-            .map(|k| (0.7 * (k * k % 31) as f64).sin())
-            .collect();
-        let back = unfiltered(&system, &sampled, &filtered(&system, &sampled, &w));
-        assert!(w.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-11));
-    }
-}
+mod tests;

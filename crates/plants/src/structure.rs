@@ -1,10 +1,11 @@
 //! A structure: a plant, what is known of it, and the effects that are on, in chain order.
 
+mod site;
+
+pub use self::site::{Placed, Site};
 use crate::{
-    Domain, Error, ParameterInfo, Plant, Term,
-    effects::{self, EffectInfo, Place},
-    plant::Outlet,
-    scales::{OutputScales, Picked, Scales, quantile},
+    Domain, Error, ParameterInfo, Plant, Term, effects, effects::EffectInfo, effects::Place,
+    plant::Outlet, scales::OutputScales, scales::Picked, scales::Scales,
 };
 
 /// The most vessels a plant has.
@@ -59,130 +60,6 @@ impl Known {
     pub fn disturbed_vessel(&self, plant: Plant) -> Option<usize> {
         let vessel = self.disturbance.filter(|_| !plant.joined())?;
         Some(vessel.min(plant.vessels() - 1))
-    }
-}
-
-/// An effect at its place.
-#[derive(Debug, Clone, Copy)]
-pub struct Placed {
-    /// The effect.
-    pub effect: &'static EffectInfo,
-    /// The vessel it acts in, or which of the pumps or of the outputs it is at.
-    pub vessel: usize,
-}
-
-impl Placed {
-    /// The name of its place, where there are several of the kind: of a vessel, of a pump, or of the vessel that a sensor reads.
-    #[must_use]
-    pub fn place_name(&self, plant: Plant, known: &Known) -> Option<&'static str> {
-        match self.effect.place {
-            Place::Vessel => plant.vessel_name(self.vessel),
-            Place::Actuator => plant.pump_name(self.vessel),
-            Place::Sensor => known.output_name(plant, self.vessel),
-        }
-    }
-}
-
-impl PartialEq for Placed {
-    fn eq(&self, other: &Self) -> bool {
-        self.effect.id == other.effect.id && self.vessel == other.vessel
-    }
-}
-
-/// Where an effect finds itself: what it may ask when it names its parameters or is bound.
-#[derive(Debug, Clone, Copy)]
-pub struct Site<'a> {
-    /// The plant.
-    pub plant: Plant,
-    /// The vessel it acts in, or which of the pumps or of the outputs it is at.
-    pub vessel: usize,
-    /// What the data visit.
-    pub scales: &'a Scales,
-}
-
-impl Site<'_> {
-    /// The vessel's level is measured.
-    #[must_use]
-    pub fn is_measured(&self) -> bool {
-        let mut outputs = self.scales.outputs.iter();
-        outputs.any(|output| output.vessel == self.vessel)
-    }
-    /// At the sensor: its output.
-    #[must_use]
-    pub fn output(&self) -> &OutputScales {
-        &self.scales.outputs[self.vessel]
-    }
-    /// The vessel stands above another one, into which its outlet leads.
-    #[must_use]
-    pub fn is_above_another(&self) -> bool {
-        !self.plant.joined() && self.vessel + 1 < self.plant.vessels()
-    }
-    /// The vessel's outlet is a valve to a tank beside it.
-    #[must_use]
-    pub fn is_joined_to_next(&self) -> bool {
-        self.plant.joined() && self.vessel + 1 < self.plant.vessels()
-    }
-    /// Smallest and largest command to the pump.
-    #[must_use]
-    pub fn input(&self) -> (f64, f64) {
-        match (self.vessel, self.scales.input_2) {
-            (1, Some(input)) => input,
-            _ => self.scales.input,
-        }
-    }
-    /// Smallest and largest level of the vessel.
-    #[must_use]
-    pub fn level(&self) -> (f64, f64) {
-        self.scales.level[self.vessel]
-    }
-    /// Mean level of the vessel.
-    #[must_use]
-    pub fn operating_level(&self) -> f64 {
-        self.scales.operating_level[self.vessel]
-    }
-    /// Length of the record \[s\].
-    #[must_use]
-    pub fn duration(&self) -> f64 {
-        self.scales.duration.max(f64::MIN_POSITIVE)
-    }
-    /// The command to the pump below which it stays for a share of the time.
-    #[must_use]
-    pub fn input_quantile(&self, share: f64) -> f64 {
-        let second = self.vessel == 1 && self.scales.input_2.is_some();
-        let deciles = &self.scales.input_deciles[usize::from(second)];
-        quantile(share, self.input(), deciles.as_ref())
-    }
-    /// The level below which the vessel stays for a share of the time.
-    #[must_use]
-    pub fn level_quantile(&self, share: f64) -> f64 {
-        let deciles = &self.scales.level_deciles[self.vessel];
-        quantile(share, self.level(), deciles.as_ref())
-    }
-    /// At the sensor: the same of the level that it reads.
-    #[must_use]
-    pub fn measured_quantile(&self, share: f64) -> f64 {
-        let deciles = &self.scales.level_deciles[self.output().vessel];
-        quantile(share, self.measured_level(), deciles.as_ref())
-    }
-    /// The highest place for a rim or a hole: the height of the tank, where it is known and the level is counted from its bottom; else so far
-    /// above the largest level that nothing there would show. A level that is not measured is known from the believed model alone,
-    /// which may have it far too low.
-    #[must_use]
-    pub fn highest_place(&self) -> f64 {
-        let (low, high) = self.level();
-        let beyond = if self.is_measured() { 0.5 } else { 3.0 };
-        let beyond = high + beyond * (high - low);
-        let absolute = self.is_measured() || self.plant.outlet() == Outlet::Torricelli;
-        match self.scales.tank_height.filter(|_| absolute) {
-            // What a wrong model has run over still has room for a rim.
-            Some(height) => height.max(low + 0.1 * (high - low)),
-            None => beyond,
-        }
-    }
-    /// At the sensor: smallest and largest level of the vessel that it reads.
-    #[must_use]
-    pub fn measured_level(&self) -> (f64, f64) {
-        self.scales.level[self.output().vessel]
     }
 }
 

@@ -19,13 +19,14 @@
 //! Reference: A. J. Udink ten Cate, *Continuous-time constrained least-squares algorithms for recursive parameter estimation of stochastic
 //! linear systems by a stabilized output error method*, WP-85-54, IIASA, Laxenburg, 1985, sections 4 and 5.
 
-use ct_constrained::{Bounds, Relation};
+mod keep;
+
+use ct_constrained::Bounds;
 use ct_rls::{Health, Innovation, Outcome, RecursiveEstimator};
 use nalgebra::{SMatrix, SVector};
 
 use crate::hurwitz::is_hurwitz;
-use crate::integrator::sealed::ModelRule;
-use crate::limits::{default_bounds, inside};
+use crate::limits::inside;
 use crate::model::Model;
 use crate::rows::check_rows;
 use crate::{CoupledRow, Derivatives, Error, Gain};
@@ -275,73 +276,6 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
     /// How often the estimates had to be brought back.
     pub fn bounded(&self) -> Bounded {
         self.bounded
-    }
-
-    fn unused(outcome: Outcome) -> Innovation {
-        Innovation {
-            epsilon: f64::NAN,
-            s: f64::NAN,
-            outcome,
-        }
-    }
-
-    /// Equalities, then penalties.
-    #[inline]
-    fn take_rows(&mut self, dt: f64) {
-        for equality in [true, false] {
-            for row in &self.rows {
-                if (row.relation() == Relation::Equal) == equality && row.weight() > 0.0 {
-                    self.gain.take_row(row, dt);
-                }
-            }
-        }
-    }
-
-    /// Brings the estimates back to their bounds, and the model to stability.
-    #[inline]
-    fn keep(&mut self, dt: f64) -> Result<(), Error> {
-        let theta_bounds = match &self.theta_bounds {
-            Some(bounds) => bounds,
-            None => {
-                self.shortest = self.shortest.min(dt);
-                let (step, highest) = if <G::Integrator as ModelRule>::ANY_STEP {
-                    let lag = SHORTEST_LAG * self.slower;
-                    (self.shortest, lag * self.shortest)
-                } else {
-                    (dt, f64::INFINITY)
-                };
-                if self.default_bounds.0 != step {
-                    self.default_bounds = (step, default_bounds::<N, P>(step, highest)?);
-                }
-                &self.default_bounds.1
-            }
-        };
-        let [theta, filter] = self.gain.keep(theta_bounds, &self.filter_bounds, dt)?;
-        self.bounded.theta += u64::from(theta);
-        self.bounded.filter += u64::from(filter);
-        let before = self.theta;
-        self.theta = self.gain.theta();
-        if !is_hurwitz::<N>(self.theta.as_slice()) {
-            self.stabilize(before)?;
-        }
-        Ok(())
-    }
-
-    /// Takes part of the last step of `theta^` back, so much that the model is stable.
-    #[cold]
-    fn stabilize(&mut self, before: SVector<f64, P>) -> Result<(), Error> {
-        self.bounded.unstable += 1;
-        let mut step = self.theta - before;
-        self.theta = before;
-        for _ in 0..HALVINGS {
-            step *= 0.5;
-            let theta = before + step;
-            if is_hurwitz::<N>(theta.as_slice()) {
-                self.theta = theta;
-                break;
-            }
-        }
-        self.gain.set_theta(self.theta)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{ReadOptions, Table, fewest_rows, text::line_number};
+use super::{ReadOptions, fewest_rows, table::Table, text::line_number};
 use crate::columns::{Found, Layout, Purpose};
 use crate::record::median_step;
 use crate::{Error, quoted};

@@ -47,7 +47,7 @@ pub(super) struct RawTerm {
 
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct RawKnown {
+pub(crate) struct RawKnown {
     pub(super) area: Option<Spanned<Number>>,
     pub(super) area_upper: Option<Spanned<Number>>,
     pub(super) area_lower: Option<Spanned<Number>>,

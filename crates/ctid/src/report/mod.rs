@@ -14,6 +14,7 @@ mod figures;
 mod identification;
 mod missing_term;
 mod page;
+mod residual;
 #[cfg(test)]
 pub(crate) mod sample;
 mod side_by_side;
@@ -21,7 +22,7 @@ mod tables;
 mod text;
 mod udink;
 
-use missing_effect::{Diagnosis, Failures, OutputStep, ResidualTests, Shown, Step, Verdict};
+use missing_effect::{Diagnosis, OutputStep, Step, Verdict};
 
 pub use self::baysse::html as baysse;
 pub(crate) use self::data::{json as drawing, records as drawing_of_records, rounded};
@@ -29,8 +30,9 @@ pub(crate) use self::decimate::min_max;
 pub use self::identification::html as identification;
 pub(crate) use self::missing_term::{COMPARED, ComparedPort, MissingTerm};
 pub use self::page::head;
-use self::page::{NOTICES, Page, figure, figure_with, items, large, section};
+use self::page::{NOTICES, Page, figure, items, large, section};
 pub(crate) use self::page::{PLOTLY, PLOTS, STYLE};
+use self::residual::{failures, residual_tests, role, unknown, variable};
 pub use self::side_by_side::html as side_by_side;
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
@@ -270,186 +272,6 @@ fn fit(diagnosis: &Diagnosis) -> String {
              magnifier first), double-click to see all again; the names switch the curves on and off."
         ),
         &figures,
-    )
-}
-
-fn failures(diagnosis: &Diagnosis) -> String {
-    let Some(last) = diagnosis.steps.last() else {
-        return String::new();
-    };
-    let sentences = items(findings::sentences(diagnosis, last));
-    let any = |bins: fn(&Failures) -> usize| {
-        let outputs = diagnosis.steps.iter().flat_map(|step| &step.outputs);
-        outputs
-            .map(|output| bins(&output.failures))
-            .any(|count| count > 0)
-    };
-    let mut figures = String::new();
-    if !diagnosis.records.is_empty() {
-        figures.push_str(&figure("by-time", "Residual against time", ""));
-    }
-    let mut pairs = String::new();
-    if any(|failures| failures.by_level.len()) {
-        pairs.push_str(&figure("by-level", "Against the model's output", BINNED));
-    }
-    if any(|failures| failures.by_flow.len()) {
-        pairs.push_str(&figure("by-flow", "Against the input", BINNED));
-    }
-    if any(|failures| failures.by_direction.len()) {
-        pairs.push_str(&figure(
-            "by-direction",
-            "By direction of the model's output",
-            "Bars: root mean square; diamonds: mean.",
-        ));
-    }
-    if any(|failures| failures.by_frequency.len()) {
-        pairs.push_str(&figure(
-            "by-frequency",
-            "By frequency",
-            "Root mean square of the residual in each octave.",
-        ));
-    }
-    let choices = choices(diagnosis);
-    if figures.is_empty() && pairs.is_empty() && sentences.is_empty() {
-        return String::new();
-    }
-    section(
-        "failures",
-        "Where the model fails",
-        "The residual is the measurement minus the simulated output. \
-         Hatched bars and shaded windows fail clearly; the dashed line is the noise floor.",
-        &format!(
-            "<ul id=\"failure-sentences\">{sentences}</ul>\n{choices}{figures}<div class=\"pairs\">{pairs}</div>\n"
-        ),
-    )
-}
-
-/// What nothing explains, where it has a shape.
-fn unknown(diagnosis: &Diagnosis) -> String {
-    let Some(unknown) = &diagnosis.unknown else {
-        return String::new();
-    };
-    let mut figures = figure(
-        "unknown-path",
-        "The missing term against time",
-        "Smoothed, with its 95 % band, on the first fitted record; shaded where the band does not hold zero.",
-    );
-    if unknown.variable != "time" {
-        figures.push_str(&figure(
-            "unknown-shape",
-            &format!("Against the {}", variable(unknown.variable)),
-            "Fitted with all parameters of the plant, without what those imitate; with its 95 % band.",
-        ));
-    }
-    section(
-        "unknown",
-        "What nothing explains",
-        "The term that has to be added to the last model so that it meets the data. <code>ctid diagnose --unknown F.csv</code> writes \
-         its shape, <code>ctid add NAME --from F.csv</code> keeps it as a term of your own.",
-        &format!("{figures}{}", tables::shares(unknown)),
-    )
-}
-
-/// A variable of a missing term in words.
-fn variable(name: &str) -> &str {
-    match name {
-        "rate" => "net inflow",
-        "input" => "command",
-        other => other,
-    }
-}
-
-const BINNED: &str = "Above the samples with the mean of each bin, below the root mean square of each bin; \
-                      first fitted record.";
-
-/// Chooses the record of the residual plot and whether the axes stay, where there is a choice.
-fn choices(diagnosis: &Diagnosis) -> String {
-    let mut choices = String::new();
-    if diagnosis.records.len() > 1 {
-        let options: String = diagnosis
-            .records
-            .iter()
-            .enumerate()
-            .map(|(k, record)| {
-                let name = escape(&record.name);
-                format!("<option value=\"{k}\">{name} ({})</option>", role(record))
-            })
-            .collect();
-        choices.push_str(&format!(
-            "<label>Record <select id=\"residual-record\" autocomplete=\"off\">{options}</select></label>\n"
-        ));
-    }
-    if diagnosis.steps.len() > 1 {
-        choices.push_str(
-            "<label><input type=\"checkbox\" id=\"same-axes\" autocomplete=\"off\" checked> \
-             same axes for every model</label>\n",
-        );
-    }
-    if choices.is_empty() {
-        return choices;
-    }
-    format!("<p class=\"choice\">{choices}</p>\n")
-}
-
-fn role(record: &Shown) -> &'static str {
-    if record.held_out {
-        "held out"
-    } else {
-        "fitted"
-    }
-}
-
-fn residual_tests(diagnosis: &Diagnosis) -> String {
-    let Some(last) = diagnosis.steps.last() else {
-        return String::new();
-    };
-    let mut outputs = diagnosis.steps.iter().flat_map(|step| &step.outputs);
-    let any = outputs.any(|output| {
-        output.tests.autocorrelation.len() > 1 || !output.tests.cross_correlation.is_empty()
-    });
-    if !any {
-        return String::new();
-    }
-    // The script leaves those of the chosen output.
-    let said = |of: fn(&ResidualTests) -> String| {
-        let said = last.outputs.iter().map(|output| {
-            let finding = of(&output.tests);
-            if findings::several(diagnosis) {
-                format!("{}: {finding}", output.name)
-            } else {
-                finding
-            }
-        });
-        escape(&said.collect::<Vec<_>>().join(" "))
-    };
-    // A model may have no input.
-    let records = &diagnosis.records;
-    let has_input = records.is_empty() || records.iter().any(|one| !one.inputs.is_empty());
-    let input = figure_with(
-        "cross-correlation",
-        "Residual against past input",
-        &format!(
-            "<span id=\"input-test\">{}</span> Both were whitened first.",
-            said(|tests| text::input_test(tests.input_p))
-        ),
-    );
-    section(
-        "tests",
-        "Is anything left in the residual?",
-        "A model that has taken all there is leaves noise: nearly all stems inside the band, \
-         which holds 95 % of them when nothing is left.",
-        &format!(
-            "<div class=\"pairs\">{}{}</div>\n",
-            figure_with(
-                "autocorrelation",
-                "Residual against its own past",
-                &format!(
-                    "<span id=\"whiteness\">{}</span>",
-                    said(|tests| text::whiteness(tests.whiteness_p))
-                )
-            ),
-            if has_input { input } else { String::new() }
-        ),
     )
 }
 

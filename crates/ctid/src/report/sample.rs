@@ -1,60 +1,19 @@
 //! A diagnosis to try the report on: two tanks whose upper one overflows and whose pump has a dead
 //! zone, with the base model, the overflow, and both. The simulations are real, the scores made up.
 
+mod signals;
+mod variants;
+
 use missing_effect::{
-    Acceptance, Bin, Diagnosis, Effort, Failures, HeldOutError, NoiseFloor, OutputStep, Parameter,
-    PerOutput, PlaceScore, Rankings, ResidualTests, Score, Shown, ShownInput, Step, Verdict,
+    Bin, Diagnosis, Effort, Failures, NoiseFloor, OutputStep, Parameter, PerOutput, Rankings,
+    ResidualTests, Score, Shown, ShownInput, Step, Verdict,
 };
 
+use self::signals::{NOISE, PERIOD, input, noise, simulate};
+pub(crate) use self::variants::{
+    awkward, comparison, comparison_of, partial, partial_of, rename_outputs,
+};
 use crate::identify::rms;
-
-const PERIOD: f64 = 4.0;
-const NOISE: f64 = 0.08;
-
-/// What the two tanks do with this command: lower and upper level \[V\].
-fn simulate(input: &[f64], rim: f64, deadzone: f64, gain: f64) -> [Vec<f64>; 2] {
-    let (mut upper, mut lower) = (2.0_f64, 3.0_f64);
-    let fine = 8;
-    let levels = input
-        .iter()
-        .map(|u| {
-            let readings = (lower, upper);
-            for _ in 0..fine {
-                let dt = PERIOD / f64::from(fine);
-                let between = 0.085 * upper.max(0.0).sqrt();
-                upper = (upper + dt * (gain * (u - deadzone).max(0.0) - between)).clamp(0.0, rim);
-                lower = (lower + dt * (between - 0.075 * lower.max(0.0).sqrt())).max(0.0);
-            }
-            readings
-        })
-        .unzip();
-    levels.into()
-}
-
-/// A repeatable, nearly Gaussian sequence.
-fn noise(seed: u64, n: usize) -> Vec<f64> {
-    let mut state = seed;
-    let mut uniform = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..n)
-        .map(|_| NOISE * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0))
-        .collect()
-}
-
-fn input(n: usize, shift: f64) -> Vec<f64> {
-    (0..n)
-        .map(|k| {
-            let k = k as f64 + shift;
-            let slow = 3.0 + 1.6 * (k / 130.0).sin() + 1.3 * (k / 37.0).sin() * (k / 201.0).cos();
-            ((slow + 0.9 * (k / 11.0).sin().signum()) * 20.0).round() / 20.0
-        })
-        .map(|u: f64| u.clamp(0.2, 6.5))
-        .collect()
-}
 
 fn bins(by: &[f64], residual: &[f64], edges: &[f64]) -> Vec<Bin> {
     edges
@@ -402,168 +361,5 @@ fn diagnosis(outputs: &[&str]) -> Diagnosis {
         outputs,
         records,
         seconds: 0.4,
-    }
-}
-
-/// The same after `compare`: the base model alone, nothing scored, nothing held out.
-pub(crate) fn comparison() -> Diagnosis {
-    comparison_of(two_tanks())
-}
-
-/// What `compare` has of a diagnosis.
-pub(crate) fn comparison_of(mut diagnosis: Diagnosis) -> Diagnosis {
-    diagnosis.verdict = Verdict::Unexplained;
-    diagnosis.effects.clear();
-    diagnosis.groups.clear();
-    diagnosis.in_doubt.clear();
-    diagnosis.residual_unexplained = true;
-    diagnosis.ranked.clear();
-    diagnosis.scores.clear();
-    diagnosis.known_effects.clear();
-    diagnosis.steps.truncate(1);
-    diagnosis.records.truncate(1);
-    for step in &mut diagnosis.steps {
-        step.simulated.truncate(diagnosis.outputs.len());
-        step.rmse_test = None;
-        step.rmse_test_per_output = None;
-        step.weighted_rmse_test = None;
-        for output in &mut step.outputs {
-            output.rmse_test = None;
-        }
-    }
-    diagnosis.sentences = vec!["The model errs by 7 times the noise floor.".into()];
-    diagnosis
-}
-
-/// The overflow alone, as a part of the answer: what the acceptance test, the places, the rankings, the held-out error and the limit
-/// on the time have to say.
-pub(crate) fn partial() -> Diagnosis {
-    partial_of(two_tanks())
-}
-
-/// A part of the answer of a diagnosis that has found the overflow first.
-pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
-    diagnosis.verdict = Verdict::Partial;
-    for list in [&mut diagnosis.effects, &mut diagnosis.ranked] {
-        list.retain(|effect| effect != "pump_deadzone");
-    }
-    diagnosis.groups.truncate(1);
-    diagnosis.in_doubt.truncate(1);
-    diagnosis.steps.truncate(2);
-    diagnosis.residual_unexplained = true;
-    let place = |place: &str, relative_likelihood: f64| PlaceScore {
-        place: place.to_owned(),
-        relative_likelihood,
-    };
-    diagnosis.places = vec![vec![place("upper", 1.0), place("lower", 0.31)]];
-    diagnosis.acceptance = Some(Acceptance {
-        effects: vec!["overflow".into()],
-        share: Some(0.85),
-        share_test: Some(0.86),
-        required: 0.9,
-        required_partial: 0.5,
-        floor: named(&diagnosis.outputs, diagnosis.outputs.iter().map(|_| NOISE)),
-        bic_fall: Some(512.4),
-        required_bic_fall: 6.0,
-        reasons: vec![
-            "The residual is not noise: it still depends on the command (p < 0.001).".into(),
-        ],
-    });
-    diagnosis.rankings = Rankings {
-        white: ["overflow", "sensor_saturation", "pump_deadzone"]
-            .map(String::from)
-            .to_vec(),
-        prewhitened: ["sensor_saturation", "overflow", "pump_nonlinearity"]
-            .map(String::from)
-            .to_vec(),
-        disagree: true,
-    };
-    diagnosis.effort = Effort {
-        limit: Some(20.0),
-        left_out: vec!["swap steps between pairs of effects".into()],
-        interrupted: false,
-    };
-    let steps = diagnosis.steps.iter_mut();
-    for output in steps.flat_map(|step| &mut step.outputs) {
-        output.held_out_error = output.rmse_test.map(|rmse| HeldOutError {
-            offset: 0.6 * rmse,
-            gain: 0.48 * rmse,
-            shape: 0.64 * rmse,
-        });
-    }
-    diagnosis.sentences = vec![
-        "The model lacks an overflow of the upper tank: its rim is at 7.50 ± 0.03 V.".into(),
-        "Something remains that no effect of the catalogue explains.".into(),
-    ];
-    diagnosis
-}
-
-/// Long records, a name that is markup, gaps, infinite edges and numbers that are not finite.
-pub(crate) fn awkward() -> Diagnosis {
-    let mut diagnosis = two_tanks();
-    let repeats = 100;
-    for (k, record) in diagnosis.records.iter_mut().enumerate() {
-        let n = record.time.len() * repeats;
-        record.name = "<a href=\"x\">week</a> & <b>\"all\"</b>".to_owned();
-        record.time = (0..n).map(|i| i as f64 * PERIOD).collect();
-        record.inputs[0].values = record.inputs[0].values.repeat(repeats);
-        record.outputs[0] = record.outputs[0].repeat(repeats);
-        record.outputs[0][n / 3..n / 2].fill(f64::NAN);
-        for step in &mut diagnosis.steps {
-            step.simulated[k] = step.simulated[k].repeat(repeats);
-        }
-    }
-    for step in &mut diagnosis.steps {
-        let OutputStep {
-            failures, tests, ..
-        } = &mut step.outputs[0];
-        for bin in &mut failures.by_time {
-            bin.from *= repeats as f64;
-            bin.to *= repeats as f64;
-        }
-        for (from, to) in [(0, f64::NEG_INFINITY), (2, f64::INFINITY)] {
-            failures.by_direction[from].from = to;
-        }
-        failures.by_level[3].rms = f64::NAN;
-        failures.by_level[3].mean = f64::NAN;
-        failures.by_frequency.clear();
-        tests.cross_correlation.clear();
-        tests.input_p = f64::NAN;
-        tests.autocorrelation_bound = f64::NAN;
-    }
-    diagnosis.steps[1].simulated.clear();
-    diagnosis.steps[1].rmse = f64::NAN;
-    diagnosis.steps[1].rmse_test = None;
-    diagnosis.steps[1].outputs[0].rmse = f64::NAN;
-    diagnosis.steps[1].outputs[0].rmse_test = None;
-    diagnosis.steps[1].outputs[0].failures.by_flow.clear();
-    diagnosis.scores[2].bic_gain = f64::NAN;
-    diagnosis.noise_floor = f64::NAN;
-    diagnosis.noise[0].level = f64::NAN;
-    diagnosis.output_unit = "cm^2".to_owned();
-    diagnosis.input_unit = String::new();
-    diagnosis
-}
-
-/// Names of outputs come from the headers of files.
-pub(crate) fn rename_outputs(diagnosis: &mut Diagnosis, names: &[&str]) {
-    let renamed = |values: &mut PerOutput| {
-        for ((name, _), new) in values.0.iter_mut().zip(names) {
-            (*new).clone_into(name);
-        }
-    };
-    for (k, new) in names.iter().enumerate() {
-        (*new).clone_into(&mut diagnosis.outputs[k]);
-        (*new).clone_into(&mut diagnosis.noise[k].output);
-    }
-    if let Some(test) = &mut diagnosis.acceptance {
-        renamed(&mut test.floor);
-    }
-    for step in &mut diagnosis.steps {
-        renamed(&mut step.rmse_per_output);
-        step.rmse_test_per_output.as_mut().map(renamed);
-        for (output, new) in step.outputs.iter_mut().zip(names) {
-            (*new).clone_into(&mut output.name);
-        }
     }
 }

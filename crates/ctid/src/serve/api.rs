@@ -1,6 +1,7 @@
 //! The routes of the page's requests; the head of the module `serve` says what each takes and gives.
 
-use std::num::NonZeroU8;
+mod run;
+
 use std::sync::Arc;
 
 use axum::body::Body;
@@ -10,23 +11,20 @@ use axum::middleware::{self, Next};
 use axum::response::Response;
 use axum::routing::{get, post};
 use axum::{Json, Router};
-use missing_effect::design::Limits;
 use plants::{Domain, EffectInfo};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
 
+use self::run::{cancel, finish, run};
 use super::body::whole;
 use super::guard::{LARGEST_BODY, Refusal, check_length};
-use super::jobs::{self, Task};
-use super::own_design::AppliedInput;
 use super::session::{Session, lock};
 use super::sessions::Shared;
 use super::settings::Form;
 use super::upload::Upload;
 use super::{App, downloads, own, state};
 use crate::edit;
-use crate::effort::EffortLevel;
 use crate::term_file::TermFile;
 
 /// Requests in JSON are no larger \[bytes\].
@@ -326,84 +324,6 @@ async fn treat_loop(
 ) -> Answer {
     with(&app, &tab.session, move |session| {
         session.treat_loop(treated.measured);
-        Ok(())
-    })
-    .await
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(tag = "what", rename_all = "lowercase")]
-enum Run {
-    Compare,
-    Chain {
-        effects: Vec<(String, Option<String>)>,
-    },
-    Diagnose {
-        max_effects: Option<NonZeroU8>,
-        #[serde(default)]
-        effort: EffortLevel,
-    },
-    Design {
-        group: usize,
-        between: [String; 2],
-        range: Option<(f64, f64)>,
-        slew: Option<f64>,
-        duration: Option<f64>,
-        /// Of a model of one's own: what each input may do.
-        #[serde(default)]
-        inputs: Vec<AppliedInput>,
-    },
-}
-
-async fn run(State(app): State<Arc<App>>, Query(tab): Query<Tab>, Json(run): Json<Run>) -> Answer {
-    let session = find(&app, &tab.session)?;
-    let task = match run {
-        Run::Compare => Task::Compare,
-        Run::Chain { effects } => Task::Chain(effects),
-        Run::Diagnose {
-            max_effects,
-            effort,
-        } => Task::Diagnose {
-            max_effects,
-            effort,
-        },
-        Run::Design {
-            group,
-            between,
-            range,
-            slew,
-            duration,
-            inputs,
-        } => Task::Design {
-            group,
-            between,
-            limits: Limits {
-                range,
-                slew,
-                duration,
-                ..Limits::default()
-            },
-            inputs,
-        },
-    };
-    aside(move || {
-        jobs::begin(&session, task)?;
-        Ok(Json(state::state(&mut lock(&session))))
-    })
-    .await
-}
-
-async fn cancel(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Answer {
-    with(&app, &tab.session, |session| {
-        session.stop();
-        Ok(())
-    })
-    .await
-}
-
-async fn finish(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Answer {
-    with(&app, &tab.session, |session| {
-        session.finish();
         Ok(())
     })
     .await

@@ -67,7 +67,7 @@ enum Outcome {
 /// What a computation works on.
 struct Work {
     text: String,
-    model: ModelFile,
+    pub(super) model: ModelFile,
     files: Files,
     problem: Problem,
     data: u64,

@@ -7,10 +7,10 @@
 //! | the page's files | `assets.rs`, `page/` |
 //! | what one tab works on | `session.rs`, its records `upload.rs`; all of them: `sessions.rs`; what they hold: `held.rs` |
 //! | the form of the model | `settings.rs` |
-//! | a model of its user's own, and its fits | `own.rs`; what was found `own_findings.rs`; its experiments `own_design.rs` |
+//! | a model of its user's own, and its fits | `own.rs`; what is computed for it `own/work.rs`; what was found `own_findings.rs`; its experiments `own_design.rs` |
 //! | computations | `jobs.rs` |
 //! | what the page is told | `state.rs`, `words.rs` |
-//! | the routes | `api.rs`, `downloads.rs` |
+//! | the routes | `api.rs`, those of computations `api/run.rs`; `downloads.rs` |
 //!
 //! The state is a model file, that of `--model` or a text that is kept for the tab and can be downloaded. It is changed by the
 //! functions of `ctid add` and `ctid remove`, fitted by those of `ctid compare` and `ctid diagnose`; a file is read again at

@@ -1,17 +1,20 @@
 //! What one tab works on: records, the model, what was fitted and found, and the computation that runs.
 
+mod fits;
+
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use axum::body::Bytes;
 use ct_signals::{Columns, ReadOptions};
 use missing_effect::design::Design;
-use missing_effect::{Diagnosis, PerOutput, Progress};
+use missing_effect::{Diagnosis, Progress};
 use plants::Domain;
 
+use self::fits::without_effects;
+pub(super) use self::fits::{Fitted, same};
 use super::guard::{LARGEST_BODY, Refusal};
 use super::held::of_diagnosis;
 use super::own::Own;
@@ -28,25 +31,6 @@ const LARGEST_MODEL: usize = 1 << 20;
 const MOST_MODELS: usize = 12;
 /// How the model is called where it is in no file.
 pub(super) const UNNAMED: &str = "model.toml";
-
-/// A model that was fitted to the records, ready to be drawn.
-#[derive(Debug)]
-pub(super) struct Fitted {
-    pub id: u64,
-    pub model: ModelFile,
-    /// Which state of the records it was fitted to.
-    pub data: u64,
-    /// It ran on the measured command, also where the loop could be simulated.
-    pub measured: bool,
-    /// Simulation error of each output, on the fitted and on the held-out records.
-    pub errors: PerOutput,
-    pub errors_test: Option<PerOutput>,
-    pub bic: f64,
-    /// What is left of the records looks like noise.
-    pub adequate: bool,
-    /// What the page draws and says of it, as JSON.
-    pub body: Bytes,
-}
 
 /// What was found, and of what.
 #[derive(Debug)]
@@ -367,54 +351,6 @@ impl Session {
         self.failure = None;
     }
 
-    /// Keeps a fitted model; the oldest goes where there are many.
-    pub(super) fn keep(&mut self, fitted: Fitted) {
-        let again =
-            |other: &Fitted| other.model == fitted.model && other.measured == fitted.measured;
-        self.models.retain(|other| !again(other));
-        self.models.push_back(Arc::new(fitted));
-        if self.models.len() > MOST_MODELS {
-            self.models.pop_front();
-        }
-    }
-
-    /// The fit of this model to these records.
-    pub(super) fn fit_of(&self, model: &ModelFile) -> Option<&Arc<Fitted>> {
-        let of = |fitted: &&Arc<Fitted>| self.is_comparable(fitted) && same(&fitted.model, model);
-        self.models.iter().find(of)
-    }
-
-    fn is_comparable(&self, fitted: &Fitted) -> bool {
-        fitted.data == self.data && fitted.measured == self.measured
-    }
-
-    /// The fits to these records of models that differ from this one in their effects and terms alone.
-    pub(super) fn kin(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
-        let bare = without_effects(model);
-        let kin = |fitted: &&Arc<Fitted>| {
-            self.is_comparable(fitted) && without_effects(&fitted.model) == bare
-        };
-        self.models.iter().filter(kin).collect()
-    }
-
-    /// The fits of the model with its first effects, none of them and then one more each time, and then with its first terms, as
-    /// far as they are known.
-    pub(super) fn trail(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
-        let kin = self.kin(model);
-        let (effects, terms) = (model.effects.as_slice(), model.terms.as_slice());
-        let first_effects = (0..=effects.len()).map(|count| (&effects[..count], &terms[..0]));
-        let first_terms = (1..=terms.len()).map(|count| (effects, &terms[..count]));
-        first_effects
-            .chain(first_terms)
-            .filter_map(|(effects, terms)| {
-                let of = |fitted: &&&Arc<Fitted>| {
-                    fitted.model.effects == effects && fitted.model.terms == terms
-                };
-                kin.iter().find(of).copied()
-            })
-            .collect()
-    }
-
     /// Stops what nobody has asked after for so long, in words where the page would not begin it again by itself.
     pub(super) fn stop_abandoned(&mut self) {
         let Some(job) = &self.job else { return };
@@ -447,32 +383,6 @@ impl Session {
             self.version += 1;
         }
     }
-}
-
-/// Whether two files say the same of what is fitted.
-pub(super) fn same(a: &ModelFile, b: &ModelFile) -> bool {
-    let bare = |model: &ModelFile| ModelFile {
-        waiting: Vec::new(),
-        ..model.clone()
-    };
-    bare(a) == bare(b)
-}
-
-/// The model without effects and terms and what is said of their parameters.
-fn without_effects(model: &ModelFile) -> ModelFile {
-    let mut bare = model.clone();
-    let effects = model.effects.iter().map(|placed| placed.effect.id);
-    let terms = model.terms.iter().map(|own| own.term.name.as_str());
-    for name in effects.chain(terms) {
-        let own = format!("{name}.");
-        bare.start.retain(|name, _| !name.starts_with(&own));
-        bare.fixed.retain(|name| !name.starts_with(&own));
-        bare.priors.retain(|name, _| !name.starts_with(&own));
-    }
-    bare.effects.clear();
-    bare.terms.clear();
-    bare.waiting.clear();
-    bare
 }
 
 /// The lock of something that no panic leaves half changed.

@@ -1,11 +1,13 @@
 //! What a person reads in the terminal; all of it is derived from the [`Diagnosis`] that `--json` writes.
 
 mod curves;
+mod errors;
 mod ranking;
 
 use missing_effect::{Diagnosis, OutputStep, ResidualTests, Shown, Step, Verdict};
 
 pub(crate) use self::curves::{overlay, residuals};
+pub(crate) use self::errors::trail;
 pub(crate) use self::ranking::ranking;
 use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
@@ -157,157 +159,6 @@ fn placed(effect: &str, place: Option<&str>) -> String {
 
 fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
-}
-
-/// The error from step to step: of each output, and where there are several of all together.
-pub(crate) fn trail(diagnosis: &Diagnosis, look: Look) -> String {
-    // One model's residual does not tell its noise from its faults.
-    let floor_known = !compared(diagnosis);
-    let several = findings::several(diagnosis);
-    let mut text = String::new();
-    for (index, floor) in diagnosis.noise.iter().enumerate() {
-        let errors = diagnosis.steps.iter().map(|step| {
-            let output = step.outputs.get(index);
-            let rmse = output.map_or(f64::NAN, |output| output.rmse);
-            (rmse, output.and_then(|output| output.rmse_test))
-        });
-        let of = if several {
-            format!(" of {}", floor.output)
-        } else {
-            String::new()
-        };
-        let title = format!("Simulation error{of}, root mean square");
-        let errors = Errors {
-            title: &title,
-            of_steps: errors.collect(),
-            floor: floor.level,
-            floor_known,
-            unit: &diagnosis.output_unit,
-        };
-        text += &errors.table(diagnosis, look);
-        if floor_known && !floor.source.is_empty() {
-            let source = format!("(noise floor: {})", floor.source);
-            text += &look.faint(look.paragraph("  ", &source).trim_end());
-            text.push('\n');
-        }
-        if several {
-            text.push('\n');
-        }
-    }
-    if several && floor_known {
-        let errors = diagnosis.steps.iter();
-        let errors = errors.map(|step| (step.weighted_rmse, step.weighted_rmse_test));
-        let errors = Errors {
-            title: "Simulation error of all outputs, in multiples of their noise",
-            of_steps: errors.collect(),
-            floor: 1.0,
-            floor_known: false,
-            unit: "",
-        };
-        text += &errors.table(diagnosis, look);
-    }
-    text += &held_out_errors(diagnosis, look);
-    text.push('\n');
-    text
-}
-
-/// The error of each step on the fitted and on the held-out records.
-struct Errors<'a> {
-    title: &'a str,
-    of_steps: Vec<(f64, Option<f64>)>,
-    floor: f64,
-    /// The floor is shown.
-    floor_known: bool,
-    unit: &'a str,
-}
-
-impl Errors<'_> {
-    /// With bars, above the noise floor.
-    fn table(&self, diagnosis: &Diagnosis, look: Look) -> String {
-        let held_out = self.of_steps.iter().any(|(_, test)| test.is_some());
-        let fitted = self.of_steps.iter().map(|(rmse, _)| Some(*rmse));
-        let fitted: Vec<Option<f64>> = fitted.chain([Some(self.floor)]).collect();
-        let scored = self.of_steps.iter().map(|(_, test)| *test);
-        // One number of decimals for both, so that they can be compared at a glance.
-        let all: Vec<Option<f64>> = fitted.iter().copied().chain(scored).collect();
-        let numbers = numbers::column(&all);
-        let (fitted_text, scored_text) = numbers.split_at(fitted.len());
-        let worst = self
-            .of_steps
-            .iter()
-            .map(|(rmse, _)| *rmse)
-            .fold(0.0, f64::max);
-
-        let mut heading = vec![String::new(), look.faint("fitted data")];
-        let mut sides = vec![Side::Left, Side::Right];
-        if held_out {
-            heading.push(look.faint("held-out data"));
-            sides.push(Side::Right);
-        }
-        sides.push(Side::Left);
-        let mut rows = vec![heading];
-        for (index, (step, (rmse, test))) in diagnosis.steps.iter().zip(&self.of_steps).enumerate()
-        {
-            let mut row = vec![
-                step_name(diagnosis, step),
-                with_unit(&fitted_text[index], self.unit),
-            ];
-            if held_out {
-                row.push(match test {
-                    Some(_) => with_unit(&scored_text[index], self.unit),
-                    None => "-".to_string(),
-                });
-            }
-            row.push(bar(*rmse, worst));
-            rows.push(row);
-        }
-        if self.floor_known {
-            let mut row = vec![
-                look.faint("noise floor"),
-                look.faint(with_unit(&fitted_text[self.of_steps.len()], self.unit)),
-            ];
-            if held_out {
-                row.push(String::new());
-            }
-            row.push(look.faint(bar(self.floor, worst)));
-            rows.push(row);
-        }
-        let mut text = format!("{}\n", look.heading(self.title));
-        for line in table(&sides, &rows) {
-            text += &format!("  {line}\n");
-        }
-        text
-    }
-}
-
-/// What the error on held-out data is made of, of the first and the last model.
-fn held_out_errors(diagnosis: &Diagnosis, look: Look) -> String {
-    let last = diagnosis.steps.len().saturating_sub(1);
-    let mut text = String::new();
-    for (index, step) in diagnosis.steps.iter().enumerate() {
-        if index > 0 && index < last {
-            continue;
-        }
-        let of = if last > 0 {
-            format!("{}, ", model_name(diagnosis, step))
-        } else {
-            String::new()
-        };
-        for error in findings::held_out_errors(diagnosis, step) {
-            text += &look.paragraph("  ", &format!("{of}{error}"));
-        }
-    }
-    text
-}
-
-/// A bar whose length is the value's share of the largest, to an eighth of a character.
-fn bar(value: f64, largest: f64) -> String {
-    if !(value.is_finite() && largest > 0.0) {
-        return String::new();
-    }
-    let eighths = ((value / largest).clamp(0.0, 1.0) * (8 * BAR) as f64).round() as usize;
-    let rest = ["", "▏", "▎", "▍", "▌", "▋", "▊", "▉"][eighths % 8];
-    "█".repeat(eighths / 8) + rest
 }
 
 /// Where a model fails, in words, output by output.
@@ -503,64 +354,4 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::sample;
-
-    #[test]
-    fn a_partial_answer_is_told_with_all_that_belongs_to_it() {
-        let told = diagnosis(&sample::partial(), Look::plain());
-        let flat = told.split_whitespace().collect::<Vec<_>>().join(" ");
-        for part in [
-            "Mostly overflow: 85 % of the squared error above the noise floor (86 % on held-out data); what remains: 0.26 V rms",
-            "cascaded-tanks + sqrt_outflow, held-out error 0.55 V: offset 0.33, gain 0.26, shape 0.35 V",
-            "+ overflow (upper), held-out error 0.22 V: offset 0.13, gain 0.10, shape 0.14 V",
-            "Where + overflow (upper) fails",
-            "- overflow: upper tank 1.00, lower tank 0.31: cannot be told",
-            "1 overflow sensor_saturation 2 sensor_saturation overflow",
-            "Left out by the time limit of 20 s: swap steps between pairs of effects.",
-            "`--effort thorough`",
-        ] {
-            assert!(flat.contains(part), "{part}: {told}");
-        }
-    }
-
-    #[test]
-    fn each_output_is_told_by_its_name() {
-        let found = sample::partial_of(sample::two_outputs());
-        let told = diagnosis(&found, Look::plain());
-        for part in [
-            "Simulation error of lower, root mean square",
-            "Simulation error of upper, root mean square",
-            "Simulation error of all outputs, in multiples of their noise",
-            "Where cascaded-tanks + sqrt_outflow fails: lower",
-            "Where cascaded-tanks + sqrt_outflow fails: upper",
-            "Measured minus model, lower [V]:",
-            "Measured minus model, upper [V]:",
-            "held-out error of lower ",
-            "held-out error of upper ",
-            "error/noise",
-        ] {
-            assert!(told.contains(part), "{part}: {told}");
-        }
-        let compared = comparison(&sample::comparison_of(found), Look::plain());
-        assert!(
-            compared.contains("tanks-estimation.csv, upper:"),
-            "{compared}"
-        );
-        // The noise is not known before a search.
-        assert!(!compared.contains("multiples of their noise"), "{compared}");
-    }
-
-    #[test]
-    fn what_is_not_known_is_not_told() {
-        for told in [
-            diagnosis(&sample::two_tanks(), Look::plain()),
-            comparison(&sample::comparison(), Look::plain()),
-        ] {
-            for part in ["held-out error", "Two rankings", "likelihood", "Left out"] {
-                assert!(!told.contains(part), "{part}: {told}");
-            }
-        }
-    }
-}
+mod tests;

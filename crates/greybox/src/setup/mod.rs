@@ -1,5 +1,6 @@
 //! A structure set against records: the vector that is fitted, and its bounds.
 
+mod build;
 mod priors;
 mod rows;
 mod simulation;
@@ -10,20 +11,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_signals::{Channel, Hold, Record};
 use estimation::{Noise, Prior};
-use plants::{
-    Command, Domain, Known, MAX_VESSELS, OutputScales, Place, Placed, Plant, Scales, Structure,
-    controller::Controller, deciles,
-};
+use plants::{Command, Place, Placed, Structure, controller::Controller};
 
 pub use self::priors::PriorValue;
 pub(crate) use self::priors::priors_of;
 pub use self::simulation::{LoopRun, Simulated, weighted_rms};
-use crate::{
-    Error, LinearPlant, Replay, TimeLimit,
-    clock::{Clock, span},
-    feedback::Feedback,
-    reading_step::reading_step,
-};
+use crate::{Error, LinearPlant, Replay, TimeLimit, clock::Clock, feedback::Feedback};
 
 /// A structure, the records, and which parameters are free.
 ///
@@ -73,199 +66,7 @@ pub struct Setup<'a> {
 /// it costs the logarithm, a lag, whose state before the record is unknown, is handicapped against a dead time.
 const STATE_PRICE: f64 = 2.0;
 
-/// Scales of records as the structure meets them first.
-pub(crate) fn scales_of(records: &[Record], plant: Plant, known: &Known) -> Option<Scales> {
-    let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    let input = records.iter().map(Record::input_range).reduce(wider)?;
-    let input_2 = records
-        .iter()
-        .filter_map(|record| Some(record.inputs.get(1)?.range()))
-        .reduce(wider);
-    let ranges: Vec<(f64, f64)> = (0..known.outputs(plant).len())
-        .map(|o| output_range(records, o))
-        .collect::<Option<_>>()?;
-    let output = ranges.iter().copied().reduce(wider)?;
-    let sample = records
-        .iter()
-        .map(Record::sample_interval)
-        .fold(f64::INFINITY, f64::min);
-    let mut scales = Scales::from_ranges(input, output, sample, span(records));
-    scales.input_2 = input_2;
-    let commands = |signal: fn(&Record) -> Option<&Channel>| {
-        let signals = records.iter().filter_map(signal);
-        deciles(signals.flat_map(|signal| &signal.values).copied().collect())
-    };
-    scales.input_deciles = [
-        commands(|record| Some(&record.inputs[0])),
-        commands(|record| record.inputs.get(1)),
-    ];
-    let readings = |o: usize| {
-        let outputs = records.iter().map(move |record| &record.outputs[o]);
-        deciles(outputs.flat_map(Channel::present).collect())
-    };
-    let vessels = known.outputs(plant);
-    // A level that nobody reads is taken for one like the lowest that is read.
-    let lowest = (0..vessels.len()).max_by_key(|&o| vessels[o])?;
-    scales.level_deciles = [readings(lowest); MAX_VESSELS];
-    for (o, (vessel, (low, high))) in vessels.into_iter().zip(ranges).enumerate() {
-        scales.level[vessel] = (low, high);
-        scales.operating_level[vessel] = 0.5 * (low + high);
-        scales.level_deciles[vessel] = readings(o);
-    }
-    // A disturbance says nothing of how far the actuator goes.
-    if let Some((low, high)) = input_2.filter(|_| plant.joined()) {
-        scales.input_range = scales.input_range.max(low.abs()).max(high.abs());
-    }
-    if let Some(range) = known.input_range {
-        scales.input_range = range;
-    }
-    scales.outputs = (0..known.outputs(plant).len())
-        .map(|o| OutputScales {
-            reading_step: reading_step(records, o).unwrap_or(0.0),
-            ..OutputScales::default()
-        })
-        .collect();
-    Some(scales)
-}
-
-/// Smallest and largest reading of an output in all records; `None` where it has none.
-fn output_range(records: &[Record], output: usize) -> Option<(f64, f64)> {
-    let ranges = records
-        .iter()
-        .filter_map(|record| Some(record.outputs.get(output)?.range()));
-    ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
-}
-
 impl<'a> Setup<'a> {
-    /// A structure against records.
-    ///
-    /// # Errors
-    /// Where there is no record, a record is not sound or lacks samples of an input, or `fixed` names a parameter that there is not.
-    pub fn new(
-        structure: Structure,
-        records: &'a [Record],
-        fixed: BTreeMap<String, f64>,
-    ) -> Result<Self, Error> {
-        Self::build(structure, records, fixed, None)
-    }
-
-    fn build(
-        structure: Structure,
-        records: &'a [Record],
-        fixed: BTreeMap<String, f64>,
-        feedback: Option<Feedback>,
-    ) -> Result<Self, Error> {
-        if records.is_empty() {
-            return Err(Error::NoRecord);
-        }
-        for record in records {
-            record.validate()?;
-            record.require_whole_inputs()?;
-        }
-        let outputs = structure.scales.outputs.len();
-        if let Some(record) = records.iter().find(|r| r.outputs.len() != outputs) {
-            return Err(Error::Outputs {
-                record: record.name.clone(),
-                given: record.outputs.len(),
-                needed: outputs,
-            });
-        }
-        let plant = structure.plant;
-        let mut names = structure.parameter_names();
-        let mut bounds: Vec<(f64, f64)> = structure
-            .parameters()
-            .iter()
-            .map(|p| (p.lower, p.upper))
-            .collect();
-        for name in fixed.keys() {
-            // A name of an effect that is not on in this structure is no mistake: it waits.
-            let effect_known = name
-                .split_once('.')
-                .is_some_and(|(effect, _)| plants::EffectInfo::find(effect).is_some());
-            if !names.contains(name) && !effect_known {
-                return Err(Error::UnknownParameter {
-                    name: name.clone(),
-                    known: names.join(", "),
-                });
-            }
-        }
-        let mut free: Vec<usize> = (0..names.len())
-            .filter(|&i| !fixed.contains_key(&names[i]))
-            .collect();
-        let reach = structure.scales.largest_level().max(f64::MIN_POSITIVE);
-        // An empty tank is a trap: the outflow's slope is infinite there, and a step that overshot to it would stay.
-        let lowest = if plant.outlet() == plants::Outlet::Torricelli {
-            1e-6 * reach
-        } else {
-            -1e3 * reach
-        };
-        let lags = structure.lags();
-        let parameters = names.len();
-        for (r, record) in records.iter().enumerate() {
-            let of = if records.len() > 1 {
-                format!(", record {}", r + 1)
-            } else {
-                String::new()
-            };
-            for vessel in 0..plant.vessels() {
-                free.push(names.len());
-                names.push(format!("{}(0){of}", plant.level_name(vessel)));
-                bounds.push((lowest, 1e3 * reach));
-            }
-            // Before the record anything may have happened, and a lag remembers it.
-            for &lag in &lags {
-                let (name, range) = structure.lag_before(lag, at_rest(record)[pump_of(lag)]);
-                let name = name + &of;
-                if !fixed.contains_key(&name) {
-                    free.push(names.len());
-                }
-                names.push(name);
-                bounds.push(range);
-            }
-            if let Some(feedback) = &feedback {
-                for (name, range) in feedback.entries(r, structure.scales.input) {
-                    let name = name + &of;
-                    if feedback.released && !fixed.contains_key(&name) {
-                        free.push(names.len());
-                    }
-                    names.push(name);
-                    bounds.push(range);
-                }
-            }
-        }
-        let count = |o: usize| {
-            let outputs = records.iter().map(|record| &record.outputs[o]);
-            outputs
-                .map(|output| output.values.len() - output.missing())
-                .sum()
-        };
-        // A millionth of the range or, of a level that stands still, of the largest level.
-        let floor = |o: usize| match output_range(records, o) {
-            Some((low, high)) if outputs > 1 && low < high => 1e-6 * (high - low),
-            Some(_) if outputs > 1 => 1e-6 * reach,
-            _ => 0.0,
-        };
-        Ok(Self {
-            known_scales: None,
-            priors: Vec::new(),
-            samples: (0..outputs).map(count).collect(),
-            floors: (0..outputs).map(floor).collect(),
-            structure,
-            records,
-            fixed,
-            substeps: 1,
-            stop: None,
-            interrupt: None,
-            time_limit: None,
-            names,
-            bounds,
-            free,
-            parameters,
-            feedback,
-            clock: Clock::of(records),
-        })
-    }
-
     /// The same structure and records in the loop of a controller, simulated from the reference, and the vector `x` with
     /// the controller's initial states: those with which it gives the measured command.
     ///
@@ -325,36 +126,6 @@ impl<'a> Setup<'a> {
     #[must_use]
     pub fn replays(&self) -> &[Replay] {
         self.feedback.as_ref().map_or(&[], |f| &f.replays)
-    }
-
-    /// A setup from records alone: the scales and the domain are taken from them.
-    ///
-    /// # Errors
-    /// As [`Setup::new`].
-    pub fn from_records(
-        plant: plants::Plant,
-        known: plants::Known,
-        effects: &[plants::Placed],
-        records: &'a [Record],
-        fixed: BTreeMap<String, f64>,
-    ) -> Result<Self, Error> {
-        let known_outputs = known.outputs(plant).len();
-        if let Some(record) = records.iter().find(|r| r.outputs.len() != known_outputs) {
-            return Err(Error::Outputs {
-                record: record.name.clone(),
-                given: record.outputs.len(),
-                needed: known_outputs,
-            });
-        }
-        let scales = scales_of(records, plant, &known).ok_or(Error::NoRecord)?;
-        let mut structure = Structure::new(plant, known, scales);
-        if let Some(output) = records.first().and_then(|record| record.outputs.first()) {
-            structure.domain = Domain::of(plant, &output.unit);
-        }
-        for &effect in effects {
-            structure = structure.with(effect)?;
-        }
-        Self::new(structure, records, fixed)
     }
 
     /// The same records against another structure.

@@ -145,9 +145,9 @@ struct Search<'s, 'a> {
     spec: &'s ModelSpec,
     /// All parameters of the learned model.
     theta: Vec<f64>,
-    noise: Noise,
+    pub(super) noise: Noise,
     /// Standard deviation of each output's innovations.
-    sigmas: Vec<f64>,
+    pub(super) sigmas: Vec<f64>,
     /// Rows that are kept times outputs.
     samples: f64,
 }

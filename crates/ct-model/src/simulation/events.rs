@@ -1,0 +1,283 @@
+//! Changes of branches within a step: found, timed with their derivatives, and made.
+
+use super::Simulation;
+use super::delays::Delays;
+use super::step::{Drive, Interval, Step};
+use crate::scalar::Scalar;
+use crate::tape::{Register, Registers, Tape};
+
+/// After two events of one guard that lie nearer to each other than this share of an interval a step of this length is taken.
+const SLIDE: f64 = 1e-2;
+/// An event's time is found to this share of the step.
+const EVENT: f64 = 1e-13;
+/// Distance of the differences from which the speed of a guard is computed, as a share of the step.
+const SPEED: f64 = 1e-4;
+
+impl<'a, T: Scalar> Simulation<'a, T> {
+    /// Where an equation has no value within a step: the change of a branch before that, `sqrt(max(x, 0))` at zero, and the error of the step
+    /// to it, which stands computed.
+    pub(super) fn branch_before(
+        &mut self,
+        tape: &Tape,
+        interval: Interval<'_>,
+        h: T,
+        delays: &Delays<T>,
+    ) -> Option<(Event<T>, f64)> {
+        self.work.registers.extended = true;
+        self.work.begun = false;
+        let error = self.attempt(tape, interval, h, delays);
+        let event = error
+            .is_finite()
+            .then(|| self.first_event(tape, interval, h, delays))
+            .flatten();
+        let found = event.map(|event| {
+            let error = self.attempt(tape, interval, event.after, delays);
+            (event, error)
+        });
+        self.work.registers.extended = false;
+        self.work.begun = false;
+        found
+    }
+
+    /// Changes branches where a step has ended at an event; what drives the model stands in the registers.
+    pub(super) fn change(&mut self, tape: &Tape, drive: &Drive<'_, T>, change: Change) {
+        let Step {
+            sliding, registers, ..
+        } = &mut self.work;
+        let difference = match change {
+            Change::Crossed(difference, positive) => {
+                tape.answer(registers, difference, positive);
+                sliding.add(tape, registers, difference);
+                self.work.evaluate_slopes(tape, drive);
+                let length = drive.interval.length;
+                if self.work.sliding.is_attractive(length, &self.largest) {
+                    self.put_back(tape, drive);
+                } else {
+                    let Step {
+                        sliding, registers, ..
+                    } = &mut self.work;
+                    sliding.remove(tape, registers, sliding.len() - 1, positive);
+                }
+                difference
+            }
+            Change::LetGo(k, positive) => sliding.remove(tape, registers, k, positive),
+            Change::None => return,
+        };
+        for (guard, changed) in tape.guards.iter().zip(&mut self.changed) {
+            if guard.difference == difference {
+                *changed = self.time.value();
+            }
+        }
+    }
+
+    /// Puts states back onto the guards that stay at zero.
+    pub(super) fn put_back(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
+        drive.load(tape, &mut self.work, self.time, &self.state);
+        self.work.evaluate_slopes(tape, drive);
+        let Step {
+            sliding, registers, ..
+        } = &mut self.work;
+        sliding.put_back(registers, &mut self.state);
+    }
+
+    /// Guards stay at zero where every guard has answered by its difference, but for those that an input has moved off or whose sides do not
+    /// both lead there any more.
+    pub(super) fn slide_on(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
+        while !self.work.sliding.is_empty() {
+            self.work.follow_sliding(tape);
+            self.work.evaluate_slopes(tape, drive);
+            let Step {
+                sliding, registers, ..
+            } = &mut self.work;
+            let Some((k, positive)) = sliding.let_go(registers, drive.interval.length) else {
+                break;
+            };
+            sliding.remove(tape, registers, k, positive);
+            self.work.evaluate_slopes(tape, drive);
+        }
+    }
+
+    /// What may change within a step: what of it has to stay above zero, where the registers are.
+    fn distance(&self, watched: Watched) -> T {
+        let Step {
+            sliding, registers, ..
+        } = &self.work;
+        match watched {
+            Watched::Guard(guard) => {
+                let difference = self.model.tape.guards[guard].difference;
+                registers.values[difference]
+            }
+            Watched::Share(k, true) => T::constant(1.0 - sliding.share(k)),
+            Watched::Share(k, false) => T::constant(sliding.share(k)),
+        }
+    }
+
+    /// The first change of a branch within the step that has been computed.
+    pub(super) fn first_event(
+        &mut self,
+        tape: &Tape,
+        interval: Interval<'_>,
+        h: T,
+        delays: &Delays<T>,
+    ) -> Option<Event<T>> {
+        if tape.guards.is_empty() || h.value() <= 0.0 {
+            return None;
+        }
+        tape.evaluate_guards(&mut self.work.registers);
+        let Registers {
+            values, answers, ..
+        } = &self.work.registers;
+        let guards = tape.guards.iter().zip(answers);
+        let mut stays = guards
+            .map(|(guard, &answer)| !guard.is_crossed(answer, values[guard.difference].value()));
+        if self.work.sliding.is_empty() && stays.all(|stays| stays) {
+            return None;
+        }
+        let answers = self.work.registers.answers.clone();
+        let is_crossed = |watched: Watched, value: f64| match watched {
+            Watched::Guard(i) => tape.guards[i].is_crossed(answers[i], value),
+            Watched::Share(..) => value < 0.0,
+        };
+        let sliding = &self.work.sliding;
+        let guards = (0..tape.guards.len()).map(Watched::Guard);
+        let shares =
+            (0..sliding.len()).flat_map(|k| [Watched::Share(k, false), Watched::Share(k, true)]);
+        let crossed = guards.chain(shares).filter_map(|watched| {
+            if let Watched::Guard(i) = watched
+                && sliding.holds(tape.guards[i].difference)
+            {
+                return None;
+            }
+            let distance = self.distance(watched).value();
+            is_crossed(watched, distance).then_some((watched, distance))
+        });
+        let crossed: Vec<_> = crossed.collect();
+        let at = |own: &mut Self, watched: Watched, share: f64| {
+            let part = T::constant(h.value() * share);
+            own.attempt(tape, interval, part, delays);
+            tape.evaluate_guards(&mut own.work.registers);
+            own.distance(watched)
+        };
+        let mut first: Option<(f64, Watched, bool)> = None;
+        for (watched, mut ends_with) in crossed {
+            let mut end = 1.0;
+            if let Some((share, ..)) = first {
+                end = share;
+                ends_with = at(self, watched, share).value();
+            }
+            if !is_crossed(watched, ends_with) {
+                continue;
+            }
+            let begins_with = at(self, watched, 0.0).value();
+            // It may have been on the other side when the step began.
+            let share = if is_crossed(watched, begins_with) || begins_with == 0.0 {
+                0.0
+            } else {
+                let distance = |share: f64| at(self, watched, share).value();
+                change_of_sign(distance, (0.0, begins_with), (end, ends_with))
+            };
+            first = Some((share, watched, ends_with > 0.0));
+        }
+        let (share, watched, positive) = first?;
+        let mut after = T::constant(h.value() * share);
+        let guard = match watched {
+            // Slopes are the same with the share at its end and without: the time needs no derivative.
+            Watched::Share(k, upper) => {
+                return Some(Event {
+                    after,
+                    change: Change::LetGo(k, upper),
+                });
+            }
+            Watched::Guard(guard) => guard,
+        };
+        let difference = tape.guards[guard].difference;
+        let slide = SLIDE * interval.length;
+        let since = self.time.value() - self.changed[guard];
+        if since < slide && share * h.value() < 1e-3 * slide {
+            // It changes back at once, by rounding: to either side in turn.
+            let after = T::constant(slide.min(h.value()));
+            self.attempt(tape, interval, after, delays);
+            tape.evaluate_guards(&mut self.work.registers);
+            let there = self.distance(watched).value();
+            let change = if is_crossed(watched, there) {
+                Change::Crossed(difference, there > 0.0)
+            } else {
+                Change::None
+            };
+            return Some(Event { after, change });
+        }
+        let speed = (at(self, watched, share + SPEED).value()
+            - at(self, watched, share - SPEED).value())
+            / (2.0 * SPEED * h.value());
+        if speed != 0.0 && speed.is_finite() {
+            let here = at(self, watched, share);
+            after = T::with_slopes(after.value(), [(here, -1.0 / speed)]);
+        }
+        Some(Event {
+            after,
+            change: Change::Crossed(difference, positive),
+        })
+    }
+}
+
+/// Where a function changes its sign between two points, by regula falsi with halved ordinates (Illinois); the point on the far side.
+fn change_of_sign(
+    mut f: impl FnMut(f64) -> f64,
+    (mut a, mut fa): (f64, f64),
+    (mut b, mut fb): (f64, f64),
+) -> f64 {
+    let far = fb.is_sign_positive();
+    let mut last = None;
+    for _ in 0..100 {
+        if b - a <= EVENT {
+            break;
+        }
+        let mut c = (a * fb - b * fa) / (fb - fa);
+        if !(c > a && c < b) {
+            c = 0.5 * (a + b);
+        }
+        let fc = f(c);
+        if fc == 0.0 {
+            return c;
+        }
+        let is_far = fc.is_sign_positive() == far;
+        if is_far {
+            (b, fb) = (c, fc);
+        } else {
+            (a, fa) = (c, fc);
+        }
+        if last == Some(is_far) {
+            if is_far {
+                fa *= 0.5;
+            } else {
+                fb *= 0.5;
+            }
+        }
+        last = Some(is_far);
+    }
+    b
+}
+
+/// A change of branches within a step.
+pub(super) struct Event<T> {
+    /// How long after its beginning.
+    pub(super) after: T,
+    pub(super) change: Change,
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum Change {
+    None,
+    /// A difference has changed its sign; whether to a positive one.
+    Crossed(Register, bool),
+    /// A guard that stayed at zero does so no more; whether it turns positive.
+    LetGo(usize, bool),
+}
+
+/// What is looked at after each step.
+#[derive(Clone, Copy)]
+enum Watched {
+    Guard(usize),
+    /// The share of a guard that stays at zero, at its upper or lower end.
+    Share(usize, bool),
+}

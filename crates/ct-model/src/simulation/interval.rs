@@ -1,0 +1,308 @@
+//! One interval between rows: steps as long as their error allows, which end where something jumps.
+
+use super::delays::{Delays, POINTS};
+use super::events::Event;
+use super::step::{Drive, Interval};
+use super::{Method, NoSolution, Simulation, explicit, implicit};
+use crate::scalar::Scalar;
+use crate::tape::Tape;
+
+/// Error of a step, as a share of the largest absolute value that a state has had. Derivatives are those of the steps that follow: at twice
+/// this they are off by some 1e-3 where a right-hand side bends sharply.
+const TOLERANCE: f64 = 1e-10;
+/// The shortest step, as a share of an interval between rows.
+const SHORTEST: f64 = 1e-9;
+/// A step is at most so many times as long as the last one.
+const LONGER: f64 = 5.0;
+/// A step that is longer than the error asked for by this much is tried, where it is the last one of an interval.
+const STRETCH: f64 = 1.1;
+/// Steps in an interval beyond which the simulation has failed, ...
+pub(super) const MOST_STEPS: usize = 50_000;
+/// ... and those that every interval adds to what is left of them: a trial whose steps are short all along ends within seconds.
+const STEPS_PER_INTERVAL: usize = 300;
+/// Steps in an interval from which on the model may be stiff.
+const MANY_STEPS: usize = 40;
+/// It is where the length of such steps times the norm of the Jacobian is above this: the stability of the method, and not its error, limits
+/// them.
+const STABILITY: f64 = 1.5;
+
+impl<'a, T: Scalar> Simulation<'a, T> {
+    /// The guards' answers where an interval begins, and what delays know of it.
+    pub(super) fn begin_interval(
+        &mut self,
+        interval: Interval<'_>,
+        until: f64,
+        delays: &mut Delays<T>,
+    ) {
+        let tape = &self.model.tape;
+        let Interval {
+            begin, from, rise, ..
+        } = interval;
+        let first = !self.begun;
+        let jumps = first || from != self.last;
+        let bends = rise.iter().any(|rise| *rise != 0.0);
+        if !delays.all.is_empty() {
+            if first {
+                let drive = Drive::new(interval, delays);
+                drive.load(tape, &mut self.work, self.time, &self.state);
+                self.before_the_record();
+                for (delay, &(what, _)) in delays.all.iter_mut().zip(&tape.delays) {
+                    delay.begin(self.time, self.work.registers.values[what]);
+                }
+            } else if jumps || bends {
+                for delay in &mut delays.all {
+                    delay.jump(self.time);
+                }
+            }
+            let length = T::constant(until) - self.time;
+            self.keep_past(interval, length, delays, true);
+            for delay in &mut delays.all {
+                delay.forget(begin);
+            }
+        }
+        self.begun = true;
+        if !self.is_computed(from) {
+            let drive = Drive::new(interval, delays);
+            drive.load(tape, &mut self.work, self.time, &self.state);
+            tape.evaluate_with_guards(&mut self.work.registers);
+            self.remember();
+            self.slide_on(tape, &drive);
+        }
+        // Whatever made the registers, it was computed for the inputs of this interval.
+        self.work.registers.held = !bends;
+        self.work.keep_slope(tape, 0);
+        self.work.begun = true;
+    }
+
+    /// Whether the registers hold what these inputs give at the present row.
+    pub(super) fn is_computed(&self, inputs: &[f64]) -> bool {
+        self.computed && self.read == inputs
+    }
+
+    /// Keeps what is delayed over the next or the last step: what is known ahead for a whole interval, everything else after each step.
+    fn keep_past(
+        &mut self,
+        interval: Interval<'_>,
+        length: T,
+        delays: &mut Delays<T>,
+        ahead: bool,
+    ) {
+        let tape = &self.model.tape;
+        if length.value() <= 0.0 || delays.all.iter().all(|delay| delay.known_ahead != ahead) {
+            return;
+        }
+        let count = delays.all.len();
+        let mut values = vec![[T::constant(0.0); POINTS]; count];
+        for point in 0..POINTS {
+            let share = point as f64 / (POINTS - 1) as f64;
+            let mut state = std::mem::take(&mut self.scratch);
+            state.copy_from_slice(&self.state);
+            if !ahead {
+                match self.method {
+                    Method::Implicit => {
+                        for (i, x) in state.iter_mut().enumerate() {
+                            *x = *x + (self.work.next[i] - *x) * share;
+                        }
+                    }
+                    _ => explicit::within(&self.work, &self.state, length, share, &mut state),
+                }
+            }
+            let drive = Drive::new(interval, delays);
+            drive.load(tape, &mut self.work, self.time + length * share, &state);
+            if ahead {
+                tape.evaluate_with_guards(&mut self.work.registers);
+            } else {
+                tape.evaluate(&mut self.work.registers);
+            }
+            self.scratch = state;
+            for (values, &(what, _)) in values.iter_mut().zip(&tape.delays) {
+                values[point] = self.work.registers.values[what];
+            }
+        }
+        for (delay, values) in delays.all.iter_mut().zip(values) {
+            if delay.known_ahead == ahead {
+                delay.push(self.time, length, values);
+            }
+        }
+    }
+
+    pub(super) fn steps(
+        &mut self,
+        tape: &Tape,
+        interval: Interval<'_>,
+        until: f64,
+        delays: &mut Delays<T>,
+    ) -> Result<(), NoSolution> {
+        let shortest = SHORTEST * interval.length;
+        let mut taken = 0;
+        let most = self.steps_left + STEPS_PER_INTERVAL;
+        loop {
+            let now = self.time.value();
+            let left = T::constant(until) - self.time;
+            // The end of what is smooth: the row, or a jump that comes out of a delay.
+            let mut limit = left;
+            let mut out = None;
+            for (i, delay) in delays.all.iter().enumerate() {
+                if let Some(next) = delay.next_out() {
+                    let distance = next - self.time;
+                    if distance.value() < limit.value() {
+                        limit = distance;
+                        out = Some(i);
+                    }
+                }
+            }
+            if out.is_none() && left.value() <= 1e-14 * interval.length {
+                // What is left of the interval has a derivative, where its last step ended at an event.
+                self.finish(tape, interval, left, delays);
+                return Ok(());
+            }
+            taken += 1;
+            self.steps_left = (most - taken).min(MOST_STEPS);
+            if taken == most {
+                return Err(NoSolution { time: now });
+            }
+            let mut longest = self.length;
+            for delay in delays.all.iter().filter(|delay| !delay.known_ahead) {
+                longest = longest.min(delay.by.value().max(interval.length / 50.0));
+            }
+            let whole = limit.value() <= longest * STRETCH;
+            let mut h = if whole { limit } else { T::constant(longest) };
+            let mut error = self.attempt(tape, interval, h, delays);
+            let mut beyond = None;
+            if error.is_nan() {
+                beyond = self.branch_before(tape, interval, h, delays);
+            }
+            if let Some((event, error_there)) = &beyond {
+                (h, error) = (event.after, *error_there);
+            }
+            if (error > 1.0 || error.is_nan()) && h.value() > shortest {
+                // What is no number asks for a much shorter step.
+                let factor = if error.is_finite() {
+                    (0.9 * error.powf(-0.2)).clamp(0.1, 0.9)
+                } else {
+                    0.1
+                };
+                self.length = (h.value() * factor).max(shortest);
+                continue;
+            }
+            if !error.is_finite() {
+                return Err(NoSolution { time: now });
+            }
+            let is_new = beyond.is_none();
+            let event = match beyond {
+                Some((event, _)) => Some(event),
+                None => self.first_event(tape, interval, h, delays),
+            };
+            let is_short = !whole || error > 0.5 || self.length < h.value() * LONGER;
+            if event.is_none() && is_short {
+                let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, LONGER);
+                if !whole || error > 0.5 || grown > self.length {
+                    self.length = grown.max(shortest);
+                }
+            }
+            if let Some(Event { after, .. }) = event.as_ref().filter(|_| is_new) {
+                h = *after;
+                self.attempt(tape, interval, h, delays);
+            }
+            self.keep_past(interval, h, delays, false);
+            let sliding = !self.work.sliding.is_empty();
+            self.work
+                .go_on(event.is_none() && !sliding && self.method == Method::Explicit);
+            self.state.copy_from_slice(&self.work.next);
+            self.time = self.time + h;
+            if sliding {
+                self.put_back(tape, &Drive::new(interval, delays));
+            }
+            self.note_largest();
+            if event.is_none() && whole && out.is_none() {
+                let explicit = self.method == Method::Explicit;
+                self.ended_within = explicit
+                    && !sliding
+                    && self.work.registers.held
+                    && !tape.reads_time
+                    && tape.plays.is_empty();
+                return Ok(());
+            }
+            if let Some(Event { change, .. }) = event {
+                let drive = Drive::new(interval, delays);
+                drive.load(tape, &mut self.work, self.time, &self.state);
+                self.change(tape, &drive, change);
+                for delay in delays.all.iter_mut().filter(|delay| !delay.known_ahead) {
+                    delay.jump(self.time);
+                }
+            } else if let Some(out) = out.filter(|_| whole) {
+                delays.all[out].let_out();
+                self.work.begun = false;
+                // A branch may stand on what jumps.
+                let drive = Drive::new(interval, delays);
+                drive.load(tape, &mut self.work, self.time, &self.state);
+                tape.evaluate_with_guards(&mut self.work.registers);
+                self.slide_on(tape, &drive);
+                for (i, delay) in delays.all.iter_mut().enumerate() {
+                    if i != out && !delay.known_ahead {
+                        delay.jump(self.time);
+                    }
+                }
+            }
+            if taken == MANY_STEPS && self.method == Method::Explicit {
+                self.look_for_stiffness(tape, h.value());
+            }
+        }
+    }
+
+    /// Carries the derivative of what is left of an interval whose last step ended at its very end.
+    fn finish(&mut self, tape: &Tape, interval: Interval<'_>, left: T, delays: &Delays<T>) {
+        let drive = Drive::new(interval, delays);
+        drive.load(tape, &mut self.work, self.time, &self.state);
+        self.work.evaluate_slopes(tape, &drive);
+        for (x, &register) in self.state.iter_mut().zip(&tape.derivatives) {
+            *x = *x + left * self.work.registers.values[register];
+        }
+    }
+
+    pub(super) fn note_largest(&mut self) {
+        for (largest, x) in self.largest.iter_mut().zip(&self.state) {
+            *largest = largest.max(x.value().abs());
+        }
+    }
+
+    fn look_for_stiffness(&mut self, tape: &Tape, h: f64) {
+        if let Some(jacobian) = &mut self.jacobian {
+            jacobian.compute(tape, &self.work.registers);
+            if self.length.min(h) * jacobian.norm() > STABILITY {
+                self.method = Method::Implicit;
+            }
+        }
+    }
+
+    /// Computes a step, with the answers of the guards as they are, and its error against the tolerance.
+    pub(super) fn attempt(
+        &mut self,
+        tape: &Tape,
+        interval: Interval<'_>,
+        h: T,
+        delays: &Delays<T>,
+    ) -> f64 {
+        let drive = Drive::new(interval, delays);
+        for (i, scale) in self.scale.iter_mut().enumerate() {
+            let slope = self.work.slopes.get(i).map_or(0.0, |k| k.value().abs());
+            let moved = if slope.is_finite() {
+                slope * h.value()
+            } else {
+                0.0
+            };
+            *scale = TOLERANCE * self.largest[i].max(moved).max(1e-30);
+        }
+        let at = (self.time, &self.state[..], h);
+        match (&mut self.jacobian, self.method) {
+            (Some(jacobian), Method::Implicit) => {
+                implicit::step(tape, &mut self.work, jacobian, &drive, at, &self.scale)
+                    .unwrap_or(f64::NAN)
+            }
+            _ => {
+                explicit::step(tape, &mut self.work, &drive, at);
+                explicit::error(&self.work, h.value(), &self.scale)
+            }
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Why a line of a stream is not used.
+
+use crate::TimestampError;
+use crate::csv::TIME_AS_NUMBER;
+
+/// Why a line is not used; the next one may be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BadLine {
+    /// A longer or a shorter row.
+    #[error(
+        "{found} fields where {expected} are read; check for a missing or a surplus {delimiter}, and whether the line is whole"
+    )]
+    Fields {
+        /// Fields of a row.
+        expected: usize,
+        /// Fields of this one.
+        found: usize,
+        /// The delimiter's name.
+        delimiter: &'static str,
+    },
+    /// An empty cell.
+    #[error("column \"{column}\": the cell is empty; check what writes the rows")]
+    Empty {
+        /// The column's header.
+        column: String,
+    },
+    /// A cell that says that its sample is missing.
+    #[error("column \"{column}\": \"{text}\" stands for a missing sample")]
+    Missing {
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// A number too large to be one.
+    #[error("column \"{column}\": \"{text}\" is not a finite number; check what writes the rows")]
+    NotFinite {
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// A time that is no number, where those before are.
+    #[error("column \"{column}\": \"{text}\" is not a number; {TIME_AS_NUMBER}")]
+    NoNumber {
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// A date or a time that is not understood.
+    #[error("column \"{column}\": {error}")]
+    Time {
+        /// The column's header.
+        column: String,
+        /// Why.
+        error: Box<TimestampError>,
+    },
+    /// A cell that holds no number.
+    #[error("column \"{column}\": \"{text}\" is not a number; {mend}")]
+    Text {
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+        /// What to do.
+        mend: &'static str,
+    },
+    /// Both marks for decimals.
+    #[error(
+        "column \"{column}\": \"{text}\" has another decimal mark than the rows before; use one of them throughout"
+    )]
+    DecimalMark {
+        /// The column's header.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// Bytes that are no text.
+    #[error("the line is not UTF-8 text; check the speed of the line and what writes the rows")]
+    NotText,
+}

@@ -1,0 +1,153 @@
+//! Models and curves exported.
+
+use super::{FILE, column, place, table};
+use crate::common::Place;
+
+#[test]
+fn what_is_exported_reads_back() {
+    let place = place();
+    let said = place.succeeds("export m.toml a.csv --modelica fitted.mo --csv curves.csv");
+    assert!(
+        said.contains("wrote fitted.mo") && said.contains("wrote curves.csv"),
+        "{said}"
+    );
+    let text = place.read("fitted.mo");
+    assert!(
+        text.starts_with("// Written by ctid export from block.mo, fitted to a.csv."),
+        "{text}"
+    );
+    assert!(
+        text.contains("//   C: known, not fitted") && text.contains("//   k: "),
+        "{text}"
+    );
+    place.succeeds("check fitted.mo");
+    // Simulated as it was written it gives the curves of the fit.
+    place.write("again.toml", FILE.replace("block.mo", "fitted.mo"));
+    let inputs = place.read("a.csv");
+    let inputs = inputs.lines().map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        cells[..3].join(",") + "\n"
+    });
+    place.write("inputs.csv", inputs.collect::<String>());
+    place.succeeds("simulate again.toml inputs.csv --out again.csv");
+    let (curves, again) = (place.read("curves.csv"), place.read("again.csv"));
+    for (name, unit) in [("block", "degC"), ("loss", "W")] {
+        let model = column(&curves, &format!("{name} model [{unit}]"));
+        let own = column(&again, &format!("{name} [{unit}]"));
+        assert_eq!(model.len(), 300);
+        for (model, own) in model.iter().zip(&own) {
+            assert!(
+                (model - own).abs() < 1e-9 * (1.0 + model.abs()),
+                "{model} {own}"
+            );
+        }
+        let measured = column(&curves, &format!("{name} [{unit}]"));
+        let residual = column(&curves, &format!("{name} residual [{unit}]"));
+        for ((y, m), r) in measured.iter().zip(&model).zip(&residual) {
+            assert!((y - m - r).abs() < 1e-12 * (1.0 + y.abs()));
+        }
+    }
+    // The curves are a record: the same fit comes of them.
+    place.succeeds("simulate m.toml inputs.csv --fit curves.csv --out of-curves.csv");
+    place.succeeds("simulate m.toml inputs.csv --fit a.csv --out of-record.csv");
+    assert_eq!(place.read("of-curves.csv"), place.read("of-record.csv"));
+    // Without records the values are those of the text and of [known].
+    place.succeeds("export m.toml --modelica plain.mo");
+    let plain = place.read("plain.mo");
+    assert!(
+        plain.contains("nothing was fitted") && plain.contains("C(unit=\"J/K\", min=0) = 52 "),
+        "{plain}"
+    );
+    assert!(plain.contains("k(unit=\"W/K\", min=0) = 0.1 "), "{plain}");
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused_in_one_line() {
+    let place = place();
+    place.refuses(
+        "export m.toml a.csv --modelica block.mo",
+        &["block.mo", "one of the inputs"],
+    );
+    place.write("mine.mo", "// mine\n");
+    place.refuses(
+        "export m.toml --modelica mine.mo",
+        &["mine.mo", "it is there already"],
+    );
+    place.refuses("export m.toml", &["--modelica", "--csv"]);
+    place.refuses("export m.toml --csv c.csv", &["DATA.csv"]);
+    place.write("tank.toml", "plant = \"single-tank\"\n");
+    place.refuses(
+        "export tank.toml --modelica t.mo",
+        &[
+            "tank.toml: a model file of a plant holds first guesses",
+            "DATA.csv",
+        ],
+    );
+    place.write(
+        "tank.toml",
+        "plant = \"three-tank\"\n[known]\nmeasured = \"T3\"\n",
+    );
+    place.refuses(
+        "export tank.toml --modelica t.mo",
+        &["tank.toml: --modelica", "--csv"],
+    );
+    place.write(
+        "tank.toml",
+        "plant = \"single-tank\"\neffects = [\"overflow\"]\n",
+    );
+    place.refuses(
+        "export tank.toml --modelica t.mo",
+        &["a plant with effects"],
+    );
+}
+
+#[test]
+fn the_curves_of_a_plant_are_exported() {
+    let place = Place::new();
+    place.succeeds("export tour.toml tour.csv --csv curves.csv");
+    let (curves, record) = (place.read("curves.csv"), place.read("tour.csv"));
+    let (head, rows) = table(&curves);
+    assert_eq!(
+        head,
+        [
+            "record",
+            "t [s]",
+            "u [V]",
+            "y [cm]",
+            "y model [cm]",
+            "y residual [cm]"
+        ]
+    );
+    assert!(rows.iter().all(|row| row[0] == "tour.csv"));
+    for name in ["t [s]", "u [V]", "y [cm]"] {
+        assert_eq!(column(&curves, name), column(&record, name));
+    }
+    let residual = column(&curves, "y residual [cm]");
+    let rms = (residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64).sqrt();
+    let compared = place.result("compare tour.csv --model tour.toml");
+    let rmse = compared["steps"][0]["rmse"].as_f64().unwrap();
+    assert!((rms / rmse - 1.0).abs() < 1e-6, "{rms} {rmse}");
+}
+
+#[test]
+fn a_plant_is_exported_as_modelica_and_reads_back() {
+    let place = Place::new();
+    place.succeeds("export tour.toml tour.csv --modelica tank.mo --csv curves.csv");
+    place.succeeds("check tank.mo");
+    place.write(
+        "own.toml",
+        "model = \"tank.mo\"\n[columns]\ntime = \"t [s]\"\nu = \"u [V]\"\nlevel = \"y [cm]\"\n",
+    );
+    let record = place.read("tour.csv");
+    let inputs = record
+        .lines()
+        .map(|line| line.rsplit_once(',').unwrap().0.to_string() + "\n");
+    place.write("in.csv", inputs.collect::<String>());
+    place.succeeds("simulate own.toml in.csv --out y.csv");
+    let own = column(&place.read("y.csv"), "y");
+    let model = column(&place.read("curves.csv"), "y model [cm]");
+    assert_eq!(own.len(), model.len());
+    for (own, model) in own.iter().zip(&model) {
+        assert!((own - model).abs() < 1e-5, "{own} {model}");
+    }
+}

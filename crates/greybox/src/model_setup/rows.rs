@@ -1,0 +1,204 @@
+//! Simulates the records: rows of residuals and their derivatives.
+
+use ct_model::{Dual, Simulation};
+use ct_signals::Hold;
+use estimation::{Prior, Residuals, Sample};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::ModelSetup;
+
+impl<'a> ModelSetup<'a> {
+    /// The outputs that the model gives, a series for each record and output; `None` where the simulation cannot go on.
+    #[must_use]
+    pub fn simulate(&self, x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let residuals = estimation::residuals(self, x)?;
+        let measured = self.records.iter().flat_map(|record| &record.outputs);
+        let simulated = measured.zip(residuals);
+        // Where nothing was measured the residual says nothing: those are simulated on their own.
+        if simulated
+            .clone()
+            .all(|(measured, _)| measured.missing() == 0)
+        {
+            let model =
+                simulated.map(|(y, r)| y.values.iter().zip(r).map(|(y, r)| y - r).collect());
+            return Some(model.collect());
+        }
+        let mut all = vec![Vec::new(); self.records.len() * self.samples.len()];
+        self.each_instant::<0>(x, &[], |r, _, outputs| {
+            for (o, y) in outputs.iter().enumerate() {
+                all[r * self.samples.len() + o].push(y.re);
+            }
+            Some(())
+        })?;
+        Some(all)
+    }
+
+    /// Simulates all records with derivatives by some entries, at most `L` of them at once, and shows the outputs row by row with the
+    /// entries of the lanes.
+    fn each_instant<const L: usize>(
+        &self,
+        x: &[f64],
+        by: &[usize],
+        mut each: impl FnMut(usize, usize, &[Dual<L>]) -> Option<()>,
+    ) -> Option<()> {
+        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
+        let outputs = self.samples.len();
+        let mut inputs = vec![0.0; self.model.spec().inputs.len()];
+        let mut to = inputs.clone();
+        for (r, record) in self.records.iter().enumerate() {
+            let own = count + r * states..count + (r + 1) * states;
+            let lanes: Vec<usize> = by
+                .iter()
+                .copied()
+                .filter(|i| *i < count || own.contains(i))
+                .collect();
+            let mut chunks: Vec<&[usize]> = lanes.chunks(L.max(1)).collect();
+            if chunks.is_empty() {
+                chunks.push(&[]);
+            }
+            let begin = self.clock.begins[r] / self.time_unit;
+            let mut simulations: Vec<Simulation<'_, Dual<L>>> = chunks
+                .iter()
+                .map(|chunk| {
+                    let dual = |i: usize| {
+                        let lane = chunk.iter().position(|own| *own == i).unwrap_or(L);
+                        Dual::<L>::variable(x[i], lane)
+                    };
+                    let parameters: Vec<_> = (0..count).map(dual).collect();
+                    let initial: Vec<_> = own.clone().map(dual).collect();
+                    Simulation::new(self.model, &parameters, &initial, begin)
+                })
+                .collect();
+            let mut read = vec![Dual::<L>::variable(0.0, L); outputs * chunks.len()];
+            for k in 0..record.len() {
+                for (i, input) in record.inputs.iter().enumerate() {
+                    inputs[i] = input.values[k];
+                    to[i] = match input.hold {
+                        Hold::First if k + 1 < record.len() => input.values[k + 1],
+                        _ => input.values[k],
+                    };
+                }
+                for (simulation, read) in simulations.iter_mut().zip(read.chunks_exact_mut(outputs))
+                {
+                    simulation.read(&inputs, read);
+                }
+                each(r, k, &read)?;
+                if k + 1 < record.len() {
+                    let until = begin + (record.time[k + 1] - record.time[0]) / self.time_unit;
+                    for simulation in &mut simulations {
+                        simulation.advance(&inputs, &to, until).ok()?;
+                    }
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// [`Residuals::each_row`]; no generic function, so that simulations with derivatives are compiled here and not again in every crate that
+    /// fits.
+    #[inline(never)]
+    fn show_rows(&self, x: &[f64], each: &mut dyn FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        // A record has the parameters and its own states.
+        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
+        let parameters = self.free.iter().filter(|&&i| i < count).count();
+        let of = |r: usize| count + r * states..count + (r + 1) * states;
+        let own = |r: usize| self.free.iter().filter(|i| of(r).contains(i)).count();
+        let lanes = parameters + (0..self.records.len()).map(own).max().unwrap_or(0);
+        match lanes {
+            0..=2 => self.each_row_in_lanes::<2>(x, &self.free, each),
+            3..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
+            5..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
+            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
+            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
+        }
+    }
+
+    /// [`Residuals::each_residual`].
+    #[inline(never)]
+    fn show_residuals(
+        &self,
+        x: &[f64],
+        each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        self.each_row_in_lanes::<0>(x, &[], each)
+    }
+
+    fn each_row_in_lanes<const L: usize>(
+        &self,
+        x: &[f64],
+        by: &[usize],
+        each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
+        let columns = by.len() + 1;
+        let outputs = self.samples.len();
+        let mut row = vec![0.0; columns];
+        self.each_instant::<L>(x, by, |r, k, read| {
+            let own = count + r * states..count + (r + 1) * states;
+            for output in 0..outputs {
+                row.fill(0.0);
+                let mine = (0..by.len()).filter(|&c| by[c] < count || own.contains(&by[c]));
+                for (lane, column) in mine.enumerate() {
+                    row[column] = read[lane / L.max(1) * outputs + output].eps[lane % L.max(1)];
+                }
+                let model = read[output].re;
+                let measured = self.records[r].outputs[output].values[k];
+                row[columns - 1] = measured - model;
+                let sample = Sample {
+                    output,
+                    first: k == 0,
+                    missing: measured.is_nan(),
+                };
+                let finite = row[..columns - 1].iter().all(|v| v.is_finite()) && model.is_finite();
+                if !(finite && each(sample, &mut row)) {
+                    return None;
+                }
+            }
+            Some(())
+        })
+    }
+}
+
+impl Residuals for ModelSetup<'_> {
+    fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
+    }
+
+    fn samples(&self) -> &[usize] {
+        &self.samples
+    }
+
+    fn each_row(&self, x: &[f64], mut each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        self.show_rows(x, &mut each)
+    }
+
+    fn each_residual(
+        &self,
+        x: &[f64],
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        self.show_residuals(x, &mut each)
+    }
+
+    fn floor(&self, output: usize) -> f64 {
+        self.floors[output]
+    }
+
+    fn known_scales(&self) -> Option<&[f64]> {
+        self.known_scales.as_deref()
+    }
+
+    fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+
+    fn out_of_time(&self) -> bool {
+        let interrupted = |flag: &AtomicBool| flag.load(Ordering::Relaxed);
+        self.interrupt.is_some_and(interrupted)
+            || self.time_limit.as_ref().is_some_and(|limit| limit.passed())
+    }
+}

@@ -11,6 +11,8 @@ struct Compiler<'a> {
     spec: &'a ModelSpec,
     constants: Vec<f64>,
     operations: Vec<Operation>,
+    /// Whether parameters alone define the result of each operation.
+    fixed: Vec<bool>,
     known: HashMap<Operation, Register>,
     branches: Vec<Branch>,
     guards: Vec<Guard>,
@@ -49,6 +51,7 @@ impl Tape {
             spec,
             constants: Vec::new(),
             operations: Vec::new(),
+            fixed: Vec::new(),
             known: HashMap::new(),
             branches: Vec::new(),
             guards: Vec::new(),
@@ -109,28 +112,13 @@ impl Tape {
             first_constant: compiler.first_constant,
             first_operation: compiler.first_operation,
         };
-        tape.parameters_first();
+        tape.parameters_first(&compiler.fixed);
         tape.note_results();
         tape
     }
 
     /// Moves what parameters alone define to the front.
-    fn parameters_first(&mut self) {
-        let fixed_inputs = |register: Register| {
-            (1..=self.parameters).contains(&register)
-                || (self.first_constant..self.first_operation).contains(&register)
-        };
-        let mut fixed = vec![false; self.operations.len()];
-        for (i, operation) in self.operations.iter().enumerate() {
-            let all = !matches!(operation, Operation::Select(..));
-            fixed[i] = all
-                && operation.reads().into_iter().flatten().all(|register| {
-                    fixed_inputs(register)
-                        || register
-                            .checked_sub(self.first_operation)
-                            .is_some_and(|before| fixed[before])
-                });
-        }
+    fn parameters_first(&mut self, fixed: &[bool]) {
         let mut order: Vec<usize> = (0..self.operations.len()).collect();
         order.sort_by_key(|&i| !fixed[i]);
         self.once = fixed.iter().filter(|fixed| **fixed).count();
@@ -183,6 +171,10 @@ impl Compiler<'_> {
             return register;
         }
         let register = self.first_operation + self.operations.len();
+        let all = !matches!(operation, Operation::Select(..));
+        let mut reads = operation.reads().into_iter().flatten();
+        self.fixed
+            .push(all && reads.all(|register| self.is_fixed(register)));
         self.operations.push(operation);
         self.known.insert(operation, register);
         register
@@ -200,10 +192,7 @@ impl Compiler<'_> {
     /// Whether parameters alone define it.
     fn is_fixed(&self, register: Register) -> bool {
         if let Some(i) = register.checked_sub(self.first_operation) {
-            let operation = self.operations[i];
-            let mut reads = operation.reads().into_iter().flatten();
-            return !matches!(operation, Operation::Select(..))
-                && reads.all(|register| self.is_fixed(register));
+            return self.fixed[i];
         }
         (1..=self.spec.parameters.len()).contains(&register) || register >= self.first_constant
     }

@@ -1,6 +1,6 @@
 //! What the subset means.
 
-use ct_model::{Expression, Given, Linearity, ModelSpec, Variable};
+use ct_model::{Expression, Given, Linearity, Model, ModelSpec, Simulation, Variable};
 
 fn model(body: &str) -> ModelSpec {
     ModelSpec::parse(&format!("model M\n{body}\nend M;")).unwrap_or_else(|error| panic!("{error}"))
@@ -195,4 +195,24 @@ fn linear_models_are_told_from_their_text() {
     }
     let spec = model("input Real u; output Real x(start=1); equation x*der(x) = u;");
     assert_ne!(spec.linearity(), Linearity::Linear);
+}
+
+/// Each parameter reads the one before twice: what is computed anew at each reading takes twice as long with each line, and a test of 200 lines
+/// would not end.
+#[test]
+fn a_long_chain_of_parameters_is_compiled_in_one_pass() {
+    let chain: String = (1..=200)
+        .map(|i| format!("final parameter Real p{i} = p{0}*p{0};\n", i - 1))
+        .collect();
+    let text = format!(
+        "model Chain\nparameter Real p0 = 1;\n{chain}output Real x(start=1);\nequation\nder(x) = -x/p200;\nend Chain;"
+    );
+    let model = Model::new(ModelSpec::parse(&text).unwrap());
+    let parameters = model.parameters();
+    let initial = model.starts(&parameters);
+    let mut simulation = Simulation::<f64>::new(&model, &parameters, &initial, 0.0);
+    simulation.advance(&[], &[], 1.0).unwrap();
+    let mut y = [0.0];
+    simulation.read(&[], &mut y);
+    assert!((y[0] - (-1.0_f64).exp()).abs() < 1e-9, "{}", y[0]);
 }

@@ -25,15 +25,19 @@ pub use plan::{Alternative, Candidate, Design, Reach, SecondSensor, Sequence, Wi
 
 use crate::{
     Error, Options, Problem, Progress,
-    control_loop::slowest_time_constant,
-    diagnose::{allow, effort},
-    gaps::Mended,
-    groups::GROUP_MARGIN,
-    node::{FINE, Node, in_time, refine},
-    noise_floor::colour,
-    problem::base,
-    proposal::place,
-    step,
+    base::{
+        believed::base,
+        control_loop::slowest_time_constant,
+        gaps::Mended,
+        time_limit::{allow, effort},
+    },
+    diagnostics::step,
+    fit::{
+        criterion::GROUP_MARGIN,
+        node::{FINE, Node, in_time, refine},
+        noise_model::colour,
+        proposal::place,
+    },
 };
 use experiments::Search;
 use separation::Metric;

@@ -4,7 +4,7 @@ use effect_search::design::{Kind, Power, Prospect};
 use plants::Domain;
 
 use super::plan::{Alternative, Candidate, Design};
-use crate::{groups::GROUP_MARGIN, numbers::significant, sentences::with_error};
+use crate::{fit::criterion::GROUP_MARGIN, numbers::significant, sentences::with_error};
 
 /// Criteria that differ by less are equal, in words.
 const TWIN: f64 = 0.01;

@@ -6,7 +6,7 @@ use missing_effect::{
     PerOutput, PlaceScore, Rankings, ResidualTests, Score, Shown, ShownInput, Step, Verdict,
 };
 
-use crate::identify::rms;
+use linear_identification::rms;
 
 const PERIOD: f64 = 4.0;
 const NOISE: f64 = 0.08;

@@ -5,7 +5,7 @@
 use crate::common::{Place, bundled};
 use ct_lti::{Simulator, StateSpace, TransferFunction};
 use ct_signals::{Channel, Hold, ReadOptions, Reading, Record, excitation, noise, read_csv};
-use ctid::identify::{Identification, Method, Order, Request, identify};
+use linear_identification::{Identification, Method, Order, Request, identify};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 

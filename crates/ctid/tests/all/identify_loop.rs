@@ -4,8 +4,8 @@
 
 use crate::common::Place;
 use ct_signals::{Channel, Record, excitation};
-use ctid::identify::{Identification, LevelChoice, Method, Order, Request, identify};
 use fcloe::{Controller, LoopData, Noise, PlantModel, continuous_loop, noise_at_snr, sampled_loop};
+use linear_identification::{Identification, LevelChoice, Method, Order, Request, identify};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use serde_json::Value;
 

@@ -4,8 +4,7 @@ use fcloe::{LoopRecord, Offsets};
 use serde::Serialize;
 
 use super::Task;
-use crate::Error;
-use crate::identify::Method;
+use crate::{Error, Method, residual::limits};
 
 /// A loop rests in the first rows if there are so many in which the drive stands still, and neither output nor command would go
 /// further than this share of its range at their present pace, in the time that the record itself takes to forget.
@@ -17,7 +16,8 @@ const NOISE: f64 = 3.0;
 const LONG: f64 = 3.0;
 
 /// Where zero of reference, input and output is. The loop has to rest there when the record begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelChoice {
     /// Estimated by fcloe; else the rows before the reference moves first, or the means
@@ -47,10 +47,9 @@ impl Task<'_> {
             LevelChoice::Mean => Offsets::Means,
             LevelChoice::Rest => Offsets::FirstRows(still),
             LevelChoice::Estimated if self.request.method != Method::Fcloe => {
-                return Err(Error::Usage(format!(
-                    "--levels estimated is of --method fcloe; {} takes them from the record: rest, mean or zero",
-                    self.request.method.id()
-                )));
+                return Err(Error::LevelsEstimated {
+                    method: self.request.method,
+                });
             }
             _ if self.rests(&zero, still) => Offsets::FirstRows(still),
             _ => Offsets::Means,
@@ -69,7 +68,7 @@ impl Task<'_> {
         }
         let memory = forgets_after(&ct_signals::interpolated(&record.y)) as f64;
         let stands = |signal: &[f64]| {
-            let (low, high) = crate::plot::limits([signal]);
+            let (low, high) = limits(signal);
             let trend = Trend::new(&signal[..still]);
             let unseen = NOISE * trend.slope_error * memory;
             let room = MOVES * (high - low);
@@ -80,7 +79,7 @@ impl Task<'_> {
         let integrates = self.controller.s().coefficient(0) == 0.0;
         let at_its_level = match record.r.as_deref() {
             Some(r) if integrates && !self.controller.is_open_loop() => {
-                let (low, high) = crate::plot::limits([record.y.as_slice()]);
+                let (low, high) = limits(&record.y);
                 let y = Trend::new(&record.y[..still]);
                 (y.mean - r[0]).abs() <= MOVES * (high - low) + NOISE * y.mean_error
             }

@@ -4,157 +4,43 @@
 //!
 //! A reference that moves says that the record comes from a loop: the instruments then come from it, and the controller need not be known.
 
-use ct_signals::{Record, quoted, residual_tests};
-use missing_effect::Parameter;
-use rivc::{Data, Delay, Kind, Noise, Structure};
-use serde::Serialize;
+mod data;
+mod delay;
+mod result;
+mod visible;
 
-use super::{Identification, Mended, Method, Order, Request, Shown, poles, rms};
-use crate::Error;
-use crate::numbers;
+use ct_signals::{Record, quoted};
+use missing_effect::{Parameter, numbers};
+use rivc::{Data, Delay, Kind, Noise, Structure};
+
+pub(crate) use self::data::data;
+use self::{
+    data::parts,
+    visible::{Joined, Visible},
+};
+pub use self::{
+    delay::DelayChoice,
+    result::{RecordNoise, Refined},
+};
+use crate::{
+    Error, Identification, Mended, Method, Order, Request, Shown,
+    checks::positive,
+    parameters::{gain_unit, poles, power_of_time},
+    residual::{errors, rms},
+    warnings::{doubtful, too_fast},
+};
 
 /// A delay that is looked for without a limit is at most this part of the shortest record.
 const PART: f64 = 0.1;
 /// Instruments from a reference that explains less of the input are weak.
 const EXPLAINED: f64 = 0.2;
-/// Lags of the test that the error has nothing of a signal, at most.
-const MOST_LAGS: usize = 25;
-/// A signal that shows in the error with less than this probability by chance is said.
-const UNLIKELY: f64 = 0.01;
-
-/// What is said of the delay.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum DelayChoice {
-    /// It is known, s.
-    Known(f64),
-    /// It is estimated, up to a tenth of the record.
-    Auto,
-    /// It is estimated, up to this, s.
-    UpTo(f64),
-}
-
-impl std::str::FromStr for DelayChoice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || {
-            format!(
-                "a delay is a number of seconds of at least 0, auto, or a range from 0 as in 0..30; found {text}"
-            )
-        };
-        let number = |text: &str| {
-            let value = text.trim().parse::<f64>().map_err(|_| wrong())?;
-            match value.is_finite() && value >= 0.0 {
-                true => Ok(value),
-                false => Err(wrong()),
-            }
-        };
-        match text.split_once("..") {
-            None if text == "auto" => Ok(Self::Auto),
-            None => Ok(Self::Known(number(text)?)),
-            Some((from, to)) => match (number(from)?, number(to)?) {
-                (0.0, to) if to > 0.0 => Ok(Self::UpTo(to)),
-                _ => Err(wrong()),
-            },
-        }
-    }
-}
-
-/// What SRIVC and RIVC say besides the model.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Refined {
-    /// SRIVC, RIVC, CLSRIVC or CLRIVC.
-    pub name: &'static str,
-    /// Whether `A(0) = 0`.
-    pub integrator: bool,
-    /// Delay of each input, s.
-    pub delays: Vec<f64>,
-    /// Records that were fitted.
-    pub records: Vec<String>,
-    /// Names of the inputs.
-    pub inputs: Vec<String>,
-    /// Noise of each record.
-    pub noise: Vec<RecordNoise>,
-    /// Rows of each record that do not count, as the inputs before the record are not known under the delays.
-    pub left_out: Vec<usize>,
-    /// In a loop: share of the input's power that the reference explains.
-    pub explained: Option<f64>,
-    /// Iterations.
-    pub iterations: usize,
-    /// Whether the estimates have converged.
-    pub converged: bool,
-}
-
-/// The noise of a record, an autoregression counted in samples: of the residual for SRIVC.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RecordNoise {
-    /// Its coefficients; none where it is white.
-    pub coefficients: Vec<f64>,
-    /// Standard deviation of what drives it, output unit.
-    pub deviation: f64,
-}
-
-/// A record as the crate takes it; its reference only where it moves.
-pub(super) fn data(record: &Record) -> Data {
-    let moves = record.references.first().is_some_and(|reference| {
-        let (low, high) = reference.range();
-        high > low
-    });
-    part(record, moves, false)
-}
-
-/// The parts of records that are long enough, and how many rows the others have.
-fn parts(records: &[Mended], structure: &Structure) -> (Vec<(Record, Data)>, usize) {
-    let (mut all, mut unused) = (Vec::new(), 0);
-    for mended in records {
-        let in_loop = data(&mended.whole).reference.is_some();
-        let mut first = true;
-        for record in &mended.parts {
-            let data = part(record, in_loop, !first);
-            // A record that is not cut is refused with what it lacks.
-            if mended.parts.len() == 1 || data.is_long_enough(structure) {
-                all.push((record.clone(), data));
-                first = false;
-            } else {
-                unused += record.len();
-            }
-        }
-        if let (true, Some(record)) = (first, mended.parts.first()) {
-            all.push((record.clone(), part(record, in_loop, false)));
-        }
-    }
-    (all, unused)
-}
-
-fn part(record: &Record, in_loop: bool, continues: bool) -> Data {
-    let hold = match record.hold() {
-        ct_signals::Hold::Zero => ct_lti::Hold::Zero,
-        ct_signals::Hold::First => ct_lti::Hold::First,
-    };
-    let inputs = record.inputs.iter();
-    let reference = record.references.first().filter(|_| in_loop);
-    Data {
-        name: record.name.clone(),
-        time: record.time.clone(),
-        inputs: inputs
-            .map(|input| rivc::Input {
-                values: input.values.clone(),
-                hold,
-            })
-            .collect(),
-        output: record.outputs[0].values.clone(),
-        reference: reference.map(|reference| reference.values.clone()),
-        continues,
-    }
-}
 
 /// The plant alone, of one order, without a delay, and whether it is determined: the iteration has converged, and the highest coefficient of A differs from zero.
 pub(super) fn plant(records: &[Mended], request: &Request) -> Result<(rivc::Plant, bool), Error> {
     let (structure, settings) = asked(records, request);
     let (parts, _) = parts(records, &structure);
     let data: Vec<Data> = parts.into_iter().map(|(_, data)| data).collect();
-    let found = rivc::estimate(&data, &structure, &settings)
-        .map_err(|error| Error::Usage(error.to_string()))?;
+    let found = rivc::estimate(&data, &structure, &settings)?;
     let highest = found.parameter(Kind::A {
         power: request.order.n,
     });
@@ -196,11 +82,11 @@ fn asked(records: &[Mended], request: &Request) -> (Structure, rivc::Settings) {
 
 /// Identifies from all records together.
 pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identification, Error> {
-    super::positive("--bandwidth", "1/s", request.bandwidth)?;
+    positive("--bandwidth", "1/s", request.bandwidth)?;
     let first = all
         .first()
         .map(|mended| &mended.whole)
-        .ok_or_else(|| Error::Usage("no record is given".to_owned()))?;
+        .ok_or(Error::NoRecord)?;
     let (structure, settings) = asked(all, request);
     let (parts, unused) = parts(all, &structure);
     let (records, data): (Vec<Record>, Vec<Data>) = parts.into_iter().unzip();
@@ -282,7 +168,7 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
         ));
     }
     if inputs == 1 && !request.integrator {
-        warnings.extend(super::doubtful(&parameters, request.order));
+        warnings.extend(doubtful(&parameters, request.order));
     }
     for (parameter, found) in parameters.iter().zip(&found.parameters) {
         let own = inputs > 1 || request.integrator;
@@ -297,14 +183,14 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
             ));
         }
     }
-    warnings.extend(super::too_fast(&time_constants, first, request.order));
+    warnings.extend(too_fast(&time_constants, first, request.order));
     if unused > 0 {
         warnings.push(format!(
             "{unused} rows between long gaps are too few for initial states of their own, and are not used"
         ));
     }
     let mut visible = Visible::default();
-    let (mut errors, mut deviations) = (Vec::new(), Vec::new());
+    let (mut all_errors, mut deviations) = (Vec::new(), Vec::new());
     let mut shown: Option<Shown> = None;
     let mut at = 0;
     while at < records.len() {
@@ -321,7 +207,7 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
             let output = &record.outputs[0];
             let pairs = output.values.iter().zip(simulated);
             joined.add(record, data.reference.is_some(), pairs.map(|(y, m)| y - m));
-            errors.extend(super::errors(output, &fitted));
+            all_errors.extend(errors(output, &fitted));
             joined.readings.extend(output.present());
             joined.shown.simulated.extend(fitted);
         }
@@ -331,7 +217,7 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
         shown.get_or_insert(joined.shown);
     }
     warnings.extend(visible.warning(inputs));
-    let rmse = rms(errors.into_iter());
+    let rmse = rms(all_errors.into_iter());
     let deviation = rms(deviations.into_iter());
     if rmse > deviation {
         warnings.push(
@@ -380,84 +266,6 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
     Ok(identification)
 }
 
-/// The parts of a record, one behind the other.
-#[derive(Default)]
-struct Joined {
-    shown: Shown,
-    /// Of the signals that must not show in the error, and the error; with rows without a value between the parts.
-    signals: Vec<ct_signals::Channel>,
-    error: Vec<f64>,
-    readings: Vec<f64>,
-}
-
-impl Joined {
-    /// In open loop every input is held against the error, in a loop the reference, as the input answers to the noise there.
-    fn add(&mut self, record: &Record, in_loop: bool, error: impl Iterator<Item = f64>) {
-        let signals: Vec<&ct_signals::Channel> = match record.references.first().filter(|_| in_loop)
-        {
-            Some(reference) => vec![reference],
-            None => record.inputs.iter().collect(),
-        };
-        let between = match self.signals.is_empty() {
-            true => 0,
-            false => MOST_LAGS,
-        };
-        if self.signals.is_empty() {
-            self.signals = signals.iter().map(|s| s.with_values(Vec::new())).collect();
-            self.shown.input = record.inputs[0].with_values(Vec::new());
-            self.shown.output = record.outputs[0].with_values(Vec::new());
-        }
-        let nothing = || std::iter::repeat_n(f64::NAN, between);
-        for (own, signal) in self.signals.iter_mut().zip(signals) {
-            own.values.extend(nothing());
-            own.values.extend(&signal.values);
-        }
-        self.error.extend(nothing());
-        self.error.extend(error);
-        self.shown.time.extend(&record.time);
-        self.shown.input.values.extend(&record.inputs[0].values);
-        self.shown.output.values.extend(&record.outputs[0].values);
-    }
-}
-
-/// The signal that shows most in the simulation errors.
-#[derive(Default)]
-struct Visible {
-    tests: usize,
-    least: Option<(f64, String)>,
-}
-
-impl Visible {
-    fn test(&mut self, joined: &Joined) -> Result<(), Error> {
-        let lags = (joined.readings.len() / 10).clamp(2, MOST_LAGS);
-        for signal in &joined.signals {
-            let (_, p) =
-                residual_tests::prewhitened_input_test(&signal.values, &joined.error, lags)?;
-            self.tests += 1;
-            if self.least.as_ref().is_none_or(|(least, _)| p < *least) {
-                self.least = Some((p, signal.name.clone()));
-            }
-        }
-        Ok(())
-    }
-
-    fn warning(self, inputs: usize) -> Option<String> {
-        let (p, name) = self.least?;
-        let several = match inputs {
-            1 => "",
-            _ => {
-                " (one A serves all inputs, so that time constants that differ need a higher order)"
-            }
-        };
-        (p * (self.tests as f64) < UNLIKELY).then(|| {
-            format!(
-                "\"{}\" shows in the simulation error: the order is too low{several}, there is a delay (try --delay auto), or the plant is not linear; the standard errors do not hold then",
-                quoted(&name)
-            )
-        })
-    }
-}
-
 /// Of a second input and of further records with their number: `b0_2`, `offset_2`.
 fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, String) {
     let numbered = |name: String, index: usize| match index {
@@ -468,7 +276,7 @@ fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, Stri
     // With an integrator A begins with p: everything is divided by a time.
     let lower = usize::from(integrator);
     match kind {
-        Kind::A { power } => (format!("a{power}"), super::power_of_time(power - lower)),
+        Kind::A { power } => (format!("a{power}"), power_of_time(power - lower)),
         Kind::B { input, power } => {
             let signal = match (input, &record.inputs.get(1)) {
                 (1, Some(second)) => second,
@@ -476,8 +284,8 @@ fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, Stri
             };
             let unit = match power.checked_sub(lower) {
                 Some(power) => {
-                    let gain = super::gain_unit(output, &signal.unit);
-                    format!("{} {gain}", super::power_of_time(power))
+                    let gain = gain_unit(output, &signal.unit);
+                    format!("{} {gain}", power_of_time(power))
                 }
                 None => match (&**output, &*signal.unit) {
                     (y, u) if y == u => "1/s".to_owned(),
@@ -507,10 +315,10 @@ fn named(records: &[Record], error: rivc::Error) -> Error {
         let rest = what.strip_prefix(&format!("{}: ", record.name))?;
         Some((record.name.clone(), rest.to_owned()))
     });
-    let (file, what) = match (own, records.first()) {
+    let (record, what) = match (own, records.first()) {
         (Some(own), _) => own,
         (None, Some(first)) => (first.name.clone(), what),
-        (None, None) => return Error::Usage(what),
+        (None, None) => return Error::Instruments(error),
     };
-    Error::File { file, what }
+    Error::InRecord { record, what }
 }

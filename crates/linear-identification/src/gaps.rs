@@ -13,8 +13,11 @@
 use ct_signals::Record;
 use missing_effect::{LONGEST_HOLD, MendedGaps};
 
-use super::{Method, Order, Request, refined};
-use crate::Error;
+use crate::{
+    Error, Method, Order, Request,
+    checks::{possible, whole},
+    refined,
+};
 
 /// For the first fit inputs are held for so many sampling intervals.
 const FIRST_HOLD: f64 = 20.0;
@@ -34,7 +37,7 @@ pub struct Mended {
 
 impl Mended {
     /// Readings of the parts that the whole lacks.
-    pub(super) fn readings_left_out(&self) -> usize {
+    pub(crate) fn readings_left_out(&self) -> usize {
         let readings = |record: &Record| record.outputs.first().map_or(0, |y| y.present().count());
         let of_parts: usize = self.parts.iter().map(readings).sum();
         of_parts.saturating_sub(readings(&self.whole))
@@ -51,13 +54,15 @@ struct TimeConstants {
 /// Records that are fitted, and others of the same plant, without gaps, for models of at most this order.
 ///
 /// # Errors
-/// [`Error::File`] where nothing is left of a record, or its first fit fails.
+/// [`Error::Signals`] and [`Error::NoSignal`] for a record that is none, [`Error::NoStretch`] where nothing is left of a record, [`Error::FirstFit`] where its first fit fails.
 pub fn mend(
     fitted: Vec<Record>,
     others: Vec<Record>,
     order: Order,
     integrator: bool,
 ) -> Result<(Vec<Mended>, Vec<Mended>), Error> {
+    possible(order)?;
+    fitted.iter().chain(&others).try_for_each(whole)?;
     let has_gaps =
         |record: &Record| record.has_gaps() || record.references.iter().any(|r| r.missing() > 0);
     if !fitted.iter().chain(&others).any(has_gaps) {
@@ -93,7 +98,7 @@ fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
     let (parts, gaps) = record.without_gaps(limit);
     let (whole, _) = record.without_gaps(f64::INFINITY);
     let Some(mut whole) = whole.into_iter().next().filter(|_| !parts.is_empty()) else {
-        return Err(Error::from(missing_effect::Error::NoStretch {
+        return Err(Error::NoStretch(missing_effect::Error::NoStretch {
             record: record.name.clone(),
             limit,
         }));
@@ -189,10 +194,8 @@ fn time_constants(
         || "it did not converge".to_owned(),
         |error| error.to_string(),
     );
-    Err(Error::File {
-        file: name.unwrap_or_default(),
-        what: format!(
-            "rows or samples of the input are missing, and a first fit that says for how long the input may be held failed: {why}; choose a part with --from and --to, or put the record on a coarser grid with --resample"
-        ),
+    Err(Error::FirstFit {
+        record: name.unwrap_or_default(),
+        why,
     })
 }

@@ -4,8 +4,7 @@ use ct_lti::{Hold, ReadingFilter, Start, StateVariableFilter};
 use ct_signals::Record;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Order, Request, Settings};
-use crate::Error;
+use crate::{Error, Order, Request, Settings};
 
 /// Time constants that are tried, between the sampling interval and the length of the record.
 const GRID: usize = 60;
@@ -130,9 +129,7 @@ impl Scaled {
             return Ok(());
         }
         let [found, low, high] = [self.bandwidth, low, high].map(|b| b / self.unit);
-        Err(Error::Usage(format!(
-            "--bandwidth is {found:e} 1/s, but the filters need one from {low:.1e} to {high:.1e} 1/s for this record; without the option it is found"
-        )))
+        Err(Error::Bandwidth { found, low, high })
     }
 
     pub fn settings(&self) -> Settings {

@@ -5,8 +5,7 @@ use fcloe::{LoopRecord, PlantModel};
 
 use super::levels::chosen;
 use super::{Found, Start, Task};
-use crate::Error;
-use crate::identify::rms;
+use crate::{Error, residual::rms};
 
 /// Renewals of instruments with a filter that stays, and of both.
 const INSTRUMENTS: usize = 3;

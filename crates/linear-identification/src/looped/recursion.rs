@@ -8,8 +8,7 @@ use fcloe::{
 
 use super::levels::chosen;
 use super::{Found, LevelChoice, Run, Start, Task};
-use crate::Error;
-use crate::identify::{Trajectory, rms};
+use crate::{Error, Trajectory, residual::rms};
 
 /// The part of the record that a recursion is started from.
 const BEGINNING: f64 = 0.3;

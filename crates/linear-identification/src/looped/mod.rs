@@ -15,10 +15,13 @@ use fcloe::{
 use missing_effect::Parameter;
 use serde::Serialize;
 
-use super::{
-    Identification, Method, Order, Request, Shown, Trajectory, deviation, errors, names, poles, rms,
+use crate::{
+    Error, Identification, Method, Order, Request, Shown, Trajectory,
+    checks::positive,
+    parameters::{names, plant, poles},
+    residual::{deviation, errors, rms},
+    warnings::{doubtful, too_fast},
 };
-use crate::Error;
 pub use levels::LevelChoice;
 
 /// Points of the picture of condition (14).
@@ -122,10 +125,10 @@ struct Run {
     memory: f64,
 }
 
-/// Identifies; everything that [`super::identify`] refuses, and what `fcloe` refuses.
+/// Identifies; everything that [`crate::identify()`] refuses, and what `fcloe` refuses.
 pub(super) fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
-    super::positive("--memory", "s", request.memory)?;
-    super::positive("--bandwidth", "1/s", request.bandwidth)?;
+    positive("--memory", "s", request.memory)?;
+    positive("--bandwidth", "1/s", request.bandwidth)?;
     let Order { n, m } = request.order;
     let task = Task {
         record,
@@ -188,7 +191,7 @@ impl Task<'_> {
                 std_error: *std_error,
             })
             .collect();
-        let plant = super::plant(&parameters, order);
+        let plant = plant(&parameters, order);
         let (time_constants, oscillations) = poles(&plant.a)?;
         let output = &record.outputs[0];
         let rmse = rms(errors(output, &simulated));
@@ -202,8 +205,8 @@ impl Task<'_> {
         }
         warnings.extend(mismatch.and_then(|mismatch| missed(&mismatch)));
         warnings.extend(limited(record, self.request.limits));
-        warnings.extend(super::doubtful(&parameters, order));
-        warnings.extend(super::too_fast(&time_constants, record, order));
+        warnings.extend(doubtful(&parameters, order));
+        warnings.extend(too_fast(&time_constants, record, order));
         let doubt = found
             .recursion
             .as_ref()
@@ -297,35 +300,32 @@ impl Task<'_> {
     /// The record's name before what the crate says, which does not always know it.
     fn named(&self, error: Error) -> Error {
         match error {
-            Error::Loop(fcloe::Error::ControllerMismatch { mismatch, size, .. }) => Error::File {
-                file: self.record.name.clone(),
-                what: format!(
-                    "the measured command disagrees with the controller of the model file, R/S (r - y), by {} {} rms, {:.0} % of what it moves: \
-                     check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
-                    crate::numbers::significant(mismatch, 3),
-                    self.record.inputs[0].unit,
-                    100.0 * mismatch / size
-                ),
-            },
+            Error::Loop(fcloe::Error::ControllerMismatch { mismatch, size, .. }) => {
+                Error::ControllerMismatch {
+                    record: self.record.name.clone(),
+                    mismatch,
+                    size,
+                    unit: self.record.inputs[0].unit.clone(),
+                }
+            }
             Error::Loop(fcloe::Error::Gaps {
                 missing,
                 left,
                 rows,
                 ..
-            }) => Error::File {
-                file: self.record.name.clone(),
-                what: format!(
-                    "{:.0} % of the readings of \"{}\" are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of --method {}; --method srivc and fcloe leave single readings out",
-                    100.0 * missing,
-                    ct_signals::quoted(&self.record.outputs[0].name),
-                    self.request.method.id()
-                ),
+            }) => Error::MissingReadings {
+                record: self.record.name.clone(),
+                output: self.record.outputs[0].name.clone(),
+                missing,
+                left,
+                rows,
+                method: self.request.method,
             },
             Error::Loop(what) => {
                 let what = what.to_string();
                 let name = format!("{}: ", self.record.name);
-                Error::File {
-                    file: self.record.name.clone(),
+                Error::InRecord {
+                    record: self.record.name.clone(),
                     what: what.strip_prefix(&name).unwrap_or(&what).to_owned(),
                 }
             }

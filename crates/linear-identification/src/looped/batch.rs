@@ -43,10 +43,8 @@ impl Task<'_> {
         };
         let uncertainty = problem.uncertainty(&fit, None)?;
         if fit.stop == Stop::StabilityBorder {
-            return Err(Error::File {
-                file: self.record.name.clone(),
-                what: "the fit ended where the loop would become unstable: the record asks for a plant that this controller does not stabilise; check the controller's sign and units, or the orders"
-                    .to_owned(),
+            return Err(Error::StabilityBorder {
+                record: self.record.name.clone(),
             });
         }
         let mut warnings = Vec::new();

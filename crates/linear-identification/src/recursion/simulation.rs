@@ -3,9 +3,8 @@
 use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
 use nalgebra::{DMatrix, DVector};
 
-use super::Order;
 use super::scaled::Scaled;
-use crate::Error;
+use crate::{Error, Order};
 
 /// A free response that still counts for this part of itself at the end of the record.
 const LASTING: f64 = 0.2;

@@ -14,9 +14,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Trajectory;
-use super::recursion::{Path, Point};
+use super::path::{Path, Point};
 use super::scaled::Scaled;
+use crate::Trajectory;
 
 /// Stretches that the parameters must be outnumbered by.
 const SPARE: f64 = 2.0;

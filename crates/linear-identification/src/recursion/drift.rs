@@ -13,7 +13,7 @@
 use serde::Serialize;
 
 use super::scaled::Scaled;
-use super::{Order, Trajectory};
+use crate::{Order, Trajectory};
 
 /// Stretches of the level.
 const STRETCHES: usize = 8;
@@ -86,7 +86,8 @@ impl OverLevel {
     }
 
     /// The values at the lowest and the highest level.
-    pub(crate) fn ends(&self) -> Option<[(f64, f64); 2]> {
+    #[must_use]
+    pub fn ends(&self) -> Option<[(f64, f64); 2]> {
         let at = |i: usize| Some((*self.values.get(i)?, *self.std_errors.get(i)?));
         Some([at(0)?, at(self.values.len().checked_sub(1)?)?])
     }

@@ -7,6 +7,7 @@ use crate::{Method, Order, Settings};
 
 /// A simulation error so many times that of the start is worse.
 const WORSE: f64 = 1.05;
+
 /// The start was better than the end.
 pub(crate) fn worse_than_first_order(
     (method, order): (Method, Order),

@@ -14,6 +14,7 @@ use crate::{Error, Order};
 const P_EQUATION_ERROR: f64 = 100.0;
 /// The share of the readings that has to be left for the equation error where readings are missing.
 const LEAST_LEFT: f64 = 0.3;
+
 /// Least squares on `y_f = -a_1 y_f' - .. + b_0 u_f + .. + d`. Rows count where the reading is there and the filter of y has forgotten what long gaps were
 /// bridged with; in the others nothing is learnt and nothing forgotten.
 pub(super) fn equation_error(scaled: &Scaled, order: Order) -> Result<Path, Error> {

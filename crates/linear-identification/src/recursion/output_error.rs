@@ -22,6 +22,7 @@ const BOUNDS: [f64; 4] = [2.0, 1.5, 1.2, 1.05];
 /// The output error keeps every lag above this part of the sampling interval, where the others are those of the start. Less cannot be
 /// seen, and `y_m^(n)`, which is divided by `a_n`, would be so large that the recursion takes itself for sure.
 const SHORTEST_LAG: f64 = 0.05;
+
 /// Output error of a model in parallel.
 pub(super) fn output_error(scaled: &Scaled, order: Order) -> Result<Path, Error> {
     // The crate's sizes are known when it is built: one for each order.

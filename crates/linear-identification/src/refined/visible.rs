@@ -8,6 +8,7 @@ use crate::{Error, Shown};
 const MOST_LAGS: usize = 25;
 /// A signal that shows in the error with less than this probability by chance is said.
 const UNLIKELY: f64 = 0.01;
+
 /// The parts of a record, one behind the other.
 #[derive(Default)]
 pub(super) struct Joined {

@@ -9,6 +9,7 @@ use crate::{Error, Identification, Mended, Method, refined::data, residual::rms}
 const NOISE_ORDER: usize = 6;
 /// A parameter whose squared relative standard error is larger does not differ significantly from zero.
 const INSIGNIFICANT: f64 = 0.25;
+
 pub(super) fn outcome(
     mended: &Mended,
     test: &[Mended],

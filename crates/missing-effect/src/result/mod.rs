@@ -13,6 +13,7 @@ mod step;
 mod unknown;
 
 use ct_signals::Clock;
+pub use effect_search::Verdict;
 use plants::{Domain, Plant};
 use serde::{Deserialize, Serialize};
 
@@ -32,23 +33,6 @@ pub(crate) use self::{
     read::{no_number, none, number, numbers},
     unknown::SHAPES,
 };
-
-/// What the search found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Every added effect is singled out by the data.
-    Effect,
-    /// Something is missing, and at least one added effect has a stand-in that fits as well.
-    Undecided,
-    /// The added effects explain the larger part of the error, and something else remains that is not noise.
-    Partial,
-    /// What the model leaves is not noise, and nothing in the catalogue explains it; after a comparison, which searches nothing: the
-    /// model lacks something.
-    Unexplained,
-    /// Nothing is missing that these data would show.
-    Adequate,
-}
 
 /// How times are said where no calendar is known.
 fn plain_clock() -> Clock {
@@ -71,7 +55,7 @@ pub struct Effort {
 pub struct Diagnosis {
     /// Version of this layout.
     pub schema: u32,
-    /// The finding.
+    /// The finding; after a comparison, which searches nothing, `Unexplained` where the model lacks something.
     pub verdict: Verdict,
     /// How the times of the records are said.
     #[serde(skip, default = "plain_clock")]

@@ -8,9 +8,9 @@ mod experiments;
 mod limits;
 mod plan;
 mod second_sensor;
+mod sentences;
 mod separation;
 mod simulated;
-mod words;
 
 #[cfg(test)]
 mod tests;
@@ -177,7 +177,7 @@ pub fn design(
         output_unit: problem.records[0].outputs[0].unit.clone(),
         seconds: 0.0,
     };
-    design.sentences = words::of(&design);
+    design.sentences = sentences::of(&design);
     design.seconds = begun.elapsed().as_secs_f64();
     Ok(design)
 }

@@ -24,7 +24,7 @@ pub(crate) fn with_error(parameter: &Parameter) -> String {
     with_unit(&format!("{value}{error}"), &parameter.unit)
 }
 
-fn with_unit(number: &str, unit: &str) -> String {
+pub(crate) fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
 

@@ -4,7 +4,7 @@
 //! A bin fails where its mean square is clearly above what the noise would show there (`expected.rs`).
 
 mod expected;
-mod words;
+mod sentences;
 
 use ct_signals::{ArModel, Clock};
 use plants::Domain;
@@ -229,7 +229,7 @@ pub fn locate(located: &Located) -> Failures {
         by_frequency: by_frequency(series, &expected),
         sentences: Vec::new(),
     };
-    failures.sentences = words::sentences(located, &residual, &failures);
+    failures.sentences = sentences::sentences(located, &residual, &failures);
     failures
 }
 

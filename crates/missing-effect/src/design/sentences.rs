@@ -4,14 +4,14 @@ use effect_search::design::{Kind, Power, Prospect};
 use plants::Domain;
 
 use super::plan::{Alternative, Candidate, Design};
-use crate::{fit::criterion::GROUP_MARGIN, numbers::significant, sentences::with_error};
+use crate::{
+    fit::criterion::GROUP_MARGIN,
+    numbers::significant,
+    sentences::{with_error, with_unit},
+};
 
 /// Criteria that differ by less are equal, in words.
 const TWIN: f64 = 0.01;
-
-fn with_unit(number: &str, unit: &str) -> String {
-    format!("{number} {unit}").trim_end().to_string()
-}
 
 /// An effect, with the tank where there are two, and its size.
 fn sized(alternative: &Alternative, domain: Domain) -> String {
